@@ -1,0 +1,75 @@
+"""Coal with its default settings: GJK and EPA, signed distance, normal from A to B.
+
+Hulls are handed over with faces of our own: coal's own hull builder ends the interpreter on thin
+boxes. Its separate boolean (no contact wanted) is asked too, since its tolerances differ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.adapters.peers.facets import triangulate
+from collide.adapters.peers.protocol import PairwisePeer, Reply
+from collide.adapters.peers.question import corners
+from collide.errors import UnsupportedQuery
+from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
+
+
+class CoalPeer(PairwisePeer):
+    """coal's `collide` with contacts off for the boolean, its `distance` for the rest."""
+
+    name, package, module = "coal", "coal", "coal"
+
+    def build(self, part: Shape):
+        import coal
+
+        if isinstance(part, Sphere):
+            return coal.Sphere(part.radius)
+        if isinstance(part, Box):
+            return coal.Box(np.array(part.size))
+        if isinstance(part, Capsule):
+            return coal.Capsule(part.radius, part.length)
+        if isinstance(part, Cylinder):
+            return coal.Cylinder(part.radius, part.length)
+        if isinstance(part, Cone):
+            return coal.Cone(part.radius, part.length)
+        if isinstance(part, Ellipsoid):
+            return coal.Ellipsoid(*map(float, part.radii))
+        if isinstance(part, Halfspace):
+            length = float(np.linalg.norm(part.normal))
+            return coal.Halfspace(part.normal / length, part.offset / length)
+        return self._hull(part)
+
+    def _hull(self, part: Shape):
+        import coal
+
+        points = corners(part)
+        if points is None:
+            raise UnsupportedQuery(f"coal has no {type(part).__name__}")
+        corner_list, triangle_list = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+        vertices, triangles = triangulate(points[0])
+        for vertex in vertices:
+            corner_list.append(vertex)
+        for triangle in triangles:
+            triangle_list.append(coal.Triangle(*map(int, triangle)))
+        try:
+            hull = coal.Convex(corner_list, triangle_list)
+        except RuntimeError as error:
+            if "Too many neighbors" in str(error):
+                raise UnsupportedQuery("coal refuses hulls with a vertex of 255 or more neighbours") from None
+            raise
+        if isinstance(part, ConvexHull):
+            hull.setSweptSphereRadius(part.radius)
+        return hull
+
+    def ask(self, A, X_WA, B, X_WB) -> Reply:
+        import coal
+
+        T_WA, T_WB = (coal.Transform3s(X[:3, :3], X[:3, 3]) for X in (X_WA, X_WB))
+        request = coal.CollisionRequest()
+        request.enable_contact = False
+        hit = coal.collide(A, T_WA, B, T_WB, request, coal.CollisionResult()) > 0
+        result = coal.DistanceResult()  # a fresh one each time: an old one keeps its answer
+        distance = float(coal.distance(A, T_WA, B, T_WB, coal.DistanceRequest(), result))
+        point_a, point_b = tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2())
+        return Reply(hit, distance, tuple(result.normal), point_a, point_b)

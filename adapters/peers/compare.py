@@ -1,0 +1,357 @@
+"""Ask several engines the same question and settle every disagreement by exact arithmetic.
+
+    from collide.adapters.peers.compare import compare
+    comparison = compare(scene, engines=("fcl", "coal", "pybullet"))
+    comparison.ours_wrong       # how often collide is refuted by exact arithmetic, contradicts itself or fails
+    headers, rows = comparison.table()
+
+A boolean disagreement nearer to touching than `TOUCHING` of the pair's size is "within rounding":
+both engines computed with rounded numbers, and one ulp decides. It counts against an engine only
+where that engine claims a proof. What exact arithmetic cannot judge (cylinders, cones, ellipsoids,
+half-spaces) is reported as not judged, and counts against nobody.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from collide.adapters.peers.exact_peer import ExactPeer, is_rounded
+from collide.adapters.peers.protocol import ENGINES, Question, Table, engine
+from collide.adapters.peers.question import ask, is_union
+from collide.errors import InvalidArgument
+
+#: A pair whose exact distance is within this part of its size touches within rounding.
+TOUCHING = 1e-12
+#: What other engines promise of a distance, as a part of the pair's size; larger differences are listed.
+TOLERANCE = 1e-6
+
+
+@dataclass
+class Disagreement:
+    """One pair on which an engine and the reference differ, or an engine contradicts itself.
+
+    kind : "hit" (the booleans differ), "distance" (by more than the tolerance), "contradiction"
+        (the engine's boolean and its own distance do not go together), or "left out" (a World
+        reports no row where its own pair query finds one).
+    exact_hit, exact_distance : the verdict; None where the pair is not judged, and then
+        ``not_judged`` says why.
+    touching : the exact distance is within rounding of 0; None where not judged.
+    wrong : the names of the engines that the verdict refutes.   proven, undecided : of those that claim
+        a proof, and of those that say themselves that the boolean is open.
+    distances in m, negative inside; None where an engine gives none.
+    """
+
+    engine: str
+    kind: str
+    a: str
+    b: str
+    size: float
+    reference_hit: bool | None
+    reference_distance: float | None
+    hit: bool
+    distance: float | None
+    exact_hit: bool | None = None
+    exact_distance: float | None = None
+    touching: bool | None = None
+    not_judged: str = ""
+    wrong: list[str] = field(default_factory=list)
+    proven: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
+    note: str = ""
+
+
+@dataclass
+class Largest:
+    """The largest difference between two engines' distances [m], and the pair it stands at."""
+
+    difference: float = 0.0
+    a: str = ""
+    b: str = ""
+    pairs: int = 0
+
+    def see(self, difference: float, a: str, b: str) -> None:
+        self.pairs += 1
+        if difference > self.difference or not self.a:
+            self.difference, self.a, self.b = difference, a, b
+
+
+@dataclass
+class Summary:
+    """How one engine did. Counts are of pairs.
+
+    skipped : why the engine was not asked at all; the rest is then 0.
+    agreeing : same boolean as the reference.   hit_disagreements : the other one.
+    wrong : booleans that exact arithmetic refutes beyond rounding (or within it, where proven).
+    wrong_within_rounding : refuted, but the pair touches within rounding, or the engine said itself
+        that rounding leaves it open (undecided) and its bracket holds the truth.
+    wrong_distances : farther than the tolerance from the exact distance.
+    contradictions : boolean against own distance, beyond rounding.
+    gap, depth : largest differences to the reference, apart and overlapping; overlaps of unions
+        are left out, since engines mean different things by their depth.
+    failed : each pair lost, with the reason.   unsupported : reasons and their counts.
+    seconds : spent in this engine's interface; not a benchmark.
+    """
+
+    engine: str
+    version: str = ""
+    skipped: str = ""
+    asked: int = 0
+    answered: int = 0
+    hits: int = 0
+    undecided: int = 0
+    without_distance: int = 0
+    agreeing: int = 0
+    hit_disagreements: int = 0
+    distance_disagreements: int = 0
+    wrong: int = 0
+    wrong_within_rounding: int = 0
+    wrong_distances: int = 0
+    contradictions: int = 0
+    not_judged: int = 0
+    gap: Largest = field(default_factory=Largest)
+    depth: Largest = field(default_factory=Largest)
+    failed: list[dict[str, str]] = field(default_factory=list)
+    unsupported: dict[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+@dataclass
+class Comparison:
+    """Plain data: what was asked, how each engine did, every disagreement.
+
+    reference : the engine that the others are compared with.
+    summaries : the reference first, then the engines in the order asked for.
+    """
+
+    reference: str
+    bodies: int
+    pairs: int
+    max_distance: float
+    tolerance: float
+    summaries: list[Summary]
+    disagreements: list[Disagreement]
+
+    @property
+    def ours_wrong(self) -> int:
+        """Answers of the reference known to be wrong, or owed: refuted booleans and distances,
+        contradictions, and pairs on which it failed."""
+        ours = self.summaries[0]
+        return ours.wrong + ours.wrong_distances + ours.contradictions + len(ours.failed)
+
+    def summary(self, name: str) -> Summary:
+        for summary in self.summaries:
+            if summary.engine == name:
+                return summary
+        raise InvalidArgument(f"{name!r} was not asked; there are {', '.join(s.engine for s in self.summaries)}")
+
+    def to_dict(self) -> dict:
+        """Plain data for JSON: dicts, lists, texts and finite numbers."""
+        return asdict(self) | {"ours_wrong": self.ours_wrong}
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Headers and rows of text for printing, one row per engine.
+
+        "differ" counts booleans, "distance off" distances farther than the tolerance from the
+        reference's (for the reference: from the exact ones), "largest" differences both engines' own.
+        """
+        headers = [
+            "engine", "version", "answered", "agree", "differ", "wrong", "within rounding", "not judged",
+            "contradicts itself", "distance off", "largest gap difference", "largest depth difference",
+            "failed", "unsupported",
+        ]
+        return headers, [_printed(s, s.engine == self.reference) for s in self.summaries]
+
+
+def compare(
+    of, engines=("fcl", "coal", "pybullet"), *, reference: str = "collide", max_distance: float = 0.0,
+    tolerance: float = TOLERANCE, every_pair: bool = False, timeout: float = 10.0,
+) -> Comparison:
+    """Ask every engine about every pair that the scene tests, and judge what they disagree on.
+
+    of : a Scene, a World, a Question, or (A, B, X_WA, X_WB) tuples.
+    engines : names from `protocol.ENGINES`; one whose package is missing is skipped with the reason.
+    reference : what the others are compared with.
+    max_distance : [m] the clearance of interest. Pairs with bounding boxes farther apart than this
+        and than a tenth of the scene are not asked, unless ``every_pair``.
+    tolerance : of distances, as a part of the pair's size.
+    timeout : how long an isolated engine may think about one pair [s].
+
+    Raises InvalidArgument for unknown engines, MissingExtra where the reference itself is missing.
+    """
+    if isinstance(engines, str) or not all(isinstance(name, str) for name in engines):
+        raise InvalidArgument(f"engines must be a sequence of names, got {engines!r}")
+    for name in (reference, *engines):
+        if name not in ENGINES:
+            raise InvalidArgument(f"no engine {name!r}; there are {', '.join(sorted(ENGINES))}")
+    question = ask(of, max_distance, every_pair=every_pair)
+    judge = _Judge(question, tolerance)
+    ours = engine(reference, isolated=False).answer(question)
+    summaries = [_counts(question, ours)]
+    disagreements = _own(judge, ours)
+    for name in dict.fromkeys(n for n in engines if n != reference):
+        peer = engine(name, timeout=timeout)
+        if peer.missing():
+            summaries.append(Summary(name, skipped=str(peer.missing())))
+            continue
+        theirs = peer.answer(question)
+        summaries.append(_counts(question, theirs))
+        disagreements += _own(judge, theirs) + _between(judge, ours, theirs, summaries[-1])
+    for summary in summaries:
+        _tally(summary, disagreements, reference)
+    return Comparison(
+        reference, len(question.bodies), len(question.pairs), float(question.max_distance), tolerance,
+        summaries, disagreements,
+    )
+
+
+def _counts(question: Question, table: Table) -> Summary:
+    """What can be counted from one engine's table alone."""
+    rows = table.rows
+    return Summary(
+        table.engine, table.version,
+        asked=len(rows), answered=int(rows["answered"].sum()), hits=int(rows["hit"].sum()), undecided=int(rows["undecided"].sum()),
+        without_distance=int((rows["answered"] & ~rows["has_distance"]).sum()),
+        failed=[
+            {"a": a, "b": b, "reason": table.reasons[k]}
+            for k in np.flatnonzero(rows["failed"]).tolist() for a, b in [question.names(k)]
+        ],
+        unsupported=dict(Counter(table.reasons[k] for k in np.flatnonzero(rows["unsupported"]))),
+        seconds=float(rows["seconds"].sum()),
+    )
+
+
+class _Judge:
+    """Exact verdicts, each found once and only for pairs in dispute."""
+
+    def __init__(self, question: Question, tolerance: float):
+        self.question, self.tolerance = question, tolerance
+        self.size = question.sizes()
+        self.union = [is_union(body.shape) for body in question.bodies]
+        self._verdicts: dict[int, Table] = {}
+
+    def verdict(self, k: int) -> Table:
+        if k not in self._verdicts:
+            alone = Question(self.question.bodies, [self.question.pairs[k]], isolated=True)
+            self._verdicts[k] = ExactPeer().answer(alone)
+        return self._verdicts[k]
+
+    def decide(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> Disagreement:
+        """Write the verdict down, and who is wrong by it."""
+        table = self.verdict(k)
+        row = table.rows[0]
+        if not row["answered"]:
+            dispute.not_judged = table.reasons[0]
+            return dispute
+        dispute.proven = [name for name, answer in parties if answer["certified"]]
+        dispute.undecided = [name for name, answer in parties if answer["undecided"]]
+        dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), float(row["distance"])
+        dispute.touching = abs(dispute.exact_distance) <= TOUCHING * dispute.size
+        pair = self.question.pairs[k]
+        if dispute.touching and any(is_rounded(self.question.bodies[i]) for i in pair):
+            dispute.not_judged = "touching within the rounding of the body itself"
+            return dispute
+        if dispute.kind == "distance" and dispute.exact_hit and any(self.union[i] for i in pair):
+            dispute.not_judged = "the depth of a union"
+            return dispute
+        # (of a union that overlaps, exact arithmetic has parts, not the depth: brackets are not judged)
+        dispute.wrong = [name for name, answer in parties if self._refuted(dispute, answer)]
+        return dispute
+
+    def _refuted(self, dispute: Disagreement, answer: np.void) -> bool:
+        truth = float(dispute.exact_distance or 0.0)
+        # The truth was rounded once to be compared; a bracket that misses it by more was no proof.
+        if np.nextafter(truth, np.inf) < answer["lower"] or np.nextafter(truth, -np.inf) > answer["upper"]:
+            return True
+        if dispute.kind == "distance":
+            return bool(abs(answer["distance"] - truth) > self.tolerance * dispute.size)
+        return bool(answer["hit"]) != dispute.exact_hit
+
+
+def _dispute(judge: _Judge, k: int, kind: str, theirs: Table, ours: Table | None = None) -> Disagreement:
+    a, b = judge.question.names(k)
+    row, reference = theirs.rows[k], None if ours is None else ours.rows[k]
+    dispute = Disagreement(
+        theirs.engine, kind, a, b, judge.size[k],
+        None if reference is None else bool(reference["hit"]),
+        None if reference is None else _number(reference["distance"]),
+        bool(row["hit"]), _number(row["distance"]), note=theirs.reasons[k],
+    )
+    parties = [(theirs.engine, row)] if ours is None else [(ours.engine, reference), (theirs.engine, row)]
+    return judge.decide(dispute, k, parties)
+
+
+def _own(judge: _Judge, table: Table) -> list[Disagreement]:
+    """Where an engine contradicts itself."""
+    found = []
+    for k, row in enumerate(table.rows):
+        if not row["answered"]:
+            continue
+        beyond_rounding = abs(row["distance"]) > TOUCHING * judge.size[k]
+        if row["has_distance"] and beyond_rounding and not row["undecided"] and bool(row["hit"]) != bool(row["distance"] < 0):
+            found.append(_dispute(judge, k, "contradiction", table))
+        elif "left this pair out" in table.reasons[k]:
+            found.append(_dispute(judge, k, "left out", table))
+    return found
+
+
+def _between(judge: _Judge, ours: Table, theirs: Table, summary: Summary) -> list[Disagreement]:
+    """Where two engines differ; the largest differences go into the summary."""
+    found = []
+    for k in np.flatnonzero(ours.rows["answered"] & theirs.rows["answered"]).tolist():
+        mine, other = ours.rows[k], theirs.rows[k]
+        if mine["hit"] != other["hit"]:
+            found.append(_dispute(judge, k, "hit", theirs, ours))
+            continue
+        summary.agreeing += 1
+        if not (mine["has_distance"] and other["has_distance"]):
+            continue
+        if mine["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
+            continue
+        difference = abs(float(mine["distance"]) - float(other["distance"]))
+        (summary.depth if mine["hit"] else summary.gap).see(difference, *judge.question.names(k))
+        if difference > judge.tolerance * judge.size[k]:
+            found.append(_dispute(judge, k, "distance", theirs, ours))
+    return found
+
+
+def _tally(summary: Summary, disagreements: list[Disagreement], reference: str) -> None:
+    """Counts of the disagreements that concern one engine; a pair counts once for the reference."""
+    wrong: set[tuple[str, str]] = set()
+    rounding: set[tuple[str, str]] = set()
+    distances: set[tuple[str, str]] = set()
+    for d in disagreements:
+        pair = d.a, d.b
+        if d.engine == summary.engine:
+            summary.hit_disagreements += d.kind == "hit"
+            summary.distance_disagreements += d.kind == "distance"
+            summary.contradictions += d.kind in ("contradiction", "left out")
+            summary.not_judged += bool(d.not_judged)
+        if summary.engine in d.wrong:
+            excused = summary.engine in d.undecided or (d.touching and summary.engine not in d.proven)
+            (distances if d.kind == "distance" else rounding if excused else wrong).add(pair)
+    summary.wrong, summary.wrong_within_rounding, summary.wrong_distances = map(len, (wrong, rounding, distances))
+
+
+def _number(value) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _printed(s: Summary, is_reference: bool) -> list[str]:
+    if s.skipped:
+        return [s.engine, f"skipped: {s.skipped}", *[""] * 12]
+    agree, differ = ("", "") if is_reference else (str(s.agreeing), str(s.hit_disagreements))
+    off = s.wrong_distances if is_reference else s.distance_disagreements
+    largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
+    return [
+        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, str(s.wrong), str(s.wrong_within_rounding),
+        str(s.not_judged), str(s.contradictions), str(off), *largest,
+        str(len(s.failed)), str(sum(s.unsupported.values())),
+    ]
+
+
+def _length(largest: Largest) -> str:
+    return f"{largest.difference:.1e} m" if largest.pairs else "-"

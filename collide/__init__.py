@@ -1,0 +1,82 @@
+"""collide: collision detection for robotics whose answers carry proofs.
+
+    import collide
+    r = collide.distance(collide.Box((1, 1, 1)), collide.Sphere(0.5), X_WA, X_WB)
+    r.distance, r.normal, r.point_a, r.point_b, r.lower, r.upper, r.certified
+
+Shapes, pair queries and `World` are documented in docs/conventions.md; `collide --help` shows
+the command line. Names below load when first used, so that importing collide costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collide.errors import (
+        CollideError,
+        InvalidArgument,
+        InvalidPose,
+        InvalidShape,
+        MissingExtra,
+        SceneError,
+        UnknownBody,
+        UnsupportedQuery,
+    )
+    from collide.query import collide, distance
+    from collide.results import PairResult, WorldResult
+    from collide.robot import Robot
+    from collide.shapes import (
+        Box,
+        Capsule,
+        Compound,
+        Cone,
+        ConvexHull,
+        Cylinder,
+        Ellipsoid,
+        Halfspace,
+        HPolytope,
+        Shape,
+        Sphere,
+    )
+    from collide.transforms import pose
+    from collide.world import World
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "collide.errors": (
+        "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
+        "UnknownBody", "UnsupportedQuery",
+    ),
+    "collide.query": ("collide", "distance"),
+    "collide.results": ("PairResult", "WorldResult"),
+    "collide.robot": ("Robot",),
+    "collide.shapes": (
+        "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
+        "Halfspace", "Shape", "Sphere",
+    ),
+    "collide.transforms": ("pose",),
+    "collide.world": ("World",),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Box", "Capsule", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
+    "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "PairResult", "Robot",
+    "SceneError", "Shape", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
+    "distance", "pose",
+]
+
+
+def __getattr__(name: str):
+    if name not in _HOME:
+        raise AttributeError(f"module 'collide' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

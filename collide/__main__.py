@@ -1,0 +1,8 @@
+"""``python -m collide`` is the command ``collide``."""
+
+import sys
+
+from collide.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,224 @@
+"""The one way to compile a kernel. Nothing else in collide imports numba.
+
+Rules, each measured or forced by a bug met:
+
+* no fastmath and no contraction: products and sums round separately, so error bounds hold and
+  the same call gives the same bits everywhere;
+* no BLAS inside kernels, no ``parallel=True`` (two Python threads on its work queue abort the
+  process): kernels release the GIL and callers chunk;
+* no reference counting: kernels take addresses and make views with `view_f64` and its siblings.
+  Array arguments cost more than the geometry of a box pair. The caller keeps every buffer alive
+  for the length of the call;
+* the disk cache is keyed to a hash of all kernel sources. Numba's own key does not see an edit
+  in an imported callee, and a stale kernel answers wrongly.
+
+``NUMBA_DISABLE_JIT=1`` runs the same source as plain Python, for coverage and for debugging.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from functools import lru_cache
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba.core import types
+from numba.core.caching import FunctionCache, _CacheLocator
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+
+from collide.cache_folder import cache_folder
+
+log = logging.getLogger("collide")
+
+PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
+_FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
+
+#: Packages whose sources are kernels: an edit in any of them makes all cached kernels stale.
+_KERNEL_SOURCES = ("_jit.py", "results.py", "geometry", "broadphase", "narrowphase")
+
+
+def kernel(function: Callable) -> Callable:
+    """A function that other kernels call; compiled into its callers."""
+    return numba.njit(function, **_FLAGS)
+
+
+class Entry:
+    """A kernel that Python calls: integers and floats in, everything else behind addresses.
+
+    Compiled at its first call for the one signature given, or read from the disk cache.
+    """
+
+    def __init__(self, function: Callable, signature: str):
+        self.__doc__, self.name = function.__doc__, function.__name__
+        self._function, self._signature = function, signature
+        self._ready: Callable | None = function if PLAIN_PYTHON else None
+        self._lock = threading.Lock()
+
+    def __call__(self, *args):
+        if self._ready is None:
+            self._compile()
+        return self._ready(*args)  # type: ignore[misc]
+
+    def _compile(self) -> None:
+        with self._lock:
+            if self._ready is not None:
+                return
+            started = time.perf_counter()
+            dispatcher = numba.njit(self._function, **_FLAGS)
+            dispatcher._cache = _KernelCache.of(self._function)
+            with on_compile(self.name):
+                dispatcher.compile(self._signature)
+            dispatcher.disable_compile()
+            seconds[self.name] = time.perf_counter() - started
+            self._ready = dispatcher
+
+
+def entry(signature: str) -> Callable[[Callable], Entry]:
+    """Decorator: a kernel called from Python, with its numba signature."""
+    return lambda function: Entry(function, signature)
+
+
+#: Seconds each entry took to become callable in this process, by compiling or by loading.
+seconds: dict[str, float] = {}
+
+
+def _silent(_name: str) -> AbstractContextManager:
+    return nullcontext()
+
+
+#: Called with a kernel's name; the context it returns surrounds compiling or loading it. The
+#: command line puts a progress line here.
+on_compile: Callable[[str], AbstractContextManager] = _silent
+
+
+# --- the disk cache -----------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=1)
+def source_hash() -> str:
+    """Hash of every kernel source and of numba's version."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    for name in _KERNEL_SOURCES:
+        place = root / name
+        for file in [place] if place.is_file() else sorted(place.rglob("*.py")):
+            digest.update(file.relative_to(root).as_posix().encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kernel_cache_folder() -> Path:
+    """Where compiled kernels of these very sources are kept."""
+    return cache_folder("kernels", source_hash())
+
+
+class _Locator(_CacheLocator):
+    """Tells numba's cache to live in our folder, for our kernels only."""
+
+    def __init__(self, function: Callable):
+        self._function = function
+
+    def get_cache_path(self) -> str:
+        return str(kernel_cache_folder())
+
+    def get_source_stamp(self):
+        return source_hash()
+
+    def get_disambiguator(self) -> str:
+        return str(self._function.__code__.co_firstlineno)
+
+    def ensure_cache_path(self) -> None:
+        folder = self.get_cache_path()
+        os.makedirs(folder, exist_ok=True)
+        probe = os.path.join(folder, f".writable-{os.getpid()}-{threading.get_ident()}")
+        with open(probe, "wb"):
+            pass
+        os.unlink(probe)
+
+    @classmethod
+    def from_function(cls, py_func, py_file):
+        return cls(py_func)
+
+
+class _KernelCache(FunctionCache):
+    class _impl_class(FunctionCache._impl_class):
+        _locator_classes = [_Locator]
+
+    @classmethod
+    def of(cls, function: Callable):
+        """A cache for this kernel, or numba's null cache where the folder cannot be written."""
+        try:
+            _Locator(function).ensure_cache_path()
+            return cls(function)
+        except (OSError, RuntimeError) as error:
+            _say_once(
+                f"compiled kernels cannot be kept in {kernel_cache_folder()} ({error}); they are compiled "
+                "again in every process. Set COLLIDE_CACHE_DIR to a folder that can be written."
+            )
+            return numba.core.caching.NullCache()
+
+
+@lru_cache(maxsize=None)
+def _say_once(message: str) -> None:
+    log.warning(message)
+
+
+# --- views on buffers ---------------------------------------------------------------------------
+
+if PLAIN_PYTHON:
+
+    def _view(ctype, dtype):
+        def view(address, n):
+            buffer = (ctype * int(n)).from_address(int(address)) if n else b""
+            return np.frombuffer(buffer, dtype=dtype)
+
+        return view
+
+else:
+
+    def _view(_ctype, dtype):
+        element = numba.from_dtype(np.dtype(dtype))
+        array = types.Array(element, 1, "C")
+
+        @intrinsic
+        def view(_context, address, n):
+            def codegen(cgctx, builder, _signature, args):
+                layout = cgctx.get_data_type(element)
+                size = cgctx.get_constant(types.intp, cgctx.get_abi_sizeof(layout))
+                result = make_array(array)(cgctx, builder)
+                populate_array(
+                    result,
+                    data=builder.inttoptr(args[0], layout.as_pointer()),
+                    shape=[args[1]],
+                    strides=[size],
+                    itemsize=size,
+                    meminfo=None,
+                )
+                return result._getvalue()
+
+            return array(types.int64, types.int64), codegen
+
+        return view
+
+#: ``view_f64(address, n)``: n doubles at an address, as a one-dimensional array; the caller keeps
+#: the buffer alive. Siblings for other element types.
+view_f64 = _view(ctypes.c_double, np.float64)
+view_i64 = _view(ctypes.c_int64, np.int64)
+view_i32 = _view(ctypes.c_int32, np.int32)
+view_u8 = _view(ctypes.c_uint8, np.uint8)
+
+
+def address_of(array: np.ndarray) -> int:
+    """Address of a C-contiguous array's first element. The caller keeps the array alive."""
+    if not array.flags.c_contiguous:
+        raise ValueError("kernels read C-contiguous buffers")
+    return array.ctypes.data

@@ -1,0 +1,198 @@
+"""A box-tree over bodies: sorted by size class and Morton code, then an implicit binary tree.
+
+Boxes of one size class stand together, as the graded box-tree of Erickson's local polyhedra keeps
+facets near cubes of their own size ("Local polyhedra and geometric graphs", section 3.2): a floor
+slab does not widen the boxes of the cups on it. Within a class, order along the Z-curve.
+
+Leaf k of the tree is the k-th body in that order; node i has children 2i and 2i + 1, node 1 is the
+root, and the leaves start at a power of two. Empty places hold boxes that meet nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide._jit import address_of, entry, view_f64, view_i64
+
+#: Bits of a Morton code along each axis.
+_BITS = 16
+
+
+class BoxTree:
+    """The tree, over boxes (n, 6): low x, y, z, high x, y, z.
+
+    Boxes without end (half-spaces) are kept apart and meet everything; ``nodes`` (2·leaves, 6)
+    holds the rest, ``order`` (m,) the body at each leaf.
+    """
+
+    def __init__(self, boxes: np.ndarray):
+        finite = np.isfinite(boxes).all(axis=1)
+        self.boxes = boxes
+        self.endless = np.flatnonzero(~finite)
+        within = np.flatnonzero(finite)
+        self.order = within[_sorted_order(boxes[within])] if len(within) else within
+        self.leaves = 1 << max(0, (len(within) - 1).bit_length())
+        self.nodes = np.empty((2 * self.leaves, 6))
+        self._fit()
+
+    def refit(self, boxes: np.ndarray) -> None:
+        """Take moved boxes without sorting anew; answers stay right, only speed drifts."""
+        if len(boxes) != len(self.boxes) or not np.array_equal(
+            np.flatnonzero(~np.isfinite(boxes).all(axis=1)), self.endless
+        ):
+            raise ValueError("refit needs the same bodies; build a new tree")
+        self.boxes = boxes
+        self._fit()
+
+    def _fit(self) -> None:
+        self.nodes[:, :3], self.nodes[:, 3:] = math.inf, -math.inf
+        self.nodes[self.leaves : self.leaves + len(self.order)] = self.boxes[self.order]
+        level = self.leaves
+        while level > 1:
+            children = self.nodes[level : 2 * level].reshape(-1, 2, 6)
+            level //= 2
+            self.nodes[level : 2 * level, :3] = children[:, :, :3].min(axis=1)
+            self.nodes[level : 2 * level, 3:] = children[:, :, 3:].max(axis=1)
+
+    def pairs(self, margin: float, static: np.ndarray, group: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis.
+
+        Pairs of static bodies, and pairs whose groups and masks exclude each other, are left out.
+        """
+        found = self._search(self.boxes[self.order], margin, True, static, group, mask)
+        if len(self.endless):
+            found = np.concatenate([found, _with_endless(self.endless, len(self.boxes), static, group, mask)])
+        found = np.sort(found, axis=1)
+        return found[np.lexsort((found[:, 1], found[:, 0]))]
+
+    def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
+        """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
+        everything = np.zeros(len(self.boxes), dtype=np.int64)
+        found = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
+        return np.sort(np.concatenate([found[:, 1], self.endless]))
+
+    def _search(self, queries, margin, among_themselves, static, group, mask) -> np.ndarray:
+        queries = np.ascontiguousarray(queries)
+        capacity = 64 + 8 * len(queries)
+        while True:
+            found = np.empty((capacity, 2), dtype=np.int64)
+            count = meeting_boxes(
+                address_of(queries), len(queries), address_of(self.nodes), self.leaves, address_of(self.order),
+                len(self.order), margin, among_themselves, address_of(static), address_of(group), address_of(mask),
+                address_of(found), capacity,
+            )  # fmt: skip
+            if count <= capacity:
+                return found[:count]
+            capacity = count
+
+
+def validate_box_tree(tree: BoxTree) -> None:
+    """Check every property the traversal relies on; raises AssertionError naming the node."""
+    assert sorted([*tree.order, *tree.endless]) == list(range(len(tree.boxes))), "a body is missing or doubled"
+    for node in range(1, tree.leaves):
+        for child in (2 * node, 2 * node + 1):
+            low, high = tree.nodes[child, :3], tree.nodes[child, 3:]
+            inside = (tree.nodes[node, :3] <= low).all() and (tree.nodes[node, 3:] >= high).all()
+            assert inside or (low > high).all(), f"node {node} does not enclose node {child}"
+    for leaf, body in enumerate(tree.order):
+        assert (tree.nodes[tree.leaves + leaf] == tree.boxes[body]).all(), f"leaf {leaf} is not body {body}'s box"
+
+
+def _sorted_order(boxes: np.ndarray) -> np.ndarray:
+    """Size class first, then the Z-curve through the centres; ties by body, so that it is reproducible."""
+    centres = 0.5 * boxes[:, :3] + 0.5 * boxes[:, 3:]
+    low = centres.min(axis=0)
+    extent = float((centres.max(axis=0) - low).max())
+    scale = (2**_BITS - 1) / extent if extent > 0.0 and math.isfinite(2**_BITS / extent) else 0.0
+    cells = np.clip((centres - low) * scale, 0, 2**_BITS - 1).astype(np.uint64)
+    code = np.zeros(len(boxes), dtype=np.uint64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    size = (boxes[:, 3:] - boxes[:, :3]).max(axis=1)
+    size_class = np.frexp(np.maximum(size, np.finfo(float).tiny))[1]
+    return np.lexsort((code, -size_class))
+
+
+def _with_endless(endless, n, static, group, mask) -> np.ndarray:
+    i = np.repeat(endless, n)
+    j = np.tile(np.arange(n), len(endless))
+    is_endless = np.zeros(n, dtype=bool)
+    is_endless[endless] = True
+    keep = (i != j) & ~(is_endless[j] & (j < i))
+    keep &= ~((static[i] != 0) & (static[j] != 0))
+    keep &= ((group[i] & mask[j]) != 0) & ((group[j] & mask[i]) != 0)
+    return np.stack([i[keep], j[keep]], axis=1)
+
+
+@entry(
+    "int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)"
+)
+def meeting_boxes(
+    queries_at, n_queries, nodes_at, leaves, order_at, n_order, margin, among_themselves, static_at, group_at, mask_at,
+    found_at, capacity,
+):  # fmt: skip
+    """Pairs (query, body) of boxes within ``margin`` along every axis; returns how many there are.
+
+    Only the first ``capacity`` are stored. Among themselves, query k is leaf k: it looks at later
+    leaves only, and names its body.
+    """
+    queries = view_f64(queries_at, 6 * n_queries)
+    nodes = view_f64(nodes_at, 12 * leaves)
+    order = view_i64(order_at, n_order)
+    found = view_i64(found_at, 2 * capacity)
+    n_bodies = 0
+    for k in range(n_order):
+        n_bodies = max(n_bodies, order[k] + 1)
+    static = view_i64(static_at, n_bodies)
+    group = view_i64(group_at, n_bodies)
+    mask = view_i64(mask_at, n_bodies)
+    count = 0
+    for k in range(n_queries):
+        low0 = queries[6 * k] - margin
+        low1 = queries[6 * k + 1] - margin
+        low2 = queries[6 * k + 2] - margin
+        high0 = queries[6 * k + 3] + margin
+        high1 = queries[6 * k + 4] + margin
+        high2 = queries[6 * k + 5] + margin
+        # Depth first without a stack: down to the left while boxes meet, else on to the next
+        # subtree to the right, which is the sibling of the nearest ancestor that is a left child.
+        node = 1
+        last = leaves + k if among_themselves else 0
+        first = 1
+        while node > 0:
+            at = 6 * node
+            meets = (
+                nodes[at] <= high0 and nodes[at + 3] >= low0
+                and nodes[at + 1] <= high1 and nodes[at + 4] >= low1
+                and nodes[at + 2] <= high2 and nodes[at + 5] >= low2
+            )  # fmt: skip
+            if meets and among_themselves:
+                # The last leaf under the node must come after the query's own.
+                first = node
+                while first < leaves:
+                    first = 2 * first + 1
+                meets = first > last
+            if meets and node < leaves:
+                node = 2 * node
+                continue
+            if meets and node - leaves < n_order:
+                i = order[k] if among_themselves else k
+                j = order[node - leaves]
+                tested = True
+                if among_themselves:
+                    tested = (
+                        not (static[i] != 0 and static[j] != 0)
+                        and (group[i] & mask[j]) != 0 and (group[j] & mask[i]) != 0
+                    )  # fmt: skip
+                if tested:
+                    if count < capacity:
+                        found[2 * count] = i
+                        found[2 * count + 1] = j
+                    count += 1
+            while node & 1:
+                node >>= 1
+            node = node + 1 if node > 0 else 0
+    return count

@@ -1,0 +1,1 @@
+"""Pure arrays to numbers: packed convex sets, supports, boxes, exact vertices. Knows no World."""

@@ -1,0 +1,82 @@
+"""A convex set as the kernels read it: a kind, a few numbers, a block of coordinates.
+
+Every convex shape is a core (points, or one of three curved sets) swept by a ball, or a
+half-space. Spheres are one point, capsules two, boxes eight: one kernel answers them all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import NamedTuple
+
+import numpy as np
+
+#: Kinds of core. POINTS is the hull of points; the others are the sets of their names.
+POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
+
+#: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
+BLOCK = 8
+
+
+class PackedConvex(NamedTuple):
+    """One convex set, in its own frame.
+
+    kind : POINTS, CYLINDER, CONE, ELLIPSOID or HALFSPACE.
+    radius : of the ball swept over the core, in the world [m].
+    reach : proven upper bound of the distance of a core point from the frame's origin [m].
+    slop : proven upper bound of the distance between the set described and the set stored [m];
+        0 where the numbers given are stored as they are.
+    params : (4,) cylinder, cone: radius and half length; ellipsoid: three radii; half-space:
+        normal and offset; unused entries are 0.
+    points : (n, 3) core points for POINTS; their number is what ids in results refer to.
+    coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
+        filled up with copies of the first point.
+    content : digest of the numbers above; equal for equal sets, in every process. It orders the
+        bodies of a pair, so that swapped questions are worked out on the same numbers.
+    """
+
+    kind: int
+    radius: float
+    reach: float
+    slop: float
+    params: np.ndarray
+    points: np.ndarray
+    coordinates: np.ndarray
+    content: bytes
+
+
+def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0) -> PackedConvex:
+    """The hull of ``points`` (n, 3), swept by a ball of ``radius``."""
+    n = len(points)
+    columns = np.empty((3, -(-n // BLOCK) * BLOCK))
+    columns[:, :n] = points.T
+    columns[:, n:] = points[0][:, None]
+    # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
+    reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
+    return _packed(POINTS, float(radius), reach, slop, (), points, _frozen(columns))
+
+
+def pack_curved(kind: int, params, reach: float) -> PackedConvex:
+    """A cylinder, cone or ellipsoid by its numbers."""
+    return _packed(kind, 0.0, float(reach) * (1 + 1e-15), 0.0, params, *_NO_POINTS)
+
+
+def pack_halfspace(normal, offset: float) -> PackedConvex:
+    """{x : normal·x ≤ offset}; the normal keeps the length it was given."""
+    return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
+
+
+def _packed(kind, radius, reach, slop, params, points, coordinates) -> PackedConvex:
+    row = np.zeros(4)
+    row[: len(params)] = params
+    digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
+    digest.update((points + 0.0).tobytes())
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, digest.digest())
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
+
+
+_NO_POINTS = (_frozen(np.zeros((0, 3))), _frozen(np.zeros((3, 0))))

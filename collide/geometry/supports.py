@@ -1,0 +1,103 @@
+"""Support mappings: the point of a convex set that lies farthest in a direction.
+
+A direction is in the set's own frame and need not have unit length. Support values are good to a
+few units in the last place of |direction|·reach, which is what `narrowphase/bounds.py` assumes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
+
+
+@kernel
+def support_vertex(coordinates, n, m, gx, gy, gz):
+    """Id of a vertex with the largest product with g, by a scan over contiguous blocks.
+
+    coordinates : 3·m doubles: all x, all y, all z, filled up to a multiple of BLOCK.
+    n, m : number of vertices, and of stored ones.
+
+    Four running maxima break the chain of comparisons: a plain loop waits for each comparison.
+    (A scan with explicit SIMD, and a structure that is logarithmic in n, are to replace this.)
+    """
+    x0 = coordinates[0] * gx + coordinates[m] * gy + coordinates[2 * m] * gz
+    best0 = x0
+    best1 = x0
+    best2 = x0
+    best3 = x0
+    k0 = 0
+    k1 = 0
+    k2 = 0
+    k3 = 0
+    for i in range(0, m, 4):
+        d0 = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
+        d1 = coordinates[i + 1] * gx + coordinates[m + i + 1] * gy + coordinates[2 * m + i + 1] * gz
+        d2 = coordinates[i + 2] * gx + coordinates[m + i + 2] * gy + coordinates[2 * m + i + 2] * gz
+        d3 = coordinates[i + 3] * gx + coordinates[m + i + 3] * gy + coordinates[2 * m + i + 3] * gz
+        if d0 > best0:
+            best0 = d0
+            k0 = i
+        if d1 > best1:
+            best1 = d1
+            k1 = i + 1
+        if d2 > best2:
+            best2 = d2
+            k2 = i + 2
+        if d3 > best3:
+            best3 = d3
+            k3 = i + 3
+    if best1 > best0:
+        best0 = best1
+        k0 = k1
+    if best3 > best2:
+        best2 = best3
+        k2 = k3
+    if best2 > best0:
+        k0 = k2
+    return k0 if k0 < n else 0  # the filling repeats vertex 0
+
+
+@kernel
+def support(kind, coordinates, n, m, params, at, gx, gy, gz):
+    """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
+
+    params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
+    """
+    if kind == POINTS:
+        k = support_vertex(coordinates, n, m, gx, gy, gz)
+        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]
+    p0 = params[at]
+    p1 = params[at + 1]
+    if kind == ELLIPSOID:
+        # The gradient of |D g|, D the diagonal of the radii: D² g / |D g|.
+        p2 = params[at + 2]
+        ax = p0 * gx
+        ay = p1 * gy
+        az = p2 * gz
+        largest = max(abs(ax), abs(ay), abs(az))
+        if largest == 0.0:
+            return -1, p0, 0.0, 0.0
+        ax /= largest
+        ay /= largest
+        az /= largest
+        length = math.sqrt(ax * ax + ay * ay + az * az)
+        return -1, p0 * (ax / length), p1 * (ay / length), p2 * (az / length)
+    # Cylinder and cone: a disc of radius p0 across z, at ±p1.
+    largest = max(abs(gx), abs(gy))
+    x = 0.0
+    y = 0.0
+    across = 0.0
+    if largest > 0.0:
+        ux = gx / largest
+        uy = gy / largest
+        length = math.sqrt(ux * ux + uy * uy)
+        x = p0 * (ux / length)
+        y = p0 * (uy / length)
+        across = p0 * (length * largest)
+    if kind == CYLINDER:
+        return -1, x, y, p1 if gz > 0.0 else -p1
+    if p1 * gz >= across - p1 * gz:  # cone: the apex, or the rim of the base
+        return -1, 0.0, 0.0, p1
+    return -1, x, y, -p1

@@ -1,0 +1,37 @@
+"""How far rounding can move what the narrowphase computes, and what the answers promise.
+
+Write u = 2⁻⁵³ and, for a pair, t = p_WB − p_WA and
+
+    S = ρ_A + ρ_B + |t| + r_A + r_B (+ |offset| for a half-space),    ρ = reach · longest row of R.
+
+1. A difference point w = R_A a − R_B b − t. Each coordinate is two products-and-sums of three terms
+   (γ₃ of Σ|R_kj||a_j| ≤ ρ), two subtractions, and t itself rounded once: at most 5u·(ρ_A + ρ_B + |t|)
+   a coordinate, so |error of w| ≤ √3·5u·S < 9u·S. Curved supports place the point to 6u·ρ more
+   across its normal, and its value along the direction to as much: < 16u·S in all.
+2. A plane. Direction d; g = R_Aᵀd is good to 3√3·u·|d|·(longest row), the scan's products to γ₃, so the
+   vertex chosen is within 2·(3√3 + 3)u·ρ|d| < 17u·ρ|d| of the best one, for each body. With w·d itself
+   rounded (3u·|w||d|) and step 1: every point x of A ⊖ B has x·d/|d| ≥ fl(w·d)/|d| − (16 + 17 + 3 + 2)u·S.
+3. A point of A ⊖ B: Σ λ_k w_k with λ ≥ 0 and |Σ λ − 1| ≤ 3u is within (16 + 3 + 4)u·S of a true one.
+4. The final sums (± r, ± error) round at most 4u·S.
+
+All of it together stays below 45u·S, and the error used is 64u·S, plus the slop of stored points
+and of composed poses (`PackedConvex.slop`, `pose_rows`). It holds whatever the matrix, not only for
+rotations, since ρ is measured with the rows given. (The adjacency of an exact stage is to replace
+this bracket where it spans zero.)
+"""
+
+from __future__ import annotations
+
+#: Error of every bound, in units of S (see above).
+ERROR = 64 * 2.0**-53
+
+#: `certified` promises a proven sign and a bracket at most this wide, in units of S: cores of points.
+PROMISE_POINTS = 2.0**-40
+#: The same where a cylinder, cone or ellipsoid takes part.
+PROMISE_CURVED = 2.0**-26
+
+#: Rounds after which GJK hands over the bracket it has.
+GJK_ROUNDS = 128
+#: Vertices and facets an expanding polytope may use before it hands over the bracket it has.
+EPA_VERTICES = 1024
+EPA_FACETS = 8192

@@ -1,0 +1,105 @@
+"""GJK: the point of A ⊖ B nearest the origin, with a lower bound from every support plane.
+
+Gilbert, Johnson and Keerthi 1988; the duality-gap stop after van den Bergen 1999. It stops on a
+repeated vertex, on a gap below rounding, or when the distance no longer decreases: thin shapes
+would otherwise spin to the cap.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+from collide.narrowphase.minkowski import copy_point, difference_point
+from collide.narrowphase.simplex import clearance_of_origin, nearest_in_simplex
+
+#: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
+#: rounding can tell, or the last tetrahedron is too thin to prove it. ENCLOSED: the origin lies in a
+#: tetrahedron of A ⊖ B, clear of rounding. APART: proven farther apart than the limit.
+NEAREST, MEETING, ENCLOSED, APART = range(4)
+
+
+@kernel
+def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
+    """Run GJK on the cores of a pair.
+
+    points, ids : workspace for five difference points; the simplex found stands first.
+    weights : 7 doubles out: weights of the simplex and its nearest point v.
+    touch_suffices : stop as soon as an overlap is proven (a boolean is asked).
+    radius : sum of the swept radii.   limit : stop once proven farther apart than this.
+    error : absolute error of a bound, from `bounds.py`.
+
+    Returns
+    -------
+    status, number of simplex points, best lower bound of the core distance (before ``error``),
+    clearance of the origin in the tetrahedron (ENCLOSED only), rounds used.
+    """
+    tx = pair[14]
+    ty = pair[15]
+    tz = pair[16]
+    if tx == 0.0 and ty == 0.0 and tz == 0.0:
+        tx = 1.0
+    difference_point(pair, points, ids, 0, tx, ty, tz)
+    n = 1
+    square = nearest_in_simplex(points, n, weights)
+    lower = -math.inf
+    for used in range(1, rounds + 1):
+        length = math.sqrt(square)
+        if length <= error:
+            return MEETING, n, lower, 0.0, used
+        if touch_suffices and length + error <= radius:
+            return NEAREST, n, lower, 0.0, used
+        vx = weights[4]
+        vy = weights[5]
+        vz = weights[6]
+        difference_point(pair, points, ids, n, -vx, -vy, -vz)
+        at = 9 * n
+        bound = (vx * points[at] + vy * points[at + 1] + vz * points[at + 2]) / length
+        lower = max(lower, bound)
+        if lower - error - radius > limit:
+            return APART, n, lower, 0.0, used
+        if length - bound <= 0.125 * error or _repeated(ids, n):
+            return NEAREST, n, lower, 0.0, used
+        before = (weights[0], weights[1], weights[2], weights[3])
+        closer = nearest_in_simplex(points, n + 1, weights)
+        if n == 3:
+            clearance = clearance_of_origin(points)
+            if clearance > error:
+                return ENCLOSED, 4, lower, clearance, used
+            if clearance >= 0.0:
+                return MEETING, 4, lower, 0.0, used
+        if not closer < square:
+            weights[0], weights[1], weights[2], weights[3] = before
+            weights[4] = vx
+            weights[5] = vy
+            weights[6] = vz
+            return NEAREST, n, lower, 0.0, used
+        square = closer
+        n = _drop_unused(points, ids, weights, n + 1)
+    return NEAREST, n, lower, 0.0, rounds
+
+
+@kernel
+def _repeated(ids, n):
+    """Whether point n is one of the n before it (curved cores have no ids and never repeat)."""
+    if ids[2 * n] < 0 or ids[2 * n + 1] < 0:
+        return False
+    for k in range(n):
+        if ids[2 * k] == ids[2 * n] and ids[2 * k + 1] == ids[2 * n + 1]:
+            return True
+    return False
+
+
+@kernel
+def _drop_unused(points, ids, weights, n):
+    """Keep the points with a positive weight; returns their number."""
+    kept = 0
+    for k in range(n):
+        if weights[k] > 0.0:
+            if kept != k:
+                copy_point(points, ids, k, kept)
+                weights[kept] = weights[k]
+            kept += 1
+    for k in range(kept, 4):
+        weights[k] = 0.0
+    return kept

@@ -1,0 +1,36 @@
+"""Which method answers which pair of convex sets: the pair matrix, one half and its mirror.
+
+                 point   segment   points   cylinder   cone   ellipsoid   half-space
+    point          C        C         G         G        G        G            H
+    segment                 C         G         G        G        G            H
+    points                            G         G        G        G            H
+    cylinder                                    G        G        G            H
+    cone                                                 G        G            H
+    ellipsoid                                                     G            H
+    half-space                                                                 P
+
+    C  capsule_capsule.py    closed form (a sphere is a point, a capsule a segment, each swept)
+    H  halfspace_convex.py   closed form, one support query
+    P  halfspace_convex.py   two planes
+    G  gjk.py, and epa.py where the cores overlap
+
+Every set may be swept by a ball. Bodies of several sets are unions: `collide.unions` combines the
+rows. A triangle mesh will be a further row and column, answered over its own box-tree.
+"""
+
+from __future__ import annotations
+
+from collide._jit import kernel
+from collide.geometry.packing import HALFSPACE, POINTS
+
+CAPSULES, HALFSPACE_CONVEX, HALFSPACES, CONVEX = range(4)
+
+
+@kernel
+def method(kind_a, n_a, kind_b, n_b):
+    """CAPSULES, HALFSPACE_CONVEX, HALFSPACES or CONVEX; a half-space stands first."""
+    if kind_a == HALFSPACE:
+        return HALFSPACES if kind_b == HALFSPACE else HALFSPACE_CONVEX
+    if kind_a == POINTS and kind_b == POINTS and n_a <= 2 and n_b <= 2:
+        return CAPSULES
+    return CONVEX

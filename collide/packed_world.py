@@ -1,0 +1,155 @@
+"""A World as the kernels see it: flat tables of shapes, posed parts, boxes, and a box-tree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide._jit import address_of
+from collide.broadphase.box_tree import BoxTree
+from collide.geometry.boxes import bounding_boxes
+from collide.geometry.packing import PackedConvex
+from collide.geometry.tables import ShapeTable, pose_rows
+from collide.narrowphase.answer import run_pairs
+from collide.results import PAIR_DTYPE
+from collide.unions import Union, combine
+
+
+class PackedWorld:
+    """Bodies by position (0 … n − 1), each a run of convex parts.
+
+    static, group, mask : (n,) int64.   allowed : {(i, j): reason}, i < j.
+    """
+
+    def __init__(self, bodies, allowed: dict):
+        self.allowed = allowed
+        self.static = np.array([body.static for body in bodies], dtype=np.int64)
+        self.group = np.array([body.group for body in bodies], dtype=np.int64)
+        self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
+        self._keys = np.sort(np.array([i * len(bodies) + j for i, j in allowed], dtype=np.int64))
+        parts = [body.shape.parts() for body in bodies]
+        self._parts = [[packed for packed, _ in own] for own in parts]
+        counts = np.array([len(own) for own in parts], dtype=np.int64)
+        self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        self._body_of = np.repeat(np.arange(len(bodies)), counts)
+        self._X_BP = np.array([X for own in parts for _, X in own]).reshape(-1, 4, 4)
+        flat = [packed for own in self._parts for packed in own]
+        self._reach = np.array([packed.reach for packed in flat])
+        self._shape_of, self._table = _distinct(flat)
+        self._tree: BoxTree | None = None
+        self.move(np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4))
+
+    def move(self, X_WBs: np.ndarray) -> None:
+        """Take new poses (n, 4, 4) of all bodies, and refit the tree."""
+        self._poses = pose_rows(X_WBs[self._body_of], self._X_BP, self._reach)
+        self._part_boxes = self._boxes_of(self._table, self._poses, self._shape_of)
+        if len(X_WBs):
+            starts = self._first[:-1]
+            low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
+            boxes = np.hstack([low, np.maximum.reduceat(self._part_boxes[:, 3:], starts)])
+            if self._tree is None:
+                self._tree = BoxTree(boxes)
+            else:
+                self._tree.refit(boxes)
+
+    @staticmethod
+    def _boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
+        boxes = np.empty((len(poses), 6))
+        bounding_boxes(
+            address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of), len(poses),
+            address_of(boxes),
+        )  # fmt: skip
+        return boxes
+
+    def candidates(self, margin: float) -> np.ndarray:
+        """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin."""
+        if self._tree is None:
+            return np.empty((0, 2), dtype=np.int64)
+        pairs = self._tree.pairs(margin, self.static, self.group, self.mask)
+        if not len(self._keys):
+            return pairs
+        keys = pairs[:, 0] * len(self.static) + pairs[:, 1]
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return pairs[self._keys[at] != keys]
+
+    def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
+        """(rows, convex pairs answered, body pairs answered); fields a and b are positions."""
+        pairs, owner = self._part_pairs(candidates, limit)
+        rows = run_pairs(
+            self._table, self._poses, self._shape_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
+        )
+        pairs, owner = pairs[: len(rows)], owner[: len(rows)]
+        rows["a"], rows["b"] = candidates[owner, 0], candidates[owner, 1]
+        rows["part_a"] = pairs[:, 0] - self._first[rows["a"]]
+        rows["part_b"] = pairs[:, 1] - self._first[rows["b"]]
+        starts = np.flatnonzero(np.diff(owner, prepend=-1))
+        answered = len(starts)
+        if boolean:
+            return rows, len(rows), answered
+        return combine(rows, starts, lambda k: self._sides(candidates[owner[starts[k]]])), len(rows), answered
+
+    def _sides(self, pair: np.ndarray) -> tuple[Union, Union]:
+        a, b = (self._union(int(body)) for body in pair)
+        return a, b
+
+    def _union(self, body: int) -> Union:
+        return Union(self._parts[body], self._poses[self._first[body] : self._first[body + 1]])
+
+    def _part_pairs(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of parts whose boxes come within margin, and the candidate each belongs to.
+
+        A candidate keeps at least its first pair of parts, so that every pair asked has a row.
+        """
+        counts = np.diff(self._first)
+        many = counts[candidates[:, 0]] * counts[candidates[:, 1]]
+        owner = np.repeat(np.arange(len(candidates)), many)
+        within = np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)
+        width = counts[candidates[owner, 1]]
+        i = self._first[candidates[owner, 0]] + within // np.maximum(width, 1)
+        j = self._first[candidates[owner, 1]] + within % np.maximum(width, 1)
+        low, high = self._part_boxes[:, :3], self._part_boxes[:, 3:]
+        near = ((low[i] - margin <= high[j]) & (low[j] - margin <= high[i])).all(axis=1)
+        first_near = np.flatnonzero(np.diff(owner, prepend=-1))
+        missed = np.ones(len(candidates), dtype=bool)
+        missed[owner[near]] = False
+        near[first_near[missed]] = True
+        return np.stack([i[near], j[near]], axis=1), owner[near]
+
+    def against(self, shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
+        """Rows of one outside shape against all bodies near it; b is a position, a is 0."""
+        own = shape.parts()
+        packed = [part for part, _ in own]
+        reach = np.array([part.reach for part in packed])
+        poses = pose_rows(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
+        boxes = self._boxes_of(ShapeTable(packed), poses, np.arange(len(own)))
+        box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+        bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
+        if not len(bodies):
+            return np.zeros(0, dtype=PAIR_DTYPE)
+        others = np.concatenate([np.arange(self._first[b], self._first[b + 1]) for b in bodies])
+        table = ShapeTable([*packed, *self._table.packed])
+        shape_of = np.concatenate([np.arange(len(own)), self._shape_of + len(own)])
+        pairs = np.stack(
+            [np.tile(np.arange(len(own)), len(others)), np.repeat(others + len(own), len(own))], axis=1
+        )
+        rows = run_pairs(
+            table, np.concatenate([poses, self._poses]), shape_of, pairs, boolean=False, limit=limit
+        )
+        rows["b"] = self._body_of[pairs[:, 1] - len(own)]
+        rows["part_a"] = pairs[:, 0]
+        rows["part_b"] = pairs[:, 1] - len(own) - self._first[rows["b"]]
+        starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
+        return combine(rows, starts, lambda k: (Union(packed, poses), self._union(int(bodies[k]))))
+
+
+def _distinct(flat: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:
+    """A table row for each distinct convex set, and the row of every part."""
+    rows: dict[tuple[bytes, float], int] = {}
+    kept: list[PackedConvex] = []
+    shape_of = np.empty(len(flat), dtype=np.int64)
+    for k, packed in enumerate(flat):
+        key = packed.content, packed.slop
+        if key not in rows:
+            rows[key] = len(kept)
+            kept.append(packed)
+        shape_of[k] = rows[key]
+    return shape_of, ShapeTable(kept)

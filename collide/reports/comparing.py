@@ -1,0 +1,109 @@
+"""What several engines said about one scene, as a person reads it in a terminal.
+
+Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and its table; asks nobody.
+"""
+
+from __future__ import annotations
+
+from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, wrapped
+from collide.reports.units import count, lengths
+
+SHORT = 12
+
+
+def render(comparison, *, everything: bool = False, width: int = 80, whole_names: bool = False) -> list[Line]:
+    """A comparison as lines of (text, role) pieces: the verdict, a column per engine, each dispute.
+
+    comparison : has ``to_dict()``, ``table()`` -> (headers, rows of text) and ``ours_wrong``.
+    everything : no list is shortened.   width : cells a line may take.
+    whole_names : never shorten a name (for output that goes to a file).
+    """
+    data = comparison.to_dict()
+    style = "colliding" if comparison.ours_wrong else "free"
+    lines: list[Line] = [[(line, style)] for line in wrapped(verdict(data), width, hanging=2)]
+    tables = [_engine_table(data, *comparison.table()), *_dispute_tables(data, None if everything else SHORT)]
+    dropped: dict[str, None] = {}  # a set that keeps its order
+    for table in tables:
+        layout = lay_out(table, width, whole_names)
+        dropped.update(dict.fromkeys(layout.dropped))
+        lines += [[], *table_lines(table, layout, width)]
+    return lines + missing_columns(list(dropped), width)
+
+
+def verdict(data: dict) -> str:
+    """The comparison in one line."""
+    asked = [summary["engine"] for summary in data["summaries"] if not summary["skipped"]]
+    wrong, disputes = data["ours_wrong"], data["disagreements"]
+    judged = sum(not dispute["not_judged"] for dispute in disputes)
+    parts = [
+        f"{count(wrong, 'answer')} of {data['reference']} proven wrong" if wrong else
+        f"no answer of {data['reference']} proven wrong",
+        f"{count(data['pairs'], 'pair')} asked of {', '.join(asked)}",
+    ]
+    if disputes:
+        parts.append(f"{count(len(disputes), 'disagreement')}, {judged} of them judged exactly")
+    else:
+        parts.append("no disagreement")
+    return "; ".join(parts)
+
+
+def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Table:
+    """One column per engine: fourteen counts fit below one another, not beside."""
+    skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
+    shown = [row for row in rows if row[0] not in skipped]
+    columns = [Column(headers[0], "label"), *(Column(row[0]) for row in shown)]
+    lines = [[header, *(row[k] or "-" for row in shown)] for k, header in enumerate(headers) if k]
+    notes = [f"{name} was not asked: {why}" for name, why in skipped.items()]
+    return Table("ENGINES  counts of pairs", columns, lines, notes=notes)
+
+
+_TITLES = {
+    "hit": "DISAGREEMENTS  does the pair collide?",
+    "distance": "DISTANCES APART  by more than the tolerance",
+    "contradiction": "CONTRADICTIONS  an engine's boolean against its own distance",
+    "left out": "LEFT OUT  a World gave no row where its pair query finds one",
+}
+
+
+def _dispute_tables(data: dict, limit: int | None) -> list[Table]:
+    """A table for each kind of dispute, the largest first."""
+    kinds = {dispute["kind"]: None for dispute in data["disagreements"]}
+    ordered = [kind for kind in _TITLES if kind in kinds] + sorted(set(kinds) - set(_TITLES))
+    return [
+        _dispute_table(_TITLES.get(kind, kind.upper()), [d for d in data["disagreements"] if d["kind"] == kind],
+                       data["reference"], limit)
+        for kind in ordered
+    ]
+
+
+def _dispute_table(title: str, disputes: list[dict], reference: str, limit: int | None) -> Table:
+    disputes = sorted(disputes, key=lambda d: (not d["wrong"], bool(d["not_judged"])))
+    shown = disputes[:limit]
+    columns = [
+        Column("engine", "label"), Column("body A", "name"), Column("body B", "name"),
+        Column("its answer"), Column(reference, "number", 1), Column("exact"), Column("wrong", "text"),
+    ]
+    cells = [
+        [d["engine"] for d in shown], [d["a"] for d in shown], [d["b"] for d in shown],
+        _answers([(d["hit"], d["distance"]) for d in shown]),
+        _answers([(d["reference_hit"], d["reference_distance"]) for d in shown]),
+        _answers([(d["exact_hit"], d["exact_distance"]) for d in shown]),
+        [_blame(d) for d in shown],
+    ]
+    reasons = dict.fromkeys(d["not_judged"] for d in shown if d["not_judged"])
+    notes = [f"not judged: {reason}" for reason in reasons]
+    return Table(title, columns, [list(row) for row in zip(*cells)], notes=notes, more=len(disputes) - len(shown))
+
+
+def _answers(answers: list[tuple[bool | None, float | None]]) -> list[str]:
+    """Signed distances where there are any, else the boolean."""
+    known = iter(lengths([distance for _, distance in answers if distance is not None]))
+    words = {True: "collides", False: "free", None: "-"}
+    return [words[hit] if distance is None else next(known) for hit, distance in answers]
+
+
+def _blame(dispute: dict) -> str:
+    if dispute["not_judged"]:
+        return "not judged"
+    names = ", ".join(dispute["wrong"]) or "none"
+    return f"{names} (touching)" if dispute["touching"] else names

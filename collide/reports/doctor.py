@@ -1,0 +1,169 @@
+"""Is this installation sound? Versions, caches, and pairs whose answers are known.
+
+Asks the public interface like any user would; what fails is shown, never raised.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from collide.reports.progress import silent
+from collide.reports.report import package_version, versions
+from collide.reports.tables import Column, Table
+from collide.reports.units import count
+
+#: (distribution, extra that brings it, what for)
+OPTIONAL = (
+    ("pyyaml", "robots", "scene files, joint states, planning scenes"),
+    ("trimesh", "robots", "mesh files"),
+    ("yourdfpy", "robots", "checking URDF against a second reader"),
+    ("scipy", "robots", "hulls of mesh vertices"),
+    ("rich", "robots", "colours in the terminal"),
+    ("example-robot-data", "demo", "the panda of the shipped scene"),
+    ("coacd", "decompose", "meshes as unions of convex pieces"),
+    ("coal", "peers", "collide compare"),
+    ("python-fcl", "peers", "collide compare"),
+    ("pybullet", "peers", "collide compare (wheels up to Python 3.11)"),
+)
+
+
+@dataclass
+class Check:
+    """One finding: ``passed`` False means broken, None means worth knowing."""
+
+    what: str
+    found: str
+    passed: bool | None = True
+
+
+@dataclass
+class Examination:
+    """Everything `examine` found."""
+
+    installed: list[Check] = field(default_factory=list)
+    optional: list[Check] = field(default_factory=list)
+    caches: list[Check] = field(default_factory=list)
+    answers: list[Check] = field(default_factory=list)
+
+    @property
+    def sound(self) -> bool:
+        """True where nothing is broken."""
+        return all(check.passed is not False for check in self._all())
+
+    def _all(self) -> list[Check]:
+        return [*self.installed, *self.optional, *self.caches, *self.answers]
+
+    def verdict(self) -> str:
+        """The examination in one line."""
+        broken = [check.what for check in self._all() if check.passed is False]
+        names = ", ".join(broken[:3]) + (", …" if len(broken) > 3 else "")
+        return f"BROKEN: {count(len(broken), 'finding')}: {names}" if broken else "sound"
+
+    def tables(self) -> list[Table]:
+        """One table a chapter."""
+        return [
+            _table("INSTALLED", self.installed),
+            _table("OPTIONAL  pip install 'collide-robotics[EXTRA]'", self.optional),
+            _table("KEPT BETWEEN RUNS", self.caches),
+            _table("SELF-CHECK  pairs with known answers", self.answers),
+        ]
+
+
+_WORDS = {True: "ok", False: "BROKEN", None: "-"}
+
+
+def _table(title: str, checks: list[Check]) -> Table:
+    columns = [Column("", "label"), Column("", "label"), Column("", "text")]
+    return Table(title, columns, [[_WORDS[check.passed], check.what, check.found] for check in checks])
+
+
+def examine(progress=None) -> Examination:
+    """Look at the installation and ask the known pairs.
+
+    progress : called with a label, gives a context manager around long work.
+    """
+    with (progress or silent)("asking pairs with known answers"):
+        answers = _answers()
+    return Examination(_installed(), _optional(), _caches(), answers)
+
+
+def _installed() -> list[Check]:
+    known = versions()
+    python = f"{platform.python_version()} ({sys.executable})"
+    checks = [
+        Check("collide", str(known["collide"])),
+        Check("Python", python, sys.version_info >= (3, 10)),
+    ]
+    checks += [Check(name, known[name] or "missing", known[name] is not None) for name in ("numpy", "numba")]
+    machine = f"{platform.system()} {known['machine']}, {count(os.cpu_count() or 1, 'processor')}"
+    return [*checks, Check("machine", machine)]
+
+
+def _optional() -> list[Check]:
+    return [
+        Check(name, f"{version} ({purpose})", True) if version else Check(name, f"absent: {purpose} [{extra}]", None)
+        for name, extra, purpose in OPTIONAL
+        for version in [package_version(name)]
+    ]
+
+
+def _caches() -> list[Check]:
+    from collide.cache_folder import cache_folder
+
+    where = {"kernels": cache_folder("kernels"), "prepared inputs": cache_folder("scenes")}
+    return [_cache(what, folder) for what, folder in where.items()]
+
+
+def _cache(what: str, folder: Path) -> Check:
+    existing = folder
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        return Check(what, f"{folder} cannot be written: made anew in every run; set COLLIDE_CACHE_DIR", None)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    return Check(what, f"{folder} ({count(len(files), 'file')}, {megabytes:.1f} MB)")
+
+
+# --- known answers ------------------------------------------------------------------------------
+
+
+def _answers() -> list[Check]:
+    """Each pair's bracket must hold the number geometry gives, and its boolean must agree."""
+    checks = []
+    for what, A, B, x, truth in _known_pairs():
+        try:
+            checks.append(_ask(what, A, B, x, truth))
+        except Exception as error:  # noqa: BLE001 - a doctor reports what is broken, whatever broke
+            checks.append(Check(what, f"{type(error).__name__}: {error}", False))
+    return checks
+
+
+def _known_pairs():
+    """(name, A, B, where B stands along x [m], true signed distance [m])."""
+    import collide
+
+    box, sphere = collide.Box((1.0, 1.0, 1.0)), collide.Sphere(0.5)
+    hull = collide.ConvexHull([(-0.5, 0, 0), (0.5, 0.5, 0), (0.5, -0.5, 0.5), (0.5, -0.5, -0.5)])
+    yield "two spheres apart", sphere, sphere, 3.0, 2.0
+    yield "two boxes apart", box, box, 1.5, 0.5
+    yield "two boxes overlapping", box, box, 0.75, -0.25
+    yield "box and sphere touching", box, sphere, 1.0, 0.0
+    yield "capsule and hull apart", collide.Capsule(0.25, 1.0), hull, 1.0, 0.25
+    yield "cylinder and box overlapping", collide.Cylinder(0.5, 2.0), box, 0.75, -0.25
+    yield "half-space and sphere apart", collide.Halfspace((1.0, 0.0, 0.0), 0.0), sphere, 1.5, 1.0
+
+
+def _ask(what: str, A, B, x: float, truth: float) -> Check:
+    import collide
+
+    X_WB = collide.pose((x, 0.0, 0.0))
+    r = collide.distance(A, B, collide.pose(), X_WB)
+    hit = collide.collide(A, B, collide.pose(), X_WB)
+    held = r.lower <= truth <= r.upper and bool(hit) == bool(r.hit) == (truth <= 0)
+    found = f"{r.distance!r} in [{r.lower!r}, {r.upper!r}]"
+    return Check(what, found if held else f"{found}, should be {truth!r}", held)

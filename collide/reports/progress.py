@@ -1,0 +1,97 @@
+"""One line about long work, on stderr, so that a pipe of results stays clean.
+
+On a terminal the line is rewritten with the seconds passed and cleared at the end. Elsewhere a
+stage that lasts is named once when it has lasted, and once when it is done.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from contextlib import contextmanager, nullcontext
+
+_TERMINAL_PATIENCE = 0.4
+_TICK = 0.2
+
+
+def silent(label: str):
+    """A progress that says nothing."""
+    return nullcontext()
+
+
+class Progress:
+    """``progress = Progress()``, then ``with progress("compiling kernels (once per version)"): ...``
+
+    Stages nest: the innermost is shown. ``patience`` [s] is how long a stage may last unannounced
+    where stderr is no terminal.
+    """
+
+    def __init__(self, stream=None, patience: float = 2.0):
+        self.stream = sys.stderr if stream is None else stream
+        self.terminal = bool(getattr(self.stream, "isatty", lambda: False)())
+        self.patience = patience
+        self._stages: list[_Stage] = []
+        self._wake = threading.Event()
+        self._shown = False
+
+    @contextmanager
+    def __call__(self, label: str):
+        stage = _Stage(label)
+        self._stages.append(stage)
+        if len(self._stages) == 1:
+            self._start()
+        try:
+            yield
+        finally:
+            self._stages.remove(stage)
+            if not self._stages:
+                self._stop()
+            if stage.announced:
+                self._write(f"collide: {label}: done in {stage.seconds:.1f} s\n")
+
+    def _start(self) -> None:
+        self._wake.clear()
+        self._thread = threading.Thread(target=self._watch, args=(self._wake,), daemon=True)
+        self._thread.start()
+
+    def _stop(self) -> None:
+        self._wake.set()
+        self._thread.join()
+        self._wake = threading.Event()
+        if self._shown:
+            self._write("\r\x1b[2K")
+            self._shown = False
+
+    def _watch(self, wake: threading.Event) -> None:
+        while not wake.wait(_TICK):
+            stages = self._stages[-1:]  # a copy: the other thread may empty the list meanwhile
+            for stage in stages:
+                self._show(stage)
+
+    def _show(self, stage: _Stage) -> None:
+        if self.terminal:
+            if stage.seconds >= _TERMINAL_PATIENCE:
+                self._shown = True
+                self._write(f"\r\x1b[2K{stage.label} … {stage.seconds:.0f} s")
+        elif stage.seconds >= self.patience and not stage.announced:
+            stage.announced = True
+            self._write(f"collide: {stage.label} ...\n")
+
+    def _write(self, text: str) -> None:
+        try:
+            self.stream.write(text)
+            self.stream.flush()
+        except UnicodeEncodeError:
+            self.stream.write(text.replace("…", "..."))
+        except (OSError, ValueError):  # stderr closed: progress is not worth an error
+            self.terminal = False
+
+
+class _Stage:
+    def __init__(self, label: str):
+        self.label, self.started, self.announced = label, time.monotonic(), False
+
+    @property
+    def seconds(self) -> float:
+        return time.monotonic() - self.started

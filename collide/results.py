@@ -1,0 +1,126 @@
+"""What queries return: structured arrays with documented dtypes, and the names that go with them.
+
+One row is one pair of bodies. The fields, with A the first body and B the second:
+
+=============== ===================================================================================
+a, b            ids of the bodies (0 and 1 for a pair query), a < b
+part_a, part_b  which convex part of each decided (0 where a body is one convex set)
+hit             the closed sets share a point
+certified       the sign is proven and the bracket keeps the promise of `collide.accuracy`
+beyond          the pair is farther apart than the query's max_distance; `distance` and `lower` are
+                then a proven lower bound ≥ max_distance, and `upper` is infinite
+how             which argument decided: an index into `HOW`
+iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis
+distance        signed [m]: the gap, or minus the depth
+lower, upper    lower ≤ true signed distance ≤ upper, proven against rounding [m]
+normal          (3,) unit vector nhat_AB_W: moving B by −distance·normal brings the pair to touch
+point_a,point_b (3,) witness points p_WAa, p_WBb [m]: point_b − point_a = distance · normal
+count           how many vertex pairs follow
+vertices_a, _b  (4,) ids of the core vertices that span the deciding feature, pair by pair: apart,
+                the features nearest each other; together, a simplex of A ⊖ B. −1 for curved cores
+=============== ===================================================================================
+
+Invariants, asserted in the tests: lower ≤ distance ≤ upper; hit ⇔ distance ≤ 0 where certified;
+|normal| = 1; `flipped(flipped(r))` is r.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: What `how` indexes. A proof stands against both poses as given, entries taken as exact reals.
+HOW = (
+    "undecided",          # the bracket reaches to both sides of 0: touching within rounding
+    "separating plane",   # a plane with all of A on one side and all of B on the other
+    "common point",       # a simplex of points of A ⊖ B around the origin, clear of rounding
+    "swept overlap",      # two core points nearer than the sum of the radii
+    "closed form",        # a formula with an error bound: spheres, capsules, half-spaces
+    "boxes apart",        # bounding boxes, rounded outwards, that do not meet
+)
+UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, BOXES = range(len(HOW))
+
+PAIR_DTYPE = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"),
+        ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3),
+        ("a", "i4"), ("b", "i4"), ("part_a", "i4"), ("part_b", "i4"),
+        ("vertices_a", "i4", 4), ("vertices_b", "i4", 4),
+        ("iterations", "i4"),
+        ("count", "u1"), ("how", "u1"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
+    ],
+    align=True,
+)
+
+
+def flipped(rows: np.ndarray) -> np.ndarray:
+    """The same results with the bodies' roles exchanged: points swapped, normals negated, exactly."""
+    swapped = rows.copy()
+    for one, other in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("vertices_a", "vertices_b")):
+        swapped[one], swapped[other] = rows[other], rows[one]
+    swapped["normal"] = 0.0 - rows["normal"]  # never −0.0
+    return swapped
+
+
+class PairResult:
+    """Answer of a pair query: the fields of `PAIR_DTYPE` as attributes.
+
+    Scalars and (3,) arrays for single poses; arrays with a leading N for batches. ``rows`` is the
+    structured array itself.
+    """
+
+    __slots__ = ("_single", "rows")
+
+    def __init__(self, rows: np.ndarray, single: bool):
+        self.rows, self._single = rows, single
+
+    def __getattr__(self, name: str):
+        if name not in PAIR_DTYPE.names:
+            raise AttributeError(f"no field {name!r}; there are {', '.join(PAIR_DTYPE.names)}")
+        values = self.rows[name]
+        if not self._single:
+            return values
+        return values[0].copy() if values.ndim > 1 else values[0].item()
+
+    def __dir__(self):
+        return [*super().__dir__(), *PAIR_DTYPE.names]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __repr__(self) -> str:
+        if self._single:
+            row = self.rows[0]
+            return (
+                f"PairResult(distance={float(row['distance'])!r}, hit={bool(row['hit'])}, "
+                f"certified={bool(row['certified'])}, how={HOW[row['how']]!r})"
+            )
+        return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
+
+
+class WorldResult:
+    """Rows of a World query, sorted by (a, b), with the bodies' names.
+
+    Indexing by a field name gives that column; ``names`` resolves the ids.
+    """
+
+    __slots__ = ("_names", "rows")
+
+    def __init__(self, rows: np.ndarray, names: dict[int, str]):
+        self.rows, self._names = rows, names
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __getitem__(self, key):
+        return self.rows[key]
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """(name of a, name of b), row by row."""
+        return [(self._names[int(a)], self._names[int(b)]) for a, b in zip(self.rows["a"], self.rows["b"])]
+
+    def __repr__(self) -> str:
+        return f"WorldResult({len(self.rows)} rows, {int(self.rows['hit'].sum())} hits)"

@@ -1,0 +1,149 @@
+"""What all shapes share: immutability, value equality, pickling, and checks of their numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from collide.errors import InvalidShape
+from collide.geometry.packing import PackedConvex
+from collide.transforms import LARGEST, SMALLEST
+
+
+class Shape:
+    """A set of points in its own frame; immutable, picklable, compared by value.
+
+    Subclasses name their constructor arguments in ``_fields`` and store each under its name.
+    """
+
+    __slots__ = ("_parts",)
+    _fields: tuple[str, ...] = ()
+
+    #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
+    convex = True
+
+    def _store(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable; make a new one instead of setting {name}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable; {name} cannot be deleted")
+
+    def __reduce__(self):
+        return _rebuild, (type(self), tuple(getattr(self, f) for f in self._fields))
+
+    def _key(self) -> tuple:
+        return tuple(_hashable(getattr(self, f)) for f in self._fields)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self._key() == other._key()  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((type(self).__name__, self._key()))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
+        return f"{type(self).__name__}({shown})"
+
+    def parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        """The convex sets whose union this is, each with its (4, 4) pose in the shape's frame.
+
+        Packed when first asked for and kept, since a shape never changes.
+        """
+        try:
+            return self._parts
+        except AttributeError:
+            object.__setattr__(self, "_parts", self._pack())
+            return self._parts
+
+    def _pack(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        raise TypeError(f"{type(self).__name__} cannot be asked about: derive it from Shape and define _pack")
+
+
+def alone(packed: PackedConvex) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+    """The parts of a shape that is one convex set in its own frame."""
+    return ((packed, _IDENTITY),)
+
+
+_IDENTITY = np.eye(4)
+_IDENTITY.flags.writeable = False
+
+
+def _rebuild(cls, values):
+    return cls._from_fields(*values) if hasattr(cls, "_from_fields") else cls(*values)
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # + 0.0: −0.0 and 0.0 are one number
+    return value
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray) and value.size > 4:
+        return f"<{'×'.join(map(str, value.shape))} array>"
+    if isinstance(value, tuple) and len(value) > 2:
+        return f"<{len(value)} items>"
+    return str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
+
+
+# --- checks, each naming shape, field and value -------------------------------------------------
+
+
+def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float:
+    """A finite length [m]: > 0, or ≥ 0 where ``zero`` allows it, of a magnitude we can square."""
+    number = scalar(shape, field, value)
+    if zero and number == 0.0:
+        return 0.0
+    if not number > 0:
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {value!r}")
+    if not SMALLEST <= number <= LARGEST:
+        raise InvalidShape(
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {value!r}; scale the scene"
+        )
+    return number
+
+
+def scalar(shape: str, field: str, value: Any) -> float:
+    """A finite real number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidShape(f"{shape}: {field} must be a number, got {value!r}") from None
+    if not math.isfinite(number):
+        raise InvalidShape(f"{shape}: {field} must be finite, got {value!r}")
+    if abs(number) > LARGEST:
+        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {value!r}; scale the scene")
+    return number
+
+
+def vector(shape: str, field: str, value: Any) -> np.ndarray:
+    """Three finite numbers, as a read-only array."""
+    array = rows(shape, field, value, (3,))
+    return array
+
+
+def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
+    """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
+    shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InvalidShape(f"{shape}: {field} must be numbers of shape {shown}, got {type(value).__name__}") from None
+    if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
+        raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
+    if array.shape[0] == 0:
+        raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
+    bad = ~(np.abs(array) <= LARGEST)
+    if bad.any():
+        where = tuple(int(k) for k in np.argwhere(bad)[0])
+        raise InvalidShape(
+            f"{shape}: {field}{list(where)} is {array[where]}; entries must be finite and within ±{LARGEST:g}"
+        )
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,69 @@
+"""Compound: the union of posed shapes, for bodies that are not convex."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import InvalidPose, InvalidShape
+from collide.geometry.packing import PackedConvex
+from collide.shapes.base import Shape
+from collide.transforms import as_poses
+
+#: One product of two poses rounds each coordinate of a point by at most this many units in the
+#: last place of its terms: three products and three sums for the rotation, one more for the shift.
+_ULPS_PER_PRODUCT = 8
+_ULP = 2.0**-53
+
+
+class Compound(Shape):
+    """The union of shapes, each at its own pose.
+
+    items : sequence of ``(shape, X_CS)``: a shape S and its (4, 4) pose in the compound's frame C.
+        Compounds may be nested.
+
+    Nested poses are multiplied out in float64; the rounding is accounted for in every bracket.
+    """
+
+    __slots__ = _fields = ("items",)
+
+    def __init__(self, items):
+        try:
+            pairs = [(shape, X) for shape, X in items]
+        except (TypeError, ValueError):
+            raise InvalidShape("Compound: items must be a sequence of (shape, pose) pairs") from None
+        if not pairs:
+            raise InvalidShape("Compound: items is empty; at least one (shape, pose) is needed")
+        self._store(items=tuple(_check_item(k, shape, X) for k, (shape, X) in enumerate(pairs)))
+
+    @property
+    def convex(self) -> bool:  # type: ignore[override]
+        """True for a compound of one convex shape."""
+        return len(self.parts()) == 1
+
+    def _key(self) -> tuple:
+        return tuple((shape, (X + 0.0).tobytes()) for shape, X in self.items)
+
+    def _pack(self):
+        return tuple(
+            _placed(packed, X_CS, X_SP) for shape, X_CS in self.items for packed, X_SP in shape.parts()
+        )
+
+
+def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
+    if not isinstance(shape, Shape):
+        raise InvalidShape(f"Compound: items[{k}] must start with a shape, got {type(shape).__name__}")
+    X = as_poses(X, f"Compound: items[{k}] pose")
+    if len(X) != 1:
+        raise InvalidPose(f"Compound: items[{k}] pose must be one (4, 4) matrix, got {len(X)}")
+    X = X[0].copy()
+    X.flags.writeable = False
+    return shape, X
+
+
+def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> tuple[PackedConvex, np.ndarray]:
+    """A part in the compound's frame, its slop grown by what the product of poses rounds."""
+    if np.array_equal(X_SP, np.eye(4)):
+        return packed, X_CS
+    X_CP = X_CS @ X_SP
+    scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()
+    return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP

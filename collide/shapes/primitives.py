@@ -1,0 +1,151 @@
+"""Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, Halfspace: shapes of a few numbers.
+
+All are centred at the origin of their frame, with their axis along z; lengths are full lengths
+in metres, as in MuJoCo's documentation of "size" they are not.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from collide.errors import InvalidShape
+from collide.geometry.packing import (
+    CONE,
+    CYLINDER,
+    ELLIPSOID,
+    pack_curved,
+    pack_halfspace,
+    pack_points,
+)
+from collide.shapes.base import Shape, alone, positive, rows, scalar, vector
+
+
+class Sphere(Shape):
+    """A ball around the origin.
+
+    radius : [m], > 0. A Euclidean ball in the world, whatever the pose's rounding.
+    """
+
+    __slots__ = _fields = ("radius",)
+
+    def __init__(self, radius: float):
+        self._store(radius=positive("Sphere", "radius", radius))
+
+    def _pack(self):
+        return alone(pack_points(np.zeros((1, 3)), self.radius))
+
+
+class Box(Shape):
+    """A box centred at the origin, its faces across the axes.
+
+    size : (3,) full edge lengths [m], each > 0.
+    """
+
+    __slots__ = _fields = ("size",)
+
+    def __init__(self, size):
+        size = vector("Box", "size", size)
+        for axis, length in zip("xyz", size):
+            positive("Box", f"size.{axis}", length)
+        self._store(size=size)
+
+    def _pack(self):
+        signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+        return alone(pack_points(signs * self.size))
+
+
+class Capsule(Shape):
+    """All points within ``radius`` of a segment along z, centred at the origin.
+
+    radius : [m], > 0.   length : of the segment, without the caps [m], ≥ 0.
+    """
+
+    __slots__ = _fields = ("radius", "length")
+
+    def __init__(self, radius: float, length: float):
+        self._store(
+            radius=positive("Capsule", "radius", radius),
+            length=positive("Capsule", "length", length, zero=True),
+        )
+
+    def _pack(self):
+        half = 0.5 * self.length
+        ends = np.array([(0.0, 0.0, -half), (0.0, 0.0, half)])[: 2 if half else 1]
+        return alone(pack_points(ends, self.radius))
+
+
+class Cylinder(Shape):
+    """A solid cylinder along z, centred at the origin.
+
+    radius : [m], > 0.   length : full length [m], > 0.
+    """
+
+    __slots__ = _fields = ("radius", "length")
+
+    def __init__(self, radius: float, length: float):
+        self._store(
+            radius=positive("Cylinder", "radius", radius), length=positive("Cylinder", "length", length)
+        )
+
+    def _pack(self):
+        half = 0.5 * self.length
+        return alone(pack_curved(CYLINDER, (self.radius, half), math.hypot(self.radius, half)))
+
+
+class Cone(Shape):
+    """A solid cone along z: apex at +z·length/2, base of ``radius`` at −z·length/2.
+
+    radius : of the base [m], > 0.   length : from base to apex [m], > 0.
+    """
+
+    __slots__ = _fields = ("radius", "length")
+
+    def __init__(self, radius: float, length: float):
+        self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
+
+    def _pack(self):
+        half = 0.5 * self.length
+        return alone(pack_curved(CONE, (self.radius, half), math.hypot(self.radius, half)))
+
+
+class Ellipsoid(Shape):
+    """{x : Σ (x_k / radii_k)² ≤ 1}.
+
+    radii : (3,) semi-axes along x, y, z [m], each > 0.
+    """
+
+    __slots__ = _fields = ("radii",)
+
+    def __init__(self, radii):
+        radii = vector("Ellipsoid", "radii", radii)
+        for axis, length in zip("xyz", radii):
+            positive("Ellipsoid", f"radii.{axis}", length)
+        self._store(radii=radii)
+
+    def _pack(self):
+        return alone(pack_curved(ELLIPSOID, tuple(self.radii), float(self.radii.max())))
+
+
+class Halfspace(Shape):
+    """{x : normal·x ≤ offset}: everything behind a plane, without end.
+
+    normal : (3,) pointing out of the solid; any length but zero, kept as given.
+    offset : in the same units as normal·x (metres, where the normal has length 1).
+    """
+
+    __slots__ = _fields = ("normal", "offset")
+
+    def __init__(self, normal, offset: float):
+        normal = rows("Halfspace", "normal", normal, (3,))
+        length = float(np.linalg.norm(normal))
+        if not 1e-6 <= length <= 1e6:
+            raise InvalidShape(
+                f"Halfspace: normal must have a length within [1e-6, 1e6] (1 is usual), got {length:g}"
+            )
+        self._store(normal=normal, offset=scalar("Halfspace", "offset", offset))
+
+    def _pack(self):
+        return alone(pack_halfspace(tuple(self.normal), self.offset))

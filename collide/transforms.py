@@ -1,0 +1,156 @@
+"""Rigid transforms, and the notation every file of collide uses.
+
+Frames stand in the names, as Drake writes them:
+
+======== =========================================================================
+X_WA     pose of frame A in the world W: a (4, 4) matrix, ``p_Wq = X_WA @ p_Aq``
+R_WA     its rotation, (3, 3): the columns are A's axes in W
+p_WA     its translation, (3,): A's origin in W
+p_WAq    position from A's origin to the point q, in W's axes
+nhat_AB_W unit vector from A towards B, in W's axes
+X_WAs    a batch of poses, (N, 4, 4)
+======== =========================================================================
+
+Frames cancel from left to right: ``X_WC = X_WA @ X_AB @ X_BC``. Units are metres and radians.
+
+The numbers given are the problem: a matrix is used as it stands, entry by entry, and is never
+re-orthonormalised. `as_poses` refuses what is too far from a rotation to be one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import InvalidPose
+
+#: How far ``R.T @ R`` may be from the identity, in its largest entry.
+ROTATION_TOLERANCE = 1e-4
+#: Coordinates beyond this are refused: products of six of them must stay finite.
+LARGEST = 1e50
+#: Positive sizes below this are refused, for the same reason at the other end.
+SMALLEST = 1e-50
+
+
+def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, R=None) -> np.ndarray:
+    """A (4, 4) pose from a translation [m] and one of three descriptions of a rotation.
+
+    Parameters
+    ----------
+    xyz : (3,) translation [m].
+    rpy : (3,) roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them.
+    quat_wxyz : (4,) quaternion, scalar first; normalised here, because a quaternion file
+        format carries rounded digits and means the rotation.
+    R : (3, 3) rotation, used as it stands.
+    """
+    if sum(option is not None for option in (rpy, quat_wxyz, R)) > 1:
+        raise InvalidPose("pose: give at most one of rpy, quat_wxyz and R")
+    X = np.eye(4)
+    if rpy is not None:
+        X[:3, :3] = _rotation_from_rpy(_finite("rpy", rpy, (3,)))
+    elif quat_wxyz is not None:
+        X[:3, :3] = _rotation_from_quaternion(_finite("quat_wxyz", quat_wxyz, (4,)))
+    elif R is not None:
+        X[:3, :3] = _finite("R", R, (3, 3))
+    X[:3, 3] = _finite("xyz", xyz, (3,))
+    return as_poses(X, "pose")[0]
+
+
+def _finite(name: str, values, shape) -> np.ndarray:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidPose(f"pose: {name} must be numbers of shape {shape}, got {values!r}") from None
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {values!r}")
+    return array
+
+
+def _rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
+    norm = np.linalg.norm(q)
+    if not norm > 1e-6:
+        raise InvalidPose(f"pose: a quaternion of length {norm:g} names no rotation, got {q.tolist()}")
+    w, x, y, z = q / norm
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def as_poses(X, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
+    """Poses as a C-contiguous float64 batch (N, 4, 4); a single pose gives N = 1.
+
+    Parameters
+    ----------
+    X : (4, 4) or (N, 4, 4) homogeneous matrices, or a tuple ``(R, t)`` of a (3, 3) rotation and
+        a (3,) translation (either with a leading N).
+    name : how error messages call the argument.
+    check : refuse matrices with max|RᵀR − I| > 1e-4 or det ≤ 0. Finite numbers and the last row
+        are always checked.
+
+    Raises
+    ------
+    InvalidPose : names the argument, the entry of the batch and the offending value.
+    """
+    X = _from_tuple(X, name) if isinstance(X, tuple) else _to_floats(X, name)
+    if X.ndim not in (2, 3) or X.shape[-2:] != (4, 4):
+        raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {X.shape}")
+    X = np.ascontiguousarray(X.reshape(-1, 4, 4))
+    _refuse(~np.isfinite(X).all(axis=(1, 2)), X, name, "has entries that are not finite")
+    _refuse((X[:, 3] != (0, 0, 0, 1)).any(axis=1), X, name, "must end in the row (0, 0, 0, 1)")
+    _refuse((np.abs(X[:, :3]) > LARGEST).any(axis=(1, 2)), X, name, f"exceeds {LARGEST:g}")
+    if check:
+        _check_rotations(X, name)
+    return X
+
+
+def _to_floats(X, name: str) -> np.ndarray:
+    try:
+        return np.asarray(X, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidPose(f"{name} must be a (4, 4) matrix of numbers, got {X!r}") from None
+
+
+def _from_tuple(X: tuple, name: str) -> np.ndarray:
+    if len(X) != 2:
+        raise InvalidPose(f"{name}: a tuple must be (R, t), got {len(X)} items")
+    R, t = _to_floats(X[0], name), _to_floats(X[1], name)
+    if R.shape[-2:] != (3, 3) or t.shape[-1:] != (3,) or R.ndim > 3 or t.ndim > 2:
+        raise InvalidPose(f"{name}: (R, t) must have shapes (3, 3) and (3,), got {R.shape} and {t.shape}")
+    try:
+        batch = np.broadcast_shapes(R.shape[:-2], t.shape[:-1])
+    except ValueError:
+        raise InvalidPose(f"{name}: batches of R {R.shape} and t {t.shape} do not match") from None
+    full = np.zeros((*batch, 4, 4))
+    full[..., :3, :3], full[..., :3, 3], full[..., 3, 3] = R, t, 1.0
+    return full
+
+
+def _check_rotations(X: np.ndarray, name: str) -> None:
+    R = X[:, :3, :3]
+    off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
+    _refuse(
+        off > ROTATION_TOLERANCE, X, name,
+        f"is not a rotation: |RᵀR − I| exceeds {ROTATION_TOLERANCE:g} (check_poses=False skips this)",
+    )
+    _refuse(np.linalg.det(R) <= 0, X, name, "mirrors (determinant ≤ 0): a rigid pose must not")
+
+
+def _refuse(bad: np.ndarray, X: np.ndarray, name: str, complaint: str) -> None:
+    if bad.any():
+        k = int(np.argmax(bad))
+        where = f"{name}[{k}]" if len(X) > 1 else name
+        raise InvalidPose(f"{where} {complaint}, got {X[k].tolist()}")

@@ -1,0 +1,112 @@
+"""Bodies that are unions of convex sets: one answer from the answers of their parts.
+
+Apart, the distance of two unions is the least one of their parts. Overlapping, the smallest
+separating translation has no such formula; what is reported is a translation that separates the
+hulls of both bodies along the best of the parts' normals, which is a proven upper bound, beside
+the proven lower bound that each overlapping pair of parts must come apart.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.geometry.packing import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
+from collide.narrowphase.bounds import ERROR
+from collide.results import PAIR_DTYPE
+
+#: Normals of overlapping parts that are tried as the way out of a union, deepest first.
+_NORMALS_TRIED = 8
+
+
+class Union:
+    """The convex parts of one posed body: shapes, and their rows of a pose table."""
+
+    def __init__(self, packed: list[PackedConvex], poses: np.ndarray):
+        self.packed, self.poses = packed, poses
+
+    def extent(self, n: np.ndarray) -> tuple[float, float]:
+        """(support value of the whole body along unit n, its error), both in the world."""
+        value, size = -math.inf, 0.0
+        for packed, row in zip(self.packed, self.poses):
+            value = max(value, _extent(packed, row, n))
+            size = max(size, 2 * packed.reach + packed.radius + float(np.abs(row[9:12]).sum()))
+        slop = max(p.slop for p in self.packed) + float(self.poses[:, 12].max())
+        return value, ERROR * size + slop
+
+
+def _extent(packed: PackedConvex, row: np.ndarray, n: np.ndarray) -> float:
+    R, t = row[:9].reshape(3, 3), row[9:12]
+    g = R.T @ n
+    p = packed.params
+    if packed.kind == POINTS:
+        core = float((packed.points @ g).max())
+    elif packed.kind == ELLIPSOID:
+        core = float(np.linalg.norm(p[:3] * g))
+    elif packed.kind == CYLINDER:
+        core = p[0] * math.hypot(g[0], g[1]) + p[1] * abs(g[2])
+    elif packed.kind == CONE:
+        core = max(p[1] * g[2], p[0] * math.hypot(g[0], g[1]) - p[1] * g[2])
+    else:
+        assert packed.kind == HALFSPACE
+        return math.inf  # bounded in one direction only, which a rounded normal never is
+    return core + float(t @ n) + packed.radius
+
+
+def combine(rows: np.ndarray, starts: np.ndarray, sides) -> np.ndarray:
+    """One row a body pair from rows of part pairs.
+
+    Parameters
+    ----------
+    rows : PAIR_DTYPE, the part pairs of a body pair standing together.
+    starts : first row of each body pair.
+    sides : callable k → (Union A, Union B) of body pair k; asked only where unions overlap.
+    """
+    if len(starts) == len(rows):
+        return rows
+    ends = np.append(starts[1:], len(rows))
+    out = np.empty(len(starts), dtype=PAIR_DTYPE)
+    for k, (start, end) in enumerate(zip(starts, ends)):
+        group = rows[start:end]
+        out[k] = group[0] if len(group) == 1 else _nearest(group, lambda k=k: sides(k))
+    return out
+
+
+def _nearest(group: np.ndarray, sides) -> np.ndarray:
+    """The row of the nearest pair of parts, its bracket widened to hold for the unions."""
+    row = group[np.argmin(group["distance"])].copy()
+    row["lower"], row["upper"] = group["lower"].min(), group["upper"].min()
+    row["hit"] = group["hit"].any()
+    rivals = group[group["lower"] <= row["upper"]]
+    row["certified"] = bool(rivals["certified"].all())
+    row["iterations"] = min(int((group["iterations"] & 0xFFFF).sum()), 0xFFFF) | (
+        min(int((group["iterations"] >> 16).sum()), 0x7FFF) << 16
+    )
+    if row["upper"] < 0.0:
+        width = float(row["upper"] - row["lower"])
+        _way_out(row, group, *sides())
+        row["certified"] = row["certified"] and float(row["upper"] - row["lower"]) <= 2.0 * width
+    return row
+
+
+def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> None:
+    """Replace distance, lower and normal by the best translation that separates both unions."""
+    hits = group[group["upper"] < 0.0]
+    best = math.inf
+    for k in np.argsort(hits["distance"], kind="stable")[:_NORMALS_TRIED]:
+        n = hits["normal"][k]
+        reach_a, error_a = A.extent(n)
+        reach_b, error_b = B.extent(-n)
+        depth, error = reach_a + reach_b, error_a + error_b
+        if depth + error < best:
+            best = depth + error
+            row["normal"], row["point_a"] = n, hits["point_a"][k]
+            row["part_a"], row["part_b"] = hits["part_a"][k], hits["part_b"][k]
+            row["distance"], row["lower"] = min(-depth, row["upper"]), -depth - error
+    if math.isinf(best):
+        row["distance"] = row["lower"] = -math.inf
+    else:
+        row["point_b"] = row["point_a"] + row["distance"] * row["normal"]
+
+

@@ -1,0 +1,292 @@
+"""World: bodies with names and poses, filters between them, and queries over all pairs."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from collide import _jit
+from collide.broadphase.filters import CULLED, count_skipped
+from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.packed_world import PackedWorld
+from collide.query import check_distance
+from collide.results import HOW, UNDECIDED, WorldResult
+from collide.shapes.base import Shape
+from collide.transforms import as_poses
+
+#: Groups and masks are bit sets of this many bits.
+_BITS = 32
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of a World, as it stands now."""
+
+    id: int
+    name: str
+    shape: Shape
+    X_WB: np.ndarray
+    static: bool
+    group: int
+    mask: int
+
+
+class World:
+    """Bodies that may touch, and the questions one asks of them.
+
+    A pair of bodies is tested unless both are static, their groups and masks exclude each other
+    (tested when ``(group_A & mask_B) and (group_B & mask_A)``), or `allow` names the pair.
+
+        world = collide.World()
+        world.add(collide.Box((2, 1, 0.04)), pose_of_table, name="table", static=True)
+        world.add(collide.Sphere(0.1), pose_of_ball, name="ball")
+        for row, (a, b) in zip(rows := world.distances(max_distance=0.05), rows.names): ...
+
+    Packed arrays and the box-tree are made when a query first needs them, and again when bodies
+    change; moving bodies refits. A World is not safe to change from one thread while another asks.
+    """
+
+    def __init__(self) -> None:
+        self._bodies: dict[int, Body] = {}
+        self._ids: dict[str, int] = {}
+        self._allowed: dict[tuple[int, int], str] = {}
+        self._next = 0
+        self._packed: PackedWorld | None = None
+        self._moved = False
+        self._stats: dict = {}
+
+    # --- bodies ---------------------------------------------------------------------------------
+
+    def add(
+        self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
+        mask: int = 0xFFFF,
+    ) -> int:  # fmt: skip
+        """Add a body; returns its id, which is never used again.
+
+        shape : any shape.   X_WB : (4, 4) pose in the world, the identity if left out.
+        name : unique; "body 7" and so on if left out.   static : never tested against other static bodies.
+        group, mask : bit sets of up to 32 bits.
+        """
+        if not isinstance(shape, Shape):
+            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
+        X_WB = _one_pose(np.eye(4) if X_WB is None else X_WB, "World.add: X_WB")
+        identity = self._next
+        name = f"body {identity}" if name is None else name
+        if not isinstance(name, str) or not name:
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {name!r}")
+        if name in self._ids:
+            raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
+        body = Body(identity, name, shape, X_WB, bool(static), _bits("group", group), _bits("mask", mask))
+        self._bodies[identity], self._ids[name] = body, identity
+        self._next += 1
+        self._packed = None
+        return identity
+
+    def remove(self, body: int | str) -> None:
+        """Take a body out, and what was allowed for it."""
+        identity = self._id(body)
+        del self._ids[self._bodies.pop(identity).name]
+        self._allowed = {pair: why for pair, why in self._allowed.items() if identity not in pair}
+        self._packed = None
+
+    def set_pose(self, body: int | str, X_WB) -> None:
+        """Move a body to a (4, 4) pose."""
+        self._move(self._id(body), _one_pose(X_WB, "World.set_pose: X_WB"))
+
+    def set_poses(self, bodies: Iterable[int | str], X_WBs) -> None:
+        """Move k bodies to k poses (k, 4, 4)."""
+        ids = [self._id(body) for body in bodies]
+        X_WBs = as_poses(X_WBs, "World.set_poses: X_WBs")
+        if len(X_WBs) != len(ids):
+            raise InvalidPose(f"World.set_poses: {len(ids)} bodies but {len(X_WBs)} poses")
+        for identity, X_WB in zip(ids, X_WBs):
+            self._move(identity, _read_only(X_WB))
+
+    def _move(self, identity: int, X_WB: np.ndarray) -> None:
+        body = self._bodies[identity]
+        self._bodies[identity] = Body(identity, body.name, body.shape, X_WB, body.static, body.group, body.mask)
+        self._moved = True
+
+    def allow(self, a, b=None, *, reason: str = "allowed") -> None:
+        """Never test a pair: ``allow("link3", "link4")``; or many, by a symmetric boolean matrix over
+        the bodies in the order of `ids`: ``allow(matrix)``.
+
+        reason : a few words; `stats` counts skipped pairs under it.
+        """
+        if b is None:
+            self._allow_matrix(np.asarray(a), reason)
+            return
+        i, j = self._id(a), self._id(b)
+        if i == j:
+            raise InvalidArgument(f'World.allow: "{self._bodies[i].name}" twice; a body is never tested against itself')
+        self._allowed.setdefault((min(i, j), max(i, j)), str(reason))
+        self._packed = None
+
+    def _allow_matrix(self, matrix: np.ndarray, reason: str) -> None:
+        n = len(self._bodies)
+        if matrix.shape != (n, n) or matrix.dtype != bool or (matrix != matrix.T).any():
+            raise InvalidArgument(
+                f"World.allow: a matrix must be symmetric, boolean and ({n}, {n}) for the {n} bodies, "
+                f"got {matrix.dtype} {matrix.shape}"
+            )
+        ids = self.ids
+        for i, j in np.argwhere(np.triu(matrix, 1)):
+            self._allowed.setdefault((ids[i], ids[j]), str(reason))
+        self._packed = None
+
+    def _id(self, body: int | str) -> int:
+        if isinstance(body, str):
+            if body in self._ids:
+                return self._ids[body]
+            known = ", ".join(sorted(self._ids)[:12]) or "none"
+            raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
+        try:
+            identity = int(body)
+        except (TypeError, ValueError):
+            raise UnknownBody(f"a body is named by its id or its name, got {body!r}") from None
+        if identity not in self._bodies:
+            raise UnknownBody(f"no body has id {identity}; it may have been removed")
+        return identity
+
+    def __len__(self) -> int:
+        return len(self._bodies)
+
+    @property
+    def ids(self) -> list[int]:
+        """Ids of all bodies, ascending."""
+        return list(self._bodies)
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Name of each body, by id."""
+        return {identity: body.name for identity, body in self._bodies.items()}
+
+    def body(self, body: int | str) -> Body:
+        """The body of this id or name."""
+        return self._bodies[self._id(body)]
+
+    # --- queries --------------------------------------------------------------------------------
+
+    def collides(self) -> bool:
+        """Whether any tested pair hits; stops at the first that does."""
+        rows, _ = self._ask(0.0, boolean=True, stop_at_hit=True)
+        return bool(rows["hit"].any())
+
+    def collisions(self) -> WorldResult:
+        """Every hitting pair with its depth, sorted by (a, b)."""
+        rows, _ = self._ask(0.0)
+        return WorldResult(rows[rows["hit"]], self.names)
+
+    def distances(self, max_distance: float = math.inf) -> WorldResult:
+        """Every tested pair at most ``max_distance`` [m] apart, hits included, sorted by (a, b).
+
+        Two half-spaces that meet have distance −inf.
+        """
+        limit = check_distance("World.distances: max_distance", max_distance)
+        rows, _ = self._ask(limit)
+        return WorldResult(rows[rows["distance"] <= limit], self.names)
+
+    def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
+        """One outside shape S against every body: pairs at most ``max_distance`` apart.
+
+        Field a is −1 for the outside shape, b the body; normals point from the shape to the body.
+        Filters do not apply.
+        """
+        limit = check_distance("World.query: max_distance", max_distance)
+        if not isinstance(shape, Shape):
+            raise InvalidArgument(f"World.query: shape must be a shape, got {shape!r}")
+        X_WS = _one_pose(X_WS, "World.query: X_WS")
+        rows = self._pack().against(shape, X_WS, limit)
+        rows = rows[rows["distance"] <= limit]
+        ids = np.array([*self._bodies, -1], dtype=np.int32)
+        rows["b"] = ids[rows["b"]]
+        rows["a"] = -1
+        return WorldResult(rows, {**self.names, -1: "query"})
+
+    @property
+    def stats(self) -> dict:
+        """What the last collides, collisions or distances tested, culled, skipped, decided and took.
+
+        bodies, static, pairs (of all bodies), skipped {reason: pairs}, narrowphase (pairs of bodies
+        answered), convex_pairs (of their parts), hits, undecided, how {argument: pairs},
+        gjk_iterations, epa_iterations, seconds {compile, pack, broadphase, narrowphase}.
+        """
+        return self._stats
+
+    def _ask(self, limit: float, *, boolean: bool = False, stop_at_hit: bool = False):
+        compiling = sum(_jit.seconds.values())
+        started = time.perf_counter()
+        packed = self._pack()
+        ready = time.perf_counter()
+        candidates = packed.candidates(limit)
+        culled = time.perf_counter()
+        rows, convex_pairs, answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        ended = time.perf_counter()
+        compiled = sum(_jit.seconds.values()) - compiling
+        seconds = {
+            "compile": compiled, "pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled,
+        }  # fmt: skip
+        self._take_compilation_out(seconds, compiled)
+        self._stats = self._summary(packed, candidates, rows, convex_pairs, answered, seconds)
+        ids = np.array(list(self._bodies), dtype=np.int32)
+        rows["a"], rows["b"] = ids[rows["a"]], ids[rows["b"]]
+        return rows, packed
+
+    @staticmethod
+    def _take_compilation_out(seconds: dict, compiled: float) -> None:
+        """Kernels compile at their first call, within a stage: charge the stage for its own work only."""
+        for stage in ("narrowphase", "pack", "broadphase"):
+            own = min(compiled, seconds[stage])
+            seconds[stage] -= own
+            compiled -= own
+
+    def _summary(self, packed, candidates, rows, convex_pairs: int, answered: int, seconds: dict) -> dict:
+        n = len(self._bodies)
+        skipped = count_skipped(packed.static, packed.group, packed.mask, packed.allowed)
+        pairs = n * (n - 1) // 2
+        skipped[CULLED] = pairs - sum(skipped.values()) - len(candidates)
+        iterations = rows["iterations"]
+        return {
+            "bodies": n, "static": int(packed.static.sum()), "pairs": pairs, "skipped": skipped,
+            "narrowphase": answered, "convex_pairs": convex_pairs, "hits": int(rows["hit"].sum()),
+            "undecided": int((rows["how"] == UNDECIDED).sum()),
+            "how": dict(Counter(HOW[how] for how in rows["how"])),
+            "gjk_iterations": int((iterations & 0xFFFF).sum()), "epa_iterations": int((iterations >> 16).sum()),
+            "seconds": seconds,
+        }  # fmt: skip
+
+    def _pack(self) -> PackedWorld:
+        if self._packed is None:
+            position = {identity: k for k, identity in enumerate(self._bodies)}
+            allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
+            self._packed = PackedWorld(list(self._bodies.values()), allowed)
+        elif self._moved:
+            self._packed.move(np.array([body.X_WB for body in self._bodies.values()]).reshape(-1, 4, 4))
+        self._moved = False
+        return self._packed
+
+
+def _one_pose(X, name: str) -> np.ndarray:
+    X = as_poses(X, name)
+    if len(X) != 1:
+        raise InvalidPose(f"{name} must be one (4, 4) pose, got {len(X)}")
+    return _read_only(X[0])
+
+
+def _read_only(X: np.ndarray) -> np.ndarray:
+    X = X.copy()
+    X.flags.writeable = False
+    return X
+
+
+def _bits(field: str, value) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {value!r}")
+    return int(value)
+
+

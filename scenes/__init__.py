@@ -1,0 +1,63 @@
+"""Scenes: files and generators in, bodies with poses out.
+
+    from collide.scenes import load, generate
+    scene = load("panda_workbench")         # a shipped scene, a path, or several paths
+    scene.world().distances(max_distance=0.05)
+
+`load` reads URDF with SRDF, MoveIt planning scenes, meshes and the project's own scene files
+(docs/scene-format.md); `generate` makes seeded scenes. Importing this package imports numpy alone:
+each format's library is loaded when a file needs it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collide.scenes.description import Scene, SceneBody
+    from collide.scenes.generators import generate
+    from collide.scenes.loaders.dispatch import load
+
+__all__ = ["Scene", "SceneBody", "generate", "load", "path", "shipped"]
+
+_HOME = {
+    "Scene": "collide.scenes.description",
+    "SceneBody": "collide.scenes.description",
+    "generate": "collide.scenes.generators",
+    "load": "collide.scenes.loaders.dispatch",
+}
+_SUFFIXES = (".yaml", ".json")
+
+
+def shipped() -> list[str]:
+    """Names of the scenes that come with collide, sorted; `load` takes each of them."""
+    return sorted(file.stem for file in _assets().iterdir() if file.suffix in _SUFFIXES)
+
+
+def path(name: str) -> Path:
+    """The file of a shipped scene, to be copied and changed; SceneError lists the names."""
+    from collide.errors import SceneError
+
+    for suffix in _SUFFIXES:
+        file = _assets() / (name + suffix)
+        if file.is_file():
+            return file
+    raise SceneError(f"no shipped scene is called {name!r}; there are {', '.join(shipped())}")
+
+
+def _assets() -> Path:
+    return Path(__file__).resolve().parent / "assets"
+
+
+def __getattr__(name: str):
+    if name not in _HOME:
+        raise AttributeError(f"module 'collide.scenes' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,249 @@
+"""Scene: which bodies there are and where they stand, as every loader and generator describes it.
+
+A scene is plain data: bodies, pairs never tested, notes for the person who reads the report, and
+the robots with their named joint values. It knows no file format and computes no collision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide.errors import InvalidArgument, SceneError
+from collide.shapes.base import Shape
+
+if TYPE_CHECKING:
+    from collide.robot import LinkShape, Robot
+    from collide.world import World
+
+
+@dataclass
+class SceneBody:
+    """One body.
+
+    X_WB : (4, 4) pose in the world.
+    static : never moves; two static bodies are not tested against each other.
+    group, mask : 16 bits each: a pair is tested when (group_a & mask_b) and (group_b & mask_a).
+    source : where it is described, ``file: element``.
+    approximation : what the shape leaves out of the thing described, None when nothing.
+    owner : name of the robot it belongs to, None for the surroundings.
+    """
+
+    name: str
+    shape: Shape
+    X_WB: np.ndarray
+    static: bool = False
+    group: int = 1
+    mask: int = 0xFFFF
+    source: str = ""
+    approximation: str | None = None
+    owner: str | None = None
+
+
+@dataclass
+class Placement:
+    """A robot in a scene: where its root stands, its joint values, and which bodies its links carry.
+
+    X_WR : (4, 4) pose of the root link.   q : (dof,) as `Robot.joint_names` orders it.
+    given : the columns of ``q`` that somebody gave a value; the rest stand at their default.
+    carried : body name -> (link, X_LB): the body moves with the link.
+    """
+
+    robot: Robot
+    X_WR: np.ndarray
+    q: np.ndarray
+    given: frozenset[str] = frozenset()
+    carried: dict[str, tuple[str, np.ndarray]] = field(default_factory=dict)
+
+    def body_poses(self) -> dict[str, np.ndarray]:
+        """body name -> (4, 4) pose X_WB."""
+        X_WLs = self.robot.link_poses(self.q, self.X_WR)[0]
+        at = {link: X_WLs[k] for k, link in enumerate(self.robot.links)}
+        return {name: _posed(at[link], X_LB) for name, (link, X_LB) in self.carried.items()}
+
+
+@dataclass
+class Scene:
+    """Bodies and robots, ready to be asked.
+
+    allowed : (body, body, reason) of pairs that are never tested.
+    notes : what the user should know: joints out of limits, links without geometry, repairs.
+    sources : the files read.
+    robots : robot name -> `Robot`.   states : state name -> {joint: value}.
+    state : the joint values the poses were computed from.
+    seconds : stage -> seconds spent: ``read`` for text, ``meshes`` for meshes.
+    """
+
+    name: str
+    bodies: list[SceneBody] = field(default_factory=list)
+    allowed: list[tuple[str, str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    sources: list[str] = field(default_factory=list)
+    robots: dict[str, Robot] = field(default_factory=dict)
+    states: dict[str, dict[str, float]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    placements: dict[str, Placement] = field(default_factory=dict)
+    state_notes: list[str] = field(default_factory=list)
+
+    @property
+    def state(self) -> dict[str, float]:
+        return {
+            joint: float(value)
+            for placement in self.placements.values()
+            for joint, value in zip(placement.robot.joint_names, placement.q)
+        }
+
+    def body(self, name: str) -> SceneBody:
+        """The body of that name; InvalidArgument where there is none."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise InvalidArgument(f"scene {self.name}: no body {name!r}; it has {', '.join(b.name for b in self.bodies)}")
+
+    def world(self) -> World:
+        """A `collide.World` of these bodies, in their order, with the allowed pairs entered."""
+        from collide.world import World
+
+        world = World()
+        for body in self.bodies:
+            world.add(
+                body.shape, body.X_WB, name=body.name, static=body.static, group=body.group, mask=body.mask
+            )
+        for a, b, reason in self.allowed:
+            world.allow(a, b, reason=reason)
+        return world
+
+    def with_state(self, state: str | Mapping[str, float]) -> Scene:
+        """This scene with its robots at other joint values; the scene itself stays as it is.
+
+        state : the name of one of ``states``, or joint -> value. Joints without a value keep theirs.
+
+        Raises InvalidArgument for an unknown state or joint; the known ones are listed.
+        """
+        values = self._named_state(state) if isinstance(state, str) else dict(state)
+        shares = self._shares(values)
+        placements, notes = {}, []
+        for name, placement in self.placements.items():
+            q, about = placement.robot.configuration(shares[name], start=placement.q)
+            placements[name] = replace(placement, q=q, given=placement.given | shares[name].keys())
+            notes += about + placement.robot.default_notes(placements[name].given, q)
+        moved = {name: X for placement in placements.values() for name, X in placement.body_poses().items()}
+        bodies = [replace(body, X_WB=moved.get(body.name, body.X_WB)) for body in self.bodies]
+        kept = [note for note in self.notes if note not in self.state_notes]
+        return replace(
+            self, bodies=bodies, placements=placements, notes=kept + notes, state_notes=notes,
+            allowed=list(self.allowed), sources=list(self.sources), seconds=dict(self.seconds),
+        )
+
+    def _named_state(self, name: str) -> dict[str, float]:
+        if name not in self.states:
+            known = ", ".join(self.states) or "none"
+            raise InvalidArgument(f"scene {self.name}: unknown state {name!r}; it has {known}")
+        return self.states[name]
+
+    def _shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        """The part of a state that concerns each robot, by the names of its joints."""
+        shares: dict[str, dict[str, float]] = {name: {} for name in self.placements}
+        owner = {
+            joint: name
+            for name, placement in self.placements.items()
+            for joint in (*placement.robot.joint_names, *(j.name for j in placement.robot.joints))
+        }
+        for joint, value in values.items():
+            if joint not in owner:
+                known = ", ".join(j for p in self.placements.values() for j in p.robot.joint_names)
+                raise InvalidArgument(
+                    f"scene {self.name}: unknown joint {joint!r}; "
+                    + (f"its robots have {known}" if known else "it has no robot with joints")
+                )
+            shares[owner[joint]][joint] = value
+        return shares
+
+    # --- building: used by loaders and generators -------------------------------------------------
+
+    def add(self, body: SceneBody) -> None:
+        """A further body; SceneError where the name is taken."""
+        for other in self.bodies:
+            if other.name == body.name:
+                raise SceneError(
+                    f'a body named "{body.name}" exists already, from {other.source or "this scene"}; rename one '
+                    "or give a robot a prefix",
+                    element=body.source or None,
+                )
+        self.bodies.append(body)
+
+    def place_robot(
+        self,
+        robot: Robot,
+        X_WR: np.ndarray,
+        values: Mapping[str, float] | None = None,
+        *,
+        name: str | None = None,
+        mobile: bool = False,
+        allowed: Iterable[tuple[str, str, str]] | None = None,
+    ) -> Placement:
+        """Put a robot into the scene: one body for each link with collision geometry.
+
+        values : joint -> value; the rest at 0 or the nearest limit, which is noted.
+        mobile : the base moves too, so that it is tested against static bodies.
+        allowed : pairs never tested, by default those of the robot.
+        """
+        label = _free_name(name or robot.name, self.robots)
+        q, notes = robot.configuration(values or {})
+        placement = Placement(robot, X_WR, q, frozenset(values or ()))
+        notes += robot.default_notes(placement.given, q)
+        for link in robot.links:
+            if link in robot.geometry:
+                body, X_LB = _link_body(link, robot.geometry[link])
+                body.owner, body.static = label, link in robot.base_links and not mobile
+                self.add(body)
+                placement.carried[body.name] = (link, X_LB)
+        self.robots[label], self.placements[label] = robot, placement
+        for body_name, X_WB in placement.body_poses().items():
+            self.body(body_name).X_WB = X_WB
+        self.allowed += list(robot.disabled_pairs if allowed is None else allowed)
+        self.sources += [source for source in robot.sources if source not in self.sources]
+        self.notes += robot.notes + notes
+        self.state_notes += notes
+        for state, joints in robot.states.items():
+            self.states.setdefault(state, {}).update(joints)
+        return placement
+
+    def carry(self, owner: str, link: str, body: SceneBody, X_LB: np.ndarray) -> None:
+        """A body that moves with a link of a robot in the scene, such as a grasped part."""
+        placement = self.placements[owner]
+        X_WL = placement.robot.link_poses(placement.q, placement.X_WR)[0, placement.robot.links.index(link)]
+        self.add(replace(body, X_WB=_posed(X_WL, X_LB), owner=owner, static=False))
+        placement.carried[body.name] = (link, X_LB)
+
+
+def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
+    """One body for a link, and its pose X_LB in the link: several elements become a compound."""
+    from collide.shapes.compound import Compound
+
+    about = [element.approximation for element in elements if element.approximation]
+    if len(elements) == 1:
+        shape, X_LB, approximation = elements[0].shape, elements[0].X_LG, elements[0].approximation
+    else:
+        shape, X_LB = Compound([(element.shape, element.X_LG) for element in elements]), np.eye(4)
+        approximation = f"{len(about)} of {len(elements)} elements: " + "; ".join(about) if about else None
+    source = elements[0].source if len(elements) == 1 else elements[0].source.split(": ", 1)[0] + f': link "{link}"'
+    return SceneBody(link, shape, np.eye(4), source=source, approximation=approximation), X_LB
+
+
+def _posed(X_WL: np.ndarray, X_LB: np.ndarray) -> np.ndarray:
+    """X_WL @ X_LB; the link's own pose, untouched, where the body stands at its origin."""
+    return X_WL.copy() if np.array_equal(X_LB, np.eye(4)) else X_WL @ X_LB
+
+
+def _free_name(name: str, taken: Iterable[str]) -> str:
+    """``name``, or the first of name_2, name_3, ... that is not taken."""
+    taken = set(taken)
+    free, k = name, 1
+    while free in taken:
+        k += 1
+        free = f"{name}_{k}"
+    return free

@@ -1,0 +1,188 @@
+"""Checked reading of mappings: every complaint names the file, the element and the value."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NoReturn
+
+import numpy as np
+
+from collide.errors import InvalidPose, SceneError
+from collide.transforms import as_poses, pose
+
+
+class Fields:
+    """One mapping of a document, with its place in the file.
+
+    path : of the file.   element : ``bodies[3] "mug".pose``; empty for the document itself.
+    """
+
+    def __init__(self, data: Any, path: object, element: str = "", known: Iterable[str] = ()):
+        self.path, self.element, self.data = path, element, data
+        if not isinstance(data, Mapping):
+            self.fail(f"must be a mapping{_listing(known)}, got {brief(data)}")
+        known = tuple(known)
+        for key in data:
+            if known and key not in known:
+                self.fail(f"unknown key {key!r}{did_you_mean(key, known)}; known keys are {', '.join(known)}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.data
+
+    def get(self, key: str, default: Any = None) -> Any:
+        return self.data.get(key, default)
+
+    def place(self, key: str) -> str:
+        return f"{self.element}.{key}" if self.element else key
+
+    def fail(self, what: str, key: str | None = None) -> NoReturn:
+        raise SceneError(what, path=self.path, element=(self.place(key) if key else self.element) or None)
+
+    def sub(self, key: str, known: Iterable[str]) -> Fields:
+        return Fields(self.data[key], self.path, self.place(key), known)
+
+    def items(self, key: str) -> list[tuple[Any, str]]:
+        """The entries of a list, each with its place; an absent or empty key gives none."""
+        value = self.data.get(key)
+        if value is None:
+            return []
+        if not isinstance(value, list):
+            self.fail(f"must be a list, got {brief(value)}", key)
+        return [(entry, f"{self.place(key)}[{k}]") for k, entry in enumerate(value)]
+
+    def text(self, key: str, default: str | None = None) -> str:
+        value = self.data.get(key, default)
+        if value is None and default is None:
+            self.fail(f"{key!r} is missing")
+        if isinstance(value, bool) or not isinstance(value, (str, int)) or not str(value).strip():
+            self.fail(f"must be text, got {brief(value)}", key)
+        return str(value)
+
+    def choice(self, key: str, options: Iterable[str], default: str) -> str:
+        value = self.data.get(key, default)
+        options = tuple(options)
+        if value not in options:
+            self.fail(f"must be one of {', '.join(options)}, got {brief(value)}{did_you_mean(value, options)}", key)
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        value = self.data.get(key, default)
+        if not isinstance(value, bool):
+            self.fail(f"must be true or false, got {brief(value)}", key)
+        return value
+
+    def bits(self, key: str, default: int) -> int:
+        value = self.data.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 0xFFFF:
+            self.fail(f"must be a whole number from 0 to 65535 (16 bits), got {brief(value)}", key)
+        return value
+
+    def number(self, key: str, default: float | None = None) -> float:
+        if key not in self.data and default is None:
+            self.fail(f"{key!r} is missing")
+        return self.checked_number(self.data.get(key, default), key)
+
+    def checked_number(self, value: Any, key: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.fail(f"must be a number, got {brief(value)}", key)
+        number = _to_float(value)
+        if not math.isfinite(number):
+            self.fail(f"must be a finite number, got {value!r}", key)
+        return number
+
+    def numbers(self, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
+        """A finite float64 array; None in ``shape`` stands for any length."""
+        if key not in self.data:
+            self.fail(f"{key!r} is missing")
+        shown = " × ".join("N" if n is None else str(n) for n in shape)
+        try:
+            array = np.array(self.data[key], dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            self.fail(f"must be {shown} numbers, got {brief(self.data[key])}", key)
+        if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape)):
+            self.fail(f"must be {shown} numbers, got {brief(self.data[key])}", key)
+        if not np.isfinite(array).all():
+            self.fail(f"must be finite numbers, got {brief(self.data[key])}", key)
+        return array
+
+
+def read_pose(parent: Fields, key: str, metres: float = 1.0) -> np.ndarray:
+    """A pose mapping as a (4, 4) matrix; the identity where it is absent.
+
+    metres : how many metres one unit of length is, as a divisor where it is below 1 (see `scaled`).
+    """
+    if parent.get(key) is None:
+        return np.eye(4)
+    fields = parent.sub(key, ("xyz", "rpy", "rpy_deg", "quat_wxyz", "quat_xyzw", "matrix"))
+    given = [name for name in fields.data if name != "xyz"]
+    if len(given) > 1:
+        fields.fail(f"give one of rpy, rpy_deg, quat_wxyz, quat_xyzw and matrix, got {' and '.join(given)}")
+    try:
+        if "matrix" in fields:
+            return _matrix(fields, metres)
+        xyz = scaled(fields.numbers("xyz", (3,)), metres) if "xyz" in fields else np.zeros(3)
+        if "rpy" in fields:
+            return pose(xyz, rpy=fields.numbers("rpy", (3,)))
+        if "rpy_deg" in fields:
+            return pose(xyz, R=rotation_from_degrees(fields.numbers("rpy_deg", (3,))))
+        if "quat_wxyz" in fields:
+            return pose(xyz, quat_wxyz=fields.numbers("quat_wxyz", (4,)))
+        if "quat_xyzw" in fields:
+            return pose(xyz, quat_wxyz=fields.numbers("quat_xyzw", (4,))[[3, 0, 1, 2]])
+        return pose(xyz)
+    except InvalidPose as error:
+        raise InvalidPose(f"{fields.path}: {fields.element}: {error}") from None
+
+
+def _matrix(fields: Fields, metres: float) -> np.ndarray:
+    if "xyz" in fields:
+        fields.fail("a matrix holds the translation already; leave out xyz")
+    X = fields.numbers("matrix", (4, 4)).copy()
+    X[:3, 3] = scaled(X[:3, 3], metres)
+    return as_poses(X, "matrix")[0]
+
+
+def rotation_from_degrees(rpy_deg: np.ndarray) -> np.ndarray:
+    """(3, 3) rotation of roll, pitch, yaw [degrees]; multiples of 90° give exact 0 and ±1."""
+    R = np.eye(3)
+    for axis, angle in enumerate(rpy_deg):
+        turns = angle / 90.0
+        if turns == round(turns):
+            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(round(turns)) % 4]
+        else:
+            c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
+        R = turn @ R
+    return R
+
+
+def scaled(values, metres: float):
+    """Lengths in metres. Units below the metre are divided out: 250 / 1000 is the float nearest 0.25."""
+    return values / round(1.0 / metres) if metres < 1.0 else values * metres
+
+
+def did_you_mean(word: object, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(str(word), list(known), n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def brief(value: Any) -> str:
+    """A value for a message, cut where it is long."""
+    shown = repr(value)
+    return shown if len(shown) <= 80 else shown[:77] + "..."
+
+
+def _listing(known: Iterable[str]) -> str:
+    known = tuple(known)
+    return f" with the keys {', '.join(known)}" if known else ""
+
+
+def _to_float(value: int | float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf

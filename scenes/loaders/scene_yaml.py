@@ -1,0 +1,205 @@
+"""The project's own scene files, YAML or JSON: docs/scene-format.md describes every key.
+
+Every complaint names the file and the place in it, ``bodies[3] "mug".pose.xyz``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from collide.errors import InvalidArgument, SceneError
+from collide.robot import Robot
+from collide.scenes.description import Scene, SceneBody
+from collide.scenes.loaders import resources, shape_yaml, urdf
+from collide.scenes.loaders.documents import read_document
+from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose
+from collide.scenes.loaders.robot_yaml import inline_robot
+from collide.scenes.loaders.states import state_of
+
+VERSION = 1
+#: Metres in a unit of length.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+_SCENE = ("collide", "name", "about", "units", "include", "robots", "bodies", "allow", "states")
+_ROBOT = ("urdf", "srdf", "robot", "name", "prefix", "pose", "state", "base")
+_BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
+
+
+@dataclass
+class _Building:
+    """What one `build` hands down: the scene, the file being read, and how meshes are taken."""
+
+    scene: Scene
+    path: Path
+    metres: float
+    meshes: str
+    package_path: tuple
+    missing_meshes: str
+    open_files: tuple[Path, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def mesh(self, filename: str, place: str):
+        """The mesh file that a shape names, read; its time counts as ``meshes``."""
+        from collide.scenes.loaders import mesh
+
+        started = time.perf_counter()
+        file = mesh.read_mesh(resources.find(filename, self.path, self.package_path, element=place), self.meshes)
+        self.scene.notes += [note for note in file.notes if note not in self.scene.notes]
+        self.seconds["meshes"] = self.seconds.get("meshes", 0.0) + time.perf_counter() - started
+        return file
+
+
+def build(
+    data: Any, path, *, meshes: str = "hull", package_path: Iterable = (), missing_meshes: str = "error",
+) -> Scene:
+    """The scene that a document of this format describes.
+
+    data : the document, as plain data.   path : of the file it came from; names in it are relative to that.
+    """
+    path = Path(path)
+    scene = Scene(str(data.get("name") or path.stem) if isinstance(data, Mapping) else path.stem)
+    _build_into(_Building(scene, path, 1.0, meshes, tuple(package_path), missing_meshes, seconds=scene.seconds), data)
+    return scene
+
+
+def _build_into(building: _Building, data: Any) -> None:
+    document = Fields(data, building.path, "", _SCENE)
+    if document.get("collide") != VERSION or isinstance(document.get("collide"), bool):
+        document.fail(f"must be {VERSION}, the version of the format; got {brief(document.get('collide'))}", "collide")
+    building.metres = UNITS[document.choice("units", UNITS, "m")]
+    scene = building.scene
+    scene.sources.append(str(building.path))
+    if building.metres != 1.0:
+        scene.notes.append(f"{building.path.name}: lengths are in {document.get('units')}; they were turned into metres")
+    for entry, place in document.items("include"):
+        _include(building, entry, place)
+    for entry, place in document.items("robots"):
+        _add_robot(building, Fields(entry, building.path, place, _ROBOT))
+    for entry, place in document.items("bodies"):
+        _add_body(building, Fields(entry, building.path, place, _BODY))
+    for entry, place in document.items("allow"):
+        scene.allowed.append(_allowed_pair(document, entry, place, scene))
+    if document.get("states") is not None:
+        _add_states(document, scene)
+
+
+def _include(building: _Building, entry: Any, place: str) -> None:
+    if not isinstance(entry, str):
+        raise SceneError(f"must be the name of a file, got {brief(entry)}", path=building.path, element=place)
+    file = resources.find(entry, building.path, building.package_path, element=place)
+    chain = (*building.open_files, building.path.resolve())
+    if file.resolve() in chain:
+        names = " -> ".join(one.name for one in (*chain, file))
+        raise SceneError(f"files include each other in a circle: {names}", path=building.path, element=place)
+    inner = _Building(
+        building.scene, file, 1.0, building.meshes, building.package_path, building.missing_meshes, chain, building.seconds
+    )
+    _build_into(inner, read_document(file))
+
+
+# --- robots -------------------------------------------------------------------------------------
+
+
+def _add_robot(building: _Building, entry: Fields) -> None:
+    robot = _read_robot(building, entry).renamed(str(entry.get("prefix") or ""))
+    name = entry.text("name", robot.name)
+    X_WR = read_pose(entry, "pose", building.metres)
+    mobile = entry.choice("base", ("fixed", "mobile"), "fixed") == "mobile"
+    values = _robot_state(entry, robot)
+    try:
+        building.scene.place_robot(robot, X_WR, values, name=name, mobile=mobile)
+    except InvalidArgument as error:
+        entry.fail(str(error), "state")
+    except SceneError as error:
+        raise SceneError(error.what, path=building.path, element=entry.element) from None
+
+
+def _read_robot(building: _Building, entry: Fields) -> Robot:
+    if ("urdf" in entry) == ("robot" in entry):
+        entry.fail("give either urdf, a file, or robot, a description with links and joints")
+    if "robot" in entry:
+        return inline_robot(entry, building.metres, building.mesh)
+    srdf = entry.get("srdf")
+    if isinstance(srdf, str):
+        srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
+    elif srdf not in (None, False):
+        entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
+    file = resources.find(entry.text("urdf"), building.path, building.package_path, element=entry.place("urdf"))
+    return urdf.load_robot(
+        file, srdf, meshes=building.meshes, package_path=building.package_path,
+        missing_meshes=building.missing_meshes, seconds=building.seconds,
+    )
+
+
+def _robot_state(entry: Fields, robot: Robot) -> dict[str, float]:
+    """Joint values by the robot's names: a mapping with or without the prefix, or a named state."""
+    state = entry.get("state")
+    if state is None:
+        return {}
+    if isinstance(state, str):
+        if state not in robot.states:
+            entry.fail(f"unknown state {state!r}{did_you_mean(state, robot.states)}; known are {', '.join(robot.states) or 'none'}", "state")
+        return dict(robot.states[state])
+    prefix = str(entry.get("prefix") or "")
+    known = set(robot.joint_names) | {joint.name for joint in robot.joints}
+    values = {}
+    for joint, value in state_of(state, entry.path, entry.place("state")).items():
+        full = joint if joint in known else prefix + joint
+        if full not in known:
+            entry.fail(
+                f"unknown joint {joint!r}{did_you_mean(joint, known)}; robot {robot.name} has {', '.join(robot.joint_names)}",
+                "state",
+            )
+        values[full] = value
+    return values
+
+
+# --- bodies -------------------------------------------------------------------------------------
+
+
+def _add_body(building: _Building, entry: Fields) -> None:
+    name = entry.text("name")
+    entry.element = f'{entry.element} "{name}"'
+    if "shape" not in entry:
+        entry.fail("'shape' is missing")
+    described = shape_yaml.read_shape(entry.data["shape"], entry.path, entry.place("shape"), building.metres, building.mesh)
+    building.scene.add(
+        SceneBody(
+            name, described.shape, read_pose(entry, "pose", building.metres), static=entry.flag("static", False),
+            group=entry.bits("group", 1), mask=entry.bits("mask", 0xFFFF),
+            source=f"{building.path}: {entry.element}", approximation=described.approximation,
+        )
+    )
+    building.scene.notes += described.notes
+
+
+def _allowed_pair(document: Fields, entry: Any, place: str, scene: Scene) -> tuple[str, str, str]:
+    if not isinstance(entry, list) or len(entry) not in (2, 3) or not all(isinstance(word, str) for word in entry):
+        raise SceneError(f"must be [body, body] or [body, body, reason], got {brief(entry)}", path=document.path, element=place)
+    names = [body.name for body in scene.bodies]
+    for name in entry[:2]:
+        if name not in names:
+            raise SceneError(
+                f"no body is called {name!r}{did_you_mean(name, names)}; bodies are {', '.join(names)}",
+                path=document.path, element=place,
+            )
+    if entry[0] == entry[1]:
+        raise SceneError(f"a body is never tested against itself, got {brief(entry)}", path=document.path, element=place)
+    return entry[0], entry[1], entry[2] if len(entry) == 3 else "allowed by the scene"
+
+
+def _add_states(document: Fields, scene: Scene) -> None:
+    states = document.sub("states", ())
+    for name in states.data:
+        values = state_of(states.data[name], document.path, f"states.{name}")
+        try:
+            scene._shares(values)
+        except InvalidArgument as error:
+            states.fail(str(error), str(name))
+        scene.states[str(name)] = values

@@ -1,0 +1,143 @@
+"""Shapes as scene files write them: one key, the kind, and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from collide.errors import InvalidPose, InvalidShape
+from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose, scaled
+from collide.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    Halfspace,
+    HPolytope,
+    Shape,
+    Sphere,
+)
+
+#: kind -> its keys
+KINDS = {
+    "box": ("size",),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length"),
+    "cylinder": ("radius", "length"),
+    "cone": ("radius", "length"),
+    "ellipsoid": ("radii",),
+    "halfspace": ("normal", "offset"),
+    "hull": ("points", "radius"),
+    "hpolytope": ("normals", "offsets"),
+    "mesh": ("file", "scale"),
+    "compound": ("shape", "pose"),
+}
+
+
+@dataclass
+class Described:
+    """A shape, what it leaves out of the thing described, and what there is to say about it."""
+
+    shape: Shape
+    approximation: str | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callable) -> Described:
+    """A shape mapping such as ``{box: {size: [1, 2, 3]}}``.
+
+    metres : in a unit of length.   mesh : (file name, place) -> `MeshFile`.
+    """
+    kinds = Fields(data, path, place)
+    unknown = [kind for kind in kinds.data if kind not in KINDS]
+    if unknown or len(kinds.data) != 1:
+        found = f"unknown shape {unknown[0]!r}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
+        kinds.fail(f"{found}; known shapes are {', '.join(KINDS)}")
+    kind = next(iter(kinds.data))
+    try:
+        if kind == "compound":
+            return _compound(kinds, metres, mesh)
+        fields = kinds.sub(kind, KINDS[kind])
+        if kind == "mesh":
+            return _mesh(fields, mesh)
+        return Described(_plain(kind, fields, metres))
+    except InvalidShape as error:
+        raise InvalidShape(_placed(error, path, f"{place}.{kind}")) from None
+    except InvalidPose as error:
+        raise InvalidPose(_placed(error, path, f"{place}.{kind}")) from None
+
+
+def _placed(error: Exception, path: object, place: str) -> str:
+    """The message with its place before it, once: shapes nest."""
+    return str(error) if str(error).startswith(f"{path}: ") else f"{path}: {place}: {error}"
+
+
+def _plain(kind: str, fields: Fields, metres: float) -> Shape:
+    def length(key: str, default: float | None = None) -> float:
+        return float(scaled(fields.number(key, default), metres))
+
+    if kind == "box":
+        return Box(scaled(fields.numbers("size", (3,)), metres))
+    if kind == "sphere":
+        return Sphere(length("radius"))
+    if kind == "capsule":
+        return Capsule(length("radius"), length("length"))
+    if kind == "cylinder":
+        return Cylinder(length("radius"), length("length"))
+    if kind == "cone":
+        return Cone(length("radius"), length("length"))
+    if kind == "ellipsoid":
+        return Ellipsoid(scaled(fields.numbers("radii", (3,)), metres))
+    if kind == "halfspace":
+        return Halfspace(fields.numbers("normal", (3,)), length("offset"))
+    if kind == "hull":
+        return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
+    normals = fields.numbers("normals", (None, 3))
+    return HPolytope(normals, scaled(fields.numbers("offsets", (None,)), metres))
+
+
+def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
+    items, about, notes = [], [], []
+    for entry, place in kinds.items("compound"):
+        item = Fields(entry, kinds.path, place, KINDS["compound"])
+        if "shape" not in item:
+            item.fail("'shape' is missing")
+        inner = read_shape(item.data["shape"], item.path, item.place("shape"), metres, mesh)
+        items.append((inner.shape, read_pose(item, "pose", metres)))
+        about += [inner.approximation] if inner.approximation else []
+        notes += inner.notes
+    approximation = f"{len(about)} of {len(items)} parts: " + "; ".join(about) if about else None
+    return Described(Compound(items), approximation, notes)
+
+
+def _mesh(fields: Fields, mesh: Callable) -> Described:
+    from collide.scenes.loaders import mesh as mesh_loader
+
+    scale = _mesh_scale(fields)
+    parts = mesh_loader.element_parts(mesh(fields.text("file"), fields.place("file")))
+    shapes = [mesh_loader.mesh_shape(part, scale, f"{fields.path}: {fields.element}") for part in parts]
+    about = [approximation for _, approximation in shapes if approximation]
+    points = np.concatenate([part.points for part in parts]) * scale
+    note = mesh_loader.size_note(float(np.ptp(points, axis=0).max()), fields.element)
+    notes = [note] if note else []
+    if np.prod(scale) < 0:
+        notes.append(f"{fields.element}: the scale {scale.tolist()} mirrors; the vertices were mirrored")
+    if len(shapes) == 1:
+        return Described(shapes[0][0], about[0] if about else None, notes)
+    return Described(Compound([(shape, np.eye(4)) for shape, _ in shapes]), "; ".join(about) or None, notes)
+
+
+def _mesh_scale(fields: Fields) -> np.ndarray:
+    if isinstance(fields.get("scale"), list):
+        scale = fields.numbers("scale", (3,))
+    else:
+        scale = np.full(3, fields.number("scale", 1.0))
+    if not scale.all():
+        fields.fail(f"must not be 0, got {brief(fields.get('scale'))}", "scale")
+    return scale

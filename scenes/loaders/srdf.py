@@ -1,0 +1,70 @@
+"""SRDF: which pairs of links are never tested, and named joint values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from collide.errors import SceneError
+
+
+@dataclass
+class Semantics:
+    """What an SRDF says.
+
+    pairs : (link, link, "SRDF: reason").   states : name -> {joint: value}.
+    """
+
+    pairs: list[tuple[str, str, str]] = field(default_factory=list)
+    states: dict[str, dict[str, float]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_srdf(path: Path, links: list[str], joints: list[str]) -> Semantics:
+    """Read an SRDF for a robot with these links and joints.
+
+    Entries about links or joints the robot does not have are left out and noted.
+    """
+    from collide.scenes.loaders.urdf import parse_xml
+
+    semantics = Semantics()
+    root = parse_xml(path, semantics.notes)
+    if root.tag != "robot":
+        raise SceneError("the outermost element of an SRDF is <robot>", path=path, element=f"<{root.tag}>")
+    strangers: list[str] = []
+    for element in root.findall("disable_collisions"):
+        a, b = element.get("link1"), element.get("link2")
+        if not a or not b:
+            raise SceneError("needs link1 and link2", path=path, element="<disable_collisions>")
+        unknown = [link for link in (a, b) if link not in links]
+        strangers += unknown
+        if not unknown:
+            semantics.pairs.append((a, b, f"SRDF: {element.get('reason') or 'no reason given'}"))
+    _read_states(root, path, joints, semantics)
+    if strangers:
+        semantics.notes.append(f"links that the robot does not have: {', '.join(dict.fromkeys(strangers))}")
+    semantics.notes = [f"{path.name}: {note}" for note in semantics.notes]
+    return semantics
+
+
+def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> None:
+    """Group states. Two groups may share a name ("home" of an arm and of its gripper): one state."""
+    for state in root.findall("group_state"):
+        name = state.get("name")
+        if not name:
+            raise SceneError('needs a name="..."', path=path, element="<group_state>")
+        values = semantics.states.setdefault(name, {})
+        for joint in state.findall("joint"):
+            label, text = joint.get("name", ""), joint.get("value", "")
+            words = text.split()
+            if label not in joints or len(words) != 1:
+                semantics.notes.append(f'state "{name}": joint "{label}" with value "{text}" was left out')
+                continue
+            try:
+                value = float(words[0])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise SceneError(f'the value must be a finite number, got "{text}"', path=path, element=f'state "{name}" joint "{label}"')
+            values[label] = value

@@ -1,0 +1,59 @@
+"""How a comparison of engines reads: a column per engine, every dispute with its verdict."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from collide.reports import comparing
+
+HEADERS = ["engine", "version", "answered", "agree", "differ", "wrong"]
+ROWS = [["collide", "0.1.0", "30 of 30", "", "", "0"], ["coal", "3.0", "30 of 30", "28", "2", "1"],
+        ["pybullet", "skipped: absent", "", "", "", ""]]
+
+
+def dispute(kind="hit", **changes):
+    return {
+        "engine": "coal", "kind": kind, "a": "table", "b": "panda_hand", "size": 1.0, "reference_hit": False,
+        "reference_distance": 2e-5, "hit": True, "distance": -1e-9, "exact_hit": False, "exact_distance": 2e-5,
+        "touching": False, "not_judged": "", "wrong": ["coal"], "proven": ["collide"], "note": "", **changes,
+    }
+
+
+def comparison(disputes=(), ours_wrong=0):
+    data = {
+        "reference": "collide", "bodies": 9, "pairs": 30, "max_distance": 0.05, "tolerance": 1e-6,
+        "summaries": [{"engine": row[0], "skipped": "absent" if row[0] == "pybullet" else ""} for row in ROWS],
+        "disagreements": list(disputes), "ours_wrong": ours_wrong,
+    }
+    return SimpleNamespace(to_dict=lambda: data, table=lambda: (HEADERS, ROWS), ours_wrong=ours_wrong)
+
+
+def text_of(lines):
+    return ["".join(text for text, _ in line) for line in lines]
+
+
+def test_the_verdict_comes_first_and_each_engine_has_a_column():
+    lines = text_of(comparing.render(comparison(), width=100))
+    assert lines[0] == "no answer of collide proven wrong; 30 pairs asked of collide, coal; no disagreement"
+    heading = next(line for line in lines if "engine" in line.split())
+    assert heading.split() == ["engine", "collide", "coal"]
+    assert any(line.split() == ["agree", "-", "28"] for line in lines)
+    assert "  pybullet was not asked: absent" in lines
+
+
+def test_every_dispute_carries_its_verdict():
+    disputes = [dispute(), dispute(not_judged="cylinders", wrong=[], exact_hit=None, exact_distance=None),
+                dispute("distance", distance=0.3)]
+    lines = text_of(comparing.render(comparison(disputes, 1), width=120))
+    assert lines[0].startswith("1 answer of collide proven wrong; ") and "3 disagreements, 2 of them" in lines[0]
+    assert "  not judged: cylinders" in lines
+    row = next(line for line in lines if "panda_hand" in line and "not judged" not in line)
+    assert "20.000 µm" in row and "-1.00e-09 m" in row and row.endswith("coal")
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_no_line_is_wider_than_the_terminal(width):
+    lines = text_of(comparing.render(comparison([dispute(), dispute("left out", hit=None, distance=None)]), width=width))
+    assert max(map(len, lines)) <= width, max(lines, key=len)
