@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from typing import NoReturn
 
 from collide.errors import CollideError, InvalidArgument
-from collide.reports.units import UNITS, parse_length
+from collide.reports.units import UNITS, count, parse_length
 
 _STARTED = time.perf_counter()
 
@@ -240,14 +240,19 @@ def _copy_scene(words: list[str], force: bool) -> str:
 
 
 def _first_words(file) -> str:
-    """A scene file's description: its ``description`` field, else its first comment."""
-    import re
-
+    """What a scene file says it is: its ``about``, else its first comment, else what it counts."""
     text = file.read_text(encoding="utf-8")
-    found = re.search(r"""^\s*["']?description["']?:\s*["']?(.*?)["']?,?\s*$""", text, re.MULTILINE) or re.search(
-        r"^#\s*(\S.*)$", text, re.MULTILINE
-    )
-    return found.group(1) if found else ""
+    if file.suffix == ".json":
+        import json
+
+        data = json.loads(text)
+        robots, bodies = (len(data.get(key, [])) for key in ("robots", "bodies"))
+        return data.get("about") or f"{count(robots, 'robot')}, {count(bodies, 'body', 'bodies')}"
+    for start in ("about:", "#"):
+        for line in text.splitlines():
+            if line.startswith(start) and line[len(start):].strip():
+                return line[len(start):].strip().strip("\"'")
+    return ""
 
 
 def _doctor(args) -> int:
@@ -271,11 +276,26 @@ def _write_json(data: dict, place: str) -> None:
     if place == "-":
         sys.stdout.write(text)
         return
+    # "--json a.yaml b.yaml" must not overwrite a scene
     if not place.lower().endswith(".json") and (os.path.isfile(place) or not os.path.exists(place)):
-        # "--json a.yaml b.yaml" must not overwrite a scene
         raise InvalidArgument(f"--json: {place!r} must end in .json, or be - for standard output")
+    if _is_scene(place):
+        raise InvalidArgument(f"--json: {place!r} is a scene; it is not overwritten by a report")
     with open(place, "w", encoding="utf-8") as file:
         file.write(text)
+
+
+def _is_scene(place: str) -> bool:
+    import json
+
+    if not os.path.isfile(place):
+        return False
+    try:
+        with open(place, encoding="utf-8") as file:
+            data = json.load(file)
+    except ValueError:
+        return False
+    return isinstance(data, dict) and ("collide" in data or "robot_model_name" in data)
 
 
 # --- arguments ----------------------------------------------------------------------------------
@@ -349,8 +369,8 @@ exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
 
 _SCENES = """examples:
   collide scenes
-  collide scenes --copy workcell             to ./workcell.yaml, for editing
-  collide scenes --copy workcell cell.yaml && collide report cell.yaml"""
+  collide scenes --copy workcell             to ./workcell.json, for editing
+  collide scenes --copy workcell cell.json && collide report cell.json"""
 
 _DOCTOR = """Shows versions, optional packages and the extras that bring them, where compiled
 kernels and prepared inputs are kept, and asks a few pairs with known answers.
@@ -424,7 +444,8 @@ def _scene_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the URDF)")
     group.add_argument("--meshes", choices=("hull", "pieces"),
                        help="how meshes enter: their convex hull, or a union of convex pieces")
-    group.add_argument("--missing-meshes", choices=("error", "skip"), help="what to do about mesh files that are missing")
+    group.add_argument("--missing-meshes", choices=("error", "skip"),
+                       help="what to do about mesh files that are missing")
     group.add_argument("--package-path", action="append", metavar="DIR",
                        help="where package:// is looked for; may be given more than once")
     group.add_argument("--scale", type=_scale, metavar="S", help="factor for mesh files, or their unit: 0.001 or mm")

@@ -85,7 +85,12 @@ class PackedWorld:
         answered = len(starts)
         if boolean:
             return rows, len(rows), answered
-        return combine(rows, starts, lambda k: self._sides(candidates[owner[starts[k]]])), len(rows), answered
+        plural = self._plural(rows["a"][starts]) | self._plural(rows["b"][starts])
+        combined = combine(rows, starts, plural, lambda k: self._sides(candidates[owner[starts[k]]]))
+        return combined, len(rows), answered
+
+    def _plural(self, bodies: np.ndarray) -> np.ndarray:
+        return np.diff(self._first)[bodies] > 1
 
     def _sides(self, pair: np.ndarray) -> tuple[Union, Union]:
         a, b = (self._union(int(body)) for body in pair)
@@ -138,7 +143,8 @@ class PackedWorld:
         rows["part_a"] = pairs[:, 0]
         rows["part_b"] = pairs[:, 1] - len(own) - self._first[rows["b"]]
         starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
-        return combine(rows, starts, lambda k: (Union(packed, poses), self._union(int(bodies[k]))))
+        plural = self._plural(bodies) | (len(own) > 1)
+        return combine(rows, starts, plural, lambda k: (Union(packed, poses), self._union(int(bodies[k]))))
 
 
 def _distinct(flat: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:

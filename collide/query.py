@@ -128,4 +128,4 @@ def _rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bo
         rows = rows[::many].copy()
         rows["hit"] = hits
         return rows
-    return combine(rows, np.arange(0, n * many, many), sides)
+    return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)

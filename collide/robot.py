@@ -264,7 +264,7 @@ class Robot:
                 f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
                 f"{', '.join(self.joint_names) or 'no joints'}; got {array.shape}"
             )
-        array = array.reshape(-1, self.dof)
+        array = array if array.ndim == 2 else array[None]
         bad = np.argwhere(~np.isfinite(array))
         if len(bad):
             row, col = bad[0]

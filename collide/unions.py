@@ -54,22 +54,24 @@ def _extent(packed: PackedConvex, row: np.ndarray, n: np.ndarray) -> float:
     return core + float(t @ n) + packed.radius
 
 
-def combine(rows: np.ndarray, starts: np.ndarray, sides) -> np.ndarray:
+def combine(rows: np.ndarray, starts: np.ndarray, plural: np.ndarray, sides) -> np.ndarray:
     """One row a body pair from rows of part pairs.
 
     Parameters
     ----------
     rows : PAIR_DTYPE, the part pairs of a body pair standing together.
     starts : first row of each body pair.
+    plural : bool, whether a body of the pair has several parts. Parts too far apart may have been
+        left out of ``rows``, but they still bar the way out.
     sides : callable k → (Union A, Union B) of body pair k; asked only where unions overlap.
     """
-    if len(starts) == len(rows):
+    if not plural.any():
         return rows
     ends = np.append(starts[1:], len(rows))
     out = np.empty(len(starts), dtype=PAIR_DTYPE)
     for k, (start, end) in enumerate(zip(starts, ends)):
         group = rows[start:end]
-        out[k] = group[0] if len(group) == 1 else _nearest(group, lambda k=k: sides(k))
+        out[k] = _nearest(group, lambda k=k: sides(k)) if plural[k] else group[0]
     return out
 
 
@@ -91,7 +93,12 @@ def _nearest(group: np.ndarray, sides) -> np.ndarray:
 
 
 def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> None:
-    """Replace distance, lower and normal by the best translation that separates both unions."""
+    """Replace distance, lower and normal by the best translation that separates both unions.
+
+    Against one half-space the deepest part already tells it: there is one way out for all.
+    """
+    if any(len(body.packed) == 1 and body.packed[0].kind == HALFSPACE for body in (A, B)):
+        return
     hits = group[group["upper"] < 0.0]
     best = math.inf
     for k in np.argsort(hits["distance"], kind="stable")[:_NORMALS_TRIED]:

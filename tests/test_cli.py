@@ -34,7 +34,8 @@ def fake_scene(*rows):
         "convex_pairs": len(rows), "hits": 0, "undecided": 0, "how": {HOW[PLANE]: len(rows)},
         "gjk_iterations": 0, "epa_iterations": 0, "seconds": {"compile": 0.0, "narrowphase": 0.0},
     }
-    world = SimpleNamespace(distances=lambda max_distance: WorldResult(answers, names), stats=stats)
+    everything, hits = WorldResult(answers, names), WorldResult(answers[answers["hit"]], names)
+    world = SimpleNamespace(distances=lambda max_distance: everything, collisions=lambda: hits, stats=stats)
     bodies = [
         SimpleNamespace(name=n, shape=object(), static=False, source="", approximation=None) for n in names.values()
     ]
@@ -106,6 +107,16 @@ def test_report_passes_its_options_on(scene, capsys):
 
 
 # --- JSON ---------------------------------------------------------------------------------------
+
+
+def test_json_never_overwrites_a_scene_written_in_json(scene, capsys, tmp_path):
+    scene()
+    victim = tmp_path / "cell.json"
+    victim.write_text('{"collide": 1}')
+    assert cli.main(["check", "x.yaml", "--json", str(victim)]) == 2
+    assert victim.read_text() == '{"collide": 1}' and "is a scene" in capsys.readouterr().err
+    victim.write_text("{}")
+    assert cli.main(["check", "x.yaml", "--json", str(victim)]) == 0
 
 
 @pytest.mark.parametrize("command", ["report", "check"])
@@ -184,7 +195,8 @@ def test_ctrl_c_is_one_line(monkeypatch, capsys):
 @pytest.mark.parametrize(
     "arguments, words",
     [
-        (["report"], "required: SCENE"), (["nonsense"], "invalid choice"), (["report", "x", "--clearance", "-1"], "negative"),
+        (["report"], "required: SCENE"), (["nonsense"], "invalid choice"),
+        (["report", "x", "--clearance", "-1"], "negative"), (["report", "x", "--scale", "parsec"], "units"),
         (["report", "x", "--clearance", "5parsec"], "units"), (["check", "x", "--min-dep", "1"], "--min-dep"),
         (["report", "x", "--meshes", "voxels"], "voxels"),
     ],

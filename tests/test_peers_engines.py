@@ -140,6 +140,28 @@ def test_random_pairs_agree_with_exact_arithmetic(name):
     assert np.linalg.norm(rows["normal"], axis=1) == pytest.approx(1, abs=1e-12)
 
 
+def test_round_shapes_agree_with_coal():
+    # Exact arithmetic has no word on these; coal is the most accurate engine that has them all.
+    rng = np.random.default_rng(4)
+
+    def shape():
+        radius, length = rng.uniform(0.2, 0.6), rng.uniform(0.3, 1.0)
+        kinds = Cylinder(radius, length), Cone(radius, length), Ellipsoid(rng.uniform(0.2, 0.7, 3)), Box((1, radius, 1))
+        return kinds[rng.integers(4)]
+
+    def place():
+        return pose(rng.normal(size=3) * 0.45, quat_wxyz=rng.normal(size=4))
+
+    question = Question.from_pairs((shape(), shape(), place(), place()) for _ in range(300))
+    coal, ours = available("coal").answer(question).rows, engine("collide").answer(question).rows
+    assert ours["answered"].all() and coal["has_distance"].all()
+    assert 0.3 <= coal["hit"].mean() <= 0.7
+    clear = np.abs(coal["distance"]) > 1e-5
+    assert (ours["hit"] == coal["hit"])[clear].all()
+    assert ours["distance"] == pytest.approx(coal["distance"], abs=1e-5)
+    assert (ours["lower"] <= ours["distance"]).all() and (ours["distance"] <= ours["upper"]).all()
+
+
 def test_flat_hulls_are_refused_with_a_reason_by_engines_that_want_faces():
     flat = ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0.5, 0.5, 0)])
     question = Question.from_pairs([(flat, Sphere(0.1), pose(), pose((0.5, 0.5, 1)))])

@@ -55,5 +55,6 @@ def test_every_dispute_carries_its_verdict():
 
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_no_line_is_wider_than_the_terminal(width):
-    lines = text_of(comparing.render(comparison([dispute(), dispute("left out", hit=None, distance=None)]), width=width))
+    disputes = [dispute(), dispute("left out", hit=None, distance=None)]
+    lines = text_of(comparing.render(comparison(disputes), width=width))
     assert max(map(len, lines)) <= width, max(lines, key=len)

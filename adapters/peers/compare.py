@@ -34,8 +34,9 @@ TOLERANCE = 1e-6
 class Disagreement:
     """One pair on which an engine and the reference differ, or an engine contradicts itself.
 
-    kind : "hit" (the booleans differ), "distance" (by more than the tolerance), "contradiction"
-        (the engine's boolean and its own distance do not go together), or "left out" (a World
+    kind : "hit" (the booleans differ), "distance" (they do, by more than the tolerance, or the exact
+        one lies outside a proven bracket), "contradiction"
+        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a World
         reports no row where its own pair query finds one).
     exact_hit, exact_distance : the verdict; None where the pair is not judged, and then
         ``not_judged`` says why.
@@ -213,7 +214,8 @@ def _counts(question: Question, table: Table) -> Summary:
     rows = table.rows
     return Summary(
         table.engine, table.version,
-        asked=len(rows), answered=int(rows["answered"].sum()), hits=int(rows["hit"].sum()), undecided=int(rows["undecided"].sum()),
+        asked=len(rows), answered=int(rows["answered"].sum()), hits=int(rows["hit"].sum()),
+        undecided=int(rows["undecided"].sum()),
         without_distance=int((rows["answered"] & ~rows["has_distance"]).sum()),
         failed=[
             {"a": a, "b": b, "reason": table.reasons[k]}
@@ -246,8 +248,6 @@ class _Judge:
         if not row["answered"]:
             dispute.not_judged = table.reasons[0]
             return dispute
-        dispute.proven = [name for name, answer in parties if answer["certified"]]
-        dispute.undecided = [name for name, answer in parties if answer["undecided"]]
         dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), float(row["distance"])
         dispute.touching = abs(dispute.exact_distance) <= TOUCHING * dispute.size
         pair = self.question.pairs[k]
@@ -257,18 +257,34 @@ class _Judge:
         if dispute.kind == "distance" and dispute.exact_hit and any(self.union[i] for i in pair):
             dispute.not_judged = "the depth of a union"
             return dispute
-        # (of a union that overlaps, exact arithmetic has parts, not the depth: brackets are not judged)
-        dispute.wrong = [name for name, answer in parties if self._refuted(dispute, answer)]
+        self._charge(dispute, k, parties)
         return dispute
 
-    def _refuted(self, dispute: Disagreement, answer: np.void) -> bool:
+    def _charge(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> None:
+        """Name who is wrong by the verdict, who claimed a proof, and who admitted not to know."""
         truth = float(dispute.exact_distance or 0.0)
-        # The truth was rounded once to be compared; a bracket that misses it by more was no proof.
-        if np.nextafter(truth, np.inf) < answer["lower"] or np.nextafter(truth, -np.inf) > answer["upper"]:
-            return True
-        if dispute.kind == "distance":
-            return bool(abs(answer["distance"] - truth) > self.tolerance * dispute.size)
-        return bool(answer["hit"]) != dispute.exact_hit
+        for name, answer in parties:
+            missed = self.misses(k, answer, truth)
+            if dispute.kind == "distance":
+                refuted = missed or abs(answer["distance"] - truth) > self.tolerance * dispute.size
+            else:
+                refuted = missed or bool(answer["hit"]) != dispute.exact_hit
+            if refuted:
+                dispute.wrong.append(name)
+            if missed or answer["certified"]:  # a bracket is a claim of proof, too
+                dispute.proven.append(name)
+            elif answer["undecided"]:
+                dispute.undecided.append(name)
+
+    def misses(self, k: int, answer: np.void, truth: float) -> bool:
+        """Whether a proven bracket does not hold the exact distance, which was rounded once."""
+        pair = self.question.pairs[k]
+        if truth <= 0 and any(self.union[i] for i in pair):
+            return False  # exact arithmetic has the depths of parts, not of the union
+        rounded = any(is_rounded(self.question.bodies[i]) for i in pair)
+        slack = TOUCHING * self.size[k] if rounded else 0.0
+        below = answer["lower"] > np.nextafter(truth, np.inf) + slack
+        return bool(below or answer["upper"] < np.nextafter(truth, -np.inf) - slack)
 
 
 def _dispute(judge: _Judge, k: int, kind: str, theirs: Table, ours: Table | None = None) -> Disagreement:
@@ -290,8 +306,9 @@ def _own(judge: _Judge, table: Table) -> list[Disagreement]:
     for k, row in enumerate(table.rows):
         if not row["answered"]:
             continue
-        beyond_rounding = abs(row["distance"]) > TOUCHING * judge.size[k]
-        if row["has_distance"] and beyond_rounding and not row["undecided"] and bool(row["hit"]) != bool(row["distance"] < 0):
+        beyond_rounding = row["has_distance"] and abs(row["distance"]) > TOUCHING * judge.size[k]
+        opposed = beyond_rounding and not row["undecided"] and bool(row["hit"]) != bool(row["distance"] < 0)
+        if opposed or row["lower"] > row["upper"]:
             found.append(_dispute(judge, k, "contradiction", table))
         elif "left this pair out" in table.reasons[k]:
             found.append(_dispute(judge, k, "left out", table))
@@ -313,7 +330,8 @@ def _between(judge: _Judge, ours: Table, theirs: Table, summary: Summary) -> lis
             continue
         difference = abs(float(mine["distance"]) - float(other["distance"]))
         (summary.depth if mine["hit"] else summary.gap).see(difference, *judge.question.names(k))
-        if difference > judge.tolerance * judge.size[k]:
+        missed = theirs.engine == "exact" and judge.misses(k, mine, float(other["distance"]))
+        if missed or difference > judge.tolerance * judge.size[k]:
             found.append(_dispute(judge, k, "distance", theirs, ours))
     return found
 

@@ -29,12 +29,14 @@ __all__ = ["ENGINES", "TABLE_DTYPE", "Body", "PairwisePeer", "Peer", "Question",
 #: One row per pair asked. `a`, `b` index the question's bodies. `answered`: the engine gave a boolean.
 #: `has_distance`: and a usable number; else `distance` is NaN. `certified`: the engine claims a proof
 #: (collide only). `undecided`: it says itself that rounding leaves the boolean open, and calls it a hit
-#: (collide only). `lower`, `upper` [m]: its proven bracket, NaN where it gives none. `failed`: it crashed, raised or ran out of time. `unsupported`: it has no such shape
-#: or question. `normal`, `point_a`, `point_b` [m] are NaN where the engine gives none. `seconds` is
-#: wall time inside this interface, for orientation: Python overhead included, never a benchmark.
+#: (collide only). `lower`, `upper` [m]: its proven bracket. `failed`: it crashed, raised or ran out of
+#: time. `unsupported`: it has no such shape or question. Numbers that the engine does not give are NaN.
+#: `seconds` is wall time inside this interface, for orientation: Python overhead included, never a
+#: benchmark.
 TABLE_DTYPE = np.dtype(
     [
-        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3), ("seconds", "f8"),
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"),
+        ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3), ("seconds", "f8"),
         ("a", "i4"), ("b", "i4"),
         ("hit", "?"), ("answered", "?"), ("has_distance", "?"), ("certified", "?"), ("undecided", "?"),
         ("failed", "?"), ("unsupported", "?"),
@@ -61,6 +63,7 @@ class Reply(NamedTuple):
 
     distance : signed [m]; NaN where the engine gives none.
     normal, point_a, point_b : (3,) in the world; NaN where the engine gives none.
+    certified, undecided, lower, upper : as in `TABLE_DTYPE`; only collide fills them.
     note : a remark that belongs to an answer ("the distance was no number").
     """
 

@@ -22,7 +22,7 @@ import math
 from collide._jit import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import EPA_FACETS, EPA_VERTICES
 from collide.narrowphase.minkowski import POINT, copy_point, difference_point
-from collide.narrowphase.simplex import face_weights
+from collide.narrowphase.simplex import clearance_behind, face_weights
 
 #: Doubles and integers of workspace one run needs (see `workspace`).
 DOUBLES = POINT * (EPA_VERTICES + 8) + 4 * EPA_FACETS
@@ -91,10 +91,7 @@ def _seed(pair, points, ids, error):
     ny = uy
     nz = uz
     for turn in range(4):
-        # u, e × u, and their opposites: four directions across the edge.
-        if turn == 1 or turn == 3:
-            ux, uy, uz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
-        elif turn == 2:
+        if turn > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
             ux, uy, uz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
         difference_point(pair, points, ids, spare, ux, uy, uz)
         qx = points[POINT * spare] - points[0]
@@ -319,38 +316,17 @@ def _is_corner(ids, facets, f, k):
 
 
 @kernel
-def _surface_clearance(points, planes, facets, count, error):
-    """Least distance of a facet from the origin, or −1 unless every facet provably faces outwards.
-
-    Orientation is the sign of det(p, q, r) = p·(e × f); moving each vertex by ``error`` moves it by
-    at most error·(|e||f| + 2|p|(|e| + |f|)), in first order, doubled here for the rest.
-    """
+def _surface_clearance(points, facets, count, error):
+    """Least distance of a facet from the origin, or −1 unless every facet provably faces outwards."""
     least = math.inf
     for g in range(count):
-        if facets[7 * g + 6] == 0:
-            continue
-        distance = planes[4 * g + 3]
-        if not distance > error:
-            return -1.0
-        a = POINT * facets[7 * g]
-        b = POINT * facets[7 * g + 1]
-        c = POINT * facets[7 * g + 2]
-        px = points[a]
-        py = points[a + 1]
-        pz = points[a + 2]
-        ex = points[b] - px
-        ey = points[b + 1] - py
-        ez = points[b + 2] - pz
-        fx = points[c] - px
-        fy = points[c + 1] - py
-        fz = points[c + 2] - pz
-        det = px * (ey * fz - ez * fy) + py * (ez * fx - ex * fz) + pz * (ex * fy - ey * fx)
-        e = math.sqrt(ex * ex + ey * ey + ez * ez)
-        f = math.sqrt(fx * fx + fy * fy + fz * fz)
-        p = math.sqrt(px * px + py * py + pz * pz)
-        if not det > 2.0 * error * (e * f + 2.0 * p * (e + f)):
-            return -1.0
-        least = min(least, distance)
+        if facets[7 * g + 6] == 1:
+            clearance = clearance_behind(
+                points, POINT * facets[7 * g], POINT * facets[7 * g + 1], POINT * facets[7 * g + 2], error
+            )
+            if clearance <= error:
+                return -1.0
+            least = min(least, clearance)
     return least
 
 
@@ -393,7 +369,7 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
             continue
         distance = planes[4 * f + 3]
         if overlap_suffices and distance > 2.0 * error:
-            clearance = _surface_clearance(points, planes, facets, count, error)
+            clearance = _surface_clearance(points, facets, count, error)
             if clearance > error:
                 break
         difference_point(pair, points, ids, vertices, planes[4 * f], planes[4 * f + 1], planes[4 * f + 2])
@@ -406,7 +382,7 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
             return EXPANDED, depth, -1.0, planes[4 * facet], planes[4 * facet + 1], planes[4 * facet + 2], facet, rounds
         final = depth - distance <= tolerance or _is_corner(ids, facets, f, vertices)
         if final or vertices + 1 >= EPA_VERTICES or count + _WIDEST_HORIZON > EPA_FACETS:
-            clearance = _surface_clearance(points, planes, facets, count, error)
+            clearance = _surface_clearance(points, facets, count, error)
             break
         starts[2 * vertices + 1] = -1
         rounds += 1

@@ -11,10 +11,10 @@ import math
 
 from collide._jit import kernel
 from collide.narrowphase.minkowski import copy_point, difference_point
-from collide.narrowphase.simplex import clearance_of_origin, nearest_in_simplex
+from collide.narrowphase.simplex import clearance_in_tetrahedron, nearest_in_simplex
 
 #: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
-#: rounding can tell, or the last tetrahedron is too thin to prove it. ENCLOSED: the origin lies in a
+#: rounding can tell, or no plane separates and no tetrahedron encloses provably. ENCLOSED: the origin lies in a
 #: tetrahedron of A ⊖ B, clear of rounding. APART: proven farther apart than the limit.
 NEAREST, MEETING, ENCLOSED, APART = range(4)
 
@@ -59,24 +59,28 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
         if lower - error - radius > limit:
             return APART, n, lower, 0.0, used
         if length - bound <= 0.125 * error or _repeated(ids, n):
-            return NEAREST, n, lower, 0.0, used
+            return _stalled(lower, error), n, lower, 0.0, used
         before = (weights[0], weights[1], weights[2], weights[3])
         closer = nearest_in_simplex(points, n + 1, weights)
         if n == 3:
-            clearance = clearance_of_origin(points)
+            clearance = clearance_in_tetrahedron(points, error)
             if clearance > error:
                 return ENCLOSED, 4, lower, clearance, used
-            if clearance >= 0.0:
-                return MEETING, 4, lower, 0.0, used
         if not closer < square:
             weights[0], weights[1], weights[2], weights[3] = before
             weights[4] = vx
             weights[5] = vy
             weights[6] = vz
-            return NEAREST, n, lower, 0.0, used
+            return _stalled(lower, error), n, lower, 0.0, used
         square = closer
         n = _drop_unused(points, ids, weights, n + 1)
-    return NEAREST, n, lower, 0.0, rounds
+    return _stalled(lower, error), n, lower, 0.0, rounds
+
+
+@kernel
+def _stalled(lower, error):
+    """A run that can get no closer has the nearest point if some plane separates; else it is open."""
+    return NEAREST if lower > error else MEETING
 
 
 @kernel

@@ -125,41 +125,72 @@ def face_weights(points, a, b, c):
 
 
 @kernel
-def clearance_of_origin(points):
-    """How deep the origin lies in the tetrahedron of the first four points; −1 where it is outside.
+def clearance_behind(points, a, b, c, error):
+    """Distance of the origin behind the plane of a triangle, or −1 unless it is provably behind it.
 
-    The least distance from the four face planes, each with the origin strictly on the side of the
-    opposite vertex.
+    a, b, c : starts of three points, counter-clockwise as seen from outside.
+    error : how far each point may be from its true place.
+
+    The side is the sign of det(p, q, r) = p·(e × f). Moving the three points by ``error`` moves it by
+    at most error·(|e||f| + 2|p|(|e| + |f|)) in first order, doubled here for the rest. Without this
+    test a tetrahedron as thin as rounding "contained" an origin 0.29 m outside it. The distance is
+    the least of the three corners' along the computed normal, a lower bound for any unit normal.
     """
+    px = points[a]
+    py = points[a + 1]
+    pz = points[a + 2]
+    ex = points[b] - px
+    ey = points[b + 1] - py
+    ez = points[b + 2] - pz
+    fx = points[c] - px
+    fy = points[c + 1] - py
+    fz = points[c + 2] - pz
+    nx = ey * fz - ez * fy
+    ny = ez * fx - ex * fz
+    nz = ex * fy - ey * fx
+    e = math.sqrt(ex * ex + ey * ey + ez * ez)
+    f = math.sqrt(fx * fx + fy * fy + fz * fz)
+    p = math.sqrt(px * px + py * py + pz * pz)
+    if not px * nx + py * ny + pz * nz > 2.0 * error * (e * f + 2.0 * p * (e + f)):
+        return -1.0
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return -1.0
+    return (
+        min(
+            nx * px + ny * py + nz * pz,
+            nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
+            nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
+        )
+        / length
+    )
+
+
+@kernel
+def clearance_in_tetrahedron(points, error):
+    """How deep the origin provably lies in the hull of the first four points; −1 where it may not.
+
+    The least clearance behind the four faces, which are oriented by the sign of the volume.
+    """
+    ex = points[POINT] - points[0]
+    ey = points[POINT + 1] - points[1]
+    ez = points[POINT + 2] - points[2]
+    fx = points[2 * POINT] - points[0]
+    fy = points[2 * POINT + 1] - points[1]
+    fz = points[2 * POINT + 2] - points[2]
+    gx = points[3 * POINT] - points[0]
+    gy = points[3 * POINT + 1] - points[1]
+    gz = points[3 * POINT + 2] - points[2]
+    volume = gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
+    one = POINT if volume < 0.0 else 2 * POINT  # vertex 3 behind (0, one, other)
+    other = 2 * POINT if volume < 0.0 else POINT
     least = math.inf
-    for left_out in range(4):
-        i = 0 if left_out != 0 else 1
-        j = 1 if left_out > 1 else 2
-        k = 2 if left_out == 3 else 3
-        a = POINT * i
-        b = POINT * j
-        c = POINT * k
-        o = POINT * left_out
-        ex = points[b] - points[a]
-        ey = points[b + 1] - points[a + 1]
-        ez = points[b + 2] - points[a + 2]
-        fx = points[c] - points[a]
-        fy = points[c + 1] - points[a + 1]
-        fz = points[c + 2] - points[a + 2]
-        nx = ey * fz - ez * fy
-        ny = ez * fx - ex * fz
-        nz = ex * fy - ey * fx
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        if length == 0.0:
+    for face in range(4):
+        a = 0 if face < 2 else (one if face == 2 else other)
+        b = one if face == 0 else 3 * POINT
+        c = other if face == 0 or face == 2 else (one if face == 1 else 0)
+        clearance = clearance_behind(points, a, b, c, error)
+        if clearance <= error:
             return -1.0
-        origin = -(nx * points[a] + ny * points[a + 1] + nz * points[a + 2]) / length
-        other = (
-            nx * (points[o] - points[a]) + ny * (points[o + 1] - points[a + 1]) + nz * (points[o + 2] - points[a + 2])
-        ) / length
-        if other < 0.0:
-            origin = -origin
-            other = -other
-        if origin <= 0.0 or other <= 0.0:
-            return -1.0
-        least = min(least, origin)
+        least = min(least, clearance)
     return least

@@ -77,22 +77,30 @@ def _dispute_tables(data: dict, limit: int | None) -> list[Table]:
 
 
 def _dispute_table(title: str, disputes: list[dict], reference: str, limit: int | None) -> Table:
-    disputes = sorted(disputes, key=lambda d: (not d["wrong"], bool(d["not_judged"])))
+    disputes = sorted(disputes, key=lambda d: (not d["wrong"], bool(d["not_judged"]), -_off(d)))
     shown = disputes[:limit]
+    ours = _answers([(d["reference_hit"], d["reference_distance"]) for d in shown])
     columns = [
-        Column("engine", "label"), Column("body A", "name"), Column("body B", "name"),
-        Column("its answer"), Column(reference, "number", 1), Column("exact"), Column("wrong", "text"),
+        (Column("engine", "label"), [d["engine"] for d in shown]),
+        (Column("body A", "name"), [d["a"] for d in shown]),
+        (Column("body B", "name"), [d["b"] for d in shown]),
+        (Column("it says"), _answers([(d["hit"], d["distance"]) for d in shown])),
+        (Column(f"{reference} says", "number", 1), ours),
+        (Column("exact"), _answers([(d["exact_hit"], d["exact_distance"]) for d in shown])),
+        (Column("wrong", "text"), [_blame(d) for d in shown]),
     ]
-    cells = [
-        [d["engine"] for d in shown], [d["a"] for d in shown], [d["b"] for d in shown],
-        _answers([(d["hit"], d["distance"]) for d in shown]),
-        _answers([(d["reference_hit"], d["reference_distance"]) for d in shown]),
-        _answers([(d["exact_hit"], d["exact_distance"]) for d in shown]),
-        [_blame(d) for d in shown],
-    ]
-    reasons = dict.fromkeys(d["not_judged"] for d in shown if d["not_judged"])
+    if shown[0]["kind"] == "distance":
+        columns.insert(-1, (Column("off by"), lengths([_off(d) for d in shown])))
+    reasons = dict.fromkeys(d["not_judged"].removeprefix("not judged: ") for d in shown if d["not_judged"])
+    rows = [list(row) for row in zip(*(cells for _, cells in columns))]
     notes = [f"not judged: {reason}" for reason in reasons]
-    return Table(title, columns, [list(row) for row in zip(*cells)], notes=notes, more=len(disputes) - len(shown))
+    return Table(title, [column for column, _ in columns], rows, notes=notes, more=len(disputes) - len(shown))
+
+
+def _off(dispute: dict) -> float:
+    """How far the engine's distance is from the exact one, or from the reference's where there is none."""
+    truth = dispute["reference_distance"] if dispute["exact_distance"] is None else dispute["exact_distance"]
+    return 0.0 if truth is None or dispute["distance"] is None else abs(dispute["distance"] - truth)
 
 
 def _answers(answers: list[tuple[bool | None, float | None]]) -> list[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from collide.reports.progress import silent
 from collide.reports.report import package_version, versions
 from collide.reports.tables import Column, Table
-from collide.reports.units import count
+from collide.reports.units import count, widths
 
 #: (distribution, extra that brings it, what for)
 OPTIONAL = (
@@ -165,5 +165,5 @@ def _ask(what: str, A, B, x: float, truth: float) -> Check:
     r = collide.distance(A, B, collide.pose(), X_WB)
     hit = collide.collide(A, B, collide.pose(), X_WB)
     held = r.lower <= truth <= r.upper and bool(hit) == bool(r.hit) == (truth <= 0)
-    found = f"{r.distance!r} in [{r.lower!r}, {r.upper!r}]"
-    return Check(what, found if held else f"{found}, should be {truth!r}", held)
+    found = f"{r.distance:.12g} m, known to {widths([r.upper - r.lower])[0]}"
+    return Check(what, found if held else f"{found}: [{r.lower!r}, {r.upper!r}] should hold {truth!r}", held)

@@ -19,7 +19,7 @@ SENTENCES = {
 
 #: Why pairs were never tested, for the reasons the engine itself knows.
 REASONS = {
-    "static-static": "both bodies are fixed: their placement is taken as intended",
+    "static–static": "both bodies are fixed: their placement is taken as intended",
     "filtered by group and mask": "their groups and masks exclude each other",
     "allowed": "the scene allows this contact",
 }

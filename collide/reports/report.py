@@ -138,7 +138,7 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
     begun = time.perf_counter()
     with (progress or silent)("testing the scene"):
         world = scene.world()
-        result = world.distances(max_distance=clearance)
+        result = world.distances(max_distance=clearance) if clearance else world.collisions()
     tested = time.perf_counter()
     stats = world.stats
     classes = _classes(result, scene, min_depth)

@@ -54,9 +54,16 @@ def _scene_line(report: Report) -> str:
     return f"{scene['name']}: {count(scene['bodies'], 'body', 'bodies')} ({scene['static']} fixed){robots}"
 
 
+#: Stages in the order they run; any others follow.
+_STAGES = ("read", "meshes", "compile", "pack", "broadphase", "narrowphase", "report")
+
+
 def _times(report: Report) -> list[str]:
-    stages = [f"{name} {seconds(s)}" for name, s in report.seconds.items() if name != "total" and s >= 5e-5]
+    others = [name for name in report.seconds if name not in (*_STAGES, "other", "total")]
+    spent = {name: report.seconds.get(name, 0.0) for name in (*_STAGES, *others)}
+    stages = [f"{name} {seconds(s)}" for name, s in spent.items() if s >= 5e-5]
     known = [f"{name} {version}" for name, version in report.versions.items() if version and name != "machine"]
+    stages.append(f"imports and the rest {seconds(report.seconds['other'])}")
     return [
         f"{seconds(report.seconds['total'])} in all: {', '.join(stages)}",
         f"{', '.join(known)}, {report.versions['machine'] or 'unknown machine'}",
@@ -114,17 +121,13 @@ def _pair_table(title: str, style: str, pairs: list[Pair], measure: str, limit: 
 def _bracket_notes(pairs: list[Pair], measure: str, limit: int | None) -> list[str]:
     """A line for each pair whose number is proven less tightly than promised."""
     wide = [pair for pair in pairs if not pair.certified and measure != "within"]
-    notes = [f"{pair.a} and {pair.b}: proven only to lie within {_range(pair, measure)}" for pair in wide]
+    notes = [
+        f"{pair.a} and {pair.b}: {measure} known to {lengths([_bracket(pair)])[0].strip()} only, wider than promised"
+        for pair in wide
+    ]
     if limit and len(notes) > 3:
         notes[3:] = [f"… and {len(notes) - 3} more with a wide bracket (--all)"]
     return notes
-
-
-def _range(pair: Pair, measure: str) -> str:
-    ends = [_or_infinite(pair.lower), _or_infinite(pair.upper)]
-    if measure == "depth":
-        ends = [max(0.0, -_or_infinite(pair.upper)), math.inf if pair.lower is None else -pair.lower]
-    return " to ".join(text.strip() for text in lengths(ends))
 
 
 def _marked(pair: Pair, name: str) -> str:
@@ -183,7 +186,9 @@ _STYLES = {
     "name": "none", "number": "bold",
 }
 #: For terminals that cannot encode the real ones; as many cells where tables use them.
-_PLAIN = str.maketrans({"…": "~", "─": "-", "µ": "u", "→": ">", "≈": "~", "≤": "<=", "≥": ">=", "–": "-", "×": "x"})
+_PLAIN = str.maketrans(
+    {"…": "~", "─": "-", "µ": "u", "→": ">", "≈": "~", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "×": "x"}
+)
 
 
 def output_width(stream) -> tuple[int, bool]:

@@ -136,7 +136,7 @@ def parse_xml(path: Path, notes: list[str]) -> ET.Element:
     Prefixes nobody declared are common in files made by hand from xacro; they are tolerated, since
     no element of URDF, SRDF or MJCF has a prefix, and noted. What is not XML at all is refused.
     """
-    blob = read_bytes(path)
+    blob = read_bytes(path).lstrip()  # blanks before <?xml ...?> are common, and harmless
     try:
         root = ET.fromstring(blob)
     except ET.ParseError as error:
@@ -196,7 +196,7 @@ def floats(element: ET.Element, attribute: str, count: int, place: str, reading:
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
-        advice = "; expand the xacro first" if "${" in text else ""
+        advice = "; expand the xacro first" if "${" in text or "$(" in text else ""
         reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{text}"{advice}')
     if len(values) != count or not all(map(math.isfinite, values)):
         reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{text}"')
