@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from collide.geometry.packing import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
-from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_POINTS
 from collide.results import PAIR_DTYPE
 
 #: Normals of overlapping parts that are tried as the way out of a union, deepest first.
@@ -86,21 +86,20 @@ def _nearest(group: np.ndarray, sides) -> np.ndarray:
         min(int((group["iterations"] >> 16).sum()), 0x7FFF) << 16
     )
     if row["upper"] < 0.0:
-        width = float(row["upper"] - row["lower"])
-        _way_out(row, group, *sides())
-        row["certified"] = row["certified"] and float(row["upper"] - row["lower"]) <= 2.0 * width
+        promised = _way_out(row, group, *sides())
+        row["certified"] = row["certified"] and float(row["upper"] - row["lower"]) <= promised
     return row
 
 
-def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> None:
+def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> float:
     """Replace distance, lower and normal by the best translation that separates both unions.
 
-    Against one half-space the deepest part already tells it: there is one way out for all.
+    Returns the width of bracket that is promised for bodies of this size. Against one half-space the deepest part already tells it: there is one way out for all.
     """
     if any(len(body.packed) == 1 and body.packed[0].kind == HALFSPACE for body in (A, B)):
-        return
+        return math.inf
     hits = group[group["upper"] < 0.0]
-    best = math.inf
+    best, error = math.inf, 0.0
     for k in np.argsort(hits["distance"], kind="stable")[:_NORMALS_TRIED]:
         n = hits["normal"][k]
         reach_a, error_a = A.extent(n)
@@ -115,5 +114,7 @@ def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> None:
         row["distance"] = row["lower"] = -math.inf
     else:
         row["point_b"] = row["point_a"] + row["distance"] * row["normal"]
+    curved = any(packed.kind != POINTS for body in (A, B) for packed in body.packed)
+    return (PROMISE_CURVED if curved else PROMISE_POINTS) / ERROR * error
 
 

@@ -189,7 +189,7 @@ class World:
         """
         limit = check_distance("World.distances: max_distance", max_distance)
         rows, _ = self._ask(limit)
-        return WorldResult(rows[rows["distance"] <= limit], self.names)
+        return WorldResult(rows[_within(rows, limit)], self.names)
 
     def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
         """One outside shape S against every body: pairs at most ``max_distance`` apart.
@@ -202,11 +202,16 @@ class World:
             raise InvalidArgument(f"World.query: shape must be a shape, got {shape!r}")
         X_WS = _one_pose(X_WS, "World.query: X_WS")
         rows = self._pack().against(shape, X_WS, limit)
-        rows = rows[rows["distance"] <= limit]
+        rows = rows[_within(rows, limit)]
         ids = np.array([*self._bodies, -1], dtype=np.int32)
         rows["b"] = ids[rows["b"]]
         rows["a"] = -1
         return WorldResult(rows, {**self.names, -1: "query"})
+
+    @property
+    def allowed(self) -> dict[tuple[int, int], str]:
+        """Pairs never tested: {(id, id): reason}, the smaller id first."""
+        return dict(self._allowed)
 
     @property
     def stats(self) -> dict:
@@ -269,6 +274,11 @@ class World:
             self._packed.move(np.array([body.X_WB for body in self._bodies.values()]).reshape(-1, 4, 4))
         self._moved = False
         return self._packed
+
+
+def _within(rows: np.ndarray, limit: float) -> np.ndarray:
+    """Pairs not farther apart than the limit, and hits: an undecided one may lie an ulp beyond 0."""
+    return rows["hit"] | (rows["distance"] <= limit)
 
 
 def _one_pose(X, name: str) -> np.ndarray:

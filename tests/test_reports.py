@@ -175,6 +175,13 @@ def test_the_verdict_comes_first():
     assert first == "3 collisions, 2 touching within rounding, 2 within 50 mm, 3 of 15 pairs never tested"
 
 
+@pytest.mark.parametrize("names, end", [({0: "a"}, "no pair to test"), ({0: "a", 1: "b"}, "1 pair answered")])
+def test_small_scenes_have_verdicts_too(names, end):
+    scene = make_scene([], names)
+    scene.world().stats["skipped"] = {}
+    assert report.make(scene).verdict() == f"no collision, {end}"
+
+
 def test_sections_come_in_order_and_empty_ones_not_at_all():
     lines = text_of(terminal.render(report.make(make_scene(), clearance=0.05)))
     titles = [line.split("  ")[0] for line in lines if line[:2].isupper()]
@@ -255,6 +262,17 @@ def test_rich_and_plain_say_the_same(monkeypatch):
     terminal.write(lines, piped)
     stripped = re.sub(r"\x1b\[[0-9;]*m", "", coloured.getvalue())
     assert [s.rstrip() for s in stripped.splitlines()] == piped.getvalue().splitlines()
+
+
+def test_without_rich_a_terminal_gets_plain_text(monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "rich.console", None)
+    lines = terminal.render(report.make(make_scene()), width=80)
+    shown, piped = Terminal(), io.StringIO()
+    terminal.write(lines, shown)
+    terminal.write(lines, piped)
+    assert shown.getvalue() == piped.getvalue()
 
 
 def test_ascii_terminals_are_served():

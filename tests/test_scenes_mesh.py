@@ -170,6 +170,14 @@ def test_cached_mesh_is_the_same(tmp_path):
     assert not list(cache.directory().glob("*.part"))
 
 
+def test_same_bytes_under_another_name(tmp_path):
+    trimesh.PointCloud(np.eye(3)).export(tmp_path / "one.ply")
+    (tmp_path / "two.ply").write_bytes((tmp_path / "one.ply").read_bytes())
+    for name in ("one", "two"):
+        scene = load(tmp_path / f"{name}.ply")
+        assert scene.bodies[0].name == name and scene.notes[0].startswith(f"{name}.ply: ")
+
+
 def test_changed_file_is_read_again(tmp_path):
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "b.stl")
     load(tmp_path / "b.stl")

@@ -179,7 +179,7 @@ def test_remote_files_are_not_fetched(robot_of):
 
 
 def test_package_of_the_demo_says_how_to_install_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(resources, "installed_folders", lambda: [])
+    monkeypatch.setattr(resources, "installed_folders", list)
     with pytest.raises(SceneError, match=r"pip install 'collide-robotics\[demo\]'"):
         resources.find("package://example-robot-data/robots/x.urdf", tmp_path / "scene.yaml")
 

@@ -248,14 +248,26 @@ def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, b
     words[_ITERATIONS] = rounds
     width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
     _write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
+    ax = _combine(points, weights, n, 3)
+    ay = _combine(points, weights, n, 4)
+    az = _combine(points, weights, n, 5)
+    bx = _combine(points, weights, n, 6)
+    by = _combine(points, weights, n, 7)
+    bz = _combine(points, weights, n, 8)
+    # On curved cores the last facet still has a width: what the two points miss of depth·n is shared
+    # between them. For polytopes this is rounding.
+    missing = 0.0 if boolean else 0.5
+    ox = missing * (ax - bx - pair[14] - depth * nx)
+    oy = missing * (ay - by - pair[15] - depth * ny)
+    oz = missing * (az - bz - pair[16] - depth * nz)
     _write_vectors(
         row, nx, ny, nz,
-        _combine(points, weights, n, 3) + poses[p + 9] + radius_a * nx,
-        _combine(points, weights, n, 4) + poses[p + 10] + radius_a * ny,
-        _combine(points, weights, n, 5) + poses[p + 11] + radius_a * nz,
-        _combine(points, weights, n, 6) + poses[q + 9] - radius_b * nx,
-        _combine(points, weights, n, 7) + poses[q + 10] - radius_b * ny,
-        _combine(points, weights, n, 8) + poses[q + 11] - radius_b * nz,
+        (ax - ox + radius_a * nx) + poses[p + 9],
+        (ay - oy + radius_a * ny) + poses[p + 10],
+        (az - oz + radius_a * nz) + poses[p + 11],
+        (bx + ox - radius_b * nx) + poses[q + 9],
+        (by + oy - radius_b * ny) + poses[q + 10],
+        (bz + oz - radius_b * nz) + poses[q + 11],
         flip,
     )  # fmt: skip
     _write_vertices(words, marks, ids, vertices, flip)

@@ -83,13 +83,43 @@ def nearest_of_segments(points, weights):
         t = (nx * (y * uz - z * uy) + ny * (z * ux - x * uz) + nz * (x * uy - y * ux)) / square
         if 0.0 < s < 1.0 and 0.0 < t < 1.0:
             best = _square(points, s, t, weights, best)
-    distance = math.sqrt(best)
-    lower = math.inf
+    lower = _bound(points, weights[4], weights[5], weights[6])
+    # The same direction to full precision, where the gap is tiny beside the segments: from the
+    # segments themselves (see `simplex.across_simplex`).
+    if nx * weights[4] + ny * weights[5] + nz * weights[6] < 0.0:
+        nx = -nx
+        ny = -ny
+        nz = -nz
+    lower = max(lower, _bound(points, nx, ny, nz))
+    for turn in range(2):
+        ex = ux if turn == 0 else vx
+        ey = uy if turn == 0 else vy
+        ez = uz if turn == 0 else vz
+        square = uu if turn == 0 else vv
+        if square > 0.0:
+            dx = weights[4]
+            dy = weights[5]
+            dz = weights[6]
+            for _ in range(2):
+                along = (dx * ex + dy * ey + dz * ez) / square
+                dx -= along * ex
+                dy -= along * ey
+                dz -= along * ez
+            lower = max(lower, _bound(points, dx, dy, dz))
+    return math.sqrt(best), lower
+
+
+@kernel
+def _bound(points, dx, dy, dz):
+    """Least value of the four differences along d, over |d|: a lower bound of their distance."""
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length == 0.0:
+        return -math.inf
+    least = math.inf
     for k in range(4):
         at = POINT * k
-        along = weights[4] * points[at] + weights[5] * points[at + 1] + weights[6] * points[at + 2]
-        lower = min(lower, along / distance if distance > 0.0 else 0.0)
-    return distance, lower
+        least = min(least, dx * points[at] + dy * points[at + 1] + dz * points[at + 2])
+    return least / length
 
 
 @kernel

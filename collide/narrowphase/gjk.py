@@ -11,7 +11,7 @@ import math
 
 from collide._jit import kernel
 from collide.narrowphase.minkowski import copy_point, difference_point
-from collide.narrowphase.simplex import clearance_in_tetrahedron, nearest_in_simplex
+from collide.narrowphase.simplex import across_simplex, clearance_in_tetrahedron, nearest_in_simplex
 
 #: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
 #: rounding can tell, or no plane separates and no tetrahedron encloses provably. ENCLOSED: the origin lies in a
@@ -34,6 +34,25 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     status, number of simplex points, best lower bound of the core distance (before ``error``),
     clearance of the origin in the tetrahedron (ENCLOSED only), rounds used.
     """
+    status, n, lower, clearance, used = _approach(
+        pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
+    )
+    if status == NEAREST or status == MEETING:
+        length = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
+        if length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
+            dx, dy, dz = across_simplex(points, n, weights[4], weights[5], weights[6])
+            along = math.sqrt(dx * dx + dy * dy + dz * dz)
+            if along > 0.0:
+                difference_point(pair, points, ids, 4, -dx, -dy, -dz)
+                lower = max(lower, (dx * points[36] + dy * points[37] + dz * points[38]) / along)
+        # Where no plane separates, the run is open whatever made it stop.
+        status = NEAREST if lower > error or (touch_suffices and length + error <= radius) else MEETING
+    return status, n, lower, clearance, used
+
+
+@kernel
+def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
+    """The rounds of GJK; see `gjk` for arguments and results."""
     tx = pair[14]
     ty = pair[15]
     tz = pair[16]
@@ -59,7 +78,7 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
         if lower - error - radius > limit:
             return APART, n, lower, 0.0, used
         if length - bound <= 0.125 * error or _repeated(ids, n):
-            return _stalled(lower, error), n, lower, 0.0, used
+            return NEAREST, n, lower, 0.0, used
         before = (weights[0], weights[1], weights[2], weights[3])
         closer = nearest_in_simplex(points, n + 1, weights)
         if n == 3:
@@ -71,16 +90,10 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
             weights[4] = vx
             weights[5] = vy
             weights[6] = vz
-            return _stalled(lower, error), n, lower, 0.0, used
+            return NEAREST, n, lower, 0.0, used
         square = closer
         n = _drop_unused(points, ids, weights, n + 1)
-    return _stalled(lower, error), n, lower, 0.0, rounds
-
-
-@kernel
-def _stalled(lower, error):
-    """A run that can get no closer has the nearest point if some plane separates; else it is open."""
-    return NEAREST if lower > error else MEETING
+    return NEAREST, n, lower, 0.0, rounds
 
 
 @kernel

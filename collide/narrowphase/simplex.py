@@ -97,6 +97,40 @@ def nearest_in_simplex(points, n, weights):
 
 
 @kernel
+def across_simplex(points, n, vx, vy, vz):
+    """The direction v made orthogonal to the edge or face of the first n = 2 or 3 points.
+
+    Where the gap is tiny beside the bodies, v is a difference of large numbers and its direction is
+    off by their rounding over the gap; edges give the same direction to full precision. Not
+    normalised; v itself for other n, or where the points are collinear.
+    """
+    ex = points[POINT] - points[0]
+    ey = points[POINT + 1] - points[1]
+    ez = points[POINT + 2] - points[2]
+    if n == 2:
+        square = ex * ex + ey * ey + ez * ez
+        along = (vx * ex + vy * ey + vz * ez) / square
+        vx -= along * ex
+        vy -= along * ey
+        vz -= along * ez
+        along = (vx * ex + vy * ey + vz * ez) / square  # once more: the first pass rounds at |v|
+        return vx - along * ex, vy - along * ey, vz - along * ez
+    if n != 3:
+        return vx, vy, vz
+    fx = points[2 * POINT] - points[0]
+    fy = points[2 * POINT + 1] - points[1]
+    fz = points[2 * POINT + 2] - points[2]
+    nx = ey * fz - ez * fy
+    ny = ez * fx - ex * fz
+    nz = ex * fy - ey * fx
+    if nx * nx + ny * ny + nz * nz == 0.0:
+        return vx, vy, vz
+    if nx * vx + ny * vy + nz * vz < 0.0:
+        return -nx, -ny, -nz
+    return nx, ny, nz
+
+
+@kernel
 def face_weights(points, a, b, c):
     """Barycentric coordinates of the origin's projection on the plane of three points.
 

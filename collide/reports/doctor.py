@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -122,7 +123,10 @@ def _cache(what: str, folder: Path) -> Check:
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
-    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+    try:
+        with tempfile.TemporaryFile(dir=existing):  # asking for permission says yes to root, writing may still fail
+            pass
+    except OSError:
         return Check(what, f"{folder} cannot be written: made anew in every run; set COLLIDE_CACHE_DIR", None)
     files = [file for file in folder.rglob("*") if file.is_file()]
     megabytes = sum(file.stat().st_size for file in files) / 1e6

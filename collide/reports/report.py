@@ -87,8 +87,14 @@ class Report:
             parts.append(f"{len(self.touching)} touching within rounding")
         if clearance > 0:
             parts.append(f"{len(self.near) or 'none'} within {brief_length(clearance)}")
-        excluded, total = self.pairs["excluded"], count(self.pairs["total"], "pair")
-        parts.append(f"{excluded} of {total} never tested" if excluded else f"all {total} answered")
+        excluded, total = self.pairs["excluded"], self.pairs["total"]
+        pairs = count(total, "pair")
+        parts.append(
+            "no pair to test" if not total
+            else f"{excluded} of {pairs} never tested" if excluded
+            else f"all {pairs} answered" if total > 1
+            else "1 pair answered"
+        )
         return ", ".join(parts)
 
     def to_dict(self) -> dict:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-import collide.scenes as scenes
+from collide import scenes
 from collide.errors import InvalidArgument, SceneError
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody

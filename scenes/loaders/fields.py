@@ -150,7 +150,7 @@ def rotation_from_degrees(rpy_deg: np.ndarray) -> np.ndarray:
     for axis, angle in enumerate(rpy_deg):
         turns = angle / 90.0
         if turns == round(turns):
-            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(round(turns)) % 4]
+            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(turns) % 4]
         else:
             c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
         i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -181,7 +181,7 @@ def _listing(known: Iterable[str]) -> str:
     return f" with the keys {', '.join(known)}" if known else ""
 
 
-def _to_float(value: int | float) -> float:
+def _to_float(value: float) -> float:
     try:
         return float(value)
     except OverflowError:

@@ -6,6 +6,7 @@ trimesh nor scipy is imported. What the shape leaves out of the mesh is said for
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -64,19 +65,29 @@ def read_mesh(path: Path, meshes: str = "hull") -> MeshFile:
     blobs = [read_bytes(path)]
     if path.suffix.lower() == ".gltf":
         blobs += _gltf_buffers(blobs[0], path)
-    name = cache.key(blobs, {"meshes": meshes, "suffix": path.suffix.lower()})
-    kept = cache.fetch(name)
-    if kept is not None:
-        try:
-            return _unpack(kept)
-        except (KeyError, ValueError, TypeError, IndexError):
-            pass  # an entry of that name made by something else: read the file again
-    file = _read_with_trimesh(path)
-    if meshes == "pieces":
-        for part, (vertices, faces) in zip(file[0].parts, file[1]):
-            part.pieces = _decompose(vertices, faces, path)
-    cache.store(name, _pack(file[0]))
-    return file[0]
+    # Without scipy a volume is unknown; once it is installed the mesh is looked at again.
+    known = importlib.util.find_spec("scipy") is not None
+    entry = cache.key(blobs, {"meshes": meshes, "suffix": path.suffix.lower(), "volumes": known})
+    file = _kept(entry)
+    if file is None:
+        file, raw = _read_with_trimesh(path)
+        if meshes == "pieces":
+            for part, (vertices, faces) in zip(file.parts, raw):
+                part.pieces = _decompose(vertices, faces, path)
+        cache.store(entry, _pack(file))
+    # The entry knows the bytes alone: a file of the same bytes may have another name.
+    if len(file.parts) == 1:
+        file.parts[0].name = path.stem
+    file.notes = [f"{path.name}: {note}" for note in file.notes]
+    return file
+
+
+def _kept(entry: str) -> MeshFile | None:
+    arrays = cache.fetch(entry)
+    try:
+        return None if arrays is None else _unpack(arrays)
+    except (KeyError, ValueError, TypeError, IndexError):
+        return None  # made by something else: read the file again
 
 
 def mesh_shape(part: MeshPart, scale, place: str) -> tuple[Shape, str | None]:
@@ -161,21 +172,20 @@ def _read_with_trimesh(path: Path) -> tuple[MeshFile, list[tuple[np.ndarray, np.
         options.update(split_objects=True, group_material=False, skip_materials=True)
     try:
         loaded = trimesh.load_scene(str(path), **options)
-        named = [(name, *loaded.graph.get(name)) for name in loaded.graph.nodes_geometry]
+        named = [(name, *loaded.graph.get(name)) for name in sorted(loaded.graph.nodes_geometry)]
     except ImportError as error:
         raise MissingExtra(error.name or "a mesh library", extra="robots", purpose=f"read the mesh {path.name}") from None
-    except Exception as error:  # the readers of seven formats raise what they like
+    except Exception as error:  # noqa: BLE001 - the readers of seven formats raise what they like
         raise SceneError(f"is not a mesh that can be read: {_one_line(error)}", path=path) from None
     parts, raw, notes = [], [], []
     metre = _metres(loaded.units)
     if metre != 1.0:
-        notes.append(f"{path.name}: the file says its unit is {metre:g} m; it was scaled to metres")
-    for node, X_WG, geometry in named:
+        notes.append(f"the file says its unit is {metre:g} m; it was scaled to metres")
+    for node, X_WG, geometry in named:  # by name: the graph keeps no order
         mesh = loaded.geometry[geometry]
         vertices, faces = _arrays(mesh, np.asarray(X_WG, dtype=np.float64), metre)
         if len(vertices):
-            label = path.stem if len(named) == 1 else str(node)
-            part, about = _describe(trimesh, label, vertices, faces, path)
+            part, about = _describe(trimesh, str(node), vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
@@ -202,9 +212,9 @@ def _describe(trimesh, label: str, vertices: np.ndarray, faces: np.ndarray, path
     notes = []
     used = np.unique(faces) if len(faces) else np.arange(len(vertices))
     if len(used) < len(vertices):
-        notes.append(f"{path.name}: {len(vertices) - len(used)} vertices that no face uses were left out")
+        notes.append(f"{len(vertices) - len(used)} vertices that no face uses were left out")
     if not len(faces):
-        notes.append(f"{path.name}: has points but no faces; their hull was taken")
+        notes.append("has points but no faces; their hull was taken")
     closed, fill = _volumes(trimesh, vertices, faces)
     return MeshPart(label, _distinct(vertices[used]), fill, closed, len(faces)), notes
 
@@ -225,7 +235,7 @@ def _volumes(trimesh, vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, fl
         return False, np.nan
     try:
         hull = float(mesh.convex_hull.volume)
-    except Exception:  # scipy absent, or Qhull refusing a flat mesh: the figure is a courtesy
+    except Exception:  # noqa: BLE001 - scipy absent, or Qhull refusing a flat mesh: the figure is a courtesy
         return True, np.nan
     return True, min(1.0, abs(float(mesh.volume)) / hull) if hull > 0 else np.nan
 

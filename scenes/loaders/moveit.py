@@ -244,9 +244,9 @@ def object_shape(thing: Fields) -> tuple[Shape, np.ndarray, str | None]:
         places = thing.items(poses)
         for k, (entry, place) in enumerate(thing.items(kind)):
             try:
-                shape, approximation = make(Fields(entry, thing.path, f"{thing.element}.{kind}[{k}]"))
+                shape, approximation = make(Fields(entry, thing.path, place))
             except InvalidShape as error:
-                raise InvalidShape(f"{thing.path}: {thing.element}.{kind}[{k}]: {error}") from None
+                raise InvalidShape(f"{thing.path}: {place}: {error}") from None
             X = _pose(Fields(places[k][0], thing.path, f"{thing.element}.{poses}[{k}]")) if k < len(places) else np.eye(4)
             items.append((shape, X))
             about += [approximation] if approximation else []
@@ -302,7 +302,7 @@ def _add_attached(fields: Fields, scene: Scene, robot: Robot) -> None:
         shape, X_OS, approximation = object_shape(thing)
         body = SceneBody(name, shape, np.eye(4), source=f"{fields.path}: {thing.element}", approximation=approximation)
         scene.carry(robot.name, link, body, X_LO @ X_OS)
-        for toucher in {link, *(attached.get("touch_links") or ())}:
+        for toucher in dict.fromkeys((link, *(attached.get("touch_links") or ()))):
             if toucher in robot.geometry:
                 scene.allowed.append((name, toucher, "attached to the link"))
 
@@ -311,15 +311,26 @@ def _add_attached(fields: Fields, scene: Scene, robot: Robot) -> None:
 
 
 def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
-    """The matrix decides alone, where there is one; links welded together are never tested."""
+    """The matrix decides, where there is one; links welded together are never tested.
+
+    A matrix that MoveIt wrote names every link of the robot it was made for. About links of this
+    robot that it does not name it says nothing: there the robot's own pairs hold, which is noted.
+    """
     names = [body.name for body in scene.bodies]
     matrix = fields.get("allowed_collision_matrix")
     pairs: dict[tuple[str, str], str] = {}
+    own = robot.disabled_pairs
     if isinstance(matrix, dict) and matrix.get("entry_names"):
         pairs.update({pair: ALLOWED for pair in _matrix_pairs(fields.sub("allowed_collision_matrix", ()), names)})
-    else:
-        pairs.update({(a, b): reason for a, b, reason in robot.disabled_pairs})
-    for a, b, reason in robot.rigid_pairs:
+        named = {*map(str, matrix["entry_names"]), *map(str, matrix.get("default_entry_names") or [])}
+        strangers = [link for link in robot.links if link in robot.geometry and link not in named]
+        own = [(a, b, reason) for a, b, reason in own if a in strangers or b in strangers]
+        if own:
+            scene.notes.append(
+                f"{Path(fields.path).name}: the allowed-collision matrix does not name {', '.join(strangers)}; "
+                "for these the pairs that the robot itself disables hold"
+            )
+    for a, b, reason in (*own, *robot.rigid_pairs):
         if (b, a) not in pairs:
             pairs.setdefault((a, b), reason)
     scene.allowed += [(a, b, reason) for (a, b), reason in pairs.items()]

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from collide.errors import InvalidArgument, SceneError
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody

@@ -1,0 +1,37 @@
+"""The doctor tells what is broken and never raises."""
+
+from __future__ import annotations
+
+from collide.reports import doctor
+from collide.reports.tables import lay_out, table_lines
+
+
+def test_a_sound_installation_is_called_sound(tmp_path):
+    examination = doctor.examine()
+    assert examination.sound and examination.verdict() == "sound"
+    lines = ["".join(t for t, _ in line) for table in examination.tables()
+             for line in table_lines(table, lay_out(table, 80), 80)]
+    assert max(map(len, lines)) <= 80 and any("numba" in line for line in lines)
+
+
+def test_a_wrong_answer_and_a_crash_are_findings(monkeypatch):
+    import collide
+
+    def two_pairs():
+        sphere = collide.Sphere(0.5)
+        yield "wrong", sphere, sphere, 3.0, 1.0
+        yield "crash", sphere, None, 3.0, 1.0
+
+    monkeypatch.setattr(doctor, "_known_pairs", two_pairs)
+    examination = doctor.examine()
+    assert [check.passed for check in examination.answers] == [False, False]
+    assert "should hold 1.0" in examination.answers[0].found
+    assert examination.verdict() == "BROKEN: 2 findings: wrong, crash"
+
+
+def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("a file where a folder should be")
+    monkeypatch.setenv("COLLIDE_CACHE_DIR", str(blocked))
+    caches = doctor.examine().caches
+    assert all(check.passed is None and "COLLIDE_CACHE_DIR" in check.found for check in caches)
