@@ -25,7 +25,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numba
@@ -66,7 +66,7 @@ class Entry:
     def __call__(self, *args):
         if self._ready is None:
             self._compile()
-        return self._ready(*args)  # type: ignore[misc]
+        return self._ready(*args)
 
     def _compile(self) -> None:
         with self._lock:
@@ -167,7 +167,7 @@ class _KernelCache(FunctionCache):
             return numba.core.caching.NullCache()
 
 
-@lru_cache(maxsize=None)
+@cache
 def _say_once(message: str) -> None:
     log.warning(message)
 

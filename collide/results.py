@@ -51,6 +51,9 @@ PAIR_DTYPE = np.dtype(
     align=True,
 )
 
+#: Names of the fields of a row.
+FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()
+
 
 def flipped(rows: np.ndarray) -> np.ndarray:
     """The same results with the bodies' roles exchanged: points swapped, normals negated, exactly."""
@@ -74,15 +77,15 @@ class PairResult:
         self.rows, self._single = rows, single
 
     def __getattr__(self, name: str):
-        if name not in PAIR_DTYPE.names:
-            raise AttributeError(f"no field {name!r}; there are {', '.join(PAIR_DTYPE.names)}")
+        if name not in FIELDS:
+            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
         values = self.rows[name]
         if not self._single:
             return values
         return values[0].copy() if values.ndim > 1 else values[0].item()
 
     def __dir__(self):
-        return [*super().__dir__(), *PAIR_DTYPE.names]
+        return [*super().__dir__(), *FIELDS]
 
     def __len__(self) -> int:
         return len(self.rows)

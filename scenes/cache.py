@@ -16,6 +16,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def fetch(name: str) -> dict[str, np.ndarray] | None:
         return None
 
 
-def store(name: str, arrays: Mapping[str, np.ndarray]) -> bool:
+def store(name: str, arrays: Mapping[str, Any]) -> bool:
     """Keep arrays under a key; True when they were written. Readers see all of it or nothing."""
     try:
         folder = directory()

@@ -152,6 +152,7 @@ def test_matrix(planning_scene):
     assert set(scene.allowed) == {
         ("base", "a", "allowed by the scene"), ("base", "b", "allowed by the scene"), ("boom", "b", "allowed by the scene"),
         ("tip", "b", "allowed by the scene"), ("a", "b", "allowed by the scene"), ("hook", "tip", "rigidly joined"),
+        ("boom", "tip", "adjacent links"),  # the matrix does not name tip
     }
     # of links that the matrix does not name, the robot's own pairs hold
     del matrix["default_entry_names"], matrix["default_entry_values"]

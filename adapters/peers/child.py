@@ -60,7 +60,8 @@ class IsolatedPeer(Peer):
         return self._peer.supports(shape)
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
-        left, lost = list(wanted), {}
+        left = list(wanted)
+        lost: dict[int, str] = {}
         for _ in range(self._most_restarts + 1):
             yield from _of_lost_bodies(question, left, lost)
             left = [k for k in left if not lost.keys() & question.pairs[k]]
@@ -70,9 +71,9 @@ class IsolatedPeer(Peer):
             with _child(self._spec, question, left, self._timeout) as child:
                 for event in child.events():
                     if event.kind in STATUSES:
-                        left.remove(event.index)
+                        left.remove(event.at)
                         yield event
-                    building = event.index if event.kind == BUILDING else None
+                    building = event.at if event.kind == BUILDING else None
                 if not left:
                     return
                 reason = child.epitaph()
@@ -107,6 +108,7 @@ def _child(spec: str, question: Question, wanted: list[int], timeout: float) -> 
         finally:
             process.kill()
             process.wait()
+            assert process.stdout is not None  # it was asked for
             process.stdout.close()
 
 
@@ -122,10 +124,12 @@ class _Child:
             threading.Thread(target=work[0], args=work[1:], daemon=True).start()
 
     def _send(self, job: tuple) -> None:
+        stdin = self._process.stdin
+        assert stdin is not None  # it was asked for
         try:
-            pickle.dump(sys.path, self._process.stdin)  # first, so that the rest can be unpickled
-            pickle.dump(job, self._process.stdin)
-            self._process.stdin.close()
+            pickle.dump(sys.path, stdin)  # first, so that the rest can be unpickled
+            pickle.dump(job, stdin)
+            stdin.close()
         except OSError:
             pass  # the child died first, which its silence will show
 

@@ -84,11 +84,11 @@ class Event(NamedTuple):
 
     kind : a row's status (ANSWERED, FAILED, UNSUPPORTED), or where the engine is now: BUILDING a
         body, ASKING a row. A child process that dies is known to have died there.
-    index : of the body for BUILDING, of the row otherwise.
+    at : index of the body for BUILDING, of the row otherwise.
     """
 
     kind: str
-    index: int
+    at: int
     reply: Reply | None = None
     reason: str = ""
     seconds: float = 0.0
@@ -119,9 +119,9 @@ class Table:
 
     def record(self, event: Event) -> None:
         """Write one row's event down; distances that are no finite length are kept out, with a remark."""
-        row = self.rows[event.index]
+        row = self.rows[event.at]
         row["seconds"], row[event.kind] = event.seconds, True
-        self.reasons[event.index] = event.reason
+        self.reasons[event.at] = event.reason
         if event.reply is None:
             return
         reply = event.reply
@@ -132,7 +132,7 @@ class Table:
             row["distance"], row["has_distance"] = reply.distance, True
         elif not math.isnan(reply.distance):
             remark = f"the distance {reply.distance:g} is no length"
-        self.reasons[event.index] = remark or event.reason
+        self.reasons[event.at] = remark or event.reason
 
 
 class Peer:

@@ -145,7 +145,7 @@ def _cut(rays: list[tuple[Row, int]], row: Row, bit: int) -> list[tuple[Row, int
 
 def _adjacent(common: int, every: list[int]) -> bool:
     """Two extreme rays span a face of dimension two iff no third ray is tight on all they share."""
-    if bin(common).count("1") < 2:
+    if common.bit_count() < 2:
         return False
     return sum(tight & common == common for tight in every) == 2
 

@@ -42,6 +42,7 @@ from collide.results import FORMULA, PAIR_DTYPE, PLANE, SIMPLEX, SWEPT, UNDECIDE
 
 
 def _at(field: str, unit: int) -> int:
+    assert PAIR_DTYPE.fields is not None
     return PAIR_DTYPE.fields[field][1] // unit
 
 

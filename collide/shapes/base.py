@@ -20,6 +20,7 @@ class Shape:
 
     __slots__ = ("_parts",)
     _fields: tuple[str, ...] = ()
+    _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
@@ -41,7 +42,7 @@ class Shape:
         return tuple(_hashable(getattr(self, f)) for f in self._fields)
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self._key() == other._key()  # type: ignore[attr-defined]
+        return type(self) is type(other) and self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash((type(self).__name__, self._key()))

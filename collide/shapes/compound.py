@@ -24,7 +24,9 @@ class Compound(Shape):
     Nested poses are multiplied out in float64; the rounding is accounted for in every bracket.
     """
 
-    __slots__ = _fields = ("items",)
+    __slots__ = ("items",)
+    _fields = __slots__
+    items: tuple[tuple[Shape, np.ndarray], ...]
 
     def __init__(self, items):
         try:

@@ -26,6 +26,11 @@ class HPolytope(Shape):
 
     __slots__ = ("bounded", "normals", "offsets", "slop", "vertices")
     _fields = ("normals", "offsets")
+    normals: np.ndarray
+    offsets: np.ndarray
+    vertices: np.ndarray
+    slop: float
+    bounded: bool
 
     def __init__(self, normals, offsets, *, bounded: bool = True):
         normals = rows("HPolytope", "normals", normals, (None, 3))

@@ -21,7 +21,11 @@ class ConvexHull(Shape):
     Ids in results are rows of ``points`` as given.
     """
 
-    __slots__ = _fields = ("points", "faces", "radius")
+    __slots__ = ("faces", "points", "radius")
+    _fields = ("points", "faces", "radius")
+    points: np.ndarray
+    faces: np.ndarray | None
+    radius: float
 
     def __init__(self, points, *, faces=None, radius: float = 0.0):
         points = rows("ConvexHull", "points", points, (None, 3))

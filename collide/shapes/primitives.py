@@ -1,7 +1,7 @@
 """Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, Halfspace: shapes of a few numbers.
 
 All are centred at the origin of their frame, with their axis along z; lengths are full lengths
-in metres, as in MuJoCo's documentation of "size" they are not.
+in metres (MuJoCo's "size" holds half lengths).
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ class Sphere(Shape):
     radius : [m], > 0. A Euclidean ball in the world, whatever the pose's rounding.
     """
 
-    __slots__ = _fields = ("radius",)
+    __slots__ = ("radius",)
+    _fields = __slots__
+    radius: float
 
     def __init__(self, radius: float):
         self._store(radius=positive("Sphere", "radius", radius))
@@ -44,7 +46,9 @@ class Box(Shape):
     size : (3,) full edge lengths [m], each > 0.
     """
 
-    __slots__ = _fields = ("size",)
+    __slots__ = ("size",)
+    _fields = __slots__
+    size: np.ndarray
 
     def __init__(self, size):
         size = vector("Box", "size", size)
@@ -63,7 +67,10 @@ class Capsule(Shape):
     radius : [m], > 0.   length : of the segment, without the caps [m], ≥ 0.
     """
 
-    __slots__ = _fields = ("radius", "length")
+    __slots__ = ("radius", "length")
+    _fields = __slots__
+    radius: float
+    length: float
 
     def __init__(self, radius: float, length: float):
         self._store(
@@ -83,7 +90,10 @@ class Cylinder(Shape):
     radius : [m], > 0.   length : full length [m], > 0.
     """
 
-    __slots__ = _fields = ("radius", "length")
+    __slots__ = ("radius", "length")
+    _fields = __slots__
+    radius: float
+    length: float
 
     def __init__(self, radius: float, length: float):
         self._store(
@@ -101,7 +111,10 @@ class Cone(Shape):
     radius : of the base [m], > 0.   length : from base to apex [m], > 0.
     """
 
-    __slots__ = _fields = ("radius", "length")
+    __slots__ = ("radius", "length")
+    _fields = __slots__
+    radius: float
+    length: float
 
     def __init__(self, radius: float, length: float):
         self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
@@ -117,7 +130,9 @@ class Ellipsoid(Shape):
     radii : (3,) semi-axes along x, y, z [m], each > 0.
     """
 
-    __slots__ = _fields = ("radii",)
+    __slots__ = ("radii",)
+    _fields = __slots__
+    radii: np.ndarray
 
     def __init__(self, radii):
         radii = vector("Ellipsoid", "radii", radii)
@@ -136,7 +151,10 @@ class Halfspace(Shape):
     offset : in the same units as normal·x (metres, where the normal has length 1).
     """
 
-    __slots__ = _fields = ("normal", "offset")
+    __slots__ = ("normal", "offset")
+    _fields = __slots__
+    normal: np.ndarray
+    offset: float
 
     def __init__(self, normal, offset: float):
         normal = rows("Halfspace", "normal", normal, (3,))

@@ -115,7 +115,7 @@ def _read_states(fields: Fields, robot: Robot, scene: Scene) -> tuple[dict[str, 
     X_WR = np.eye(4)
     if isinstance(fields.get("robot_state"), dict):
         states["scene"], X_WR = _robot_state(Fields(fields.get("robot_state"), fields.path, "robot_state"), robot, scene, X_WR)
-    request = _request_file(Path(fields.path))
+    request = _request_file(Path(str(fields.path)))
     if request is not None:
         scene.sources.append(str(request))
         asked = Fields(read_document(request), request)
@@ -141,7 +141,7 @@ def _robot_state(state: Fields, robot: Robot, scene: Scene, X_WR: np.ndarray) ->
     if strangers and len(strangers) == len(given):
         state.fail(f"none of the joints {', '.join(strangers)} is known; robot {robot.name} has {', '.join(robot.joint_names)}")
     if strangers:
-        scene.notes.append(f"{Path(state.path).name}: joints that robot {robot.name} does not have: {', '.join(strangers)}")
+        scene.notes.append(f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {', '.join(strangers)}")
     multi = state.get("multi_dof_joint_state")
     if isinstance(multi, dict) and multi.get("joint_names"):
         transforms = Fields(multi, state.path, state.place("multi_dof_joint_state")).items("transforms")
@@ -327,7 +327,7 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
         own = [(a, b, reason) for a, b, reason in own if a in strangers or b in strangers]
         if own:
             scene.notes.append(
-                f"{Path(fields.path).name}: the allowed-collision matrix does not name {', '.join(strangers)}; "
+                f"{Path(str(fields.path)).name}: the allowed-collision matrix does not name {', '.join(strangers)}; "
                 "for these the pairs that the robot itself disables hold"
             )
     for a, b, reason in (*own, *robot.rigid_pairs):
@@ -370,7 +370,7 @@ def _note_what_is_ignored(fields: Fields, scene: Scene) -> None:
     octomap = world.get("octomap") if isinstance(world, dict) else None
     cells = octomap.get("octomap") if isinstance(octomap, dict) else None
     if isinstance(cells, dict) and cells.get("data"):
-        scene.notes.append(f"{Path(fields.path).name}: the octomap is not read; what it marks as occupied is NOT checked")
+        scene.notes.append(f"{Path(str(fields.path)).name}: the octomap is not read; what it marks as occupied is NOT checked")
     for key, neutral in (("link_padding", 0), ("link_scale", 1)):
         for entry, _ in fields.items(key):
             value = entry.get("padding" if key == "link_padding" else "scale") if isinstance(entry, dict) else None
