@@ -11,6 +11,7 @@ beyond          the pair is farther apart than the query's max_distance; `distan
                 then a proven lower bound ≥ max_distance, and `upper` is infinite
 how             which argument decided: an index into `HOW`
 iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis
+exact           rounds of the exact stage, 0 where doubles decided
 distance        signed [m]: the gap, or minus the depth
 lower, upper    lower ≤ true signed distance ≤ upper, proven against rounding [m]
 normal          (3,) unit vector nhat_AB_W: moving B by −distance·normal brings the pair to touch
@@ -36,8 +37,9 @@ HOW = (
     "swept overlap",      # two core points nearer than the sum of the radii
     "closed form",        # a formula with an error bound: spheres, capsules, half-spaces
     "boxes apart",        # bounding boxes, rounded outwards, that do not meet
+    "exact arithmetic",   # GJK in integers, where doubles leave the sign open
 )
-UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, BOXES = range(len(HOW))
+UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, BOXES, EXACT = range(len(HOW))
 
 PAIR_DTYPE = np.dtype(
     [
@@ -46,7 +48,7 @@ PAIR_DTYPE = np.dtype(
         ("a", "i4"), ("b", "i4"), ("part_a", "i4"), ("part_b", "i4"),
         ("vertices_a", "i4", 4), ("vertices_b", "i4", 4),
         ("iterations", "i4"),
-        ("count", "u1"), ("how", "u1"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
+        ("count", "u1"), ("how", "u1"), ("exact", "u1"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
     ],
     align=True,
 )

@@ -124,7 +124,7 @@ class Scene:
         Raises InvalidArgument for an unknown state or joint; the known ones are listed.
         """
         values = self._named_state(state) if isinstance(state, str) else dict(state)
-        shares = self._shares(values)
+        shares = self.joint_shares(values)
         placements, notes = {}, []
         for name, placement in self.placements.items():
             q, about = placement.robot.configuration(shares[name], start=placement.q)
@@ -144,7 +144,7 @@ class Scene:
             raise InvalidArgument(f"scene {self.name}: unknown state {name!r}; it has {known}")
         return self.states[name]
 
-    def _shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    def joint_shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
         """The part of a state that concerns each robot, by the names of its joints."""
         shares: dict[str, dict[str, float]] = {name: {} for name in self.placements}
         owner = {

@@ -15,8 +15,10 @@ from collide.shapes import Box, Compound, Cone, ConvexHull, Cylinder, Halfspace
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 SCENES = sorted((SHARED / "scenes/motionbenchmaker").glob("*/*/scene*.yaml")) if SHARED.is_dir() else []
 
-#: MoveIt calls every start and goal free. These pairs meet here, since a hull fills the hollows of its link.
-HULLS_TOO_LARGE = {
+#: MoveIt calls every start and goal free. These pairs meet here: the URDF that comes with the scenes has a
+#: ball of 0.2 m for the Fetch's head, and the hull of the UR5's forearm fills its hollows (as triangles
+#: its pairs are 7, 8 and 21 mm apart).
+STAND_INS_MEET = {
     "bookshelf_tall_fetch/scene0003/goal": {("head_pan_link", "upperarm_roll_link")},
     "table_under_pick_ur5/scene0001/start": {("forearm_link", "wrist_2_link")},
     "table_under_pick_ur5/scene0001/goal": {("forearm_link", "wrist_2_link"), ("forearm_link", "table_top")},
@@ -53,7 +55,7 @@ def test_motion_bench_maker(family):
         assert {reason for reason in reasons if not reason.startswith("SRDF: ")} <= {"allowed by the scene", "rigidly joined"}
         for name, there in (("start", start), ("goal", goal)):
             hits = there.world().collisions().names
-            assert set(hits) <= HULLS_TOO_LARGE.get(f"{family.name}/{file.stem}/{name}", set())
+            assert set(hits) <= STAND_INS_MEET.get(f"{family.name}/{file.stem}/{name}", set())
         moved = [a.name for a, b in zip(start.bodies, goal.bodies) if not np.array_equal(a.X_WB, b.X_WB)]
         assert moved and set(moved) <= {body.name for body in scene.bodies if body.owner}
         assert len(scene.sources) >= 4  # scene, request, URDF, SRDF

@@ -31,6 +31,8 @@ class PackedConvex(NamedTuple):
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.
+    lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
+        integers times 2 to it.
     content : digest of the numbers above; equal for equal sets, in every process. It orders the
         bodies of a pair, so that swapped questions are worked out on the same numbers.
     """
@@ -42,6 +44,7 @@ class PackedConvex(NamedTuple):
     params: np.ndarray
     points: np.ndarray
     coordinates: np.ndarray
+    lowest: int
     content: bytes
 
 
@@ -71,7 +74,17 @@ def _packed(kind, radius, reach, slop, params, points, coordinates) -> PackedCon
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
-    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, digest.digest())
+    lowest = lowest_exponent(points)
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, lowest, digest.digest())
+
+
+def lowest_exponent(values: np.ndarray) -> int:
+    """Exponent of the lowest set bit among doubles; 2000 where all are 0."""
+    fraction, exponent = np.frexp(values[values != 0.0])
+    if not len(fraction):
+        return 2000
+    mantissa = (fraction * 2.0**53).astype(np.int64)
+    return int((exponent - 53 + np.frexp((mantissa & -mantissa).astype(float))[1] - 1).min())
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

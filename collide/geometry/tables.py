@@ -11,8 +11,8 @@ from collide._jit import address_of
 from collide.geometry.packing import PackedConvex
 
 # One row of integers a shape.
-KIND, COUNT, PADDED, ADDRESS, RANK = range(5)
-INTS = 5
+KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK = range(6)
+INTS = 6
 # One row of doubles a shape; PARAMS is the first of four.
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
@@ -36,7 +36,7 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), 0
+            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}

@@ -20,6 +20,7 @@ from collide.geometry.tables import (
     COUNT,
     INTS,
     KIND,
+    LOWEST,
     NUMBERS,
     PADDED,
     PARAMS,
@@ -30,15 +31,17 @@ from collide.geometry.tables import (
     SLOP,
     ShapeTable,
 )
-from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS
+from collide.narrowphase.bounds import ERROR, EXACT_ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa import DOUBLES, FLAT, INTEGERS, epa, workspace
+from collide.narrowphase.exact import INTEGERS as EXACT_INTEGERS
+from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.halfspace_convex import gap_of_halfspaces, plane_in_world
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.simplex import face_weights
-from collide.results import FORMULA, PAIR_DTYPE, PLANE, SIMPLEX, SWEPT, UNDECIDED
+from collide.results import EXACT, FORMULA, PAIR_DTYPE, PLANE, SIMPLEX, SWEPT, UNDECIDED
 
 
 def _at(field: str, unit: int) -> int:
@@ -50,7 +53,7 @@ _ROW = PAIR_DTYPE.itemsize
 _DISTANCE, _LOWER, _UPPER = _at("distance", 8), _at("lower", 8), _at("upper", 8)
 _NORMAL, _POINT_A, _POINT_B = _at("normal", 8), _at("point_a", 8), _at("point_b", 8)
 _VERTICES_A, _VERTICES_B, _ITERATIONS = _at("vertices_a", 4), _at("vertices_b", 4), _at("iterations", 4)
-_COUNT, _HOW, _HIT = _at("count", 1), _at("how", 1), _at("hit", 1)
+_COUNT, _HOW, _EXACT, _HIT = _at("count", 1), _at("how", 1), _at("exact", 1), _at("hit", 1)
 _CERTIFIED, _BEYOND = _at("certified", 1), _at("beyond", 1)
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights.
@@ -115,7 +118,7 @@ def _write_verdict(row, marks, distance, lower, upper, how, width, limit):
     row[_LOWER] = lower
     row[_UPPER] = upper
     row[_DISTANCE] = min(max(distance, lower), upper) + 0.0  # never −0.0
-    decided = lower > 0.0 or upper < 0.0
+    decided = lower > 0.0 or upper <= 0.0
     marks[_HOW] = how if decided else UNDECIDED
     marks[_HIT] = 0 if lower > 0.0 else 1
     marks[_CERTIFIED] = 1 if decided and upper - lower <= width else 0
@@ -225,7 +228,9 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
 
 
 @kernel
-def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, flip):
+def _swept(
+    pair, ints, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
+):
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
@@ -248,7 +253,14 @@ def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, b
     how = FORMULA if closed_form else (PLANE if lower > 0.0 else (SIMPLEX if above < 0.0 or radius == 0.0 else SWEPT))
     words[_ITERATIONS] = rounds
     width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
-    _write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
+    distance = -depth - radius
+    if lower <= 0.0 < upper and exactly and not curved:
+        distance, lower, upper, vertices, spent = _decide(
+            pair, ints, shape_a, shape_b, integers_at, distance, lower, upper, vertices, size
+        )
+        how = EXACT if spent > 0 else how
+        marks[_EXACT] = min(spent, 255)
+    _write_verdict(row, marks, distance, lower, upper, how, width, limit)
     ax = _combine(points, weights, n, 3)
     ay = _combine(points, weights, n, 4)
     az = _combine(points, weights, n, 5)
@@ -272,6 +284,27 @@ def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, b
         flip,
     )  # fmt: skip
     _write_vertices(words, marks, ids, vertices, flip)
+
+
+@kernel
+def _decide(pair, ints, shape_a, shape_b, integers_at, distance, lower, upper, vertices, size):
+    """Settle a sign that doubles leave open: (distance, lower, upper, vertices shown, rounds).
+
+    0 rounds: the magnitudes span too many bits, and the sign stays open.
+    """
+    numbers = pair[12]
+    at_a = NUMBERS * shape_a
+    at_b = NUMBERS * shape_b
+    verdict, shown, _, excess, rounds = touch_exactly(
+        pair, view_i64(integers_at + 8 * (_OWN_INTEGERS + INTEGERS), EXACT_INTEGERS), view_i64(integers_at, 10),
+        vertices, ints[INTS * shape_a + LOWEST], ints[INTS * shape_b + LOWEST], numbers[at_a + REACH],
+        numbers[at_b + REACH], numbers[at_a + RADIUS], numbers[at_b + RADIUS], size,
+    )  # fmt: skip
+    if verdict == SEPARATE:
+        return excess, max(lower, (1.0 - EXACT_ERROR) * excess), min(upper, (1.0 + EXACT_ERROR) * excess), shown, rounds
+    if verdict == TOUCHING:
+        return min(distance, 0.0), lower, 0.0, shown, rounds
+    return distance, lower, upper, vertices, 0
 
 
 @kernel
@@ -419,8 +452,9 @@ def _answer(
         _half(pair, sb, row, words, marks, doubles_at, integers_at, limit, size, ERROR * size + slop, flip)
     else:
         _swept(
-            pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop, flip
-        )
+            pair, ints, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop,
+            slop == 0.0, flip,
+        )  # fmt: skip
 
 
 def run_pairs(
@@ -452,7 +486,7 @@ class _Workspace(local):
 
     def __init__(self):
         self.doubles = np.zeros(_OWN_DOUBLES + DOUBLES)
-        self.integers = np.zeros(_OWN_INTEGERS + INTEGERS, dtype=np.int64)
+        self.integers = np.zeros(_OWN_INTEGERS + INTEGERS + EXACT_INTEGERS, dtype=np.int64)
         self.addresses = address_of(self.doubles), address_of(self.integers)
 
 

@@ -25,6 +25,10 @@ from __future__ import annotations
 #: Error of every bound, in units of S (see above).
 ERROR = 64 * 2.0**-53
 
+#: Relative error of a distance that the exact stage hands over in doubles: two conversions good to
+#: 2⁻⁵⁰ each, a quotient, a root and a quotient more.
+EXACT_ERROR = 2.0**-47
+
 #: `certified` promises a proven sign and a bracket at most this wide, in units of S: cores of points.
 PROMISE_POINTS = 2.0**-40
 #: The same where a cylinder, cone or ellipsoid takes part.
@@ -32,6 +36,8 @@ PROMISE_CURVED = 2.0**-26
 
 #: Rounds after which GJK hands over the bracket it has.
 GJK_ROUNDS = 128
+#: Rounds of the exact search; it ends by itself, and no case met needed 20.
+EXACT_ROUNDS = 100000
 #: Vertices and facets an expanding polytope may use before it hands over the bracket it has.
 EPA_VERTICES = 1024
 EPA_FACETS = 8192

@@ -197,7 +197,7 @@ def _add_states(document: Fields, scene: Scene) -> None:
     for name in states.data:
         values = state_of(states.data[name], document.path, f"states.{name}")
         try:
-            scene._shares(values)
+            scene.joint_shares(values)
         except InvalidArgument as error:
             states.fail(str(error), str(name))
         scene.states[str(name)] = values

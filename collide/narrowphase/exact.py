@@ -1,0 +1,545 @@
+"""The exact stage: whether two posed hulls, each swept by a ball, share a point. No rounding at all.
+
+GJK with Johnson's subalgorithm (Gilbert, Johnson and Keerthi 1988) in integers: every quantity is a
+polynomial of the doubles given (vertices, both poses, radii), which `geometry.digits` holds exactly.
+The exact distance of the simplex strictly decreases from round to round and there are finitely many
+simplices, so it ends, and it ends in a decision. Doubles only propose: which simplex to begin with,
+and which few vertices can be extreme in a direction (all within an error bound of the best one).
+
+Degrees, with one coordinate of a difference point y = R_A a − R_B b − (p_WB − p_WA) as one: a Gram
+entry y_i·y_j has two, Johnson's Δ has 0, 2, 4, 6 for 1 to 4 points, the direction Σ Δ_i y_i one more.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+from collide.geometry.digits import (
+    BITS,
+    LONGEST_FACTOR,
+    add_double,
+    add_number,
+    add_product,
+    as_double,
+    carry,
+    clear,
+    grid_of,
+    lowest_bit,
+)
+from collide.narrowphase.bounds import ERROR, EXACT_ROUNDS
+
+#: What the stage says. UNDONE: the magnitudes span more bits than the workspace holds.
+TOUCHING, SEPARATE, UNDONE = range(3)
+
+#: Most digits of one coordinate: 2^(26·20) between the largest and the smallest bit of a pair.
+_LONGEST = 20
+assert 6 * _LONGEST <= LONGEST_FACTOR
+
+# --- the workspace, in units of the coordinate length D (digits) --------------------------------
+# rotations 18·D and shift 3·D; then points 5·3·D, Gram 25·2D, Δ 16·4·6D, direction 3·6D, scratch.
+
+#: Integers of workspace.
+INTEGERS = 21 * _LONGEST + 15 * _LONGEST + 50 * _LONGEST + 384 * _LONGEST + 18 * _LONGEST + 60 * _LONGEST + 64
+
+
+@kernel
+def _shift_at(d):
+    return 18 * d
+
+
+@kernel
+def _point_at(d, k, axis):
+    return (21 + 3 * k + axis) * d
+
+
+@kernel
+def _gram_at(d, i, j):
+    return (36 + 2 * (5 * i + j)) * d
+
+
+@kernel
+def _delta_at(d, mask, i):
+    return (86 + 6 * (4 * mask + i)) * d
+
+
+@kernel
+def _direction_at(d, axis):
+    return (470 + 6 * axis) * d
+
+
+@kernel
+def _scratch_at(d, k):
+    """Scratch k of 4, 15·D each: room for a coordinate and for numbers of up to 14 degrees."""
+    return (488 + 15 * k) * d
+
+
+# --- scaling ------------------------------------------------------------------------------------
+
+
+@kernel
+def _lowest_and_largest(numbers, at, n):
+    """Exponents of the lowest bit and of the largest magnitude among n doubles."""
+    lowest = 2000
+    largest = -2000
+    for k in range(at, at + n):
+        if numbers[k] != 0.0:
+            lowest = min(lowest, lowest_bit(numbers[k]))
+            largest = max(largest, math.frexp(numbers[k])[1])
+    return lowest, largest
+
+
+@kernel
+def _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
+    """(D, grid of coordinates, grid and digits of R_A, grid and digits of a's coordinates, same of B).
+
+    A grid is the exponent of a number's digit 0 over BITS; all of a pair's coordinates share one.
+    """
+    low_p, high_p = _lowest_and_largest(poses, p, 9)
+    low_q, high_q = _lowest_and_largest(poses, q, 9)
+    rot_a = grid_of(low_p)
+    rot_b = grid_of(low_q)
+    core_a = grid_of(min(lowest_a, 1000))
+    core_b = grid_of(min(lowest_b, 1000))
+    low_s, _ = _lowest_and_largest(poses, p + 9, 3)
+    low_t, _ = _lowest_and_largest(poses, q + 9, 3)
+    grid = grid_of(min(low_s, low_t, lowest_bit(radius_a), lowest_bit(radius_b), 1000))
+    if lowest_a < 2000:
+        grid = min(grid, rot_a + core_a)
+    if lowest_b < 2000:
+        grid = min(grid, rot_b + core_b)
+    # Digits from the lowest bit to the highest: |x| < 2^e reaches up to bit e − 1.
+    digits_rot_a = grid_of(high_p - 1) - rot_a + 1
+    digits_rot_b = grid_of(high_q - 1) - rot_b + 1
+    digits_a = max(grid_of(math.frexp(reach_a)[1] - 1) - core_a + 1, 1) if lowest_a < 2000 else 0
+    digits_b = max(grid_of(math.frexp(reach_b)[1] - 1) - core_b + 1, 1) if lowest_b < 2000 else 0
+    # A coordinate is less than 2·size; the highest digit is signed and may be as large as a factor.
+    d = grid_of(math.frexp(size)[1]) - grid + 1
+    for k in range(3):
+        d = max(d, grid_of(math.frexp(poses[p + 9 + k])[1]) - grid + 1)
+        d = max(d, grid_of(math.frexp(poses[q + 9 + k])[1]) - grid + 1)
+    if lowest_a < 2000:
+        d = max(d, digits_rot_a + digits_a - 1 + rot_a + core_a - grid)
+    if lowest_b < 2000:
+        d = max(d, digits_rot_b + digits_b - 1 + rot_b + core_b - grid)
+    return d, grid, rot_a, digits_rot_a, core_a, digits_a, rot_b, digits_rot_b, core_b, digits_b
+
+
+@kernel
+def _load(digits, d, poses, p, q, grid, rot_a, rot_b):
+    """Rotations and the shift p_WB − p_WA into the workspace."""
+    clear(digits, 0, 21 * d)
+    for k in range(9):
+        add_double(digits, k * d, poses[p + k], rot_a)
+        add_double(digits, (9 + k) * d, poses[q + k], rot_b)
+    for k in range(3):
+        at = _shift_at(d) + k * d
+        add_double(digits, at, poses[q + 9 + k], grid)
+        add_double(digits, at, -poses[p + 9 + k], grid)
+        carry(digits, at, d)
+
+
+@kernel
+def _add_vertex(digits, d, out, rotation, digits_rot, coordinates, m, vertex, core, digits_core, offset, sign):
+    """Add sign · R v to three coordinates at out, out + D, out + 2D."""
+    at = _scratch_at(d, 3)
+    clear(digits, at, 3 * digits_core)
+    for j in range(3):
+        add_double(digits, at + j * digits_core, coordinates[j * m + vertex], core)
+    for axis in range(3):
+        for j in range(3):
+            add_product(
+                digits, out + axis * d + offset, (rotation + 3 * axis + j) * d, digits_rot, at + j * digits_core,
+                digits_core, sign,
+            )  # fmt: skip
+
+
+@kernel
+def _set_point(digits, scale, pair, k, i, j):
+    """Point k of the workspace becomes the difference of vertex i of A and vertex j of B."""
+    d, grid, rot_a, digits_rot_a, core_a, digits_a, rot_b, digits_rot_b, core_b, digits_b = scale
+    out = _point_at(d, k, 0)
+    clear(digits, out, 3 * d)
+    if digits_a > 0:
+        _add_vertex(
+            digits, d, out, 0, digits_rot_a, pair[0], pair[2], i, core_a, digits_a, rot_a + core_a - grid, 1
+        )
+    if digits_b > 0:
+        _add_vertex(
+            digits, d, out, 9, digits_rot_b, pair[6], pair[8], j, core_b, digits_b, rot_b + core_b - grid, -1
+        )
+    for axis in range(3):
+        add_number(digits, out + axis * d, _shift_at(d) + axis * d, d, -1)
+        carry(digits, out + axis * d, d)
+
+
+@kernel
+def _set_gram(digits, d, k):
+    """Products of point k with points 0 … k."""
+    for i in range(k + 1):
+        at = _gram_at(d, k, i)
+        clear(digits, at, 2 * d)
+        for axis in range(3):
+            add_product(digits, at, _point_at(d, k, axis), d, _point_at(d, i, axis), d, 1)
+        carry(digits, at, 2 * d)
+        if i != k:
+            clear(digits, _gram_at(d, i, k), 2 * d)
+            add_number(digits, _gram_at(d, i, k), at, 2 * d, 1)
+
+
+# --- Johnson's subalgorithm ---------------------------------------------------------------------
+
+
+@kernel
+def _length(d, mask):
+    """Digits of Δ for a set of points: one more factor of degree two for each point but the first."""
+    count = (mask & 1) + ((mask >> 1) & 1) + ((mask >> 2) & 1) + ((mask >> 3) & 1)
+    return 1 if count == 1 else 2 * d * (count - 1)
+
+
+@kernel
+def _lowest_member(mask):
+    k = 0
+    while not (mask >> k) & 1:
+        k += 1
+    return k
+
+
+@kernel
+def _set_delta(digits, d, mask, j):
+    """Δ_j(X ∪ {j}) = Σ_{i ∈ X} Δ_i(X)·(y_i·y_k − y_i·y_j), k in X; returns its sign.
+
+    Negative or zero for j outside X: no point of the simplex gets nearer by going towards y_j.
+    """
+    k = _lowest_member(mask)
+    larger = mask | (1 << j)
+    out = _delta_at(d, larger, j)
+    n = _length(d, larger)
+    clear(digits, out, n)
+    if mask & (mask - 1) == 0:
+        add_number(digits, out, _gram_at(d, k, k), 2 * d, 1)
+        add_number(digits, out, _gram_at(d, k, j), 2 * d, -1)
+        return carry(digits, out, n)
+    difference = _scratch_at(d, 0)
+    for i in range(4):
+        if (mask >> i) & 1:
+            clear(digits, difference, 2 * d)
+            add_number(digits, difference, _gram_at(d, i, k), 2 * d, 1)
+            add_number(digits, difference, _gram_at(d, i, j), 2 * d, -1)
+            carry(digits, difference, 2 * d)
+            add_product(digits, out, _delta_at(d, mask, i), _length(d, mask), difference, 2 * d, 1)
+    return carry(digits, out, n)
+
+
+@kernel
+def _nearest_subset(digits, d, n, newest):
+    """The subset of n ≤ 4 points that holds the nearest point of their hull in its relative interior.
+
+    Subsets with the newest point only, where newest ≥ 0: without it there is nothing nearer than
+    before. Sets are visited smaller ones first, so that every Δ needed stands. Affinely dependent
+    points are no special case: the nearest point also lies in an independent subset.
+    """
+    everything = (1 << n) - 1
+    signs = 0  # two bits a (subset, member): 1 where Δ > 0
+    for i in range(n):
+        digits[_delta_at(d, 1 << i, i)] = 1
+        signs |= 1 << i
+    for count in range(1, n + 1):
+        for mask in range(1, everything + 1):
+            size = (mask & 1) + ((mask >> 1) & 1) + ((mask >> 2) & 1) + ((mask >> 3) & 1)
+            if size != count:
+                continue
+            positive = True
+            for i in range(n):
+                if (mask >> i) & 1 and count > 1 and _delta_sign(digits, d, mask, i) <= 0:
+                    positive = False
+            nearest = positive
+            for j in range(n):
+                if not (mask >> j) & 1 and _set_delta(digits, d, mask, j) > 0:
+                    nearest = False
+            if nearest and (newest < 0 or (mask >> newest) & 1):
+                return mask
+    return 0
+
+
+@kernel
+def _delta_sign(digits, d, mask, i):
+    """Sign of a carried Δ_i(mask)."""
+    at = _delta_at(d, mask, i)
+    n = _length(d, mask)
+    if digits[at + n - 1] < 0:
+        return -1
+    for k in range(n):
+        if digits[at + k] != 0:
+            return 1
+    return 0
+
+
+@kernel
+def _set_direction(digits, d, mask):
+    """A positive multiple of the nearest point of points 0 … n − 1, into the direction.
+
+    For one or two points it is the nearest point times ΣΔ. Across three it is their normal, of degree
+    two instead of five. Returns (digits it takes, whether it is zero: the origin is in the hull).
+    """
+    if mask == 7:
+        return _set_normal(digits, d)
+    n = _length(d, mask)
+    total = d if n == 1 else n + d
+    zero = True
+    for axis in range(3):
+        at = _direction_at(d, axis)
+        clear(digits, at, 6 * d)
+        for i in range(4):
+            if (mask >> i) & 1:
+                add_product(digits, at, _delta_at(d, mask, i), n, _point_at(d, i, axis), d, 1)
+        if carry(digits, at, total) != 0:
+            zero = False
+    return total, zero
+
+
+@kernel
+def _set_normal(digits, d):
+    """The normal of points 0, 1, 2, on the side that points 0, 1, 2 lie on, seen from the origin."""
+    for edge in range(2):
+        for axis in range(3):
+            at = _scratch_at(d, 0) + (3 * edge + axis) * d
+            clear(digits, at, d)
+            add_number(digits, at, _point_at(d, edge + 1, axis), d, 1)
+            add_number(digits, at, _point_at(d, 0, axis), d, -1)
+            carry(digits, at, d)
+    height = _scratch_at(d, 1)
+    clear(digits, height, 3 * d)
+    for axis in range(3):
+        out = _direction_at(d, axis)
+        e = _scratch_at(d, 0)
+        f = e + 3 * d
+        i = (axis + 1) % 3
+        j = (axis + 2) % 3
+        clear(digits, out, 2 * d)
+        add_product(digits, out, e + i * d, d, f + j * d, d, 1)
+        add_product(digits, out, e + j * d, d, f + i * d, d, -1)
+        carry(digits, out, 2 * d)
+        add_product(digits, height, out, 2 * d, _point_at(d, 0, axis), d, 1)
+    side = carry(digits, height, 3 * d)
+    if side < 0:
+        for axis in range(3):
+            out = _direction_at(d, axis)
+            for k in range(2 * d):
+                digits[out + k] = -digits[out + k]
+            carry(digits, out, 2 * d)
+    return 2 * d, side == 0
+
+
+@kernel
+def _direction_double(digits, d, n):
+    """The direction as doubles, to a relative 2⁻⁵⁰ of its length, and up to a power of two."""
+    x, ex = as_double(digits, _direction_at(d, 0), n)
+    y, ey = as_double(digits, _direction_at(d, 1), n)
+    z, ez = as_double(digits, _direction_at(d, 2), n)
+    e = -(10**6)
+    if x != 0.0:
+        e = ex + math.frexp(x)[1]
+    if y != 0.0:
+        e = max(e, ey + math.frexp(y)[1])
+    if z != 0.0:
+        e = max(e, ez + math.frexp(z)[1])
+    return _ldexp(x, ex - e), _ldexp(y, ey - e), _ldexp(z, ez - e)
+
+
+@kernel
+def _ldexp(x, e):
+    return math.ldexp(x, int(max(e, -1060))) if e > -1200 else 0.0
+
+
+# --- supports -----------------------------------------------------------------------------------
+
+
+@kernel
+def _extreme_vertex(
+    digits, d, n, coordinates, count, m, poses, p, rotation, digits_rot, core, digits_core, vx, vy, vz, slack, sign
+):
+    """The vertex with the least sign · (v·R a), v the exact direction; the first of equals.
+
+    Doubles rule out all that are farther than twice the slack from the best; what is left, usually
+    one vertex, is compared exactly.
+    """
+    gx = sign * (poses[p] * vx + poses[p + 3] * vy + poses[p + 6] * vz)
+    gy = sign * (poses[p + 1] * vx + poses[p + 4] * vy + poses[p + 7] * vz)
+    gz = sign * (poses[p + 2] * vx + poses[p + 5] * vy + poses[p + 8] * vz)
+    least = math.inf
+    first = 0
+    for i in range(count):
+        value = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
+        if value < least:
+            least = value
+            first = i
+    best = -1
+    for i in range(count):
+        value = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
+        if value > least + slack:
+            continue
+        if best < 0:
+            best = i
+        elif _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, best) * sign < 0:
+            best = i
+    return best if best >= 0 else first
+
+
+@kernel
+def _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, j):
+    """Sign of v·R (a_i − a_j)."""
+    at = _scratch_at(d, 1)
+    out = _scratch_at(d, 2)
+    length = digits_rot + digits_core
+    clear(digits, at, 3 * d)
+    for axis in range(3):
+        clear(digits, at + axis * d, d)
+    _add_vertex(digits, d, at, rotation, digits_rot, coordinates, m, i, core, digits_core, 0, 1)
+    _add_vertex(digits, d, at, rotation, digits_rot, coordinates, m, j, core, digits_core, 0, -1)
+    clear(digits, out, n + length)
+    for axis in range(3):
+        carry(digits, at + axis * d, min(length, d))
+        add_product(digits, out, _direction_at(d, axis), n, at + axis * d, min(length, d), 1)
+    return carry(digits, out, n + length)
+
+
+# --- the search ---------------------------------------------------------------------------------
+
+
+@kernel
+def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
+    """Decide whether two swept hulls share a point.
+
+    pair : as in `difference_point`, both cores hulls of points.
+    digits : int64 workspace of `INTEGERS`.
+    ids : vertex pairs of a first simplex of n ≥ 1 points in, of the deciding one out.
+    lowest_a, lowest_b, reach_a, reach_b : of the shapes (`PackedConvex`).   size : S of `bounds.py`.
+
+    Returns
+    -------
+    verdict : TOUCHING, SEPARATE or UNDONE.
+    points of the deciding simplex: its nearest point to the origin is the separating direction, or
+    lies within the sum of the radii.
+    distance : of the cores, to a relative 1e-14.
+    excess : distance minus the radii, without cancellation, to the same.
+    rounds used.
+    """
+    poses = pair[13]
+    p = pair[5]
+    q = pair[11]
+    scale = _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
+    d = scale[0]
+    if d > _LONGEST:
+        return UNDONE, n, 0.0, 0.0, 0
+    _load(digits, d, poses, p, q, scale[1], scale[2], scale[6])
+    for k in range(n):
+        _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
+        _set_gram(digits, d, k)
+    mask = _nearest_subset(digits, d, n, -1)
+    swept = radius_a > 0.0 or radius_b > 0.0
+    for used in range(1, EXACT_ROUNDS + 1):
+        n = _compact(digits, d, ids, mask, n)
+        mask = (1 << n) - 1
+        if n == 4:
+            return TOUCHING, n, 0.0, -(radius_a + radius_b), used
+        length, zero = _set_direction(digits, d, mask)
+        if zero:
+            return TOUCHING, n, 0.0, -(radius_a + radius_b), used
+        if swept:
+            touching, distance, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
+            if touching:
+                return TOUCHING, n, distance, excess, used
+        vx, vy, vz = _direction_double(digits, d, length)
+        along = math.sqrt(vx * vx + vy * vy + vz * vz)
+        i = _extreme_vertex(
+            digits, d, length, pair[0], pair[1], pair[2], poses, p, 0, scale[3], scale[4], scale[5], vx, vy, vz,
+            2.0 * ERROR * along * size, 1.0,
+        )  # fmt: skip
+        j = _extreme_vertex(
+            digits, d, length, pair[6], pair[7], pair[8], poses, q, 9, scale[7], scale[8], scale[9], vx, vy, vz,
+            2.0 * ERROR * along * size, -1.0,
+        )  # fmt: skip
+        known = False
+        for k in range(n):
+            known = known or (ids[2 * k] == i and ids[2 * k + 1] == j)
+        if not known:
+            ids[2 * n] = i
+            ids[2 * n + 1] = j
+            _set_point(digits, scale, pair, n, i, j)
+            _set_gram(digits, d, n)
+        if known or _set_delta(digits, d, mask, n) <= 0:
+            _, distance, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
+            return SEPARATE, n, distance, excess, used
+        mask = _nearest_subset(digits, d, n + 1, n)
+        n += 1
+    return UNDONE, n, 0.0, 0.0, EXACT_ROUNDS
+
+
+@kernel
+def _compact(digits, d, ids, mask, n):
+    """Keep the points of the subset, with their Gram entries, and set their Δ; returns their number."""
+    kept = 0
+    for k in range(n):
+        if not (mask >> k) & 1:
+            continue
+        if kept != k:
+            ids[2 * kept] = ids[2 * k]
+            ids[2 * kept + 1] = ids[2 * k + 1]
+            for c in range(3 * d):
+                digits[_point_at(d, kept, 0) + c] = digits[_point_at(d, k, 0) + c]
+        column = 0
+        for j in range(n):
+            if (mask >> j) & 1:
+                for c in range(2 * d):
+                    digits[_gram_at(d, kept, column) + c] = digits[_gram_at(d, k, j) + c]
+                column += 1
+        kept += 1
+    if kept < n:
+        for subset in range(1, 1 << kept):
+            if subset & (subset - 1) == 0:
+                digits[_delta_at(d, subset, _lowest_member(subset))] = 1
+            for j in range(kept):
+                if not (subset >> j) & 1:
+                    _set_delta(digits, d, subset, j)
+    return kept
+
+
+@kernel
+def _within_radius(digits, d, mask, grid, radius_a, radius_b):
+    """(|v| ≤ r, |v|, |v| − r) for the nearest point v of the subset and the sum r of the radii.
+
+    |v|² = Σ Δ_i (y_i·y_k) / ΣΔ for any k of the subset, so the test is Σ Δ_i (y_i·y_k) ≤ r² ΣΔ.
+    """
+    k = _lowest_member(mask)
+    n = _length(d, mask)
+    total = _scratch_at(d, 0)
+    square = _scratch_at(d, 1)
+    clear(digits, total, n)
+    clear(digits, square, n + 2 * d)
+    for i in range(4):
+        if (mask >> i) & 1:
+            add_number(digits, total, _delta_at(d, mask, i), n, 1)
+            add_product(digits, square, _delta_at(d, mask, i), n, _gram_at(d, i, k), 2 * d, 1)
+    carry(digits, total, n)
+    sign = carry(digits, square, n + 2 * d)
+    over, over_exponent = as_double(digits, total, n)
+    value, exponent = as_double(digits, square, n + 2 * d)
+    scale = 2 * BITS * grid - over_exponent
+    distance = math.sqrt(_ldexp(value / over, exponent + scale))
+    if radius_a == 0.0 and radius_b == 0.0:
+        return sign == 0, distance, distance
+    radius = _scratch_at(d, 2)
+    clear(digits, radius, d)
+    add_double(digits, radius, radius_a, grid)
+    add_double(digits, radius, radius_b, grid)
+    carry(digits, radius, d)
+    power = _scratch_at(d, 3)
+    clear(digits, power, 2 * d)
+    add_product(digits, power, radius, d, radius, d, 1)
+    carry(digits, power, 2 * d)
+    add_product(digits, square, power, 2 * d, total, n, -1)
+    sign = carry(digits, square, n + 2 * d)
+    value, exponent = as_double(digits, square, n + 2 * d)
+    excess = _ldexp(value / over, exponent + scale) / (distance + (radius_a + radius_b))
+    return sign <= 0, distance, excess
