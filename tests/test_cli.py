@@ -19,6 +19,7 @@ import collide.scenes
 from collide import cli
 from collide.errors import MissingExtra, SceneError
 from collide.results import HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
+from collide.shapes import Sphere
 
 
 def fake_scene(*rows):
@@ -34,10 +35,14 @@ def fake_scene(*rows):
         "convex_pairs": len(rows), "hits": 0, "undecided": 0, "how": {HOW[PLANE]: len(rows)},
         "gjk_iterations": 0, "epa_iterations": 0, "seconds": {"compile": 0.0, "narrowphase": 0.0},
     }
-    everything, hits = WorldResult(answers, names), WorldResult(answers[answers["hit"]], names)
-    world = SimpleNamespace(distances=lambda max_distance: everything, collisions=lambda: hits, stats=stats)
+    world = SimpleNamespace(
+        distances=lambda max_distance: WorldResult(
+            answers[answers["hit"] | (answers["distance"] <= max_distance)], names
+        ),
+        stats=stats,
+    )
     bodies = [
-        SimpleNamespace(name=n, shape=object(), static=False, source="", approximation=None) for n in names.values()
+        SimpleNamespace(name=n, shape=Sphere(0.1), X_WB=np.eye(4), static=False, source="", approximation=None) for n in names.values()
     ]
     return SimpleNamespace(
         name="fake", bodies=bodies, notes=[], sources=[], robots={}, seconds={"read": 0.0}, world=lambda: world

@@ -18,6 +18,7 @@ from collide.errors import InvalidArgument
 from collide.reports import report, tables, terminal, units
 from collide.reports.progress import Progress
 from collide.results import BOXES, FORMULA, HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
+from collide.shapes import Sphere
 
 
 def row(a, b, distance, how, width=1e-16, certified=True, parts=(0, 0)):
@@ -47,7 +48,7 @@ ROWS = [
 
 
 def body(name, approximation=None, static=False):
-    return SimpleNamespace(name=name, shape=object(), X_WB=np.eye(4), static=static, source=f"scene.yaml: {name}",
+    return SimpleNamespace(name=name, shape=Sphere(0.1), X_WB=np.eye(4), static=static, source=f"scene.yaml: {name}",
                            approximation=approximation, owner=None)
 
 
@@ -64,8 +65,12 @@ def make_scene(rows=ROWS, names=NAMES):
         "seconds": {"compile": 0.5, "pack": 1e-4, "broadphase": 2e-4, "narrowphase": 3e-4},
     }
     stacked = np.array(rows, PAIR_DTYPE) if rows else np.zeros(0, PAIR_DTYPE)
-    everything, hits = WorldResult(stacked, names), WorldResult(stacked[stacked["hit"]], names)
-    world = SimpleNamespace(distances=lambda max_distance: everything, collisions=lambda: hits, stats=stats)
+    world = SimpleNamespace(
+        distances=lambda max_distance: WorldResult(
+            stacked[stacked["hit"] | (stacked["distance"] <= max_distance)], names
+        ),
+        stats=stats,
+    )
     bodies = [body(name, "convex hull of 152 mesh vertices" if "panda" in name else None, name == "table")
               for name in names.values()]
     return SimpleNamespace(

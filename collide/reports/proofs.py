@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collide.results import HOW, UNDECIDED
+from collide.results import EXACT, HOW, UNDECIDED
 
 #: What each entry of `collide.results.HOW` means to a reader.
 SENTENCES = {
@@ -12,6 +12,7 @@ SENTENCES = {
     "by more than rounding can move them",
     "common point": "differences of points of A and B surround zero, clear of rounding: the bodies share a point",
     "swept overlap": "two core points are nearer than the sum of the radii, by more than rounding",
+    "exact arithmetic": "worked out in integers from the numbers given, because rounding would have decided it",
     "closed form": "a formula for this pair of shapes, its rounding error bounded",
     "boxes apart": "bounding boxes of convex parts, rounded outwards, lie farther apart than was asked",
     "broadphase": "bounding boxes of whole bodies, grown by the clearance and rounded outwards, do not meet",
@@ -27,11 +28,14 @@ REASONS = {
 BROADPHASE = "broadphase"
 
 
+UNDECIDED_NAME = HOW[UNDECIDED]
+
+
 def name_of(how: int) -> str:
     """The argument's name for the number in a result row."""
     return HOW[how] if how < len(HOW) else f"argument {how}"
 
 
-def is_undecided(how: int) -> bool:
-    """True where the bracket reaches to both sides of zero."""
-    return how == UNDECIDED
+def is_below_rounding(how: int) -> bool:
+    """True where doubles leave the sign open, whether or not exact arithmetic has settled it."""
+    return how in (UNDECIDED, EXACT)

@@ -6,7 +6,8 @@ lower ≤ signed distance ≤ upper proven for every row:
 ========== ================================================================================
 colliding  the bodies share a point: proven
 shallow    colliding, but proven less deep than ``min_depth``: −lower < min_depth
-touching   touching within rounding: the bracket reaches to both sides of 0
+touching   touching within rounding: doubles leave the sign open, and exact arithmetic has
+           settled it where it can
 near       apart, and 0 < distance ≤ clearance
 ========== ================================================================================
 
@@ -51,6 +52,11 @@ class Pair:
     how: str
     certified: bool
     approximated: list[str]
+
+    @property
+    def decided(self) -> bool:
+        """Whether the sign is proven."""
+        return self.how != proofs.UNDECIDED_NAME
 
 
 @dataclass
@@ -144,10 +150,10 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
     begun = time.perf_counter()
     with (progress or silent)("testing the scene"):
         world = scene.world()
-        result = world.distances(max_distance=clearance) if clearance else world.collisions()
+        result = world.distances(max_distance=max(clearance, _rounding_of(scene)))
     tested = time.perf_counter()
     stats = world.stats
-    classes = _classes(result, scene, min_depth)
+    classes = _classes(result, scene, clearance, min_depth)
     report = Report(
         scene=_scene(scene),
         query={"clearance": clearance, "min_depth": min_depth},
@@ -180,14 +186,23 @@ def _length(name: str, value: float) -> float:
 # --- pairs --------------------------------------------------------------------------------------
 
 
-def _classes(result, scene, min_depth: float) -> dict[str, list[Pair]]:
+def _rounding_of(scene) -> float:
+    """A distance [m] below which pairs of this scene may touch within rounding: 2⁻⁴⁰ of its size."""
+    size = 0.0
+    for body in scene.bodies:
+        reach = max((packed.reach + abs(X[:3, 3]).sum() for packed, X in body.shape.parts()), default=0.0)
+        size = max(size, float(abs(body.X_WB[:3, 3]).max()) + float(reach))
+    return size * 2.0**-40
+
+
+def _classes(result, scene, clearance: float, min_depth: float) -> dict[str, list[Pair]]:
     """The rows of a World result, each in its class, in the order people read them."""
     approximated = {body.name for body in scene.bodies if body.approximation}
     classes: dict[str, list[Pair]] = {"colliding": [], "shallow": [], "touching": [], "near": []}
     for row, (a, b) in zip(result.rows, result.names):
-        if not row["beyond"]:
-            pair = _pair(row, a, b, approximated)
-            classes[_class_of(row, min_depth)].append(pair)
+        kind = _class_of(row, min_depth)
+        if not row["beyond"] and (kind != "near" or row["distance"] <= clearance):
+            classes[kind].append(_pair(row, a, b, approximated))
     classes["colliding"].sort(key=_deepest_first)
     classes["shallow"].sort(key=_deepest_first)
     classes["touching"].sort(key=lambda pair: (pair.a, pair.b))
@@ -196,7 +211,7 @@ def _classes(result, scene, min_depth: float) -> dict[str, list[Pair]]:
 
 
 def _class_of(row, min_depth: float) -> str:
-    if proofs.is_undecided(int(row["how"])):
+    if proofs.is_below_rounding(int(row["how"])):
         return "touching"
     if not row["hit"]:
         return "near"

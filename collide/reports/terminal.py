@@ -108,7 +108,9 @@ def _pair_table(title: str, style: str, pairs: list[Pair], measure: str, limit: 
         (Column(f"at x y z [{unit}]", "label", 1), on_a),
         (Column("normal A→B", "label", 2), directions([pair.normal for pair in shown])),
     ]
-    if measure != "within":  # there the measure is the bracket, and the class says what decided
+    if measure == "within":
+        columns.append((Column("exactly", "label", 3), [_verdict(pair) for pair in shown]))
+    else:
         columns.append((Column("known to", "number", 3), widths([_bracket(pair) for pair in shown])))
         columns.append((Column("decided by", "label", 4), [pair.how for pair in shown]))
     if any(pair.part_a or pair.part_b for pair in shown):
@@ -128,6 +130,13 @@ def _bracket_notes(pairs: list[Pair], measure: str, limit: int | None) -> list[s
     if limit and len(notes) > 3:
         notes[3:] = [f"… and {len(notes) - 3} more with a wide bracket (--all)"]
     return notes
+
+
+def _verdict(pair: Pair) -> str:
+    """What exact arithmetic says of a pair that rounding cannot tell."""
+    if not pair.decided:
+        return "open"
+    return "meet" if pair.depth is not None else "apart"
 
 
 def _marked(pair: Pair, name: str) -> str:
