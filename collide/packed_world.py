@@ -9,7 +9,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.geometry.boxes import bounding_boxes
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_rows
-from collide.narrowphase.answer import run_pairs
+from collide.narrowphase.run import run_pairs
 from collide.results import PAIR_DTYPE
 from collide.unions import Union, combine
 

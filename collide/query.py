@@ -8,7 +8,7 @@ import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable, pose_rows
-from collide.narrowphase.answer import run_pairs
+from collide.narrowphase.run import run_pairs
 from collide.results import PairResult
 from collide.shapes.base import Shape
 from collide.transforms import as_poses

@@ -8,125 +8,44 @@ bodies and flipping the row.
 from __future__ import annotations
 
 import math
-from threading import local
 
-import numpy as np
-
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
-from collide.geometry.packing import HALFSPACE, POINTS
+from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide.geometry.packing import POINTS
 from collide.geometry.supports import support
-from collide.geometry.tables import (
-    ADDRESS,
-    COUNT,
-    INTS,
-    KIND,
-    LOWEST,
-    NUMBERS,
-    PADDED,
-    PARAMS,
-    POSE,
-    RADIUS,
-    RANK,
-    REACH,
-    SLOP,
-    ShapeTable,
-)
-from collide.narrowphase.bounds import ERROR, EXACT_ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS
+from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
+from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
-from collide.narrowphase.epa import DOUBLES, FLAT, INTEGERS, epa, workspace
-from collide.narrowphase.exact import INTEGERS as EXACT_INTEGERS
-from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
+from collide.narrowphase.epa import DOUBLES as EPA_DOUBLES
+from collide.narrowphase.epa import FLAT, epa, workspace
+from collide.narrowphase.epa import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.halfspace_convex import gap_of_halfspaces, plane_in_world
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
+from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.rows import (
+    CERTIFIED,
+    DISTANCE,
+    HIT,
+    HOW,
+    ITERATIONS,
+    LOWER,
+    ROW,
+    UPPER,
+    VERTICES_A,
+    VERTICES_B,
+    write_vectors,
+    write_verdict,
+    write_vertices,
+)
 from collide.narrowphase.simplex import face_weights
-from collide.results import EXACT, FORMULA, PAIR_DTYPE, PLANE, SIMPLEX, SWEPT, UNDECIDED
-
-
-def _at(field: str, unit: int) -> int:
-    assert PAIR_DTYPE.fields is not None
-    return PAIR_DTYPE.fields[field][1] // unit
-
-
-_ROW = PAIR_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER = _at("distance", 8), _at("lower", 8), _at("upper", 8)
-_NORMAL, _POINT_A, _POINT_B = _at("normal", 8), _at("point_a", 8), _at("point_b", 8)
-_VERTICES_A, _VERTICES_B, _ITERATIONS = _at("vertices_a", 4), _at("vertices_b", 4), _at("iterations", 4)
-_COUNT, _HOW, _EXACT, _HIT = _at("count", 1), _at("how", 1), _at("exact", 1), _at("hit", 1)
-_CERTIFIED, _BEYOND = _at("certified", 1), _at("beyond", 1)
+from collide.results import FORMULA, PLANE, SIMPLEX, SWEPT
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights.
 _WEIGHTS = 5 * POINT
 _OWN_DOUBLES, _OWN_INTEGERS = 64, 16
-
-
-@kernel
-def _longest_row(poses, p):
-    longest = 0.0
-    for k in range(3):
-        x = poses[p + 3 * k]
-        y = poses[p + 3 * k + 1]
-        z = poses[p + 3 * k + 2]
-        longest = max(longest, x * x + y * y + z * z)
-    return math.sqrt(longest)
-
-
-@kernel
-def _exchange(ints, poses, sa, pa, sb, pb):
-    """Whether to work on (B, A): by content of the shapes, then by the numbers of the poses."""
-    rank_a = ints[INTS * sa + RANK]
-    rank_b = ints[INTS * sb + RANK]
-    if rank_a != rank_b:
-        return rank_a > rank_b
-    for k in range(12):
-        if poses[POSE * pa + k] != poses[POSE * pb + k]:
-            return poses[POSE * pa + k] > poses[POSE * pb + k]
-    return False
-
-
-@kernel
-def _write_vectors(row, nx, ny, nz, ax, ay, az, bx, by, bz, flip):
-    """Normal and witness points of the pair as asked, from those of the pair as worked on."""
-    sign = -1.0 if flip else 1.0
-    row[_NORMAL] = sign * nx + 0.0
-    row[_NORMAL + 1] = sign * ny + 0.0
-    row[_NORMAL + 2] = sign * nz + 0.0
-    first = _POINT_B if flip else _POINT_A
-    second = _POINT_A if flip else _POINT_B
-    row[first] = ax
-    row[first + 1] = ay
-    row[first + 2] = az
-    row[second] = bx
-    row[second + 1] = by
-    row[second + 2] = bz
-
-
-@kernel
-def _write_vertices(words, marks, ids, n, flip):
-    first = _VERTICES_B if flip else _VERTICES_A
-    second = _VERTICES_A if flip else _VERTICES_B
-    marks[_COUNT] = n
-    for k in range(n):
-        words[first + k] = ids[2 * k]
-        words[second + k] = ids[2 * k + 1]
-
-
-@kernel
-def _write_verdict(row, marks, distance, lower, upper, how, width, limit):
-    """The numbers and flags of a row; rounding must not put the distance outside its own bracket."""
-    row[_LOWER] = lower
-    row[_UPPER] = upper
-    row[_DISTANCE] = min(max(distance, lower), upper) + 0.0  # never −0.0
-    decided = lower > 0.0 or upper <= 0.0
-    marks[_HOW] = how if decided else UNDECIDED
-    marks[_HIT] = 0 if lower > 0.0 else 1
-    marks[_CERTIFIED] = 1 if decided and upper - lower <= width else 0
-    marks[_BEYOND] = 1 if lower > limit else 0
-    if lower > limit:
-        row[_DISTANCE] = lower
-        row[_UPPER] = math.inf
-        marks[_CERTIFIED] = 1
+#: Workspace of one thread.
+DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
 
 
 @kernel
@@ -228,9 +147,7 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
 
 
 @kernel
-def _swept(
-    pair, ints, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
-):
+def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, flip):
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
@@ -251,16 +168,9 @@ def _swept(
     lower = bound - error - radius
     upper = above + error - radius
     how = FORMULA if closed_form else (PLANE if lower > 0.0 else (SIMPLEX if above < 0.0 or radius == 0.0 else SWEPT))
-    words[_ITERATIONS] = rounds
+    words[ITERATIONS] = rounds
     width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
-    distance = -depth - radius
-    if lower <= 0.0 < upper and exactly and not curved:
-        distance, lower, upper, vertices, spent = _decide(
-            pair, ints, shape_a, shape_b, integers_at, distance, lower, upper, vertices, size
-        )
-        how = EXACT if spent > 0 else how
-        marks[_EXACT] = min(spent, 255)
-    _write_verdict(row, marks, distance, lower, upper, how, width, limit)
+    write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
     ax = _combine(points, weights, n, 3)
     ay = _combine(points, weights, n, 4)
     az = _combine(points, weights, n, 5)
@@ -273,7 +183,7 @@ def _swept(
     ox = missing * (ax - bx - pair[14] - depth * nx)
     oy = missing * (ay - by - pair[15] - depth * ny)
     oz = missing * (az - bz - pair[16] - depth * nz)
-    _write_vectors(
+    write_vectors(
         row, nx, ny, nz,
         (ax - ox + radius_a * nx) + poses[p + 9],
         (ay - oy + radius_a * ny) + poses[p + 10],
@@ -283,28 +193,7 @@ def _swept(
         (bz + oz - radius_b * nz) + poses[q + 11],
         flip,
     )  # fmt: skip
-    _write_vertices(words, marks, ids, vertices, flip)
-
-
-@kernel
-def _decide(pair, ints, shape_a, shape_b, integers_at, distance, lower, upper, vertices, size):
-    """Settle a sign that doubles leave open: (distance, lower, upper, vertices shown, rounds).
-
-    0 rounds: the magnitudes span too many bits, and the sign stays open.
-    """
-    numbers = pair[12]
-    at_a = NUMBERS * shape_a
-    at_b = NUMBERS * shape_b
-    verdict, shown, _, excess, rounds = touch_exactly(
-        pair, view_i64(integers_at + 8 * (_OWN_INTEGERS + INTEGERS), EXACT_INTEGERS), view_i64(integers_at, 10),
-        vertices, ints[INTS * shape_a + LOWEST], ints[INTS * shape_b + LOWEST], numbers[at_a + REACH],
-        numbers[at_b + REACH], numbers[at_a + RADIUS], numbers[at_b + RADIUS], size,
-    )  # fmt: skip
-    if verdict == SEPARATE:
-        return excess, max(lower, (1.0 - EXACT_ERROR) * excess), min(upper, (1.0 + EXACT_ERROR) * excess), shown, rounds
-    if verdict == TOUCHING:
-        return min(distance, 0.0), lower, 0.0, shown, rounds
-    return distance, lower, upper, vertices, 0
+    write_vertices(words, marks, ids, vertices, flip)
 
 
 @kernel
@@ -336,14 +225,14 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size
     bz = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
     radius = numbers[NUMBERS * shape_b + RADIUS]
     gap = ((bx + tx) * nx + (by + ty) * ny + (bz + tz) * nz) - offset / length - radius
-    _write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
+    write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
     bx += poses[q + 9] - radius * nx
     by += poses[q + 10] - radius * ny
     bz += poses[q + 11] - radius * nz
-    _write_vectors(row, nx, ny, nz, bx - gap * nx, by - gap * ny, bz - gap * nz, bx, by, bz, flip)
+    write_vectors(row, nx, ny, nz, bx - gap * nx, by - gap * ny, bz - gap * nz, bx, by, bz, flip)
     ids[0] = -1
     ids[1] = k
-    _write_vertices(words, marks, ids, 1, flip)
+    write_vertices(words, marks, ids, 1, flip)
 
 
 @kernel
@@ -353,20 +242,20 @@ def _halves(pair, row, marks, limit, flip):
     opposite, gap, error, nx, ny, nz = gap_of_halfspaces(numbers, at_a, p, at_b, q, poses, tx, ty, tz)
     if opposite and gap > error:
         # Opposite within rounding: a tilt below rounding would let them meet, very far away.
-        _write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
-        marks[_CERTIFIED] = 0
+        write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
+        marks[CERTIFIED] = 0
     else:
-        row[_LOWER] = -math.inf
-        row[_DISTANCE] = -math.inf
-        row[_UPPER] = 0.0
-        marks[_HIT] = 1
-        marks[_HOW] = FORMULA
-        marks[_CERTIFIED] = 0 if opposite and abs(gap) <= error else 1
+        row[LOWER] = -math.inf
+        row[DISTANCE] = -math.inf
+        row[UPPER] = 0.0
+        marks[HIT] = 1
+        marks[HOW] = FORMULA
+        marks[CERTIFIED] = 0 if opposite and abs(gap) <= error else 1
     foot = 0.5 * gap
     ax = poses[p + 9] + 0.5 * tx
     ay = poses[p + 10] + 0.5 * ty
     az = poses[p + 11] + 0.5 * tz
-    _write_vectors(
+    write_vectors(
         row, nx, ny, nz, ax - foot * nx, ay - foot * ny, az - foot * nz, ax + foot * nx, ay + foot * ny,
         az + foot * nz, flip,
     )  # fmt: skip
@@ -382,19 +271,19 @@ def answer_pairs(
     ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   shape_of : a shape row a part.
     pairs : two part numbers a pair.   boolean : only hit, certified and how are wanted.
     stop_at_hit : stop after the first hit.   limit : farther apart than this is not looked at.
-    rows : PAIR_DTYPE, zeroed.   doubles, integers : workspace, see `workspace_of_thread`.
+    rows : PAIR_DTYPE, zeroed.   doubles, integers : workspace, see `run`.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     for k in range(n_pairs):
-        row = view_f64(rows_at + _ROW * k, 12)
-        words = view_i32(rows_at + _ROW * k, _ROW // 4)
-        marks = view_u8(rows_at + _ROW * k, _ROW)
+        row = view_f64(rows_at + ROW * k, 12)
+        words = view_i32(rows_at + ROW * k, ROW // 4)
+        marks = view_u8(rows_at + ROW * k, ROW)
         pa = pairs[2 * k]
         pb = pairs[2 * k + 1]
         _answer(
             ints_at, numbers_at, poses_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at, integers_at
         )
-        if stop_at_hit and marks[_HIT] == 1:
+        if stop_at_hit and marks[HIT] == 1:
             return k + 1
     return n_pairs
 
@@ -409,85 +298,24 @@ def _answer(
     ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
     numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
     poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
+    sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
+    at_a, n_a = coordinates_of(ints, sa)
+    at_b, n_b = coordinates_of(ints, sb)
+    pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
+    size, slop = size_and_slop(numbers, poses, sa, pa, sb, pb)
     for k in range(4):
-        words[_VERTICES_A + k] = -1
-        words[_VERTICES_B + k] = -1
-    flip = _exchange(ints, poses, sa, pa, sb, pb)
-    if ints[INTS * sb + KIND] == HALFSPACE and ints[INTS * sa + KIND] != HALFSPACE:
-        flip = True
-    elif ints[INTS * sa + KIND] == HALFSPACE and ints[INTS * sb + KIND] != HALFSPACE:
-        flip = False
-    if flip:
-        sa, sb = sb, sa
-        pa, pb = pb, pa
-    kind_a = ints[INTS * sa + KIND]
-    kind_b = ints[INTS * sb + KIND]
-    n_a = ints[INTS * sa + COUNT]
-    n_b = ints[INTS * sb + COUNT]
-    m_a = ints[INTS * sa + PADDED]
-    m_b = ints[INTS * sb + PADDED]
-    p = POSE * pa
-    q = POSE * pb
-    tx = poses[q + 9] - poses[p + 9]
-    ty = poses[q + 10] - poses[p + 10]
-    tz = poses[q + 11] - poses[p + 11]
-    at_a = NUMBERS * sa
-    at_b = NUMBERS * sb
-    pair = (
-        view_f64(ints[INTS * sa + ADDRESS], 3 * m_a), n_a, m_a, kind_a, at_a + PARAMS, p,
-        view_f64(ints[INTS * sb + ADDRESS], 3 * m_b), n_b, m_b, kind_b, at_b + PARAMS, q,
-        numbers, poses, tx, ty, tz,
-    )  # fmt: skip
-    size = numbers[at_a + REACH] * _longest_row(poses, p) + numbers[at_b + REACH] * _longest_row(poses, q)
-    size += math.sqrt(tx * tx + ty * ty + tz * tz) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
-    slop = numbers[at_a + SLOP] + numbers[at_b + SLOP] + poses[p + 12] + poses[q + 12]
-    how = method(kind_a, n_a, kind_b, n_b)
+        words[VERTICES_A + k] = -1
+        words[VERTICES_B + k] = -1
+    how = method(pair[3], pair[1], pair[9], pair[7])
     if how == HALFSPACES:
         _halves(pair, row, marks, limit, flip)
     elif how == HALFSPACE_CONVEX:
-        m0 = numbers[at_a + PARAMS]
-        m1 = numbers[at_a + PARAMS + 1]
-        m2 = numbers[at_a + PARAMS + 2]
-        size += abs(numbers[at_a + PARAMS + 3]) / math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+        m0 = numbers[pair[4]]
+        m1 = numbers[pair[4] + 1]
+        m2 = numbers[pair[4] + 2]
+        size += abs(numbers[pair[4] + 3]) / math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
         _half(pair, sb, row, words, marks, doubles_at, integers_at, limit, size, ERROR * size + slop, flip)
     else:
         _swept(
-            pair, ints, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop,
-            slop == 0.0, flip,
-        )  # fmt: skip
-
-
-def run_pairs(
-    table: ShapeTable,
-    poses: np.ndarray,
-    shape_of: np.ndarray,
-    pairs: np.ndarray,
-    *,
-    boolean: bool,
-    limit: float,
-    stop_at_hit: bool = False,
-) -> np.ndarray:
-    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
-
-    poses : (parts, POSE).   shape_of : (parts,) int64, rows of ``table``.
-    Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
-    """
-    rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-    pairs = np.ascontiguousarray(pairs, dtype=np.int64)
-    answered = answer_pairs(
-        address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of),
-        address_of(pairs), len(pairs), boolean, stop_at_hit, limit, address_of(rows), *workspace_of_thread.addresses,
-    )  # fmt: skip
-    return rows[:answered]
-
-
-class _Workspace(local):
-    """Scratch memory of one thread, made when the thread first asks."""
-
-    def __init__(self):
-        self.doubles = np.zeros(_OWN_DOUBLES + DOUBLES)
-        self.integers = np.zeros(_OWN_INTEGERS + INTEGERS + EXACT_INTEGERS, dtype=np.int64)
-        self.addresses = address_of(self.doubles), address_of(self.integers)
-
-
-workspace_of_thread = _Workspace()
+            pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop, flip
+        )

@@ -379,9 +379,7 @@ def _extreme_vertex(
         value = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
         if value > least + slack:
             continue
-        if best < 0:
-            best = i
-        elif _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, best) * sign < 0:
+        if best < 0 or _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, best) * sign < 0:
             best = i
     return best if best >= 0 else first
 

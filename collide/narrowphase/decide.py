@@ -1,0 +1,92 @@
+"""Rows whose sign doubles leave open, settled by the exact stage.
+
+An entry point of its own, compiled when a scene first has such a pair: most scenes have none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import entry, view_f64, view_i32, view_i64, view_u8
+from collide.geometry.packing import POINTS
+from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH
+from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS
+from collide.narrowphase.exact import INTEGERS, SEPARATE, TOUCHING, touch_exactly
+from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.rows import (
+    COUNT,
+    DISTANCE,
+    EXACT_ROUNDS,
+    HOW,
+    LOWER,
+    ROW,
+    UPPER,
+    VERTICES_A,
+    VERTICES_B,
+    write_verdict,
+    write_vertices,
+)
+from collide.results import EXACT, UNDECIDED
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64)")
+def decide_pairs(
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, digits_at
+):
+    """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
+
+    Arguments as there; digits : int64 workspace of `exact.INTEGERS` + 16. What stays open: curved
+    cores, half-spaces, and parts whose stored numbers are themselves rounded (slop).
+    """
+    pairs = view_i64(pairs_at, 2 * n_pairs)
+    digits = view_i64(digits_at, INTEGERS)
+    ids = view_i64(digits_at + 8 * INTEGERS, 16)
+    settled = 0
+    for k in range(n_pairs):
+        row = view_f64(rows_at + ROW * k, 12)
+        words = view_i32(rows_at + ROW * k, ROW // 4)
+        marks = view_u8(rows_at + ROW * k, ROW)
+        if marks[HOW] != UNDECIDED:
+            continue
+        pa = pairs[2 * k]
+        pb = pairs[2 * k + 1]
+        shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
+        sa = shape_of[pa]
+        sb = shape_of[pb]
+        ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
+        numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
+        poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
+        sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
+        size, slop = size_and_slop(numbers, poses, sa, pa, sb, pb)
+        if ints[INTS * sa + KIND] != POINTS or ints[INTS * sb + KIND] != POINTS or slop != 0.0:
+            continue
+        at_a, n_a = coordinates_of(ints, sa)
+        at_b, n_b = coordinates_of(ints, sb)
+        pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
+        count = marks[COUNT]
+        for j in range(count):
+            ids[2 * j] = words[(VERTICES_B if flip else VERTICES_A) + j]
+            ids[2 * j + 1] = words[(VERTICES_A if flip else VERTICES_B) + j]
+        verdict, shown, _, excess, rounds = touch_exactly(
+            pair, digits, ids, count, ints[INTS * sa + LOWEST], ints[INTS * sb + LOWEST],
+            numbers[NUMBERS * sa + REACH], numbers[NUMBERS * sb + REACH],
+            numbers[NUMBERS * sa + RADIUS], numbers[NUMBERS * sb + RADIUS], size,
+        )  # fmt: skip
+        distance = row[DISTANCE]
+        lower = row[LOWER]
+        upper = row[UPPER]
+        if verdict == SEPARATE:
+            distance = excess
+            lower = max(lower, (1.0 - EXACT_ERROR) * excess)
+            upper = min(upper, (1.0 + EXACT_ERROR) * excess)
+        elif verdict == TOUCHING:
+            distance = min(distance, 0.0)
+            upper = 0.0
+        else:
+            continue
+        width = math.inf if boolean else PROMISE_POINTS * size
+        write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
+        write_vertices(words, marks, ids, shown, flip)
+        marks[EXACT_ROUNDS] = min(rounds, 255)
+        settled += 1
+    return settled

@@ -1,0 +1,84 @@
+"""A pair of posed convex sets as the methods take it: one tuple, the body of lower rank first.
+
+Bodies are exchanged by the content of their shapes, and for equal shapes by the numbers of their
+poses: whichever way a pair is asked, the same numbers are worked on, and the answer is flipped.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+from collide.geometry.packing import HALFSPACE
+from collide.geometry.tables import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, RANK, REACH, SLOP
+
+
+@kernel
+def _longest_row(poses, p):
+    longest = 0.0
+    for k in range(3):
+        x = poses[p + 3 * k]
+        y = poses[p + 3 * k + 1]
+        z = poses[p + 3 * k + 2]
+        longest = max(longest, x * x + y * y + z * z)
+    return math.sqrt(longest)
+
+
+@kernel
+def _exchange(ints, poses, sa, pa, sb, pb):
+    """Whether to work on (B, A): by content of the shapes, then by the numbers of the poses."""
+    rank_a = ints[INTS * sa + RANK]
+    rank_b = ints[INTS * sb + RANK]
+    if rank_a != rank_b:
+        return rank_a > rank_b
+    for k in range(12):
+        if poses[POSE * pa + k] != poses[POSE * pb + k]:
+            return poses[POSE * pa + k] > poses[POSE * pb + k]
+    return False
+
+
+@kernel
+def in_order(ints, poses, sa, pa, sb, pb):
+    """(shape of A, part A, shape of B, part B, exchanged): a half-space first, else as the module says."""
+    flip = _exchange(ints, poses, sa, pa, sb, pb)
+    if ints[INTS * sb + KIND] == HALFSPACE and ints[INTS * sa + KIND] != HALFSPACE:
+        flip = True
+    elif ints[INTS * sa + KIND] == HALFSPACE and ints[INTS * sb + KIND] != HALFSPACE:
+        flip = False
+    if flip:
+        return sb, pb, sa, pa, True
+    return sa, pa, sb, pb, False
+
+
+@kernel
+def size_and_slop(numbers, poses, sa, pa, sb, pb):
+    """S of `bounds.py` for the pair, and how far its stored points may be from those described."""
+    p = POSE * pa
+    q = POSE * pb
+    at_a = NUMBERS * sa
+    at_b = NUMBERS * sb
+    tx = poses[q + 9] - poses[p + 9]
+    ty = poses[q + 10] - poses[p + 10]
+    tz = poses[q + 11] - poses[p + 11]
+    size = numbers[at_a + REACH] * _longest_row(poses, p) + numbers[at_b + REACH] * _longest_row(poses, q)
+    size += math.sqrt(tx * tx + ty * ty + tz * tz) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
+    return size, numbers[at_a + SLOP] + numbers[at_b + SLOP] + poses[p + 12] + poses[q + 12]
+
+
+@kernel
+def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
+    """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA."""
+    p = POSE * pa
+    q = POSE * pb
+    return (
+        coords_a, ints[INTS * sa + COUNT], ints[INTS * sa + PADDED], ints[INTS * sa + KIND], NUMBERS * sa + PARAMS, p,
+        coords_b, ints[INTS * sb + COUNT], ints[INTS * sb + PADDED], ints[INTS * sb + KIND], NUMBERS * sb + PARAMS, q,
+        numbers, poses,
+        poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11],
+    )  # fmt: skip
+
+
+@kernel
+def coordinates_of(ints, s):
+    """Address and length of a shape's coordinates."""
+    return ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED]

@@ -1,0 +1,63 @@
+"""The narrowphase from Python: doubles first, the exact stage for what they leave open."""
+
+from __future__ import annotations
+
+from threading import local
+
+import numpy as np
+
+from collide._jit import address_of
+from collide.geometry.tables import ShapeTable
+from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
+from collide.narrowphase.decide import decide_pairs
+from collide.narrowphase.exact import INTEGERS as EXACT_INTEGERS
+from collide.results import PAIR_DTYPE, UNDECIDED
+
+
+def run_pairs(
+    table: ShapeTable,
+    poses: np.ndarray,
+    shape_of: np.ndarray,
+    pairs: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    stop_at_hit: bool = False,
+) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
+
+    poses : (parts, POSE).   shape_of : (parts,) int64, rows of ``table``.
+    Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
+    """
+    pairs = np.ascontiguousarray(pairs, dtype=np.int64)
+    rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+    tables = address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of)
+    done = 0
+    while done < len(pairs):
+        todo, out = pairs[done:], rows[done:]
+        answered = answer_pairs(
+            *tables, address_of(todo), len(todo), boolean, stop_at_hit, limit, address_of(out), *_workspace.addresses
+        )
+        fresh = out[:answered]
+        if (fresh["how"] == UNDECIDED).any():
+            decide_pairs(
+                *tables, address_of(todo), answered, boolean, limit, address_of(out), address_of(_workspace.digits)
+            )
+        done += answered
+        # The hit that stopped the kernel may have been an open one that turned out to be apart.
+        if stop_at_hit and fresh["hit"][-1]:
+            break
+    return rows[:done]
+
+
+class _Workspace(local):
+    """Scratch memory of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.doubles = np.zeros(DOUBLES)
+        self.integers = np.zeros(INTEGERS, dtype=np.int64)
+        self.digits = np.zeros(EXACT_INTEGERS + 16, dtype=np.int64)
+        self.addresses = address_of(self.doubles), address_of(self.integers)
+
+
+_workspace = _Workspace()

@@ -1,0 +1,88 @@
+"""Hard pairs by the family: seeded generators of the inputs on which collision libraries fail.
+
+    from collide.scenes.families import generate, names
+    for case in generate("touch_ee", n=100, seed=7):
+        A, B, X_WA, X_WB = case.shapes()
+
+27 families follow a published study of other libraries' answers (`STANDARD`); further ones are of
+our own making. A case depends on family, seed, index and sizes alone: more cases begin with the same
+ones. What sets a pair to a gap asks the exact oracle of `collide.adapters.peers`; nothing here knows
+the engine.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from zlib import crc32
+
+import numpy as np
+
+from collide.errors import InvalidArgument
+from collide.scenes.families import (
+    boxes,
+    lattices,
+    nested,
+    random_pairs,
+    rounded,
+    scales,
+    swept,
+    thin,
+    touching,
+)
+from collide.scenes.families.case import HALFSPACE, HULLS, Body, Case
+
+__all__ = ["HALFSPACE", "HULLS", "STANDARD", "Body", "Case", "describe", "generate", "names"]
+
+_FAMILIES: dict[str, Callable[..., Case]] = {
+    family.__name__: family
+    for module in (random_pairs, touching, boxes, scales, thin, rounded, nested)
+    for family in module.FAMILIES
+}
+#: The 27 families of the study.
+STANDARD: tuple[str, ...] = tuple(_FAMILIES)
+
+_FAMILIES |= {
+    family.__name__: family for module in (scales, thin, rounded, swept, lattices) for family in module.OWN
+}
+
+
+def names() -> list[str]:
+    """All families, the 27 of the study first."""
+    return list(_FAMILIES)
+
+
+def describe(name: str) -> str:
+    """The recipe of a family in one sentence; InvalidArgument for an unknown one."""
+    return " ".join((inspect.getdoc(_family(name)) or "").split())
+
+
+def generate(name: str, n: int, seed: int = 0, **size) -> list[Case]:
+    """n cases of a family.
+
+    name : one of `names`.   n, seed : whole numbers ≥ 0.
+    size : the family's own arguments, for example ``sides`` of "bipyramids" and ``copies`` of "repeats".
+
+    Raises InvalidArgument for an unknown name or size, listing the known ones.
+    """
+    family = _family(name)
+    for argument, value in (("n", n), ("seed", seed)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+            raise InvalidArgument(f"{argument} must be a whole number ≥ 0, got {value!r}")
+    known = [p for p in inspect.signature(family).parameters if p not in ("rng", "index")]
+    for argument in size:
+        if argument not in known:
+            raise InvalidArgument(f"{name} has no size {argument!r}; it has {', '.join(known) or 'none'}")
+    return [_case(name, family, k, int(seed), size) for k in range(n)]
+
+
+def _case(name: str, family: Callable[..., Case], index: int, seed: int, size: dict) -> Case:
+    rng = np.random.default_rng([seed, crc32(name.encode()), index])
+    made = family(rng, index, **size)
+    return made._replace(family=name, index=index, seed=seed, size=tuple(sorted(size.items())))
+
+
+def _family(name: str) -> Callable[..., Case]:
+    if name not in _FAMILIES:
+        raise InvalidArgument(f"no family is called {name!r}; there are {', '.join(_FAMILIES)}")
+    return _FAMILIES[name]

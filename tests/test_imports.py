@@ -1,0 +1,339 @@
+"""The house's direction of flow and the rules of its kernels, read from the sources themselves.
+
+No module is imported to be judged: the syntax tree says who imports whom. What only running can
+tell (that start-up loads no compiler, that names resolve) is asked of a fresh interpreter.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import collide
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "collide.scenes"}
+
+#: What the modules of a room of the engine may import; a room may always import itself.
+ROOMS = {
+    "errors": set(),
+    "cache_folder": set(),
+    "_jit": {"cache_folder"},
+    "transforms": {"errors"},
+    "results": {"errors"},
+    "geometry": {"_jit", "errors"},
+    "shapes": {"errors", "transforms", "geometry"},
+    "broadphase": {"_jit", "errors", "geometry"},
+    "narrowphase": {"_jit", "errors", "geometry", "results"},
+    "unions": {"geometry", "narrowphase", "results"},
+    "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
+    "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
+    "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
+    "robot": {"errors", "transforms", "shapes", "scenes"},
+    "reports": {"errors", "results", "cache_folder", ""},
+    "cli": {"_jit", "errors", "reports", "scenes", "adapters", ""},
+    "__main__": {"cli"},
+}
+#: Rooms whose functions may import packages that are not installed with the engine, or collide.scenes.
+LAZY = {"cli": set(), "robot": set(), "reports": {"rich"}}
+#: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
+BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}
+
+#: What compiles, or makes code for a compiler.
+COMPILERS = {
+    "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
+}  # fmt: skip
+BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
+
+
+def sources(*folders: str) -> list[Path]:
+    return sorted(file for folder in folders or FOLDERS for file in (ROOT / folder).rglob("*.py"))
+
+
+def shown(file: Path) -> str:
+    return file.relative_to(ROOT).as_posix()
+
+
+@cache
+def tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+
+
+def dotted(file: Path) -> str:
+    """Name under which a file is imported."""
+    folder, *rest = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join([FOLDERS[folder], *(part for part in rest if part != "__init__")])
+
+
+def modules() -> dict[str, Path]:
+    return {dotted(file): file for file in sources()}
+
+
+def imports(file: Path) -> list[tuple[str, bool, int]]:
+    """(module, whether inside a function, line) of every import; names that are modules count as such."""
+    known, found = modules(), []
+
+    def visit(node: ast.AST, lazy: bool) -> None:
+        if isinstance(node, ast.Import):
+            found.extend((alias.name, lazy, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{shown(file)}:{node.lineno}: relative import; write the whole name"
+            module = node.module or ""
+            inner = [f"{module}.{alias.name}" for alias in node.names]
+            found.extend((name if name in known else module, lazy, node.lineno) for name in inner)
+        elif isinstance(node, ast.If) and _is_type_checking(node.test):
+            return  # never run
+        inside = lazy or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+        for child in ast.iter_child_nodes(node):
+            visit(child, inside)
+
+    visit(tree(file), False)
+    return found
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def foreign(file: Path) -> list[tuple[str, bool, int]]:
+    """The imports that are neither of collide, of numpy nor of the standard library, by package."""
+    found = [(module.split(".")[0], lazy, line) for module, lazy, line in imports(file)]
+    return [item for item in found if item[0] not in {"collide", "numpy", *sys.stdlib_module_names}]
+
+
+def room(module: str) -> str:
+    """``collide.narrowphase.gjk`` → ``narrowphase``; ``collide`` itself → the empty string."""
+    return module.split(".")[1] if "." in module else ""
+
+
+def none_of(wrong: Iterable[str]) -> None:
+    """Fail with the whole list, one complaint a line."""
+    wrong = list(wrong)
+    assert not wrong, "\n" + "\n".join(wrong)
+
+
+def decorators(function: ast.FunctionDef) -> set[str]:
+    return {ast.unparse(d.func if isinstance(d, ast.Call) else d) for d in function.decorator_list}
+
+
+def kernels(file: Path) -> list[ast.FunctionDef]:
+    found = [node for node in ast.walk(tree(file)) if isinstance(node, ast.FunctionDef)]
+    return [f for f in found if decorators(f) & {"kernel", "entry", "_jit.kernel", "_jit.entry"}]
+
+
+# --- who imports whom ---------------------------------------------------------------------------
+
+
+def test_rooms_are_complete():
+    """A new room has to be placed in the flow before anything may live there."""
+    found = {room(dotted(file)) for file in sources("collide")} - {""}
+    assert found == set(ROOMS), "name the new room, or the one that left, in ROOMS"
+
+
+def test_engine_flows_one_way():
+    wrong = []
+    for file in sources("collide"):
+        own = room(dotted(file))
+        allowed = {own, *ROOMS.get(own, set(ROOMS))}
+        for module, lazy, line in imports(file):
+            if module.split(".")[0] != "collide":
+                continue
+            if room(module) not in allowed:
+                wrong.append(f"{shown(file)}:{line}: {own} must not import {module}")
+            elif room(module) in ("scenes", "adapters") and not lazy:
+                wrong.append(f"{shown(file)}:{line}: import {module} inside the function that needs it")
+    none_of(wrong)
+
+
+def test_rooms_have_no_cycle():
+    """The table itself flows one way; scenes, adapters and the package's own names lie outside it."""
+    done: set[str] = set()
+    while len(done) < len(ROOMS):
+        ready = {name for name, needs in ROOMS.items() if name not in done and needs & set(ROOMS) <= done}
+        assert ready, f"a circle among {sorted(set(ROOMS) - done)}"
+        done |= ready
+
+
+def test_engine_needs_numpy_and_numba_only():
+    wrong = []
+    for file in sources("collide"):
+        optional = LAZY.get(room(dotted(file)), set())
+        for package, lazy, line in foreign(file):
+            if package == "numba" and shown(file) == "collide/_jit.py":
+                continue
+            if package not in optional or not lazy:
+                wrong.append(f"{shown(file)}:{line}: the engine must not need {package} here")
+    none_of(wrong)
+
+
+def test_outer_rooms_import_packages_where_they_use_them():
+    none_of(
+        f"{shown(file)}:{line}: {package}: kernels belong in the engine"
+        if package == "numba"
+        else f"{shown(file)}:{line}: import {package} inside the function that needs it"
+        for file in sources("adapters", "scenes")
+        for package, lazy, line in foreign(file)
+        if package == "numba" or not lazy
+    )
+
+
+def test_scenes_do_not_know_the_peers():
+    none_of(
+        f"{shown(file)}:{line}: {module}"
+        for file in sources("scenes")
+        for module, _, line in imports(file)
+        if module.startswith("collide.adapters")
+    )
+
+
+def test_outer_rooms_have_one_name_each():
+    """``import scenes`` works from the repository's root and makes a second module of every file."""
+    none_of(
+        f"{shown(file)}:{line}: import collide.{module}"
+        for file in [*sources(), *sources("tests"), *sources("examples"), *sources("benchmarks")]
+        for module, _, line in imports(file)
+        if module.split(".")[0] in ("scenes", "adapters")
+    )
+
+
+def test_module_names_say_something():
+    none_of(
+        f"{shown(file)}: name it after what it is for"
+        for file in sources()
+        if BAD_NAMES & {file.stem, file.parent.name}
+    )
+
+
+# --- kernels ------------------------------------------------------------------------------------
+
+
+def test_kernels_are_found():
+    """The rules below would pass on nothing at all."""
+    assert sum(len(kernels(file)) for file in sources("collide")) > 30
+
+
+def test_one_way_to_compile():
+    none_of(
+        f"{shown(file)}:{node.lineno}: {name} belongs in collide/_jit.py"
+        for file in sources()
+        if shown(file) != "collide/_jit.py"
+        for node in ast.walk(tree(file))
+        if isinstance(node, (ast.Name, ast.Attribute))
+        for name in [node.id if isinstance(node, ast.Name) else node.attr]
+        if name in COMPILERS
+    )
+
+
+def test_kernels_live_where_their_sources_are_hashed():
+    """`_jit.source_hash` reads these folders; a kernel elsewhere could be stale and answer wrongly."""
+    none_of(
+        f"{shown(file)}:{kernel.lineno}: kernel {kernel.name}"
+        for file in sources()
+        for kernel in kernels(file)
+        if not shown(file).startswith(("collide/geometry/", "collide/broadphase/", "collide/narrowphase/"))
+    )
+
+
+def test_no_flag_that_changes_numbers_or_threads():
+    wrong = []
+    for file in sources():
+        for node in ast.walk(tree(file)):
+            names = [node.arg] if isinstance(node, ast.keyword) else []
+            names += [key.value for key in node.keys if isinstance(key, ast.Constant)] if isinstance(node, ast.Dict) else []
+            wrong += [f"{shown(file)}:{node.lineno}: {name}" for name in names if name in ("fastmath", "parallel")]
+    none_of(wrong)
+
+
+def test_kernels_call_no_blas():
+    """BLAS sums in an order of its own choosing: other bits on other machines, and no error bound."""
+    none_of(
+        f"{shown(file)}:{kernel.lineno}: kernel {kernel.name} uses {ast.unparse(node)}"
+        for file in sources("collide")
+        for kernel in kernels(file)
+        for node in ast.walk(kernel)
+        if (isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult))
+        or (isinstance(node, ast.Attribute) and node.attr in BLAS)
+    )
+
+
+# --- what a fresh interpreter says --------------------------------------------------------------
+
+
+def fresh(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        check=False, capture_output=True, text=True, timeout=60, cwd=ROOT,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    ("what", "code"),
+    [
+        ("import collide", "import collide"),
+        ("shapes", "import collide; collide.Box((1, 2, 3)), collide.pose((0, 0, 1)), collide.InvalidShape"),
+        ("scenes", "import collide.scenes; collide.scenes.shipped()"),
+        ("adapters", "import collide.adapters.peers"),
+        ("--help", "from collide.cli import main; assert main(['--help']) == 0"),
+        ("report --help", "from collide.cli import main; assert main(['report', '--help']) == 0"),
+        ("--version", "from collide.cli import main; assert main(['--version']) == 0"),
+    ],
+)
+def test_start_up_loads_no_compiler(what, code):
+    loaded = fresh(f"import sys\n{code}\nprint(*sys.modules, file=sys.stdout)").split()
+    heavy = {"numba", "llvmlite", "rich", "trimesh", "yaml", "scipy", "yourdfpy", "coal", "fcl", "pybullet"}
+    assert not heavy & set(loaded), f"{what} loads {sorted(heavy & set(loaded))}"
+
+
+def test_importing_collide_imports_nothing_but_the_standard_library():
+    assert "numpy" not in fresh("import sys, collide; print(*sys.modules)").split()
+
+
+def test_public_names_resolve_and_are_documented():
+    import collide.scenes
+
+    for module in (collide, collide.scenes):
+        assert inspect.getdoc(module)
+        for name in module.__all__:
+            value = getattr(module, name)
+            assert name in dir(module)
+            assert inspect.getdoc(value), f"{module.__name__}.{name} has no docstring"
+
+
+def test_public_methods_are_documented():
+    """In a docstring of their own, or, attributes, in that of their class."""
+    for owner in (collide.World, collide.Robot, collide.PairResult, collide.WorldResult, collide.scenes.Scene):
+        for name, value in vars(owner).items():
+            if not name.startswith("_") and (inspect.isfunction(value) or isinstance(value, property)):
+                told = inspect.getdoc(value) or re.search(rf"\b{name}\b", owner.__doc__)
+                assert told, f"{owner.__name__}.{name} is described nowhere"
+
+
+def test_names_in_all_are_the_lazy_ones():
+    """`__init__` names everything three times (types, homes, __all__); they must agree."""
+    init = tree(ROOT / "collide" / "__init__.py")
+    checked = {
+        alias.name
+        for node in ast.walk(init) if isinstance(node, ast.If) and _is_type_checking(node.test)
+        for inner in node.body if isinstance(inner, ast.ImportFrom)
+        for alias in inner.names
+    }  # fmt: skip
+    assert checked == set(collide.__all__) == set(collide._HOME)
+
+
+def test_every_module_says_what_it_is():
+    for file in sources():
+        assert ast.get_docstring(tree(file)), f"{shown(file)}: no docstring"
+
+
+def test_types_are_shipped():
+    assert (ROOT / "collide" / "py.typed").is_file()
