@@ -15,12 +15,15 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
+from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.results import HOW
 
 CURVED = ("Cylinder", "Cone", "Ellipsoid")
 EYE = np.eye(4)
 #: Corners of polygons around an axis, and rings of a polytope in an ellipsoid.
 SIDES, RINGS = 360, 36
+#: How far a witness point of a curved shape about 1 m large may be off it: a few times the promise.
+WITNESS = 4 * PROMISE_CURVED
 
 
 def points_inside(shape: collide.Shape) -> tuple[np.ndarray, float]:
@@ -89,16 +92,16 @@ def test_the_normal_is_a_certificate_and_no_direction_does_better(kind_a, kind_b
         with naive.reproducible(case):
             r = collide.distance(*case)
             hits.append(r.hit)
-            slack = 1e-14
+            slack, width = 1e-14, r.upper - r.lower
             found = naive.clearance_along(case, r.normal)
-            assert found >= r.lower - slack, f"along the normal {found}, below the lower bound {r.lower}"
-            assert found <= r.upper + slack
+            # The bound may stand from an earlier round than the normal.
+            assert r.lower - width - slack <= found <= r.upper + slack, f"{found} along the normal"
             for near in (directions, naive.unit(r.normal) + 0.03 * directions):
                 for n in near[:120]:
                     assert naive.clearance_along(case, naive.unit(n)) <= r.upper + slack, n
             assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() <= slack
-            assert depth_outside(case.A, case.X_WA, r.point_a) <= (r.upper - r.lower) + slack, "point_a"
-            assert depth_outside(case.B, case.X_WB, r.point_b) <= (r.upper - r.lower) + slack, "point_b"
+            assert depth_outside(case.A, case.X_WA, r.point_a) <= WITNESS, "point_a"
+            assert depth_outside(case.B, case.X_WB, r.point_b) <= WITNESS, "point_b"
             moved = case.with_b_moved(-r.distance * r.normal)
             again = collide.distance(*moved)
             assert again.lower - slack <= r.upper - r.lower and again.upper >= -(r.upper - r.lower) - slack

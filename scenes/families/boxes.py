@@ -18,14 +18,15 @@ from collide.scenes.families.parts import (
 )
 
 
-def stacked(rng, lower, upper, gap: float = 0.0) -> np.ndarray:
+def stacked(rng, lower, upper, gap: float = 0.0, *, turned: bool = False) -> np.ndarray:
     """Where the upper box's centre stands, seen from the lower one's: on top, overlapping it in plan.
 
     lower, upper : full lengths (3,). Two decimals sideways, so that only the height is delicate.
+    turned : they may be turned about z, and overlap all the same.
     """
     lower, upper = np.asarray(lower), np.asarray(upper)
-    free = 0.45 * (lower + upper)[:2]
-    return np.array([*np.round(rng.uniform(-free, free), 2), lower[2] / 2 + upper[2] / 2 + gap])
+    free = 0.3 * (lower[:2].min() + upper[:2].min()) if turned else 0.45 * (lower + upper)[:2]
+    return np.array([*np.round(rng.uniform(-1, 1, 2) * free, 2), lower[2] / 2 + upper[2] / 2 + gap])
 
 
 def boxes_flush(rng, index) -> Case:
@@ -33,8 +34,8 @@ def boxes_flush(rng, index) -> Case:
     together, tilted and turned in turn; input rounding decides the exact answer."""
     lower, upper = decimals(rng, 0.1, 2), decimals(rng, 0.1, 2)
     base = decimals(rng, -2, 2)
-    between = stacked(rng, lower, upper)
     turned, tilted = index % 4 in (1, 3), index % 4 in (2, 3)
+    between = stacked(rng, lower, upper, turned=turned)
     R = rotation(rng) if tilted else np.eye(3)
     R1, R2 = (R @ turn(2, rng.uniform(0, 2 * np.pi)) if turned else R for _ in range(2))
     return pair(Body(box(lower), R1, R @ base), Body(box(upper), R2, R @ (base + between)))
@@ -69,7 +70,7 @@ def boxes_rest(rng, index) -> Case:
     gap = sign(rng) * power(rng, -9, -2) * min(*lower, *upper)
     R = rotation(rng) if index % 2 else np.eye(3)
     base = decimals(rng, -2, 2)
-    between = stacked(rng, lower, upper, gap)
+    between = stacked(rng, lower, upper, gap, turned=True)
     R1, R2 = (R @ turn(2, rng.uniform(0, 2 * np.pi)) for _ in range(2))
     return pair(Body(box(lower), R1, R @ base), Body(box(upper), R2, R @ (base + between)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
-from collide.scenes.families.gaps import set_gap
+from collide.scenes.families.gaps import measure, set_gap
 from collide.scenes.families.parts import (
     anywhere,
     bipyramid,
@@ -23,7 +23,19 @@ from collide.scenes.families.parts import (
 def spheres_big(rng, index) -> Case:
     """200 to 2,000 points on spheres of radius 0.5 to 2, gap ±10^U(-6,-0.5)."""
     bodies = [anywhere(rng, sphere(rng, int(rng.integers(200, 2001)), rng.uniform(0.5, 2))) for _ in range(2)]
-    return set_gap(pair(*bodies), sign(rng) * power(rng, -6, -0.5), direction(rng))
+    gap, towards = power(rng, -6, -0.5), direction(rng)
+    # The nearest points lie in the caps that face each other; the rest need not be looked at.
+    caps = pair(_facing(bodies[0], towards), _facing(bodies[1], -towards))
+    caps = set_gap(caps, gap, towards)
+    if rng.random() < 0.5:
+        caps = caps.moved(-2 * gap * measure(caps)[1])
+    return caps._replace(P=bodies[0].points, Q=bodies[1].points)
+
+
+def _facing(body: Body, towards: np.ndarray) -> Body:
+    """The points of a sphere within 60° of a direction (3,) in the world."""
+    heights = body.points @ body.R.T @ towards
+    return body._replace(points=body.points[heights > 0.5 * heights.max()])
 
 
 def cyl1000(rng, index, sides: int = 1000) -> Case:
