@@ -469,9 +469,57 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
         if known or _set_delta(digits, d, mask, n) <= 0:
             _, distance, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
             return SEPARATE, n, distance, excess, used
+        if n == 3:
+            outside = _faces_that_part(digits, d)
+            if outside == 0:
+                return TOUCHING, 4, 0.0, -(radius_a + radius_b), used
+            if outside & (outside - 1) == 0:
+                # Beyond one face alone: the nearest point is on it, and the vertex across goes.
+                n = _compact(digits, d, ids, 15 & ~outside, 4) - 1
         mask = _nearest_subset(digits, d, n + 1, n)
         n += 1
     return UNDONE, n, 0.0, 0.0, EXACT_ROUNDS
+
+
+@kernel
+def _faces_that_part(digits, d):
+    """Which faces of points 0 … 3 through point 3 have the origin beyond them: bit k for the face across k.
+
+    The origin is known to lie on the inner side of the face across point 3. All three inside proves
+    that the tetrahedron holds the origin; it takes a quarter of the work of Johnson's determinants.
+    7, saying nothing, where the four points are coplanar or the origin is on a face's plane.
+    """
+    beyond = 0
+    edges = _scratch_at(d, 0)
+    for k in range(3):
+        for axis in range(3):
+            at = edges + (3 * k + axis) * d
+            clear(digits, at, d)
+            add_number(digits, at, _point_at(d, k, axis), d, 1)
+            add_number(digits, at, _point_at(d, 3, axis), d, -1)
+            carry(digits, at, d)
+    normal = _scratch_at(d, 1)
+    height = _scratch_at(d, 2)
+    for k in range(3):
+        e = edges + 3 * d * ((k + 1) % 3)
+        f = edges + 3 * d * ((k + 2) % 3)
+        clear(digits, height, 6 * d)
+        for axis in range(3):
+            i = (axis + 1) % 3
+            j = (axis + 2) % 3
+            clear(digits, normal, 2 * d)
+            add_product(digits, normal, e + i * d, d, f + j * d, d, 1)
+            add_product(digits, normal, e + j * d, d, f + i * d, d, -1)
+            carry(digits, normal, 2 * d)
+            add_product(digits, height, normal, 2 * d, _point_at(d, 3, axis), d, -1)  # the origin, seen from 3
+            add_product(digits, height + 3 * d, normal, 2 * d, edges + (3 * k + axis) * d, d, 1)
+        origin = carry(digits, height, 3 * d)
+        across = carry(digits, height + 3 * d, 3 * d)
+        if origin == 0 or across == 0:
+            return 7
+        if origin != across:
+            beyond |= 1 << k
+    return beyond
 
 
 @kernel

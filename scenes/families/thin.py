@@ -69,7 +69,8 @@ def _standing(points: np.ndarray, rng) -> np.ndarray:
     points = points - [0, 0, points[:, 2].min()]
     if rng.random() < 0.5:
         points[np.argsort(points[:, 2])[:3], 2] = 0.0
-    return points + [0, 0, float(rng.choice((0.0, 1.0))) * 10.0 ** -rng.uniform(5, 13)]
+    above = float(rng.choice((0.0, 1.0))) * 10.0 ** -rng.uniform(5, 13)
+    return points + np.array([0, 0, above])
 
 
 def degenerate(rng, index) -> Case:

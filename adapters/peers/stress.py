@@ -1,0 +1,352 @@
+"""Ask an engine the hard families, and count what exact arithmetic refutes.
+
+    from collide.adapters.peers.stress import run
+    table = run(None, n=40, seed=1)                  # every family, collide itself
+    table = run(["near_sep"], n=300, engine="coal")
+    headers, rows = table.table();  table.wrong;  table.save("wrong.json")
+
+collide is asked in this process, both its boolean and its distance, and each must be right by itself.
+Other engines are asked through the peers' protocol, those that can end the interpreter in a child
+process. Nothing counts as wrong that an engine itself calls undecided: those rows are counted apart.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
+from collide.adapters.peers.stress_truth import Truth, truth
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.results import HOW, UNDECIDED
+from collide.scenes.families import Case, generate, names
+
+#: Cases that go to a peer at a time: a child process that dies often is not given up.
+BATCH = 50
+
+HIT, BRACKET, CRASH = "boolean", "bracket", "failed"
+
+
+class Reply(NamedTuple):
+    """What an engine says about one case; distances in m, NaN where it gives none.
+
+    hits : every boolean it gave: one, or that of the boolean query and that of the distance.
+    how : which of its arguments decided (collide only).   undecided : it says rounding leaves the
+        boolean open.   failed, unsupported : the reason where there is no answer, else "".
+    """
+
+    hits: tuple[bool, ...] = ()
+    distance: float = math.nan
+    lower: float = math.nan
+    upper: float = math.nan
+    how: str = ""
+    undecided: bool = False
+    failed: str = ""
+    unsupported: str = ""
+
+
+@dataclass
+class Finding:
+    """One answer that exact arithmetic refutes, or one that was owed.
+
+    kind : "boolean", "bracket" (the proven bracket misses the exact value) or "failed".
+    exact : the signed distance to 30 digits [m].   gap : its size as a part of L.
+    case : the numbers, as `Case.from_dict` takes them.   snippet : Python that asks collide again.
+    """
+
+    kind: str
+    engine: str
+    family: str
+    index: int
+    exact: str
+    gap: float
+    answer: dict
+    case: dict
+    snippet: str
+
+
+@dataclass
+class FamilyResult:
+    """How an engine did on one family. Counts are of cases; gaps are |exact gap| / L.
+
+    hits : by exact arithmetic.   wrong : refuted booleans, of them `false_hits` and `false_misses`.
+    wrong_gap, undecided_gap : the largest gap among the wrong, and among the undecided; None: there
+        are none.   undecided_wrong : of the undecided, those whose boolean is not the exact one.
+    missed : proven brackets that do not hold the exact value, by `missed_by` of L at most.
+    how : what decided, and how often.   failed, unsupported : without an answer; `reasons` say why.
+    distance_error, depth_error : largest error as a part of the exact gap or depth; the same as a part
+        of L in distance_error_of_size and depth_error_of_size; None: nothing to compare.
+    """
+
+    family: str
+    cases: int = 0
+    hits: int = 0
+    answered: int = 0
+    wrong: int = 0
+    false_hits: int = 0
+    false_misses: int = 0
+    wrong_gap: float | None = None
+    undecided: int = 0
+    undecided_wrong: int = 0
+    undecided_gap: float | None = None
+    missed: int = 0
+    missed_by: float | None = None
+    failed: int = 0
+    unsupported: int = 0
+    distance_error: float | None = None
+    distance_error_of_size: float | None = None
+    depth_error: float | None = None
+    depth_error_of_size: float | None = None
+    how: dict[str, int] = field(default_factory=dict)
+    reasons: dict[str, int] = field(default_factory=dict)
+
+    def see(self, name: str, value: float | Decimal) -> None:
+        """Keep the larger of a recorded largest value and this one."""
+        known = getattr(self, name)
+        if known is None or value > known:
+            setattr(self, name, float(value))
+
+
+@dataclass
+class StressTable:
+    """Plain data: who was asked what, one row a family, and every finding."""
+
+    engine: str
+    version: str
+    n: int
+    seed: int
+    families: list[FamilyResult]
+    findings: list[Finding]
+
+    @property
+    def wrong(self) -> int:
+        """Refuted booleans and brackets that miss, over all families."""
+        return sum(f.wrong + f.missed for f in self.families)
+
+    @property
+    def failed(self) -> int:
+        """Cases without an answer that the engine did not refuse by name."""
+        return sum(f.failed for f in self.families)
+
+    @property
+    def undecided(self) -> int:
+        """Cases that the engine itself leaves open."""
+        return sum(f.undecided for f in self.families)
+
+    def to_dict(self) -> dict:
+        """Plain data for JSON, the findings' numbers included."""
+        return {**asdict(self), "wrong": self.wrong, "failed": self.failed, "undecided": self.undecided}
+
+    def save(self, path) -> None:
+        """Write every finding to a JSON file, numbers and snippet."""
+        data = {"engine": self.engine, "version": self.version, "n": self.n, "seed": self.seed}
+        text = json.dumps({**data, "findings": [asdict(f) for f in self.findings]}, indent=1, allow_nan=False)
+        Path(path).write_text(text + "\n", encoding="utf-8")
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Headers and rows of text for printing, a row a family and one of totals.
+
+        "wrong" is followed by its largest gap as a part of L, p for false hits and n for false misses;
+        errors are parts of the exact value.
+        """
+        headers = [
+            "family", "cases", "hits", "wrong", "undecided", "missed brackets", "failed", "unsupported",
+            "distance error", "depth error", "decided by",
+        ]
+        rows = [_printed(f) for f in self.families]
+        return headers, [*rows, _printed(self.total())] if len(rows) > 1 else rows
+
+    def total(self) -> FamilyResult:
+        """All families as one row."""
+        total = FamilyResult("all")
+        for f in self.families:
+            for name, value in vars(f).items():
+                if isinstance(value, dict):
+                    setattr(total, name, dict(Counter(getattr(total, name)) + Counter(value)))
+                elif isinstance(value, float):
+                    total.see(name, value)
+                elif isinstance(value, int):
+                    setattr(total, name, getattr(total, name) + value)
+        return total
+
+
+def run(
+    families: Iterable[str] | str | None = None, n: int = 40, seed: int = 0, engine: str = "collide", *,
+    timeout: float = 10.0, progress: Callable[[FamilyResult], None] | None = None,
+) -> StressTable:
+    """Ask one engine n cases of each family.
+
+    families : names of `collide.scenes.families`; None for all of them.
+    engine : a name of `protocol.ENGINES`.   timeout : of an isolated engine's answer to one case [s].
+    progress : called with each family's result as it comes.
+
+    Raises InvalidArgument for unknown families and engines, MissingExtra where the engine is absent.
+    """
+    if engine not in ENGINES:
+        raise InvalidArgument(f"no engine {engine!r}; there are {', '.join(sorted(ENGINES))}")
+    wanted = names() if families is None else [families] if isinstance(families, str) else list(families)
+    for family in wanted:
+        generate(family, 0, seed)  # complain before the work begins
+    ask, version = _asker(engine, timeout)
+    table = StressTable(engine, version, n, seed, [], [])
+    for family in wanted:
+        cases = generate(family, n, seed)
+        result = FamilyResult(family)
+        for case, reply in zip(cases, ask(cases)):
+            table.findings += _judge(result, engine, case, truth(case), reply)
+        table.families.append(result)
+        if progress is not None:
+            progress(result)
+    return table
+
+
+# --- asking ---------------------------------------------------------------------------------------
+
+
+def _asker(name: str, timeout: float) -> tuple[Callable[[list[Case]], list[Reply]], str]:
+    """A function from cases to replies, and the engine's version."""
+    peer = engine(name, timeout=timeout)
+    peer.require()
+    if name == "collide":
+        return (lambda cases: [_ask_collide(case) for case in cases]), peer.version
+
+    def ask(cases: list[Case]) -> list[Reply]:
+        replies = []
+        for start in range(0, len(cases), BATCH):
+            table = peer.answer(Question.from_pairs([case.shapes() for case in cases[start : start + BATCH]]))
+            replies += [_from_row(row, reason) for row, reason in zip(table.rows, table.reasons)]
+        return replies
+
+    return ask, peer.version
+
+
+def _from_row(row, reason: str) -> Reply:
+    """A row of the protocol's table as a reply."""
+    if not row["answered"]:
+        failed = bool(row[FAILED]) or not row[UNSUPPORTED]
+        return Reply(failed=reason or "no answer") if failed else Reply(unsupported=reason)
+    return Reply((bool(row["hit"]),), float(row["distance"]))
+
+
+def _ask_collide(case: Case) -> Reply:
+    """The engine's boolean and its distance; an exception is a failure, whatever its kind."""
+    from collide import collide, distance
+
+    try:
+        question = case.shapes()
+        hit = bool(collide(*question))
+        row = distance(*question).rows[0]
+    except UnsupportedQuery as error:
+        return Reply(unsupported=complaint(error))
+    except Exception as error:  # noqa: BLE001 - any failure of the engine under test is a finding
+        return Reply(failed=complaint(error))
+    return Reply(
+        (hit, bool(row["hit"])), float(row["distance"]), float(row["lower"]), float(row["upper"]),
+        HOW[row["how"]], bool(row["how"] == UNDECIDED),
+    )
+
+
+# --- judging --------------------------------------------------------------------------------------
+
+
+def _judge(result: FamilyResult, name: str, case: Case, exact: Truth, reply: Reply) -> list[Finding]:
+    """Count one reply, and return what is wrong with it."""
+    result.cases += 1
+    result.hits += exact.hit
+    if reply.failed or reply.unsupported:
+        result.failed += bool(reply.failed)
+        result.unsupported += not reply.failed
+        reason = reply.failed or reply.unsupported
+        result.reasons[reason] = result.reasons.get(reason, 0) + 1
+        return [_finding(CRASH, name, case, exact, reply)] if reply.failed else []
+    result.answered += 1
+    if reply.how:
+        result.how[reply.how] = result.how.get(reply.how, 0) + 1
+    kinds = [HIT] if _count_boolean(result, exact, reply) else []
+    kinds += [BRACKET] if _count_bracket(result, name, exact, reply) else []
+    _count_errors(result, exact, reply)
+    return [_finding(kind, name, case, exact, reply) for kind in kinds]
+
+
+def _gap(exact: Truth) -> float:
+    return abs(float(exact.distance)) / exact.size
+
+
+def _count_boolean(result: FamilyResult, exact: Truth, reply: Reply) -> bool:
+    """Whether a boolean is refuted, and not left open by the engine itself."""
+    refuted = any(hit != exact.hit for hit in reply.hits)
+    if reply.undecided:
+        result.undecided += 1
+        result.undecided_wrong += refuted
+        result.see("undecided_gap", _gap(exact))
+        return False
+    if refuted:
+        result.wrong += 1
+        result.false_misses += exact.hit
+        result.false_hits += not exact.hit
+        result.see("wrong_gap", _gap(exact))
+    return refuted
+
+
+def _count_bracket(result: FamilyResult, name: str, exact: Truth, reply: Reply) -> bool:
+    """Whether a proven bracket misses; only collide gives any."""
+    if name != "collide" or not exact.misses(reply.lower, reply.upper):
+        return False
+    result.missed += 1
+    ends = (Decimal(reply.lower) - exact.distance, exact.distance - Decimal(reply.upper))
+    result.see("missed_by", float(max(ends)) / exact.size)
+    return True
+
+
+def _count_errors(result: FamilyResult, exact: Truth, reply: Reply) -> None:
+    if not abs(reply.distance) < math.inf:
+        return
+    error, name = exact.off(reply.distance), "depth_error" if exact.hit else "distance_error"
+    result.see(f"{name}_of_size", float(error) / exact.size)
+    if exact.distance:
+        result.see(name, error / abs(exact.distance))
+
+
+def _finding(kind: str, name: str, case: Case, exact: Truth, reply: Reply) -> Finding:
+    answer = {
+        key: value if not isinstance(value, float) or math.isfinite(value) else None
+        for key, value in reply._asdict().items()
+    }
+    return Finding(
+        kind, name, case.family, case.index, str(exact.distance), _gap(exact), answer, case.to_dict(), case.snippet()
+    )
+
+
+# --- printing -------------------------------------------------------------------------------------
+
+
+def _printed(f: FamilyResult) -> list[str]:
+    return [
+        f.family, str(f.cases), str(f.hits), _wrong(f),
+        _with_gap(f.undecided, f.undecided_gap), _with_gap(f.missed, f.missed_by), str(f.failed), str(f.unsupported),
+        _part(f.distance_error), _part(f.depth_error), _shares(f),
+    ]
+
+
+def _wrong(f: FamilyResult) -> str:
+    kinds = [f"{count}{letter}" for count, letter in ((f.false_hits, "p"), (f.false_misses, "n")) if count]
+    return f"{' '.join(kinds)} @{f.wrong_gap:.0e}" if kinds and f.wrong_gap is not None else "0"
+
+
+def _with_gap(count: int, gap: float | None) -> str:
+    return f"{count} @{gap:.0e}" if count and gap is not None else str(count)
+
+
+def _part(error: float | None) -> str:
+    return "-" if error is None else f"{error:.0e}"
+
+
+def _shares(f: FamilyResult) -> str:
+    total = sum(f.how.values())
+    return ", ".join(f"{name} {count / total:.0%}" for name, count in sorted(f.how.items(), key=lambda kv: -kv[1]))
