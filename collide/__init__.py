@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collide.certificates import Certificate, CertificateRefused, verify
     from collide.errors import (
         CollideError,
         InvalidArgument,
@@ -50,6 +51,7 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
+    "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
     "collide.query": ("collide", "distance"),
     "collide.results": ("PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
@@ -63,10 +65,10 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Box", "Capsule", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
     "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "PairResult", "Robot",
     "SceneError", "Shape", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
-    "distance", "pose",
+    "distance", "pose", "verify",
 ]
 
 

@@ -62,7 +62,7 @@ def distance(A: Shape, B: Shape, X_WA, X_WB, *, max_distance: float = math.inf, 
             f"distance of {type(A).__name__} and {type(B).__name__}{where}: their overlap has no end, so no "
             "translation of finite length separates them; collide() still answers"
         )
-    return PairResult(rows, single)
+    return PairResult(rows, single, (A, B, X_WA, X_WB))
 
 
 def check_distance(name: str, value) -> float:

@@ -69,14 +69,33 @@ def flipped(rows: np.ndarray) -> np.ndarray:
 class PairResult:
     """Answer of a pair query: the fields of `PAIR_DTYPE` as attributes.
 
-    Scalars and (3,) arrays for single poses; arrays with a leading N for batches. ``rows`` is the
-    structured array itself.
+    Scalars and (3,) arrays for single poses; arrays with a leading N for batches, of which ``r[k]``
+    is one result. ``rows`` is the structured array itself.
     """
 
-    __slots__ = ("_single", "rows")
+    __slots__ = ("_question", "_single", "rows")
 
-    def __init__(self, rows: np.ndarray, single: bool):
-        self.rows, self._single = rows, single
+    def __init__(self, rows: np.ndarray, single: bool, question: tuple):
+        self.rows, self._single, self._question = rows, single, question
+
+    @property
+    def certificate(self):
+        """Plain data that proves the boolean, worked out when asked for; see `collide.certificates`.
+
+        A tuple of `Certificate`, one for each pair of parts it takes; None where there is none. A
+        list of these for batches. `collide.verify` checks it in Python integers.
+        """
+        from collide.certificates import certificate_of
+
+        A, B, X_WA, X_WB = self._question
+        found = [certificate_of(A, B, X_WA[k], X_WB[k], row) for k, row in enumerate(self.rows)]
+        return found[0] if self._single else found
+
+    def __getitem__(self, k: int) -> PairResult:
+        """Result k of a batch."""
+        A, B, X_WA, X_WB = self._question
+        k = range(len(self.rows))[k]
+        return PairResult(self.rows[k : k + 1], True, (A, B, X_WA[k : k + 1], X_WB[k : k + 1]))
 
     def __getattr__(self, name: str):
         if name not in FIELDS:

@@ -27,7 +27,7 @@ for distance, a, b in of_robot(world, world.distances(max_distance=0.05)):
 # keeps its packed shapes and refits its box-tree.
 first = arm.joint_names[0]
 print(f"\nsweeping {first}:")
-for angle in np.linspace(-0.9, 0.9, 7):
+for angle in np.arange(-9, 10, 3) / 10:
     moved = scene.with_state({first: angle})  # a new Scene; the old one stays as it is
     world.set_poses([body.name for body in moved.bodies], np.array([body.X_WB for body in moved.bodies]))
     hits = of_robot(world, world.collisions())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import naive
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
+from collide.adapters.peers import exact
 
 #: One compound is a bracket open to the right: ][ shapes catch each other.
 BRACKET = collide.Compound(
@@ -105,13 +107,14 @@ def test_upper_bound_is_what_the_parts_need():
 
 
 def test_brackets_that_hook_into_each_other():
-    """The pocket lets B's arm sit free inside; pulled together, the way out is not the parts' own."""
-    finger = collide.Box((0.3, 0.3, 0.3))
-    free = collide.distance(BRACKET, finger, np.eye(4), pose(t=(0.1, 0, 0)))
-    assert not free.hit and free.distance == pytest.approx(0.15, abs=1e-12)
-    caught = collide.distance(BRACKET, BRACKET, np.eye(4), pose(np.diag([-1.0, -1.0, 1.0]), (0.6, 0.3, 0.0)))
-    assert caught.hit and caught.distance < 0
-    moved = pose(np.diag([-1.0, -1.0, 1.0]), np.array([0.6, 0.3, 0.0]) + (1e-9 - caught.distance) * caught.normal)
+    """Hulls overlap, the bodies need not: an arm of each stands in the pocket of the other."""
+    turned = np.diag([-1.0, -1.0, 1.0])
+    free = collide.distance(BRACKET, BRACKET, np.eye(4), pose(turned, (0.6, 0.3, 0.0)))
+    assert not free.hit and free.distance == pytest.approx(0.1, abs=1e-12)
+    # 0.2 lower both arms are caught by 0.1, and 0.1 along y sets them free; what is reported is a bound.
+    caught = collide.distance(BRACKET, BRACKET, np.eye(4), pose(turned, (0.6, 0.1, 0.0)))
+    assert caught.hit and caught.lower <= -0.1 + 1e-12 and caught.upper >= -0.1 - 1e-12
+    moved = pose(turned, np.array([0.6, 0.1, 0.0]) + (1e-9 - caught.distance) * caught.normal)
     assert not collide.collide(BRACKET, BRACKET, np.eye(4), moved)
 
 
@@ -144,28 +147,23 @@ def test_nested_compounds_count_the_rounding_of_their_poses():
             assert r.lower <= truth <= r.upper
 
 
-def exact_of_nested(box, poses, other, X_WB):
-    """Exact distance with the product of poses taken exactly: corners of the box by Fractions, rounded outwards."""
-    from fractions import Fraction
-
-    points, _ = naive.corners(box)
-    moved = [[Fraction(float(x)) for x in p] for p in points]
+def exact_of_nested(box, poses, other, X_WB) -> float:
+    """Signed distance with the product of poses taken exactly: the box's corners as integers of their own."""
+    moved = [[Fraction(float(x)) for x in p] for p in naive.corners(box)[0]]
     for X in reversed(poses):
-        moved = [
-            [sum(Fraction(float(X[k, m])) * p[m] for m in range(3)) + Fraction(float(X[k, 3])) for k in range(3)]
-            for p in moved
-        ]
-    # Corners as an unevaluated sum of two doubles: the oracle places the first by a pose that adds the second.
-    # One vertex at a time cannot be posed, so scale: 2^60 holds what a double of the product rounds away.
-    from collide.adapters.peers import exact
-
-    grid = 2**80
-    integers = [[round(x * grid) for x in p] for p in moved]
-    high = [[float(x >> 60) for x in p] for p in integers]
-    low = [[float(x & (2**60 - 1)) for x in p] for p in integers]
-    del high, low, exact
-    rounded = collide.ConvexHull([[float(x) for x in p] for p in moved])
-    return naive.exact_distance(Case(rounded, other, np.eye(4), X_WB))
+        entries = [[Fraction(float(x)) for x in row] for row in X]
+        moved = [[sum(r * x for r, x in zip(row, (*p, 1))) for row in entries[:3]] for p in moved]
+    points, radius = naive.corners(other)
+    B, e = exact.world_points(points, X_WB[:3, :3], X_WB[:3, 3])
+    shift = max(max(x.denominator.bit_length() - 1 for p in moved for x in p), -e)
+    A = [tuple(int(x * 2**shift) for x in p) for p in moved]
+    B = [tuple(x << (e + shift) for x in p) for p in B]
+    nearest = exact.gjk(A, B)
+    if any(nearest.v):
+        core = math.sqrt(Fraction(exact.dot(nearest.v, nearest.v), nearest.total**2 * 4**shift))
+    else:
+        core = -float(exact.epa(A, B, -shift, nearest.pairs, 30).depth)
+    return core - radius
 
 
 def test_union_against_a_halfspace_is_as_deep_as_its_lowest_point():

@@ -38,7 +38,7 @@ class Reply(NamedTuple):
 
     hits : every boolean it gave: one, or that of the boolean query and that of the distance.
     how : which of its arguments decided (collide only).   undecided : it says rounding leaves the
-        boolean open.   failed, unsupported : the reason where there is no answer, else "".
+        boolean open.   certified : it calls its answer certified (collide only).   failed, unsupported : the reason where there is no answer, else "".
     """
 
     hits: tuple[bool, ...] = ()
@@ -47,6 +47,7 @@ class Reply(NamedTuple):
     upper: float = math.nan
     how: str = ""
     undecided: bool = False
+    certified: bool = False
     failed: str = ""
     unsupported: str = ""
 
@@ -55,7 +56,7 @@ class Reply(NamedTuple):
 class Finding:
     """One answer that exact arithmetic refutes, or one that was owed.
 
-    kind : "boolean", "bracket" (the proven bracket misses the exact value) or "failed".
+    kind : "boolean", "bracket" (the proven bracket misses the exact value or the distance given) or "failed".
     exact : the signed distance to 30 digits [m].   gap : its size as a part of L.
     case : the numbers, as `Case.from_dict` takes them.   snippet : Python that asks collide again.
     """
@@ -78,7 +79,9 @@ class FamilyResult:
     hits : by exact arithmetic.   wrong : refuted booleans, of them `false_hits` and `false_misses`.
     wrong_gap, undecided_gap : the largest gap among the wrong, and among the undecided; None: there
         are none.   undecided_wrong : of the undecided, those whose boolean is not the exact one.
-    missed : proven brackets that do not hold the exact value, by `missed_by` of L at most.
+    missed : proven brackets that do not hold the exact value, by `missed_by` of L at most, or not the
+        engine's own distance.
+    certified : answers that the engine calls so.
     how : what decided, and how often.   failed, unsupported : without an answer; `reasons` say why.
     distance_error, depth_error : largest error as a part of the exact gap or depth; the same as a part
         of L in distance_error_of_size and depth_error_of_size; None: nothing to compare.
@@ -97,6 +100,7 @@ class FamilyResult:
     undecided_gap: float | None = None
     missed: int = 0
     missed_by: float | None = None
+    certified: int = 0
     failed: int = 0
     unsupported: int = 0
     distance_error: float | None = None
@@ -248,7 +252,7 @@ def _ask_collide(case: Case) -> Reply:
         return Reply(failed=complaint(error))
     return Reply(
         (hit, bool(row["hit"])), float(row["distance"]), float(row["lower"]), float(row["upper"]),
-        HOW[row["how"]], bool(row["how"] == UNDECIDED),
+        HOW[row["how"]], bool(row["how"] == UNDECIDED), bool(row["certified"]),
     )
 
 
@@ -266,6 +270,7 @@ def _judge(result: FamilyResult, name: str, case: Case, exact: Truth, reply: Rep
         result.reasons[reason] = result.reasons.get(reason, 0) + 1
         return [_finding(CRASH, name, case, exact, reply)] if reply.failed else []
     result.answered += 1
+    result.certified += reply.certified
     if reply.how:
         result.how[reply.how] = result.how.get(reply.how, 0) + 1
     kinds = [HIT] if _count_boolean(result, exact, reply) else []
@@ -295,12 +300,17 @@ def _count_boolean(result: FamilyResult, exact: Truth, reply: Reply) -> bool:
 
 
 def _count_bracket(result: FamilyResult, name: str, exact: Truth, reply: Reply) -> bool:
-    """Whether a proven bracket misses; only collide gives any."""
-    if name != "collide" or not exact.misses(reply.lower, reply.upper):
+    """Whether a proven bracket misses the exact value, or the engine's own distance; only collide
+    gives any."""
+    if name != "collide":
+        return False
+    lower, distance, upper = reply.lower, reply.distance, reply.upper
+    if lower <= distance <= upper and not exact.misses(lower, upper):
         return False
     result.missed += 1
-    ends = (Decimal(reply.lower) - exact.distance, exact.distance - Decimal(reply.upper))
-    result.see("missed_by", float(max(ends)) / exact.size)
+    if not (math.isnan(lower) or math.isnan(upper)):
+        ends = (Decimal(lower) - exact.distance, exact.distance - Decimal(upper))
+        result.see("missed_by", float(max(*ends, Decimal(0))) / exact.size)
     return True
 
 

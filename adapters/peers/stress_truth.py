@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import Context, Decimal
 from fractions import Fraction
 from typing import NamedTuple
@@ -29,6 +30,8 @@ class Truth(NamedTuple):
 
     def misses(self, lower: float, upper: float) -> bool:
         """Whether a bracket [m] does not hold the exact value; not-a-number holds nothing."""
+        if math.isnan(lower) or math.isnan(upper):
+            return True
         slack = abs(self.distance) * _OPEN
         return not (Decimal(lower) <= self.distance + slack and Decimal(upper) >= self.distance - slack)
 

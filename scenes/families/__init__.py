@@ -43,7 +43,7 @@ _FAMILIES: dict[str, Callable[..., Case]] = {
 STANDARD: tuple[str, ...] = tuple(_FAMILIES)
 
 _FAMILIES |= {
-    family.__name__: family for module in (scales, thin, rounded, swept, lattices) for family in module.OWN
+    family.__name__: family for module in (touching, scales, thin, rounded, swept, lattices) for family in module.OWN
 }
 
 

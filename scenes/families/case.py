@@ -39,7 +39,7 @@ class Case(NamedTuple):
     """
 
     family: str
-    index: int
+    index: int  # type: ignore[assignment]  # hides the method of tuples, which nobody asks of a case
     P: np.ndarray
     R1: np.ndarray
     t1: np.ndarray
@@ -78,10 +78,8 @@ class Case(NamedTuple):
         """(A, B, X_WA, X_WB) as `collide.distance` takes them: two shapes and two (4, 4) poses."""
         from collide.shapes import ConvexHull, Halfspace
 
-        if self.kind == HALFSPACE:
-            A = Halfspace(self.P[0], self.offset)
-        else:
-            A = ConvexHull(self.P, radius=self.radius_a)
+        plane = self.kind == HALFSPACE
+        A = Halfspace(self.P[0], self.offset) if plane else ConvexHull(self.P, radius=self.radius_a)
         return A, ConvexHull(self.Q, radius=self.radius_b), _matrix(self.R1, self.t1), _matrix(self.R2, self.t2)
 
     def to_dict(self) -> dict:

@@ -166,4 +166,27 @@ def touch_1ulp(rng, index) -> Case:
     return case._replace(t2=t2)
 
 
+def touch_scaled(rng, index) -> Case:
+    """Exactly touching, one ulp towards, one ulp away in turn, and all lengths scaled by 2^e with e from
+    -150 to 150."""
+    case = (touch_1ulp(rng, 2 * index), touch_1ulp(rng, 2 * index + 1), touch_ee(rng, index))[index % 3]
+    factor = 2.0 ** int(rng.integers(-150, 151))
+    return case._replace(P=case.P * factor, t1=case.t1 * factor, Q=case.Q * factor, t2=case.t2 * factor)
+
+
+def touch_tiny_step(rng, index) -> Case:
+    """Exactly touching with a translation of B that is 0 along the largest normal component, then moved
+    there by ±2^-k, k from 55 to 1074: far less than an ulp of any other number, towards and away in turn."""
+    found = contact(rng, ("vf", "ee", "ff")[index // 2 % 3])
+    case, normal = placed(rng, found)
+    axis = int(np.abs(normal).argmax())
+    # The pair as a whole moves along that axis, so that B's translation becomes 0 there, exactly.
+    t1, t2 = case.t1.copy(), case.t2.copy()
+    t1[axis] -= t2[axis]
+    away = 1.0 if index % 2 else -1.0
+    t2[axis] = away * np.sign(normal[axis]) * 2.0 ** -int(rng.integers(55, 1075))
+    return case._replace(t1=t1, t2=t2)
+
+
 FAMILIES = (touch_vf, touch_ee, touch_ff, touch_vv, touch_ve, touch_1ulp)
+OWN = (touch_scaled, touch_tiny_step)

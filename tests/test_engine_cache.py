@@ -1,0 +1,107 @@
+"""Compiled kernels on disk: found again, dropped with any edit of a source, done without where nothing can be written.
+
+Each test runs a copy of the package in processes of its own, with a cache folder of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import collide
+
+#: Asks for a bounding box: the smallest kernel, whose callee `support_vertex` stands in another file.
+CHILD = """
+import json, sys
+import numpy as np
+import collide
+from collide import _jit
+from collide.geometry.tables import ShapeTable, pose_rows
+from collide.packed_world import PackedWorld
+
+packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
+poses = pose_rows(np.eye(4)[None], X[None], np.array([packed.reach]))
+box = PackedWorld._boxes_of(ShapeTable([packed]), poses, np.zeros(1, dtype=np.int64))
+print(json.dumps({
+    "box": box.round(6).tolist(), "hash": _jit.source_hash(), "folder": str(_jit.kernel_cache_folder()),
+    "package": collide.__file__,
+}))
+"""
+
+
+def ask(site: Path, cache: Path):
+    """(answer, what was written to stderr) of a process that uses the package under ``site``."""
+    child = subprocess.run(
+        [sys.executable, "-c", CHILD], env={**os.environ, "COLLIDE_CACHE_DIR": str(cache), "PYTHONPATH": str(site)},
+        cwd=site, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert child.returncode == 0, child.stderr[-3000:]
+    answer = json.loads(child.stdout)
+    assert Path(answer["package"]).resolve().is_relative_to(site.resolve())
+    return answer, child.stderr
+
+
+@pytest.fixture()
+def site(tmp_path) -> Path:
+    shutil.copytree(
+        Path(collide.__file__).parent, tmp_path / "site" / "collide",
+        ignore=shutil.ignore_patterns("__pycache__", "adapters", "scenes"),
+    )  # fmt: skip
+    return tmp_path / "site"
+
+
+def files_in(folder: str) -> dict[str, int]:
+    return {file.name: file.stat().st_mtime_ns for file in Path(folder).iterdir() if file.suffix == ".nbc"}
+
+
+def test_an_edit_in_a_callee_is_seen_and_the_old_kernels_stay_apart(site, tmp_path):
+    cache = tmp_path / "cache"
+    first, said = ask(site, cache)
+    assert first["box"] == [[-4, -5, -6, 1, 2, 3]] and not said
+    kept = files_in(first["folder"])
+    assert kept and Path(first["folder"]).is_relative_to(cache)
+
+    again, _ = ask(site, cache)
+    assert again == first and files_in(first["folder"]) == kept, "the second process compiled anew"
+
+    callee = site / "collide" / "geometry" / "supports.py"
+    source = callee.read_text()
+    assert source.count("return k0 if k0 < n else 0") == 1
+    callee.write_text(source.replace("return k0 if k0 < n else 0", "return 0"))
+    edited, _ = ask(site, cache)
+    assert edited["hash"] != first["hash"] and edited["folder"] != first["folder"]
+    assert edited["box"] == [[0, 0, 0, 0, 0, 0]], "an answer of the old source"
+    assert files_in(first["folder"]) == kept
+
+    callee.write_text(source)
+    assert ask(site, cache)[0] == first
+
+
+def test_edits_that_no_kernel_reads_keep_the_cache(site, tmp_path):
+    first, _ = ask(site, tmp_path / "cache")
+    kept = files_in(first["folder"])
+    world = site / "collide" / "world.py"
+    world.write_text(world.read_text() + "\n# a remark\n")
+    again, _ = ask(site, tmp_path / "cache")
+    assert again["folder"] == first["folder"] and files_in(first["folder"]) == kept
+
+
+def test_a_folder_that_cannot_be_written_is_said_and_done_without(site, tmp_path):
+    blocked = tmp_path / "a file"
+    blocked.write_text("not a folder")
+    answer, said = ask(site, blocked)
+    assert answer["box"] == [[-4, -5, -6, 1, 2, 3]]
+    assert "COLLIDE_CACHE_DIR" in said and str(blocked) in said
+    assert said.count("cannot be kept") == 1
+
+
+def test_importing_the_package_does_not_import_numba(site):
+    code = "import sys, collide, collide.errors, collide.shapes; collide.Box((1, 1, 1)); print('numba' in sys.modules)"
+    child = subprocess.run([sys.executable, "-c", code], cwd=site, capture_output=True, text=True, timeout=60, check=True)
+    assert child.stdout.strip() == "False"

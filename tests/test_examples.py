@@ -1,0 +1,79 @@
+"""The examples run, each in an interpreter of its own, and print what their readers are told to see."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+#: The package that an example cannot do without, beyond the engine.
+NEEDS = {"06_compare_with_fcl": "fcl"}
+#: What each example's output must hold.
+SHOWS = {
+    "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
+    "02_batch_of_poses": ["beyond 2 cm: 2 of 7", "hits:"],
+    "03_world_with_filters": ["1 grasped", "static–static", "collisions left: []"],
+    "04_robot_in_a_scene": ["right_finger", "sweeping yaw", "free"],
+    "05_scene_file_to_report": ["COLLIDING", "HOW EACH ANSWER IS KNOWN", "as data: 1 collision"],
+    "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
+}
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, env={**os.environ, "PYTHONIOENCODING": "utf-8"},
+        check=False, capture_output=True, encoding="utf-8", timeout=120,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_example_runs(file):
+    needed = NEEDS.get(file.stem)
+    if needed and find_spec(needed) is None:
+        pytest.skip(f"{file.name} compares with {needed}, which is not installed")
+    done = run(str(file))
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr, "an example prints no warnings"
+    assert file.stem in SHOWS, f"say in SHOWS what {file.name} must print"
+    for words in SHOWS[file.stem]:
+        assert words in done.stdout
+
+
+def test_example_without_its_peer_says_so():
+    """Where the engine is not installed, the example explains and leaves with status 0."""
+    example = ROOT / "examples" / "06_compare_with_fcl.py"
+    hide = (
+        "import importlib.util, runpy; real = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda name, *a: None if name == 'fcl' else real(name, *a)\n"
+        f"runpy.run_path({str(example)!r}, run_name='__main__')"
+    )
+    done = run("-c", hide)
+    assert done.returncode == 0, done.stderr
+    assert "is not installed" in done.stdout and "collide-robotics[peers]" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_example_is_short_and_says_what_it_shows(file):
+    text = file.read_text(encoding="utf-8")
+    assert len(text.splitlines()) < 50
+    assert ast.get_docstring(ast.parse(text))
+
+
+def test_every_example_is_known():
+    assert {file.stem for file in EXAMPLES} == set(SHOWS)
+
+
+def test_python_in_the_readme_runs():
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    done = run("-c", "\n".join(blocks))
+    assert done.returncode == 0, done.stderr
