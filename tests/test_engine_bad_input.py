@@ -26,9 +26,11 @@ from collide import (
     UnknownBody,
     UnsupportedQuery,
     World,
-    collide as meets,
     distance,
     pose,
+)
+from collide import (
+    collide as meets,
 )
 
 EYE = np.eye(4)
@@ -161,12 +163,12 @@ def test_what_is_no_pose_is_refused(name):
         with pytest.raises(InvalidPose, match="X_WA"):
             query(Sphere(1), Sphere(1), X, EYE)
     world = World()
-    with pytest.raises(InvalidPose, match="World.add: X_WB"):
+    with pytest.raises(InvalidPose, match=r"World.add: X_WB"):
         world.add(Sphere(1), X)
     world.add(Sphere(1), name="ball")
-    with pytest.raises(InvalidPose, match="World.set_pose: X_WB"):
+    with pytest.raises(InvalidPose, match=r"World.set_pose: X_WB"):
         world.set_pose("ball", X)
-    with pytest.raises(InvalidPose, match="World.query: X_WS"):
+    with pytest.raises(InvalidPose, match=r"World.query: X_WS"):
         world.query(Sphere(1), X)
     assert len(world) == 1 and np.array_equal(world.body("ball").X_WB, EYE)
 

@@ -16,8 +16,8 @@ import collide
 from collide.results import HOW, flipped
 
 pytest.importorskip("hypothesis")
-from hypothesis import HealthCheck, given, settings  # noqa: E402
-from hypothesis import strategies as st  # noqa: E402
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 QUICK = settings(
     max_examples=150, derandomize=True, deadline=None, print_blob=False,

@@ -12,7 +12,6 @@ from naive import pose, random_pose, rng_of
 import collide
 from collide.broadphase.box_tree import BoxTree, validate_box_tree
 
-
 #: All but the effort: a World leaves out parts of compounds that are too far apart to matter.
 FIELDS = [field for field in naive.ANSWER_FIELDS if field != "iterations"]
 

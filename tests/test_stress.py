@@ -13,7 +13,7 @@ import collide
 from collide.adapters.peers import exact, stress
 from collide.adapters.peers.protocol import engine
 from collide.adapters.peers.stress import Reply, run
-from collide.adapters.peers.stress_truth import DIGITS, halfspace_distance, truth
+from collide.adapters.peers.stress_truth import DIGITS, gap_along, halfspace_distance, truth
 from collide.errors import InvalidArgument
 from collide.results import HOW, UNDECIDED
 from collide.scenes.families import Case, generate, names
@@ -151,6 +151,24 @@ def test_findings_are_saved_with_all_their_numbers(monkeypatch, tmp_path):
         assert np.array_equal(again.P, made.P) and np.array_equal(again.t2, made.t2) and again.index == made.index
         assert float(finding["exact"]) == float(truth(made).distance) and finding["answer"]["distance"] is None
         assert finding["snippet"] == made.snippet()
+
+
+def test_a_wrong_normal_shows_as_its_excess(monkeypatch):
+    (honest,) = run(["rand_sep"], n=15, seed=1).families
+    assert honest.normal_excess < 1e-12
+    (turned,) = answered_by(monkeypatch, lambda r: r._replace(normal=tuple(np.roll(r.normal, 1))), "rand_sep").families
+    assert turned.normal_excess > 1e-2 and turned.wrong == 0
+
+
+def test_gap_along_a_direction_is_at_most_the_distance():
+    rng = np.random.default_rng(0)
+    for case in generate("swept_near", 10, 1):
+        assert all(gap_along(case, rng.standard_normal(3)) <= truth(case).distance for _ in range(5))
+        assert gap_along(case, (0, 0, 0)) is None and gap_along(case, (np.nan, 0, 1)) is None
+    # Two swept points, the second straight above: exactly their distance less the radii.
+    above = case._replace(P=np.zeros((1, 3)), Q=np.zeros((1, 3)), t1=np.zeros(3), t2=np.array([0, 0, 4.0]), radius_a=1, radius_b=0.5)
+    assert gap_along(above, (0, 0, 7.0)) == truth(above).distance == Decimal("2.5")
+    assert gap_along(generate("halfspace_near", 1, 1)[0], (0, 0, 1)) is None
 
 
 def test_errors_are_parts_of_the_exact_value(monkeypatch):

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
-from collide.adapters.peers.stress_truth import Truth, truth
+from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.results import HOW, UNDECIDED
 from collide.scenes.families import Case, generate, names
@@ -48,6 +48,7 @@ class Reply(NamedTuple):
     how: str = ""
     undecided: bool = False
     certified: bool = False
+    normal: tuple[float, float, float] = (math.nan,) * 3
     failed: str = ""
     unsupported: str = ""
 
@@ -85,6 +86,8 @@ class FamilyResult:
     how : what decided, and how often.   failed, unsupported : without an answer; `reasons` say why.
     distance_error, depth_error : largest error as a part of the exact gap or depth; the same as a part
         of L in distance_error_of_size and depth_error_of_size; None: nothing to compare.
+    normal_excess : by how much the gap along the normal given falls short of the exact signed distance, at
+        most, as a part of L: 0 for the right normal, whichever of several it is.
     """
 
     family: str
@@ -107,6 +110,7 @@ class FamilyResult:
     distance_error_of_size: float | None = None
     depth_error: float | None = None
     depth_error_of_size: float | None = None
+    normal_excess: float | None = None
     how: dict[str, int] = field(default_factory=dict)
     reasons: dict[str, int] = field(default_factory=dict)
 
@@ -157,11 +161,11 @@ class StressTable:
         """Headers and rows of text for printing, a row a family and one of totals.
 
         "wrong" is followed by its largest gap as a part of L, p for false hits and n for false misses;
-        errors are parts of the exact value.
+        errors are parts of the exact value, the normal's excess of L.
         """
         headers = [
             "family", "cases", "hits", "wrong", "undecided", "missed brackets", "failed", "unsupported",
-            "distance error", "depth error", "decided by",
+            "distance error", "depth error", "normal excess", "decided by",
         ]
         rows = [_printed(f) for f in self.families]
         return headers, [*rows, _printed(self.total())] if len(rows) > 1 else rows
@@ -235,7 +239,7 @@ def _from_row(row, reason: str) -> Reply:
     if not row["answered"]:
         failed = bool(row[FAILED]) or not row[UNSUPPORTED]
         return Reply(failed=reason or "no answer") if failed else Reply(unsupported=reason)
-    return Reply((bool(row["hit"]),), float(row["distance"]))
+    return Reply((bool(row["hit"]),), float(row["distance"]), normal=tuple(row["normal"].tolist()))
 
 
 def _ask_collide(case: Case) -> Reply:
@@ -252,7 +256,7 @@ def _ask_collide(case: Case) -> Reply:
         return Reply(failed=complaint(error))
     return Reply(
         (hit, bool(row["hit"])), float(row["distance"]), float(row["lower"]), float(row["upper"]),
-        HOW[row["how"]], bool(row["how"] == UNDECIDED), bool(row["certified"]),
+        HOW[row["how"]], bool(row["how"] == UNDECIDED), bool(row["certified"]), tuple(row["normal"].tolist()),
     )
 
 
@@ -276,6 +280,9 @@ def _judge(result: FamilyResult, name: str, case: Case, exact: Truth, reply: Rep
     kinds = [HIT] if _count_boolean(result, exact, reply) else []
     kinds += [BRACKET] if _count_bracket(result, name, exact, reply) else []
     _count_errors(result, exact, reply)
+    along = gap_along(case, reply.normal)
+    if along is not None:
+        result.see("normal_excess", max(0.0, float(exact.distance - along)) / exact.size)
     return [_finding(kind, name, case, exact, reply) for kind in kinds]
 
 
@@ -324,13 +331,17 @@ def _count_errors(result: FamilyResult, exact: Truth, reply: Reply) -> None:
 
 
 def _finding(kind: str, name: str, case: Case, exact: Truth, reply: Reply) -> Finding:
-    answer = {
-        key: value if not isinstance(value, float) or math.isfinite(value) else None
-        for key, value in reply._asdict().items()
-    }
+    # JSON has no NaN and no infinity.
+    answer = {key: _plain(value) for key, value in reply._asdict().items()}
     return Finding(
         kind, name, case.family, case.index, str(exact.distance), _gap(exact), answer, case.to_dict(), case.snippet()
     )
+
+
+def _plain(value):
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # --- printing -------------------------------------------------------------------------------------
@@ -340,7 +351,7 @@ def _printed(f: FamilyResult) -> list[str]:
     return [
         f.family, str(f.cases), str(f.hits), _wrong(f),
         _with_gap(f.undecided, f.undecided_gap), _with_gap(f.missed, f.missed_by), str(f.failed), str(f.unsupported),
-        _part(f.distance_error), _part(f.depth_error), _shares(f),
+        _part(f.distance_error), _part(f.depth_error), _part(f.normal_excess), _shares(f),
     ]
 
 

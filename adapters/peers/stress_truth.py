@@ -46,6 +46,20 @@ def truth(case: Case) -> Truth:
     return Truth(exact.hit(*pair, **radii), distance, _size(case))
 
 
+def gap_along(case: Case, normal) -> Decimal | None:
+    """How far the hulls are apart along a direction (3,) from A to B [m]: at most their signed distance,
+    and equal to it for the right normal. None for a half-space and where there is no direction.
+    """
+    if case.kind == HALFSPACE or not all(map(math.isfinite, normal)) or not any(normal):
+        return None
+    n = [Fraction(float(x)) for x in normal]
+    (A, e_a), (B, e_b) = exact.world_points(*case[2:5]), exact.world_points(*case[5:8])
+    nearest = min(exact.dot(n, p) for p in B) * Fraction(2) ** e_b
+    farthest = max(exact.dot(n, p) for p in A) * Fraction(2) ** e_a
+    length = _GUARD.sqrt(_decimal(exact.dot(n, n)))
+    return _GUARD.divide(_decimal(nearest - farthest), length) - _decimal(Fraction(case.radius_a) + Fraction(case.radius_b))
+
+
 def _size(case: Case) -> float:
     """The diagonal of the smaller body that has one, radii included; 1 for two points."""
     diagonals = (case.a.diagonal() + 2 * case.radius_a, case.b.diagonal() + 2 * case.radius_b)

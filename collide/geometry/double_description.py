@@ -28,7 +28,7 @@ def halfspace_vertices(normals: np.ndarray, offsets: np.ndarray):
     Returns
     -------
     vertices : (v, 3) float64, each the rounding of an exact vertex; (0, 3) where the set is empty.
-    slop : upper bound of the distance between a vertex and its rounding [m].
+    slop : upper bound of the distance between a vertex and its rounding [m]; 0 where all are exact.
     unbounded : (3,) a direction in which the set is unbounded, or None.
     """
     rows = _distinct(
@@ -152,6 +152,9 @@ def _adjacent(common: int, every: list[int]) -> bool:
 
 def _rounded(rays: list[Row]) -> tuple[np.ndarray, float]:
     vertices = np.array([[float(Fraction(c, w)) for c in (x, y, z)] for x, y, z, w in rays])
+    exact = all(Fraction(v) * w == c for row, ray in zip(vertices.tolist(), rays) for v, c, w in zip(row, ray, ray[3:] * 3))
+    if exact:
+        return vertices, 0.0
     # Each coordinate is rounded to nearest: half an ulp, plus the smallest number there is.
     slop = float(np.sqrt(3) * np.spacing(np.abs(vertices).max()) / 2 * (1 + 1e-15))
     return vertices, slop

@@ -48,7 +48,8 @@ def pose_rows(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> np.ndarr
 
     X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
 
-    A part without a pose of its own keeps the numbers given, bit by bit. Elsewhere the product is
+    A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
+    the origin. Elsewhere the product is
     written out, so that a batch rounds as a single pose does.
     """
     rows = np.empty((len(X_WB), POSE))
@@ -56,7 +57,11 @@ def pose_rows(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> np.ndarr
     rows[:, :9] = R_WB.reshape(-1, 9)
     rows[:, 9:12] = p_WB
     rows[:, 12] = 0.0
-    own = np.flatnonzero((X_BP != np.eye(4)).any(axis=(1, 2)))
+    identity = np.eye(4)
+    own = (X_BP != identity).any(axis=(1, 2))
+    unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
+    rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
+    own = np.flatnonzero(own & ~unmoved)
     if len(own):
         R, p, X = R_WB[own], p_WB[own], X_BP[own]
         rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 
 from collide._jit import entry, view_f64, view_i32, view_i64, view_u8
-from collide.geometry.packing import POINTS
+from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH
 from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS
-from collide.narrowphase.exact import INTEGERS, SEPARATE, TOUCHING, touch_exactly
+from collide.narrowphase.exact import INTEGERS as HULL_DIGITS
+from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
+from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
+from collide.narrowphase.exact_plane import reach_plane_exactly
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
 from collide.narrowphase.rows import (
     COUNT,
@@ -28,6 +31,9 @@ from collide.narrowphase.rows import (
 )
 from collide.results import EXACT, UNDECIDED
 
+#: Digits of workspace; 16 integers for ids follow them.
+DIGITS = max(HULL_DIGITS, PLANE_DIGITS)
+
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64)")
 def decide_pairs(
@@ -35,12 +41,12 @@ def decide_pairs(
 ):
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
 
-    Arguments as there; digits : int64 workspace of `exact.INTEGERS` + 16. What stays open: curved
-    cores, half-spaces, and parts whose stored numbers are themselves rounded (slop).
+    Arguments as there; digits : int64 workspace of DIGITS + 16. What stays open: curved
+    cores, and parts whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
-    digits = view_i64(digits_at, INTEGERS)
-    ids = view_i64(digits_at + 8 * INTEGERS, 16)
+    digits = view_i64(digits_at, DIGITS)
+    ids = view_i64(digits_at + 8 * DIGITS, 16)
     settled = 0
     for k in range(n_pairs):
         row = view_f64(rows_at + ROW * k, 12)
@@ -58,7 +64,8 @@ def decide_pairs(
         poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
         sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
         size, slop = size_and_slop(numbers, poses, sa, pa, sb, pb)
-        if ints[INTS * sa + KIND] != POINTS or ints[INTS * sb + KIND] != POINTS or slop != 0.0:
+        plane = ints[INTS * sa + KIND] == HALFSPACE
+        if not (plane or ints[INTS * sa + KIND] == POINTS) or ints[INTS * sb + KIND] != POINTS or slop != 0.0:
             continue
         at_a, n_a = coordinates_of(ints, sa)
         at_b, n_b = coordinates_of(ints, sb)
@@ -67,11 +74,20 @@ def decide_pairs(
         for j in range(count):
             ids[2 * j] = words[(VERTICES_B if flip else VERTICES_A) + j]
             ids[2 * j + 1] = words[(VERTICES_A if flip else VERTICES_B) + j]
-        verdict, shown, _, excess, rounds = touch_exactly(
-            pair, digits, ids, count, ints[INTS * sa + LOWEST], ints[INTS * sb + LOWEST],
-            numbers[NUMBERS * sa + REACH], numbers[NUMBERS * sb + REACH],
-            numbers[NUMBERS * sa + RADIUS], numbers[NUMBERS * sb + RADIUS], size,
-        )  # fmt: skip
+        low_b = ints[INTS * sb + LOWEST]
+        reach_b = numbers[NUMBERS * sb + REACH]
+        radius_b = numbers[NUMBERS * sb + RADIUS]
+        if plane:
+            rounds = 1
+            shown = 1
+            verdict, vertex, excess = reach_plane_exactly(pair, digits, low_b, reach_b, radius_b, size)
+            ids[0] = -1
+            ids[1] = vertex
+        else:
+            verdict, shown, _, excess, rounds = touch_exactly(
+                pair, digits, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+                numbers[NUMBERS * sa + RADIUS], radius_b, size,
+            )  # fmt: skip
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]

@@ -9,8 +9,7 @@ import numpy as np
 from collide._jit import address_of
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
-from collide.narrowphase.decide import decide_pairs
-from collide.narrowphase.exact import INTEGERS as EXACT_INTEGERS
+from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 
@@ -56,7 +55,7 @@ class _Workspace(local):
     def __init__(self) -> None:
         self.doubles = np.zeros(DOUBLES)
         self.integers = np.zeros(INTEGERS, dtype=np.int64)
-        self.digits = np.zeros(EXACT_INTEGERS + 16, dtype=np.int64)
+        self.digits = np.zeros(DIGITS + 16, dtype=np.int64)
         self.addresses = address_of(self.doubles), address_of(self.integers)
 
 
