@@ -58,6 +58,8 @@ def certificate_of(A, B, X_WA, X_WB, row) -> tuple[Certificate, ...] | None:
     if row["how"] == UNDECIDED or row["beyond"]:
         return None
     parts_a, parts_b = _posed(A, X_WA), _posed(B, X_WB)
+    if all(any(part.packed.kind == HALFSPACE for part in parts) for parts in (parts_a, parts_b)):
+        return None
     if any(part.packed.kind not in (POINTS, HALFSPACE) for part in (*parts_a, *parts_b)):
         return None
     ids = [(int(i), int(j)) for i, j in zip(row["vertices_a"], row["vertices_b"])][: row["count"]]

@@ -6,7 +6,7 @@ One row is one pair of bodies. The fields, with A the first body and B the secon
 a, b            ids of the bodies (0 and 1 for a pair query), a < b
 part_a, part_b  which convex part of each decided (0 where a body is one convex set)
 hit             the closed sets share a point
-certified       the sign is proven and the bracket keeps the promise of `collide.accuracy`
+certified       the sign is proven and the bracket keeps the promise of `narrowphase/bounds.py`
 beyond          the pair is farther apart than the query's max_distance; `distance` and `lower` are
                 then a proven lower bound ≥ max_distance, and `upper` is infinite
 how             which argument decided: an index into `HOW`
@@ -36,10 +36,11 @@ HOW = (
     "common point",       # a simplex of points of A ⊖ B around the origin, clear of rounding
     "swept overlap",      # two core points nearer than the sum of the radii
     "closed form",        # a formula with an error bound: spheres, capsules, half-spaces
-    "boxes apart",        # bounding boxes, rounded outwards, that do not meet
     "exact arithmetic",   # GJK in integers, where doubles leave the sign open
 )
-UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, BOXES, EXACT = range(len(HOW))
+UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, EXACT = range(len(HOW))
+#: Set by a kernel on a pair outside the range of sizes; never in a result.
+REFUSED = 255
 
 PAIR_DTYPE = np.dtype(
     [

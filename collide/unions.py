@@ -107,13 +107,15 @@ def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> float:
         depth, error = reach_a + reach_b, error_a + error_b
         if depth + error < best:
             best = depth + error
-            row["normal"], row["point_a"] = n, hits["point_a"][k]
+            row["normal"], row["point_a"], row["point_b"] = n, hits["point_a"][k], hits["point_b"][k]
             row["part_a"], row["part_b"] = hits["part_a"][k], hits["part_b"][k]
             row["distance"], row["lower"] = min(-depth, row["upper"]), -depth - error
     if math.isinf(best):
         row["distance"] = row["lower"] = -math.inf
     else:
-        row["point_b"] = row["point_a"] + row["distance"] * row["normal"]
+        # The points of the deepest parts fit that normal's own depth: keep their middle.
+        middle, half = 0.5 * (row["point_a"] + row["point_b"]), 0.5 * row["distance"] * row["normal"]
+        row["point_a"], row["point_b"] = middle - half, middle + half
     curved = any(packed.kind != POINTS for body in (A, B) for packed in body.packed)
     return (PROMISE_CURVED if curved else PROMISE_POINTS) / ERROR * error
 

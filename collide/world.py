@@ -195,7 +195,7 @@ class World:
         """One outside shape S against every body: pairs at most ``max_distance`` apart.
 
         Field a is −1 for the outside shape, b the body; normals point from the shape to the body.
-        Filters do not apply.
+        Filters do not apply, and `stats` stays that of the last query of the whole World.
         """
         limit = check_distance("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):

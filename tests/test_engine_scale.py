@@ -12,7 +12,7 @@ from naive import Case, pose, random_pose, rng_of
 
 import collide
 from collide.narrowphase.bounds import EXACT_ERROR
-from collide.results import BOXES, HOW
+from collide.results import HOW
 
 #: What scales, and what stays as it is.
 LENGTHS = ("distance", "lower", "upper", "point_a", "point_b")

@@ -106,6 +106,37 @@ def test_upper_bound_is_what_the_parts_need():
                 assert collide.collide(*case.with_b_moved(shift)), "a shorter way out than the bound allows"
 
 
+def test_the_bound_of_the_way_out_counts_its_own_rounding():
+    """Along the reported normal, exactly: the extents of all corners, in Fractions, reach no farther than −lower."""
+    rng = rng_of("exact way out")
+    hits = []
+    for _ in range(60):
+        unions = [
+            collide.Compound([(collide.Box(rng.uniform(0.2, 1, 3)), random_pose(rng, 0.5)) for _ in range(3)])
+            for _ in range(2)
+        ]
+        case = Case(*unions, np.eye(4), np.eye(4))  # at the origin parts keep the poses given
+        r = collide.distance(*case)
+        hits.append(r.hit)
+        if not r.hit:
+            continue
+        with naive.reproducible(case):
+            n = [Fraction(x) for x in r.normal.tolist()]
+            along = [[sum(c * x for c, x in zip(n, p)) for p in exact_corners(union)] for union in unions]
+            reach = max(along[0]) - min(along[1])
+            # The normal is a unit vector to rounding only: compare squares.
+            assert reach > 0 and reach**2 <= Fraction(r.lower) ** 2 * sum(x * x for x in n)
+    assert naive.share(hits) > 0.5
+
+
+def exact_corners(union: collide.Compound) -> list[list[Fraction]]:
+    found = []
+    for box, X in union.items:
+        points, e = exact.world_points(naive.corners(box)[0], X[:3, :3], X[:3, 3])
+        found += [[x * Fraction(2) ** e for x in p] for p in points]
+    return found
+
+
 def test_brackets_that_hook_into_each_other():
     """Hulls overlap, the bodies need not: an arm of each stands in the pocket of the other."""
     turned = np.diag([-1.0, -1.0, 1.0])

@@ -95,6 +95,21 @@ def test_stats_add_up(seed):
         assert {why: k for why, k in stats["skipped"].items() if why != "broadphase"} == expected
 
 
+def test_a_body_in_the_gap_of_a_compound_is_asked_and_counted():
+    """The boxes of the bodies meet, no boxes of their parts do: a row all the same, and a pair that counts."""
+    world = collide.World()
+    ends = collide.Compound([(collide.Sphere(0.5), pose(t=(side * 5, 0, 0))) for side in (-1, 1)])
+    world.add(ends, name="ends")
+    world.add(collide.Sphere(0.5), name="middle")
+    for margin in (0.0, 1.0):
+        assert len(world.distances(max_distance=margin)) == 0 and not world.collides()
+        world.distances(max_distance=margin)
+        stats = world.stats
+        assert stats["narrowphase"] == 1 and sum(stats["skipped"].values()) == 0 and stats["convex_pairs"] >= 1
+    assert world.distances(max_distance=4.0)["distance"].tolist() == [4.0]
+    assert len(world.query(collide.Sphere(0.5), np.eye(4), max_distance=1.0)) == 1  # the middle, not the ends
+
+
 def skipped_pairs(world: collide.World) -> dict:
     """What the filters leave out, pair by pair, the first reason that applies."""
     counts: dict[str, int] = {}

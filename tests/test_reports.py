@@ -17,7 +17,7 @@ import pytest
 from collide.errors import InvalidArgument
 from collide.reports import report, tables, terminal, units
 from collide.reports.progress import Progress
-from collide.results import BOXES, FORMULA, HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
+from collide.results import FORMULA, HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
 from collide.shapes import Sphere
 
 
@@ -60,7 +60,7 @@ def make_scene(rows=ROWS, names=NAMES):
         "bodies": n, "static": 1, "pairs": pairs,
         "skipped": {"static–static": 0, "adjacent links": 2, "allowed": 1, "broadphase": pairs - 3 - len(rows)},
         "narrowphase": len(rows), "convex_pairs": 11, "hits": sum(bool(r["hit"]) for r in rows), "undecided": 2,
-        "how": {HOW[PLANE]: 4, HOW[SIMPLEX]: 3, HOW[BOXES]: 2, HOW[UNDECIDED]: 2},
+        "how": {HOW[PLANE]: 4, HOW[SIMPLEX]: 3, HOW[UNDECIDED]: 2},
         "gjk_iterations": 40, "epa_iterations": 9,
         "seconds": {"compile": 0.5, "pack": 1e-4, "broadphase": 2e-4, "narrowphase": 3e-4},
     }

@@ -13,13 +13,13 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
-from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS
+from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS, TOLERANCE_CURVED
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa import FLAT, epa, workspace
 from collide.narrowphase.epa import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
-from collide.narrowphase.halfspace_convex import gap_of_halfspaces, plane_in_world
+from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
@@ -39,7 +39,8 @@ from collide.narrowphase.rows import (
     write_vertices,
 )
 from collide.narrowphase.simplex import face_weights
-from collide.results import FORMULA, PLANE, SIMPLEX, SWEPT
+from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
+from collide.transforms import SMALLEST
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights.
 _WEIGHTS = 5 * POINT
@@ -131,7 +132,7 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     above = -clearance if status == ENCLOSED else core
     if boolean and above + error < radius:
         return -above, -math.inf, above, 0.0, 0.0, 1.0, n, n, rounds
-    tolerance = 0.125 * PROMISE_CURVED * size if curved else 0.25 * error
+    tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     outcome, depth, surface, nx, ny, nz, facet, added = epa(
         pair, doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, boolean, error, tolerance
     )
@@ -236,29 +237,22 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size
 
 
 @kernel
-def _halves(pair, row, marks, limit, flip):
-    """Two half-spaces: apart only with exactly opposite normals; overlap has no end, depth −inf."""
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, tx, ty, tz) = pair
-    opposite, gap, error, nx, ny, nz = gap_of_halfspaces(numbers, at_a, p, at_b, q, poses, tx, ty, tz)
-    if opposite and gap > error:
-        # Opposite within rounding: a tilt below rounding would let them meet, very far away.
-        write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
-        marks[CERTIFIED] = 0
-    else:
-        row[LOWER] = -math.inf
-        row[DISTANCE] = -math.inf
-        row[UPPER] = 0.0
-        marks[HIT] = 1
-        marks[HOW] = FORMULA
-        marks[CERTIFIED] = 0 if opposite and abs(gap) <= error else 1
-    foot = 0.5 * gap
-    ax = poses[p + 9] + 0.5 * tx
-    ay = poses[p + 10] + 0.5 * ty
-    az = poses[p + 11] + 0.5 * tz
+def _halves(pair, row, marks, flip):
+    """Two half-spaces: unless their normals are exactly opposite they meet, and the overlap has no end.
+
+    Opposite within rounding is left open, for `halfspaces.py` to settle.
+    """
+    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _) = pair
+    opposite, nx, ny, nz = opposite_halfspaces(numbers, at_a, p, at_b, q, poses)
+    row[LOWER] = -math.inf
+    row[DISTANCE] = -math.inf
+    row[UPPER] = 0.0
+    marks[HIT] = 1
+    marks[HOW] = UNDECIDED if opposite else FORMULA
+    marks[CERTIFIED] = 0 if opposite else 1
     write_vectors(
-        row, nx, ny, nz, ax - foot * nx, ay - foot * ny, az - foot * nz, ax + foot * nx, ay + foot * ny,
-        az + foot * nz, flip,
-    )  # fmt: skip
+        row, nx, ny, nz, poses[p + 9], poses[p + 10], poses[p + 11], poses[q + 9], poses[q + 10], poses[q + 11], flip
+    )
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)")
@@ -307,8 +301,11 @@ def _answer(
         words[VERTICES_A + k] = -1
         words[VERTICES_B + k] = -1
     how = method(pair[3], pair[1], pair[9], pair[7])
+    if 0.0 < size < SMALLEST:
+        marks[HOW] = REFUSED
+        return
     if how == HALFSPACES:
-        _halves(pair, row, marks, limit, flip)
+        _halves(pair, row, marks, flip)
     elif how == HALFSPACE_CONVEX:
         m0 = numbers[pair[4]]
         m1 = numbers[pair[4] + 1]

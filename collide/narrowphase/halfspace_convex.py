@@ -37,24 +37,13 @@ def plane_in_world(numbers, at, poses, p):
 
 
 @kernel
-def gap_of_halfspaces(numbers, at_a, p, at_b, q, poses, tx, ty, tz):
-    """(parallel, gap, error, n): whether the planes are opposite within rounding, and their gap.
-
-    Two half-spaces miss each other only if their normals are exactly opposite. Clear of rounding
-    they meet, wherever they stand; their common part has no end, so there is no depth.
-    """
-    ax, ay, az, offset_a, length_a = plane_in_world(numbers, at_a, poses, p)
-    bx, by, bz, offset_b, length_b = plane_in_world(numbers, at_b, poses, q)
+def opposite_halfspaces(numbers, at_a, p, at_b, q, poses):
+    """(whether the outward normals are opposite within rounding, nhat_A)."""
+    ax, ay, az, _, length_a = plane_in_world(numbers, at_a, poses, p)
+    bx, by, bz, _, length_b = plane_in_world(numbers, at_b, poses, q)
     cx = ay * bz - az * by
     cy = az * bx - ax * bz
     cz = ax * by - ay * bx
-    across = math.sqrt(cx * cx + cy * cy + cz * cz) / (length_a * length_b)
-    along = (ax * bx + ay * by + az * bz) / (length_a * length_b)
-    opposite = along < 0.0 and across <= 64.0 * 2.0**-53
-    ux = ax / length_a
-    uy = ay / length_a
-    uz = az / length_a
-    shift = tx * ux + ty * uy + tz * uz
-    gap = shift - offset_a / length_a - offset_b / length_b
-    size = abs(tx) + abs(ty) + abs(tz) + abs(offset_a) / length_a + abs(offset_b) / length_b
-    return opposite, gap, 64.0 * 2.0**-53 * size, ux, uy, uz
+    across = math.sqrt(cx * cx + cy * cy + cz * cz)
+    opposite = ax * bx + ay * by + az * bz < 0.0 and across <= 64.0 * 2.0**-53 * length_a * length_b
+    return opposite, ax / length_a, ay / length_a, az / length_a

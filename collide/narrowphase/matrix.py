@@ -11,7 +11,7 @@
 
     C  capsule_capsule.py    closed form (a sphere is a point, a capsule a segment, each swept)
     H  halfspace_convex.py   closed form, one support query
-    P  halfspace_convex.py   two planes
+    P  halfspaces.py         two planes
     G  gjk.py, and epa.py where the cores overlap
 
 Every set may be swept by a ball. Bodies of several sets are unions: `collide.unions` combines the

@@ -61,7 +61,8 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     ty = poses[q + 10] - poses[p + 10]
     tz = poses[q + 11] - poses[p + 11]
     size = numbers[at_a + REACH] * _longest_row(poses, p) + numbers[at_b + REACH] * _longest_row(poses, q)
-    size += math.sqrt(tx * tx + ty * ty + tz * tz) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
+    # The largest coordinate too: squares of tiny ones vanish, and such a pair must be refused, not 0.
+    size += max(math.sqrt(tx * tx + ty * ty + tz * tz), abs(tx), abs(ty), abs(tz)) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
     return size, numbers[at_a + SLOP] + numbers[at_b + SLOP] + poses[p + 12] + poses[q + 12]
 
 

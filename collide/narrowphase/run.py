@@ -7,10 +7,13 @@ from threading import local
 import numpy as np
 
 from collide._jit import address_of
+from collide.errors import UnsupportedQuery
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
 from collide.narrowphase.decide import DIGITS, decide_pairs
-from collide.results import PAIR_DTYPE, UNDECIDED
+from collide.narrowphase.halfspaces import settle
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.transforms import SMALLEST
 
 
 def run_pairs(
@@ -38,10 +41,15 @@ def run_pairs(
             *tables, address_of(todo), len(todo), boolean, stop_at_hit, limit, address_of(out), *_workspace.addresses
         )
         fresh = out[:answered]
+        if (fresh["how"] == REFUSED).any():
+            raise UnsupportedQuery(
+                f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
+            )
         if (fresh["how"] == UNDECIDED).any():
             decide_pairs(
                 *tables, address_of(todo), answered, boolean, limit, address_of(out), address_of(_workspace.digits)
             )
+            settle(out, np.flatnonzero(fresh["how"] == UNDECIDED), todo, table, poses, shape_of)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
         if stop_at_hit and fresh["hit"][-1]:

@@ -14,7 +14,6 @@ SENTENCES = {
     "swept overlap": "two core points are nearer than the sum of the radii, by more than rounding",
     "exact arithmetic": "worked out in integers from the numbers given, because rounding would have decided it",
     "closed form": "a formula for this pair of shapes, its rounding error bounded",
-    "boxes apart": "bounding boxes of convex parts, rounded outwards, lie farther apart than was asked",
     "broadphase": "bounding boxes of whole bodies, grown by the clearance and rounded outwards, do not meet",
 }
 

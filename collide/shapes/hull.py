@@ -7,6 +7,7 @@ import numpy as np
 from collide.errors import InvalidShape
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, positive, rows
+from collide.transforms import SMALLEST
 
 
 class ConvexHull(Shape):
@@ -29,6 +30,12 @@ class ConvexHull(Shape):
 
     def __init__(self, points, *, faces=None, radius: float = 0.0):
         points = rows("ConvexHull", "points", points, (None, 3))
+        largest = float(np.abs(points).max())
+        if 0.0 < largest < SMALLEST:
+            raise InvalidShape(
+                f"ConvexHull: points: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: "
+                "scale the scene"
+            )
         self._store(
             points=points,
             faces=None if faces is None else _check_faces(faces, len(points)),

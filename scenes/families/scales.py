@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.scenes.families.boxes import boxes_flush, boxes_rest
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
 from collide.scenes.families.gaps import set_gap
 from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, sign
@@ -43,8 +44,6 @@ def badrot(rng, index) -> Case:
 def tiny_motions(rng, index, steps: int = 1000) -> Case:
     """Flush boxes carried along by a chain of tiny motions: both poses are multiplied `steps` times by
     the same rotation of 10^U(-6,-2) rad and a small step, and drift from orthonormal as they go."""
-    from collide.scenes.families.boxes import boxes_flush, boxes_rest
-
     start = (boxes_flush if index % 2 else boxes_rest)(rng, index // 2)
     X1, X2 = (_matrix(b) for b in (start.a, start.b))
     motion = np.eye(4)

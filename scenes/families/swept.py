@@ -7,6 +7,7 @@ import numpy as np
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
 from collide.scenes.families.gaps import set_gap
 from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, sign
+from collide.scenes.families.thin import flat
 from collide.scenes.families.touching import UNIT, Contact, contact, placed
 
 #: Lattice normals of whole length: cores apart along them are a dyadic distance apart.
@@ -64,8 +65,6 @@ def swept_deep(rng, index) -> Case:
     """Cores that overlap, touch or are flat, swept by balls of 10^U(-6,0)·L: cores at ±10^U(-9,-1)·L,
     or polygons crossing."""
     if index % 4 == 3:
-        from collide.scenes.families.thin import flat
-
         case = flat(rng, 5 * int(rng.integers(10)) + 1 + index // 4 % 3)
     else:
         case = pair(random_body(rng), Body(random_hull(rng), random_body(rng).R, np.zeros(3)))
