@@ -160,24 +160,35 @@ def test_halfspace_against_everything(kind):
     assert 0.15 < naive.share(hits) < 0.9
 
 
-def test_halfspaces_meet_unless_opposite():
-    up, down = collide.Halfspace((0, 0, 1), 0.0), collide.Halfspace((0, 0, -1), 0.0)
-    tilted = collide.Halfspace((0, 1e-9, -1), 0.0)
-    assert not collide.collide(up, down, EYE, pose(t=(5, 5, 0.5)))
-    r = collide.distance(up, down, EYE, pose(t=(5, 5, 0.5)))
-    assert r.distance == 0.5 and not r.hit and np.array_equal(r.normal, (0, 0, 1))
-    assert collide.collide(up, down, EYE, pose(t=(0, 0, -0.5)))
-    assert collide.collide(up, up, EYE, pose(t=(0, 0, 0.5)))
-    assert collide.collide(up, tilted, EYE, pose(t=(0, 0, 1000.0)))
-    for other, t in ((down, (0, 0, -0.5)), (up, (0, 0, 2)), (tilted, (0, 0, 7))):
-        with pytest.raises(collide.UnsupportedQuery, match="Halfspace"):
-            collide.distance(up, other, EYE, pose(t=t))
+def test_halfspaces_that_are_not_opposite_meet_without_end():
+    up = collide.Halfspace((0, 0, 1), 0.0)
+    cases = [(up, 2.0), (up, -2.0)]
+    cases += [(collide.Halfspace((0, tilt, -1), 0.0), z) for tilt in (1e-9, 1e-17, 1e-30) for z in (-1.0, 0.0, 1000.0)]
+    for other, z in cases:
+        case = Case(up, other, EYE, pose(t=(0, 0, z)))
+        with naive.reproducible(case):
+            assert collide.collide(*case) and collide.collide(*case.swapped())
+            with pytest.raises(collide.UnsupportedQuery, match="Halfspace"):
+                collide.distance(*case)
+
+
+def test_opposite_halfspaces_are_apart_or_share_a_slab():
+    """A slab has a thickness: that is the way out."""
+    up, down = collide.Halfspace((0, 0, 1), 0.0), collide.Halfspace((0, 0, -3), 0.0)
+    for z in (0.5, 1e-300, 0.0, -1e-300, -0.5):
+        case = Case(up, down, EYE, pose(t=(5, 5, z)))
+        with naive.reproducible(case):
+            r = collide.distance(*case)
+            assert r.distance == z and r.lower <= z <= r.upper and r.hit == (z <= 0) == collide.collide(*case)
+            assert np.array_equal(r.normal, (0, 0, 1)) and r.certified
+            assert np.array_equal(r.point_b - r.point_a, r.distance * r.normal)
 
 
 def test_halfspaces_in_a_batch_name_the_pose_that_has_no_answer():
     up, down = collide.Halfspace((0, 0, 1), 0.0), collide.Halfspace((0, 0, -1), 0.0)
-    poses = np.array([pose(t=(0, 0, z)) for z in (1.0, 2.0, -1.0)])
-    assert collide.collide(up, down, EYE, poses).tolist() == [False, False, True]
+    turned = pose([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    poses = np.array([pose(t=(0, 0, 1.0)), pose(t=(0, 0, -1.0)), turned])
+    assert collide.collide(up, down, EYE, poses).tolist() == [False, True, True]
     with pytest.raises(collide.UnsupportedQuery, match="pose 2 of the batch"):
         collide.distance(up, down, EYE, poses)
 

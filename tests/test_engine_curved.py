@@ -22,8 +22,8 @@ CURVED = ("Cylinder", "Cone", "Ellipsoid")
 EYE = np.eye(4)
 #: Corners of polygons around an axis, and rings of a polytope in an ellipsoid.
 SIDES, RINGS = 360, 36
-#: How far a witness point of a curved shape about 1 m large may be off it: see the open faults.
-WITNESS = 64 * PROMISE_CURVED
+#: How far a witness point of a curved shape about 1 m large may be off it.
+WITNESS = 2 * PROMISE_CURVED
 
 
 def points_inside(shape: collide.Shape) -> tuple[np.ndarray, float]:

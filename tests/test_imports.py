@@ -32,7 +32,7 @@ ROOMS = {
     "geometry": {"_jit", "errors"},
     "shapes": {"errors", "transforms", "geometry"},
     "broadphase": {"_jit", "errors", "geometry"},
-    "narrowphase": {"_jit", "errors", "geometry", "results"},
+    "narrowphase": {"_jit", "errors", "transforms", "geometry", "results"},
     "certificates": {"errors", "transforms", "geometry", "results"},
     "unions": {"geometry", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},

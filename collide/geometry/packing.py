@@ -56,7 +56,7 @@ def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0) -> P
     columns[:, n:] = points[0][:, None]
     # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
     reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), points, _frozen(columns))
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns))
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:

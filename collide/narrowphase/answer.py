@@ -75,7 +75,7 @@ def _segments(pair, points, ids, weights, error):
     _segment_differences(pair, points, ids)
     core, bound = nearest_of_segments(points, weights)
     if core > error:
-        return -core, bound, core, -weights[4] / core, -weights[5] / core, -weights[6] / core
+        return -core, bound, core, -weights[7], -weights[8], -weights[9]
     nx, ny, nz = across_segments(points)
     depth = -math.inf
     for k in range(4):
@@ -84,8 +84,8 @@ def _segments(pair, points, ids, weights, error):
 
 
 @kernel
-def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids):
-    """The corners of EPA's facet become points 0..2, weighted for the origin's foot on its plane."""
+def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids, x, y, z):
+    """The corners of EPA's facet become points 0..2, weighted for the point (x, y, z) of it."""
     source, _, source_ids, facets, _, _, _ = workspace(doubles_at, integers_at)
     for k in range(3):
         v = facets[7 * facet + k]
@@ -94,7 +94,7 @@ def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids):
         if with_ids:
             ids[2 * k] = source_ids[2 * v]
             ids[2 * k + 1] = source_ids[2 * v + 1]
-    w0, w1, w2 = face_weights(points, 0, POINT, 2 * POINT)
+    w0, w1, w2 = face_weights(points, 0, POINT, 2 * POINT, x, y, z)
     w0 = max(w0, 0.0)
     w1 = max(w1, 0.0)
     w2 = max(w2, 0.0)
@@ -123,12 +123,12 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     rounds : of GJK, plus 65536 times those of EPA.
     """
     points = view_f64(doubles_at, 5 * POINT)
-    weights = view_f64(doubles_at + 8 * _WEIGHTS, 7)
+    weights = view_f64(doubles_at + 8 * _WEIGHTS, 10)
     ids = view_i64(integers_at, 10)
     status, n, bound, clearance, rounds = gjk(pair, points, ids, weights, boolean, radius, limit, error, GJK_ROUNDS)
     core = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
     if status == NEAREST or status == APART:
-        return -core, bound, core, -weights[4] / core, -weights[5] / core, -weights[6] / core, n, n, rounds
+        return -core, bound, core, -weights[7], -weights[8], -weights[9], n, n, rounds
     above = -clearance if status == ENCLOSED else core
     if boolean and above + error < radius:
         return -above, -math.inf, above, 0.0, 0.0, 1.0, n, n, rounds
@@ -139,7 +139,7 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     if outcome != FLAT:
         _load_facet(
             doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, facet, points, ids, weights,
-            status != ENCLOSED,
+            status != ENCLOSED, depth * nx, depth * ny, depth * nz,
         )  # fmt: skip
     if surface > error:
         above = min(above, -surface)
@@ -155,7 +155,7 @@ def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, b
     radius_b = numbers[NUMBERS * shape_b + RADIUS]
     radius = radius_a + radius_b
     points = view_f64(doubles_at, 5 * POINT)
-    weights = view_f64(doubles_at + 8 * _WEIGHTS, 7)
+    weights = view_f64(doubles_at + 8 * _WEIGHTS, 10)
     ids = view_i64(integers_at, 10)
     curved = kind_a != POINTS or kind_b != POINTS
     closed_form = method(kind_a, n_a, kind_b, n_b) == CAPSULES

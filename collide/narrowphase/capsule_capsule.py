@@ -47,7 +47,8 @@ def nearest_of_segments(points, weights):
     """Distance of two segments, from the four differences of their ends.
 
     points : difference points A0 − B0, A1 − B0, A0 − B1, A1 − B1 (equal ones for a point).
-    weights : 7 doubles out: weights of the four, and the nearest point of their parallelogram.
+    weights : 10 doubles out: weights of the four, the nearest point of their parallelogram, and the
+        unit axis that separates best.
 
     Returns (distance, lower bound of it from the plane through the nearest point).
 
@@ -83,14 +84,14 @@ def nearest_of_segments(points, weights):
         t = (nx * (y * uz - z * uy) + ny * (z * ux - x * uz) + nz * (x * uy - y * ux)) / square
         if 0.0 < s < 1.0 and 0.0 < t < 1.0:
             best = _square(points, s, t, weights, best)
-    lower = _bound(points, weights[4], weights[5], weights[6])
+    lower = _bound(points, weights, -math.inf, weights[4], weights[5], weights[6])
     # The same direction to full precision, where the gap is tiny beside the segments: from the
     # segments themselves (see `simplex.across_simplex`).
     if nx * weights[4] + ny * weights[5] + nz * weights[6] < 0.0:
         nx = -nx
         ny = -ny
         nz = -nz
-    lower = max(lower, _bound(points, nx, ny, nz))
+    lower = _bound(points, weights, lower, nx, ny, nz)
     for turn in range(2):
         ex = ux if turn == 0 else vx
         ey = uy if turn == 0 else vy
@@ -105,20 +106,25 @@ def nearest_of_segments(points, weights):
                 dx -= along * ex
                 dy -= along * ey
                 dz -= along * ez
-            lower = max(lower, _bound(points, dx, dy, dz))
+            lower = _bound(points, weights, lower, dx, dy, dz)
     return math.sqrt(best), lower
 
 
 @kernel
-def _bound(points, dx, dy, dz):
-    """Least value of the four differences along d, over |d|: a lower bound of their distance."""
+def _bound(points, weights, lower, dx, dy, dz):
+    """The lower bound, raised by the least value of the four differences along d, and its axis with it."""
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length == 0.0:
-        return -math.inf
+        return lower
     least = math.inf
     for k in range(4):
         at = POINT * k
         least = min(least, dx * points[at] + dy * points[at + 1] + dz * points[at + 2])
+    if not least / length > lower:
+        return lower
+    weights[7] = dx / length
+    weights[8] = dy / length
+    weights[9] = dz / length
     return least / length
 
 

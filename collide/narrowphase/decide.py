@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, view_f64, view_i32, view_i64, view_u8
+from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH
 from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS
@@ -22,6 +22,9 @@ from collide.narrowphase.rows import (
     EXACT_ROUNDS,
     HOW,
     LOWER,
+    NORMAL,
+    POINT_A,
+    POINT_B,
     ROW,
     UPPER,
     VERTICES_A,
@@ -33,6 +36,22 @@ from collide.results import EXACT, UNDECIDED
 
 #: Digits of workspace; 16 integers for ids follow them.
 DIGITS = max(HULL_DIGITS, PLANE_DIGITS)
+
+
+@kernel
+def _set_normal(row, vx, vy, vz, distance, flip):
+    """The normal from the exact direction, and the witness points along it about their middle.
+
+    Those found in doubles carry the direction of a difference of nearly equal points, which says
+    nothing where the gap is below rounding.
+    """
+    sign = 1.0 if flip else -1.0
+    for axis in range(3):
+        v = sign * (vx if axis == 0 else (vy if axis == 1 else vz))
+        middle = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis])
+        row[NORMAL + axis] = v + 0.0
+        row[POINT_A + axis] = middle - 0.5 * distance * v
+        row[POINT_B + axis] = middle + 0.5 * distance * v
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64)")
@@ -80,11 +99,13 @@ def decide_pairs(
         if plane:
             rounds = 1
             shown = 1
+            apart = False
+            vx = vy = vz = 0.0
             verdict, vertex, excess = reach_plane_exactly(pair, digits, low_b, reach_b, radius_b, size)
             ids[0] = -1
             ids[1] = vertex
         else:
-            verdict, shown, _, excess, rounds = touch_exactly(
+            verdict, shown, apart, excess, vx, vy, vz, rounds = touch_exactly(
                 pair, digits, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                 numbers[NUMBERS * sa + RADIUS], radius_b, size,
             )  # fmt: skip
@@ -95,11 +116,18 @@ def decide_pairs(
             distance = excess
             lower = max(lower, (1.0 - EXACT_ERROR) * excess)
             upper = min(upper, (1.0 + EXACT_ERROR) * excess)
+        elif verdict == TOUCHING and apart and not plane:
+            # Swept bodies: the cores are apart by less than the radii, and the depth is as exact.
+            distance = excess
+            lower = max(lower, (1.0 + EXACT_ERROR) * excess)
+            upper = min(upper, (1.0 - EXACT_ERROR) * excess)
         elif verdict == TOUCHING:
             distance = min(distance, 0.0)
             upper = 0.0
         else:
             continue
+        if not plane and apart:
+            _set_normal(row, vx, vy, vz, distance, flip)
         width = math.inf if boolean else PROMISE_POINTS * size
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
         write_vertices(words, marks, ids, shown, flip)

@@ -395,31 +395,29 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
     nx = planes[4 * facet]
     ny = planes[4 * facet + 1]
     nz = planes[4 * facet + 2]
-    facet = _facet_under_origin(points, facets, count, facet, nx, ny, nz, depth - tolerance - error)
+    facet = _facet_of(
+        points, planes, facets, count, facet, depth * nx, depth * ny, depth * nz, tolerance + 2.0 * error
+    )
     return EXPANDED, depth, clearance, nx, ny, nz, facet, rounds
 
 
 @kernel
-def _facet_under_origin(points, facets, count, best, nx, ny, nz, level):
-    """The facet on the final plane that holds the origin's foot, for the witness points.
+def _facet_of(points, planes, facets, count, best, x, y, z, slack):
+    """The facet that holds (x, y, z), the origin's foot on the final plane: for the witness points.
 
-    A face of A ⊖ B with more than three corners is covered by several coplanar facets, and the one
-    that settled the depth need not be the one under the origin.
+    It need not be the one that settled the depth. A face of A ⊖ B with more than three corners is
+    covered by several facets; and where the bodies just touch, the foot may be a corner or lie on an
+    edge of facets in other planes.
     """
     most = -math.inf
     for g in range(count):
         if facets[7 * g + 6] == 0:
             continue
-        a = POINT * facets[7 * g]
-        b = POINT * facets[7 * g + 1]
-        c = POINT * facets[7 * g + 2]
-        lowest = min(
-            nx * points[a] + ny * points[a + 1] + nz * points[a + 2],
-            nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
-            nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
-        )
-        if lowest >= level:
-            w0, w1, w2 = face_weights(points, a, b, c)
+        height = planes[4 * g] * x + planes[4 * g + 1] * y + planes[4 * g + 2] * z - planes[4 * g + 3]
+        if abs(height) <= slack:
+            w0, w1, w2 = face_weights(
+                points, POINT * facets[7 * g], POINT * facets[7 * g + 1], POINT * facets[7 * g + 2], x, y, z
+            )
             inside = min(w0, w1, w2)
             if inside > most:
                 most = inside

@@ -419,8 +419,9 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
     verdict : TOUCHING, SEPARATE or UNDONE.
     points of the deciding simplex: its nearest point to the origin is the separating direction, or
     lies within the sum of the radii.
-    distance : of the cores, to a relative 1e-14.
-    excess : distance minus the radii, without cancellation, to the same.
+    cores apart : whether the cores themselves are apart; the next two are set only then.
+    excess : distance of the cores minus the radii, without cancellation, to a relative 1e-14.
+    vx, vy, vz : unit vector from B to A, exact but for its own rounding.
     rounds used.
     """
     poses = pair[13]
@@ -429,25 +430,20 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
     scale = _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
     d = scale[0]
     if d > _LONGEST:
-        return UNDONE, n, 0.0, 0.0, 0
+        return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, 0
     _load(digits, d, poses, p, q, scale[1], scale[2], scale[6])
     for k in range(n):
         _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
         _set_gram(digits, d, k)
     mask = _nearest_subset(digits, d, n, -1)
-    swept = radius_a > 0.0 or radius_b > 0.0
     for used in range(1, EXACT_ROUNDS + 1):
         n = _compact(digits, d, ids, mask, n)
         mask = (1 << n) - 1
         if n == 4:
-            return TOUCHING, n, 0.0, -(radius_a + radius_b), used
+            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
         length, zero = _set_direction(digits, d, mask)
         if zero:
-            return TOUCHING, n, 0.0, -(radius_a + radius_b), used
-        if swept:
-            touching, distance, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
-            if touching:
-                return TOUCHING, n, distance, excess, used
+            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
         vx, vy, vz = _direction_double(digits, d, length)
         along = math.sqrt(vx * vx + vy * vy + vz * vz)
         i = _extreme_vertex(
@@ -467,18 +463,18 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
             _set_point(digits, scale, pair, n, i, j)
             _set_gram(digits, d, n)
         if known or _set_delta(digits, d, mask, n) <= 0:
-            _, distance, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
-            return SEPARATE, n, distance, excess, used
+            touching, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
+            return TOUCHING if touching else SEPARATE, n, True, excess, vx / along, vy / along, vz / along, used
         if n == 3:
             outside = _faces_that_part(digits, d)
             if outside == 0:
-                return TOUCHING, 4, 0.0, -(radius_a + radius_b), used
+                return TOUCHING, 4, False, 0.0, 0.0, 0.0, 0.0, used
             if outside & (outside - 1) == 0:
                 # Beyond one face alone: the nearest point is on it, and the vertex across goes.
                 n = _compact(digits, d, ids, 15 & ~outside, 4) - 1
         mask = _nearest_subset(digits, d, n + 1, n)
         n += 1
-    return UNDONE, n, 0.0, 0.0, EXACT_ROUNDS
+    return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, EXACT_ROUNDS
 
 
 @kernel
@@ -553,7 +549,7 @@ def _compact(digits, d, ids, mask, n):
 
 @kernel
 def _within_radius(digits, d, mask, grid, radius_a, radius_b):
-    """(|v| ≤ r, |v|, |v| − r) for the nearest point v of the subset and the sum r of the radii.
+    """(|v| ≤ r, |v| − r) for the nearest point v of the subset and the sum r of the radii.
 
     |v|² = Σ Δ_i (y_i·y_k) / ΣΔ for any k of the subset, so the test is Σ Δ_i (y_i·y_k) ≤ r² ΣΔ.
     """
@@ -574,7 +570,7 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
     scale = 2 * BITS * grid - over_exponent
     distance = math.sqrt(_ldexp(value / over, exponent + scale))
     if radius_a == 0.0 and radius_b == 0.0:
-        return sign == 0, distance, distance
+        return sign == 0, distance
     radius = _scratch_at(d, 2)
     clear(digits, radius, d)
     add_double(digits, radius, radius_a, grid)
@@ -588,4 +584,4 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
     sign = carry(digits, square, n + 2 * d)
     value, exponent = as_double(digits, square, n + 2 * d)
     excess = _ldexp(value / over, exponent + scale) / (distance + (radius_a + radius_b))
-    return sign <= 0, distance, excess
+    return sign <= 0, excess

@@ -24,7 +24,8 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     """Run GJK on the cores of a pair.
 
     points, ids : workspace for five difference points; the simplex found stands first.
-    weights : 7 doubles out: weights of the simplex and its nearest point v.
+    weights : 10 doubles out: weights of the simplex, its nearest point v, and the unit axis (along v,
+        from the simplex's own edges where v is too short to have a direction).
     touch_suffices : stop as soon as an overlap is proven (a boolean is asked).
     radius : sum of the swept radii.   limit : stop once proven farther apart than this.
     error : absolute error of a bound, from `bounds.py`.
@@ -37,16 +38,24 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     status, n, lower, clearance, used = _approach(
         pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     )
-    if status == NEAREST or status == MEETING:
+    if status != ENCLOSED:
         length = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
-        if length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
+        for axis in range(3):
+            weights[7 + axis] = weights[4 + axis] / length if length > 0.0 else 0.0
+        if status != APART and length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
             dx, dy, dz = across_simplex(points, n, weights[4], weights[5], weights[6])
             along = math.sqrt(dx * dx + dy * dy + dz * dz)
             if along > 0.0:
                 difference_point(pair, points, ids, 4, -dx, -dy, -dz)
-                lower = max(lower, (dx * points[36] + dy * points[37] + dz * points[38]) / along)
+                refined = (dx * points[36] + dy * points[37] + dz * points[38]) / along
+                if refined > lower:
+                    lower = refined
+                    weights[7] = dx / along
+                    weights[8] = dy / along
+                    weights[9] = dz / along
         # Where no plane separates, the run is open whatever made it stop.
-        status = NEAREST if lower > error or (touch_suffices and length + error <= radius) else MEETING
+        if status != APART:
+            status = NEAREST if lower > error or (touch_suffices and length + error <= radius) else MEETING
     return status, n, lower, clearance, used
 
 

@@ -86,7 +86,7 @@ def nearest_in_simplex(points, n, weights):
         i = 0 if (n == 3 or left_out != 0) else 1
         j = 1 if (n == 3 or left_out > 1) else 2
         k = 2 if (n == 3 or left_out == 3) else 3
-        wi, wj, wk = face_weights(points, POINT * i, POINT * j, POINT * k)
+        wi, wj, wk = face_weights(points, POINT * i, POINT * j, POINT * k, 0.0, 0.0, 0.0)
         if wi > 0.0 and wj > 0.0 and wk > 0.0:
             best = _try(
                 points, n, weights, best,
@@ -131,21 +131,21 @@ def across_simplex(points, n, vx, vy, vz):
 
 
 @kernel
-def face_weights(points, a, b, c):
-    """Barycentric coordinates of the origin's projection on the plane of three points.
+def face_weights(points, a, b, c, x, y, z):
+    """Barycentric coordinates of the projection of (x, y, z) on the plane of three points.
 
     All zero where the three are collinear. Measured from a, so that the error is that of the
     points over the height of the triangle.
     """
-    ax = points[a]
-    ay = points[a + 1]
-    az = points[a + 2]
-    ex = points[b] - ax
-    ey = points[b + 1] - ay
-    ez = points[b + 2] - az
-    fx = points[c] - ax
-    fy = points[c + 1] - ay
-    fz = points[c + 2] - az
+    ex = points[b] - points[a]
+    ey = points[b + 1] - points[a + 1]
+    ez = points[b + 2] - points[a + 2]
+    fx = points[c] - points[a]
+    fy = points[c + 1] - points[a + 1]
+    fz = points[c + 2] - points[a + 2]
+    ax = points[a] - x
+    ay = points[a + 1] - y
+    az = points[a + 2] - z
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx

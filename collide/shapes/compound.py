@@ -42,6 +42,9 @@ class Compound(Shape):
         """True for a compound of one convex shape."""
         return len(self.parts()) == 1
 
+    def __repr__(self) -> str:
+        return f"Compound(<{len(self.items)} items>)"
+
     def _key(self) -> tuple:
         return tuple((shape, (X + 0.0).tobytes()) for shape, X in self.items)
 
