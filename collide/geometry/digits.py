@@ -105,14 +105,26 @@ def carry(digits, at, n):
 
 @kernel
 def as_double(digits, at, n):
-    """(x, e): the carried number is x·2^e to a relative 2⁻⁵¹, with |x| < 2¹⁰⁷.
+    """(x, e): the carried number is x·2^e, x rounded to nearest, so a power of two changes e alone.
 
-    Horner from the top. The leading −1 of a negative number and the full digits behind it cancel
-    exactly, so nothing is lost before the first digit that counts.
+    From the top into 61 bits. The leading −1 of a negative number and the full digits behind it cancel
+    exactly; what is left over below only says that it is there.
     """
-    value = 0.0
-    for k in range(n - 1, -1, -1):
-        value = value * 67108864.0 + float(digits[at + k])
-        if abs(value) >= 1208925819614629174706176.0:  # 2⁸⁰
-            return value, BITS * k
-    return value, 0
+    value = 0
+    k = n - 1
+    while k >= 0 and abs(value) < 1 << 35:
+        value = (value << BITS) + digits[at + k]
+        k -= 1
+    exponent = BITS * (k + 1)
+    if k < 0:
+        return float(value), exponent
+    shift = 0
+    while abs(value) << shift < 1 << 60:
+        shift += 1
+    value = (value << shift) + (digits[at + k] >> (BITS - shift))
+    rest = digits[at + k] & ((1 << (BITS - shift)) - 1)
+    for j in range(k):
+        rest |= digits[at + j]
+    if rest != 0:
+        value |= 1
+    return float(value), exponent - shift
