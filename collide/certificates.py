@@ -124,7 +124,7 @@ class _Posed:
             for point in self.packed.points.tolist()
         ]
 
-    def plane(self) -> tuple[list[Fraction], Fraction]:
+    def plane(self):
         """(n, offset) with the half-space {x : n·x ≤ offset} in the world; n = cof(R) m."""
         R = self.rotation
         m, offset = [Fraction(v) for v in self.packed.params[:3]], Fraction(float(self.packed.params[3]))
@@ -141,7 +141,7 @@ class _Posed:
         return n, offset * determinant + sum(a * b for a, b in zip(n, self.shift))
 
 
-def _matrix(X_WB: np.ndarray, X_BP: np.ndarray) -> list[list[Fraction]]:
+def _matrix(X_WB: np.ndarray, X_BP: np.ndarray) -> list[list]:
     """The first three rows of X_WB X_BP, multiplied exactly."""
     W = [[Fraction(v) for v in row] for row in X_WB[:3].tolist()]
     P = [[Fraction(v) for v in row] for row in X_BP.tolist()]
@@ -152,10 +152,11 @@ def _posed(shape, X_WB: np.ndarray) -> list[_Posed]:
     return [_Posed(packed, X_WB, X_BP) for packed, X_BP in shape.parts()]
 
 
-def _to_integers(*groups: list[tuple[Fraction, ...]]) -> list[list[Vector]]:
-    """Points of several bodies as integers of one common scale."""
-    scale = max(c.denominator for group in groups for point in group for c in point)  # powers of two
-    return [[tuple(int(c * scale) for c in point) for point in group] for group in groups], scale  # type: ignore
+def _to_integers(P, Q) -> tuple[list[Vector], list[Vector], int]:
+    """Points of both bodies as integers, and the scale: what they were multiplied by."""
+    scale = max(c.denominator for group in (P, Q) for point in group for c in point)  # powers of two
+    scaled = [[(int(x * scale), int(y * scale), int(z * scale)) for x, y, z in group] for group in (P, Q)]
+    return scaled[0], scaled[1], scale
 
 
 def _dot(a, b) -> int:
@@ -179,7 +180,7 @@ def _refused(a: _Posed, b: _Posed, pairs, *, hit: bool) -> str | None:
     for i, j in pairs:
         if not (0 <= i < counts[0] and 0 <= j < counts[1]):
             return f"there is no vertex pair {i}, {j}"
-    (P, Q), scale = _to_integers(a.points(), b.points())  # type: ignore[misc]
+    P, Q, scale = _to_integers(a.points(), b.points())
     radius = (Fraction(a.packed.radius) + Fraction(b.packed.radius)) * scale
     v, over = _nearest([_minus(P[i], Q[j]) for i, j in pairs])
     square = _dot(v, v)
@@ -268,7 +269,7 @@ def _make(a: _Posed, b: _Posed, i: int, j: int, ids: list[tuple[int, int]], *, h
 
 def _search(a: _Posed, b: _Posed, ids: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Vertex pairs of the simplex of A ⊖ B nearest the origin: GJK in integers."""
-    (P, Q), _ = _to_integers(a.points(), b.points())  # type: ignore[misc]
+    P, Q, _ = _to_integers(a.points(), b.points())
     ids = list(dict.fromkeys(ids))[:4]
     while True:
         v, over = _nearest([_minus(P[i], Q[j]) for i, j in ids])

@@ -203,6 +203,30 @@ def _compare(args) -> int:
     return YES if comparison.ours_wrong else FREE
 
 
+def _stress(args) -> int:
+    from collide.adapters.peers.stress import run
+    from collide.reports import terminal
+    from collide.reports.tables import Column, Table
+
+    progress = _progress(args.quiet)
+    _watch_compiler(progress)
+    with progress("asking the hard families"):
+        table = run(args.family or None, n=args.cases, seed=args.seed, engine=args.engine)
+    if args.json:
+        _write_json(table.to_dict(), args.json)
+    if args.save:
+        table.save(args.save)
+    if args.json != "-" and not args.quiet:
+        headers, rows = table.table()
+        kinds = ["label", *["number"] * (len(headers) - 2), "text"]
+        columns = [Column(title, kind, optional=int(k > 5)) for k, (title, kind) in enumerate(zip(headers, kinds))]
+        title = f"STRESS  {args.engine}, {args.cases} cases a family, seed {args.seed}; judged in exact arithmetic"
+        terminal.show_table(Table(title, columns, rows))
+    if not args.quiet:
+        _say(f"{count(table.wrong, 'wrong answer')}, {table.failed} failed, {table.undecided} left open by {args.engine}")
+    return YES if args.engine == "collide" and (table.wrong or table.failed) else FREE
+
+
 def _scenes(args) -> int:
     if args.copy:
         print(_copy_scene(args.copy, args.force))
@@ -367,6 +391,19 @@ Engines come with: pip install 'collide-robotics[peers]'
 
 exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
 
+_STRESS = """examples:
+  collide stress                                 every family, 40 cases each
+  collide stress --family needles --family flat --cases 300 --seed 7
+  collide stress --engine coal --json coal.json  the same cases asked of a peer
+  collide stress --save wrong.json               every refuted answer, as Python
+
+The families are the cases collision libraries get wrong: exact contact, flush
+and tilted boxes, gaps of one unit in the last place, needles, plates, tiny
+against huge. Each answer is judged by exact rational arithmetic that shares no
+code with the engine.
+
+exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
+
 _SCENES = """examples:
   collide scenes
   collide scenes --copy workcell             to ./workcell.json, for editing
@@ -389,6 +426,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_report(commands)
     _add_check(commands)
     _add_compare(commands)
+    _add_stress(commands)
     _add_scenes(commands)
     _add(commands, "doctor", _doctor, "is this installation sound?", _DOCTOR)
     return parser
@@ -398,6 +436,26 @@ def _add(commands, name: str, run: Callable, summary: str, epilog: str) -> argpa
     parser = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:], epilog=epilog)
     parser.set_defaults(run=run)
     return parser
+
+
+def _add_stress(commands) -> None:
+    parser = _add(commands, "stress", _stress, "the hard families, judged exactly", _STRESS)
+    parser.add_argument("--family", action="append", metavar="NAME", help="only this one; may be given again")
+    parser.add_argument("--cases", type=_positive_count, default=40, metavar="N", help="cases a family (40)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
+    parser.add_argument("--engine", default="collide", metavar="E", help="collide, fcl, coal or pybullet (collide)")
+    parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
+    _output_arguments(parser)
+
+
+def _positive_count(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of cases (1 or more)")
+    return number
 
 
 def _add_report(commands) -> None:

@@ -19,7 +19,7 @@ from collide._jit import kernel
 #: Bits of a digit.
 BITS = 26
 _MASK = (1 << BITS) - 1
-#: Factors may have this many digits: sums of 8 products then stay below 2⁶³.
+#: The shorter factor of a product may have this many digits: sums of 8 such products stay below 2⁶³.
 LONGEST_FACTOR = 128
 
 

@@ -20,6 +20,7 @@ from collide.narrowphase.rows import (
     COUNT,
     DISTANCE,
     EXACT_ROUNDS,
+    HIT,
     HOW,
     LOWER,
     NORMAL,
@@ -130,6 +131,9 @@ def decide_pairs(
             _set_normal(row, vx, vy, vz, distance, flip)
         width = math.inf if boolean else PROMISE_POINTS * size
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
+        if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
+            marks[HIT] = 0
+            marks[HOW] = EXACT
         write_vertices(words, marks, ids, shown, flip)
         marks[EXACT_ROUNDS] = min(rounds, 255)
         settled += 1

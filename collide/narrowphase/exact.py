@@ -32,9 +32,11 @@ from collide.narrowphase.bounds import ERROR, EXACT_ROUNDS
 #: What the stage says. UNDONE: the magnitudes span more bits than the workspace holds.
 TOUCHING, SEPARATE, UNDONE = range(3)
 
-#: Most digits of one coordinate: 2^(26·20) between the largest and the smallest bit of a pair.
-_LONGEST = 20
-assert 6 * _LONGEST <= LONGEST_FACTOR
+#: Most digits of one coordinate: 2^1664 between the largest and the smallest bit of a pair, which is
+#: every double there is as long as the bodies are smaller than 2^500 m. The shorter factor of any
+#: product has at most two coordinates' digits.
+_LONGEST = 64
+assert 2 * _LONGEST <= LONGEST_FACTOR
 
 # --- the workspace, in units of the coordinate length D (digits) --------------------------------
 # rotations 18·D and shift 3·D; then points 5·3·D, Gram 25·2D, Δ 16·4·6D, direction 3·6D, scratch.
@@ -349,7 +351,8 @@ def _direction_double(digits, d, n):
 
 @kernel
 def _ldexp(x, e):
-    return math.ldexp(x, int(max(e, -1060))) if e > -1200 else 0.0
+    """x·2^e, with exponents far out of range brought to where they still give 0 or infinity."""
+    return math.ldexp(x, int(min(max(e, -5000), 5000)))
 
 
 # --- supports -----------------------------------------------------------------------------------
@@ -568,7 +571,9 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
     over, over_exponent = as_double(digits, total, n)
     value, exponent = as_double(digits, square, n + 2 * d)
     scale = 2 * BITS * grid - over_exponent
-    distance = math.sqrt(_ldexp(value / over, exponent + scale))
+    # The root before the power of two: the square of a tiny distance would vanish.
+    half = (exponent + scale) // 2
+    distance = _ldexp(math.sqrt(_ldexp(value / over, exponent + scale - 2 * half)), half)
     if radius_a == 0.0 and radius_b == 0.0:
         return sign == 0, distance
     radius = _scratch_at(d, 2)

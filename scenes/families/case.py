@@ -117,7 +117,7 @@ class Case(NamedTuple):
         return f"collide.ConvexHull({points.tolist()}, radius={float(radius)!r})"
 
 
-def pair(a: Body, b: Body, radius_a: float = 0.0, radius_b: float = 0.0) -> Case:
+def pair(a: Body, b: Body, *, radius_a: float = 0.0, radius_b: float = 0.0) -> Case:
     """A case that still has no family and index."""
     R1, t1, R2, t2 = (np.array(x, dtype=float) for x in (a.R, a.t, b.R, b.t))
     P, Q = np.array(a.points, dtype=float), np.array(b.points, dtype=float)

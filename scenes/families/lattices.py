@@ -60,7 +60,7 @@ def halfspace_near(rng, index) -> Case:
     gap = float(rng.choice((-1.0, 1.0))) * 10.0 ** -(2 + index % 15)
     lowest = float((B.world() @ n).min())
     t2 = B.t + (float(n @ t1) + offset + radius + gap - lowest) * n
-    case = pair(Body(normal[None], R1, t1), B._replace(t=t2), 0.0, radius)
+    case = pair(Body(normal[None], R1, t1), B._replace(t=t2), radius_b=radius)
     return case._replace(kind=HALFSPACE, offset=offset)
 
 

@@ -35,8 +35,10 @@ def swept_touch(rng, index) -> Case:
 def swept_1ulp(rng, index) -> Case:
     """The same, then the larger radius one ulp larger or smaller, in turn: hit or miss."""
     case = swept_touch(rng, index // 2)
-    name = "radius_a" if case.radius_a >= case.radius_b else "radius_b"
-    return case._replace(**{name: float(np.nextafter(getattr(case, name), 0.0 if index % 2 else np.inf))})
+    towards = 0.0 if index % 2 else np.inf
+    if case.radius_a >= case.radius_b:
+        return case._replace(radius_a=float(np.nextafter(case.radius_a, towards)))
+    return case._replace(radius_b=float(np.nextafter(case.radius_b, towards)))
 
 
 def padded_touch(rng, index) -> Case:
