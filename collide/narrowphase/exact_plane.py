@@ -110,21 +110,18 @@ def reach_plane_exactly(pair, digits, lowest_b, reach_b, radius, size):
     add_product(digits, constant + low_second - low, _slot(15), 3 * n_rot + 2, _slot(18), n_b, -1)
     carry(digits, constant, n_sum)
     nx, ny, nz, offset, length = plane_in_world(numbers, at_a, poses, p)
-    threshold = radius * length + 2.0 * ERROR * size * length
+    lowest = math.inf
+    for k in range(count):
+        lowest = min(lowest, _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset))
+    # Only vertices that may be the lowest are looked at exactly: usually one.
+    threshold = lowest + 2.0 * ERROR * size * length
     best = 0
     least = math.inf
     clear(digits, _slot(20), 9 * 2 * _LONGEST)
     for k in range(9):
         add_double(digits, _slot(20 + k), poses[q + k], rot_b)
     for k in range(count):
-        x = coords[k]
-        y = coords[m + k]
-        z = coords[2 * m + k]
-        value = -offset
-        value += nx * (poses[q] * x + poses[q + 1] * y + poses[q + 2] * z + tx)
-        value += ny * (poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z + ty)
-        value += nz * (poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z + tz)
-        if value > threshold:
+        if _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset) > threshold:
             continue
         verdict, excess = _reaches(
             digits, poses, p, q, coords, m, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
@@ -135,9 +132,19 @@ def reach_plane_exactly(pair, digits, lowest_b, reach_b, radius, size):
         if excess < least:
             least = excess
             best = k
-    if least == math.inf:
-        return UNDONE, 0, 0.0
     return SEPARATE, best, least
+
+
+@kernel
+def _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset):
+    """s of vertex k in doubles."""
+    x = coords[k]
+    y = coords[m + k]
+    z = coords[2 * m + k]
+    along_x = nx * (poses[q] * x + poses[q + 1] * y + poses[q + 2] * z + tx)
+    along_y = ny * (poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z + ty)
+    along_z = nz * (poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z + tz)
+    return along_x + along_y + along_z - offset
 
 
 @kernel

@@ -1,0 +1,63 @@
+"""Tests that could fail: small faults put into a copy of the engine, each of which the hard families must notice.
+
+The copies run as plain Python, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+CHILD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import collide
+assert collide.__file__.startswith(sys.argv[1]), collide.__file__
+from collide.adapters.peers.stress import run
+table = run(["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"], n=int(sys.argv[2]), seed=4)
+print(table.wrong + table.failed, table.undecided)
+"""
+
+MUTATIONS = {
+    "none": ("bounds.py", "", ""),
+    "error bound a hundredth": ("bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.64 * 2.0**-53"),
+    "a sign swapped": ("exact.py", "if origin != across:", "if origin == across:"),
+    "support candidates dropped": ("exact.py", "if value > least + slack:", "if i != first:"),
+    "the exact stage skipped": ("decide.py", "if marks[HOW] != UNDECIDED:", "if True:"),
+    "the plane stage inverted": ("exact_plane.py", "if sign <= 0:", "if sign < 0:"),
+}
+
+
+def _package(folder: Path) -> None:
+    """The three folders as they are installed."""
+    skip = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "collide", folder / "collide", ignore=skip)
+    shutil.copytree(ROOT / "adapters", folder / "collide" / "adapters", ignore=skip)
+    shutil.copytree(ROOT / "scenes", folder / "collide" / "scenes", ignore=skip)
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_mutation_is_noticed(name, tmp_path):
+    file, old, new = MUTATIONS[name]
+    _package(tmp_path)
+    source = tmp_path / "collide" / "narrowphase" / file
+    text = source.read_text(encoding="utf-8")
+    assert old in text, f"{file} no longer contains {old!r}"
+    source.write_text(text.replace(old, new, 1) if old else text, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-c", CHILD, str(tmp_path), "60" if "bound" in name else "8"], check=False, capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr[-2000:]
+    wrong, undecided = (int(word) for word in run.stdout.split())
+    if name == "none":
+        assert (wrong, undecided) == (0, 0)
+    else:
+        assert wrong or undecided, "the families did not notice"
