@@ -107,13 +107,13 @@ def decide_pairs(
             ids[1] = vertex
         else:
             verdict, shown, apart, excess, vx, vy, vz, rounds = touch_exactly(
-                pair, digits, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+                pair, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                 numbers[NUMBERS * sa + RADIUS], radius_b, size,
             )  # fmt: skip
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]
-        if verdict == SEPARATE:
+        if verdict == SEPARATE and (apart or plane):
             distance = excess
             lower = max(lower, (1.0 - EXACT_ERROR) * excess)
             upper = min(upper, (1.0 + EXACT_ERROR) * excess)
@@ -125,7 +125,7 @@ def decide_pairs(
         elif verdict == TOUCHING:
             distance = min(distance, 0.0)
             upper = 0.0
-        else:
+        elif verdict != SEPARATE:
             continue
         if not plane and apart:
             _set_normal(row, vx, vy, vz, distance, flip)

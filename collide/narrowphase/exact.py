@@ -409,11 +409,12 @@ def _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_co
 
 
 @kernel
-def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
+def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
     """Decide whether two swept hulls share a point.
 
     pair : as in `difference_point`, both cores hulls of points.
     digits : int64 workspace of `INTEGERS`.
+    boolean : stop at the first plane that separates, which need not be the nearest point's.
     ids : vertex pairs of a first simplex of n ≥ 1 points in, of the deciding one out.
     lowest_a, lowest_b, reach_a, reach_b : of the shapes (`PackedConvex`).   size : S of `bounds.py`.
 
@@ -464,6 +465,8 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
             ids[2 * n] = i
             ids[2 * n + 1] = j
             _set_point(digits, scale, pair, n, i, j)
+            if boolean and radius_a == 0.0 and radius_b == 0.0 and _is_ahead(digits, d, length, n):
+                return SEPARATE, n, False, 0.0, 0.0, 0.0, 0.0, used
             _set_gram(digits, d, n)
         if known or _set_delta(digits, d, mask, n) <= 0:
             touching, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
@@ -478,6 +481,16 @@ def touch_exactly(pair, digits, ids, n, lowest_a, lowest_b, reach_a, reach_b, ra
         mask = _nearest_subset(digits, d, n + 1, n)
         n += 1
     return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, EXACT_ROUNDS
+
+
+@kernel
+def _is_ahead(digits, d, length, k):
+    """Whether point k, the last one against the direction, still lies along it: then all do."""
+    out = _scratch_at(d, 0)
+    clear(digits, out, length + d)
+    for axis in range(3):
+        add_product(digits, out, _direction_at(d, axis), length, _point_at(d, k, axis), d, 1)
+    return carry(digits, out, length + d) > 0
 
 
 @kernel
