@@ -110,7 +110,7 @@ def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids, 
 
 
 @kernel
-def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved):
+def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved, exactly):
     """Two convex cores by GJK, and by EPA where they overlap.
 
     Returns
@@ -130,7 +130,8 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     if status == NEAREST or status == APART:
         return -core, bound, core, -weights[7], -weights[8], -weights[9], n, n, rounds
     above = -clearance if status == ENCLOSED else core
-    if boolean and above + error < radius:
+    # What the exact stage can settle needs no EPA to find out whether it is open.
+    if boolean and (above + error < radius or exactly):
         return -above, -math.inf, above, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     outcome, depth, surface, nx, ny, nz, facet, added = epa(
@@ -148,7 +149,9 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
 
 
 @kernel
-def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, flip):
+def _swept(
+    pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
+):
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
@@ -164,7 +167,7 @@ def _swept(pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, b
         n, vertices, rounds = 4, 4, 0
     else:
         depth, bound, above, nx, ny, nz, n, vertices, rounds = _cores(
-            pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved
+            pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved, exactly and not curved
         )
     lower = bound - error - radius
     upper = above + error - radius
@@ -314,5 +317,6 @@ def _answer(
         _half(pair, sb, row, words, marks, doubles_at, integers_at, limit, size, ERROR * size + slop, flip)
     else:
         _swept(
-            pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop, flip
-        )
+            pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop,
+            slop == 0.0, flip,
+        )  # fmt: skip
