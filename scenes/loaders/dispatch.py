@@ -91,7 +91,7 @@ def _resolve(path) -> Path:
 
 def _in_state(scene: Scene, state: str | Path | Mapping[str, float]) -> Scene:
     """The scene with its robots at a named state, at values, or at the values in a file."""
-    if isinstance(state, Path) or (isinstance(state, str) and state not in scene.states and Path(state).is_file()):
+    if isinstance(state, Path) or (isinstance(state, str) and state not in scene.states and Path(state).exists() and not Path(state).is_dir()):
         from collide.scenes.loaders.states import read_state
 
         path, state = state, read_state(state)
