@@ -55,11 +55,11 @@ def classes(collide) -> dict:
     return out
 
 
-def time_of(question) -> float:
+def time_of(question, poses: int) -> float:
     """µs a pair."""
     started = time.perf_counter()
     question()
-    return (time.perf_counter() - started) / POSES * 1e6
+    return (time.perf_counter() - started) / poses * 1e6
 
 
 def child(folder: str) -> None:
@@ -73,7 +73,7 @@ def child(folder: str) -> None:
     print("ready", flush=True)
     for line in sys.stdin:
         question = pairs[line.strip()]
-        print(time_of(lambda q=question: collide.collide(*q)), flush=True)
+        print(time_of(lambda q=question: collide.collide(*q), len(question[3])), flush=True)
 
 
 def coal_questions(pairs: dict) -> dict:
@@ -136,13 +136,13 @@ def main() -> None:
             shares = {HOW[h]: round(float((rows_of["how"] == h).mean()), 3) for h in np.unique(rows_of["how"])}
             times: dict[str, list[float]] = {"certified": [], "uncertified": [], "distance": [], "coal": []}
             for _ in range(9):
-                times["certified"].append(time_of(lambda q=question: collide.collide(*q)))
+                times["certified"].append(time_of(lambda q=question: collide.collide(*q), len(question[3])))
                 plain.stdin.write(name + "\n")
                 plain.stdin.flush()
                 times["uncertified"].append(float(plain.stdout.readline()))
-                times["distance"].append(time_of(lambda q=question: collide.distance(*q)))
+                times["distance"].append(time_of(lambda q=question: collide.distance(*q), len(question[3])))
                 if name in peers:
-                    times["coal"].append(time_of(peers[name]))
+                    times["coal"].append(time_of(peers[name], len(question[3])))
             median = {what: statistics.median(t) if t else float("nan") for what, t in times.items()}
             rows.append(
                 [name, *(f"{median[what]:.2f}" for what in times), f"{median['certified'] / median['uncertified']:.2f}",

@@ -438,6 +438,11 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
     _load(digits, d, poses, p, q, scale[1], scale[2], scale[6])
     for k in range(n):
         _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
+    if boolean and n == 3 and radius_a == 0.0 and radius_b == 0.0:
+        verdict, shown = _try_face(digits, scale, pair, ids, size)
+        if verdict != UNDONE:
+            return verdict, shown, False, 0.0, 0.0, 0.0, 0.0, 1
+    for k in range(n):
         _set_gram(digits, d, k)
     mask = _nearest_subset(digits, d, n, -1)
     for used in range(1, EXACT_ROUNDS + 1):
@@ -448,16 +453,7 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
         length, zero = _set_direction(digits, d, mask)
         if zero:
             return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
-        vx, vy, vz = _direction_double(digits, d, length)
-        along = math.sqrt(vx * vx + vy * vy + vz * vz)
-        i = _extreme_vertex(
-            digits, d, length, pair[0], pair[1], pair[2], poses, p, 0, scale[3], scale[4], scale[5], vx, vy, vz,
-            2.0 * ERROR * along * size, 1.0,
-        )  # fmt: skip
-        j = _extreme_vertex(
-            digits, d, length, pair[6], pair[7], pair[8], poses, q, 9, scale[7], scale[8], scale[9], vx, vy, vz,
-            2.0 * ERROR * along * size, -1.0,
-        )  # fmt: skip
+        i, j, vx, vy, vz = _support_pair(digits, scale, pair, length, size)
         known = False
         for k in range(n):
             known = known or (ids[2 * k] == i and ids[2 * k + 1] == j)
@@ -470,7 +466,7 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
             _set_gram(digits, d, n)
         if known or _set_delta(digits, d, mask, n) <= 0:
             touching, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
-            return TOUCHING if touching else SEPARATE, n, True, excess, vx / along, vy / along, vz / along, used
+            return TOUCHING if touching else SEPARATE, n, True, excess, vx, vy, vz, used
         if n == 3:
             outside = _faces_that_part(digits, d)
             if outside == 0:
@@ -481,6 +477,47 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
         mask = _nearest_subset(digits, d, n + 1, n)
         n += 1
     return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, EXACT_ROUNDS
+
+
+@kernel
+def _support_pair(digits, scale, pair, length, size):
+    """(vertex of A, vertex of B) whose difference is the last one against the direction; unit v in doubles."""
+    d, _, _, digits_rot_a, core_a, digits_a, _, digits_rot_b, core_b, digits_b = scale
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _) = pair
+    vx, vy, vz = _direction_double(digits, d, length)
+    along = math.sqrt(vx * vx + vy * vy + vz * vz)
+    slack = 2.0 * ERROR * along * size
+    i = _extreme_vertex(
+        digits, d, length, coords_a, n_a, m_a, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0
+    )
+    j = _extreme_vertex(
+        digits, d, length, coords_b, n_b, m_b, poses, q, 9, digits_rot_b, core_b, digits_b, vx, vy, vz, slack, -1.0
+    )
+    return i, j, vx / along, vy / along, vz / along
+
+
+@kernel
+def _try_face(digits, scale, pair, ids, size):
+    """(verdict, points) from the plane of points 0, 1, 2 alone: most flush faces need no more.
+
+    The plane separates, or its support point makes a tetrahedron around the origin; else UNDONE.
+    """
+    d = scale[0]
+    length, zero = _set_normal(digits, d)
+    if zero:
+        return UNDONE, 3
+    i, j, _, _, _ = _support_pair(digits, scale, pair, length, size)
+    for k in range(3):
+        if ids[2 * k] == i and ids[2 * k + 1] == j:
+            return SEPARATE, 3  # nothing lies farther back than the plane itself
+    _set_point(digits, scale, pair, 3, i, j)
+    if _is_ahead(digits, d, length, 3):
+        return SEPARATE, 3
+    if _faces_that_part(digits, d) != 0:
+        return UNDONE, 3
+    ids[6] = i
+    ids[7] = j
+    return TOUCHING, 4
 
 
 @kernel
