@@ -52,7 +52,7 @@ def test_tampered_certificates_are_refused(family):
     """A changed vertex may still prove the claim where there is room; without room, nearly none may."""
     tried = refused = 0
     for case in generate(family, 12, 9):
-        A, B, X_WA, X_WB = question = case.shapes()
+        A, B, _X_WA, _X_WB = question = case.shapes()
         r = collide.distance(*question)
         (certificate,) = r.certificate
         counts = len(A.points), len(B.points)
