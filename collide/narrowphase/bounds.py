@@ -29,8 +29,8 @@ ERROR = 64 * 2.0**-53
 #: 2⁻⁵⁰ each, a quotient, a root and a quotient more.
 EXACT_ERROR = 2.0**-47
 
-#: What that may be off by besides, where the distance is too small for a relative error to hold.
-SUBNORMAL = 1e-321
+#: What that may be off by besides, below the size where a relative error holds.
+SUBNORMAL, SMALLEST_NORMAL = 1e-321, 1e-290
 
 #: `certified` promises a proven sign and a bracket at most this wide, in units of S: cores of points.
 PROMISE_POINTS = 2.0**-40

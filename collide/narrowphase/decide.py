@@ -10,7 +10,7 @@ import math
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH
-from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS, SUBNORMAL
+from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
@@ -113,15 +113,17 @@ def decide_pairs(
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]
+        # Relative errors do not hold among subnormal doubles; 0 is exact.
+        slack = SUBNORMAL if 0.0 < abs(excess) < SMALLEST_NORMAL else 0.0
         if verdict == SEPARATE and (apart or plane):
             distance = excess
-            lower = max(lower, (1.0 - EXACT_ERROR) * excess - SUBNORMAL)
-            upper = min(upper, (1.0 + EXACT_ERROR) * excess + SUBNORMAL)
+            lower = max(lower, (1.0 - EXACT_ERROR) * excess - slack)
+            upper = min(upper, (1.0 + EXACT_ERROR) * excess + slack)
         elif verdict == TOUCHING and apart and not plane:
             # Swept bodies: the cores are apart by less than the radii, and the depth is as exact.
             distance = excess
-            lower = max(lower, (1.0 + EXACT_ERROR) * excess - SUBNORMAL)
-            upper = min(upper, (1.0 - EXACT_ERROR) * excess + SUBNORMAL, 0.0)
+            lower = max(lower, (1.0 + EXACT_ERROR) * excess - slack)
+            upper = min(upper, (1.0 - EXACT_ERROR) * excess + slack, 0.0)
         elif verdict == TOUCHING:
             distance = min(distance, 0.0)
             upper = 0.0

@@ -639,4 +639,6 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
     sign = carry(digits, square, n + 2 * d)
     value, exponent = as_double(digits, square, n + 2 * d)
     excess = _ldexp(value / over, exponent + scale) / (distance + (radius_a + radius_b))
+    if excess == 0.0:  # vanished, but not 0
+        excess = 5e-324 * sign
     return sign <= 0, excess
