@@ -80,7 +80,7 @@ def _scratch_at(d, k):
 
 
 @kernel
-def _lowest_and_largest(numbers, at, n):
+def lowest_and_largest(numbers, at, n):
     """Exponents of the lowest bit and of the largest magnitude among n doubles."""
     lowest = 2000
     largest = -2000
@@ -97,14 +97,14 @@ def _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b
 
     A grid is the exponent of a number's digit 0 over BITS; all of a pair's coordinates share one.
     """
-    low_p, high_p = _lowest_and_largest(poses, p, 9)
-    low_q, high_q = _lowest_and_largest(poses, q, 9)
+    low_p, high_p = lowest_and_largest(poses, p, 9)
+    low_q, high_q = lowest_and_largest(poses, q, 9)
     rot_a = grid_of(low_p)
     rot_b = grid_of(low_q)
     core_a = grid_of(min(lowest_a, 1000))
     core_b = grid_of(min(lowest_b, 1000))
-    low_s, _ = _lowest_and_largest(poses, p + 9, 3)
-    low_t, _ = _lowest_and_largest(poses, q + 9, 3)
+    low_s, _ = lowest_and_largest(poses, p + 9, 3)
+    low_t, _ = lowest_and_largest(poses, q + 9, 3)
     grid = grid_of(min(low_s, low_t, lowest_bit(radius_a), lowest_bit(radius_b), 1000))
     if lowest_a < 2000:
         grid = min(grid, rot_a + core_a)

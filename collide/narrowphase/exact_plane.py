@@ -12,7 +12,7 @@ import math
 from collide._jit import kernel
 from collide.geometry.digits import BITS, add_double, add_product, as_double, carry, clear, grid_of, lowest_bit
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.exact import SEPARATE, TOUCHING, UNDONE
+from collide.narrowphase.exact import SEPARATE, TOUCHING, UNDONE, lowest_and_largest
 from collide.narrowphase.halfspace_convex import plane_in_world
 
 #: Most digits of any number that is multiplied once more.
@@ -24,12 +24,7 @@ INTEGERS = 40 * 2 * _LONGEST
 @kernel
 def _span(numbers, at, n):
     """(grid, digits) that hold n doubles; (0, 1) where all are 0."""
-    lowest = 2000
-    largest = -2000
-    for k in range(at, at + n):
-        if numbers[k] != 0.0:
-            lowest = min(lowest, lowest_bit(numbers[k]))
-            largest = max(largest, math.frexp(numbers[k])[1])
+    lowest, largest = lowest_and_largest(numbers, at, n)
     if lowest == 2000:
         return 0, 1
     return grid_of(lowest), grid_of(largest - 1) - grid_of(lowest) + 1
