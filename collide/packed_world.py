@@ -8,7 +8,7 @@ from collide._jit import address_of
 from collide.broadphase.box_tree import BoxTree
 from collide.geometry.boxes import bounding_boxes
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import ShapeTable, pose_rows
+from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
 from collide.results import PAIR_DTYPE
 from collide.unions import Union, combine
@@ -40,8 +40,8 @@ class PackedWorld:
 
     def move(self, X_WBs: np.ndarray) -> None:
         """Take new poses (n, 4, 4) of all bodies, and refit the tree."""
-        self._poses = pose_rows(X_WBs[self._body_of], self._X_BP, self._reach)
-        self._part_boxes = self._boxes_of(self._table, self._poses, self._shape_of)
+        self._poses = pose_table(X_WBs[self._body_of], self._X_BP, self._reach)
+        self._part_boxes = self._boxes_of(self._table, self._poses.rows, self._shape_of)
         if len(X_WBs):
             starts = self._first[:-1]
             low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
@@ -97,7 +97,7 @@ class PackedWorld:
         return a, b
 
     def _union(self, body: int) -> Union:
-        return Union(self._parts[body], self._poses[self._first[body] : self._first[body + 1]])
+        return Union(self._parts[body], self._poses.rows[self._first[body] : self._first[body + 1]])
 
     def _part_pairs(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parts whose boxes come within margin, and the candidate each belongs to.
@@ -124,8 +124,8 @@ class PackedWorld:
         own = shape.parts()
         packed = [part for part, _ in own]
         reach = np.array([part.reach for part in packed])
-        poses = pose_rows(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
-        boxes = self._boxes_of(ShapeTable(packed), poses, np.arange(len(own)))
+        poses = pose_table(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
+        boxes = self._boxes_of(ShapeTable(packed), poses.rows, np.arange(len(own)))
         box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
         bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
         if not len(bodies):
@@ -137,14 +137,14 @@ class PackedWorld:
             [np.tile(np.arange(len(own)), len(others)), np.repeat(others + len(own), len(own))], axis=1
         )
         rows = run_pairs(
-            table, np.concatenate([poses, self._poses]), shape_of, pairs, boolean=False, limit=limit
+            table, poses.followed_by(self._poses), shape_of, pairs, boolean=False, limit=limit
         )
         rows["b"] = self._body_of[pairs[:, 1] - len(own)]
         rows["part_a"] = pairs[:, 0]
         rows["part_b"] = pairs[:, 1] - len(own) - self._first[rows["b"]]
         starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
         plural = self._plural(bodies) | (len(own) > 1)
-        return combine(rows, starts, plural, lambda k: (Union(packed, poses), self._union(int(bodies[k]))))
+        return combine(rows, starts, plural, lambda k: (Union(packed, poses.rows), self._union(int(bodies[k]))))
 
 
 def _distinct(flat: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.geometry.tables import ShapeTable, pose_rows
+from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
 from collide.results import PairResult
 from collide.shapes.base import Shape
@@ -103,7 +103,7 @@ def _rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bo
     n, many = len(X_WA), len(parts_a) * len(parts_b)
     X_WBs = np.concatenate([np.concatenate([X_WA] * len(parts_a)), np.concatenate([X_WB] * len(parts_b))])
     X_BPs = np.repeat(np.array([X for _, X in parts]), n, axis=0)
-    poses = pose_rows(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
+    poses = pose_table(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
     # Part k stands at rows k·n … k·n + n − 1 of the pose table; pairs of one pose stand together.
     which = np.arange(n)[:, None, None] + n * np.zeros((1, len(parts_a), len(parts_b)), dtype=np.int64)
     first = which + n * np.arange(len(parts_a))[None, :, None]
@@ -117,7 +117,7 @@ def _rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bo
     rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
 
     def sides(k: int) -> tuple[Union, Union]:
-        own = poses.reshape(len(parts), n, -1)[:, k]
+        own = poses.rows.reshape(len(parts), n, -1)[:, k]
         return (
             Union([packed for packed, _ in parts_a], own[: len(parts_a)]),
             Union([packed for packed, _ in parts_b], own[len(parts_a) :]),

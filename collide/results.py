@@ -92,6 +92,11 @@ class PairResult:
         found = [certificate_of(A, B, X_WA[k], X_WB[k], row) for k, row in enumerate(self.rows)]
         return found[0] if self._single else found
 
+    @property
+    def question(self) -> tuple:
+        """(A, B, X_WA, X_WB): the shapes and poses that were asked, poses with a leading N."""
+        return self._question
+
     def __getitem__(self, k: int) -> PairResult:
         """Result k of a batch."""
         A, B, X_WA, X_WB = self._question
@@ -123,15 +128,22 @@ class PairResult:
 
 
 class WorldResult:
-    """Rows of a World query, sorted by (a, b), with the bodies' names.
+    """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
-    Indexing by a field name gives that column; ``names`` resolves the ids.
+    Indexing by a field name gives that column; ``names`` resolves the ids; ``pair(k)`` is row k as a
+    `PairResult`, with its certificate.
     """
 
-    __slots__ = ("_names", "rows")
+    __slots__ = ("_bodies", "rows")
 
-    def __init__(self, rows: np.ndarray, names: dict[int, str]):
-        self.rows, self._names = rows, names
+    def __init__(self, rows: np.ndarray, bodies: dict):
+        self.rows, self._bodies = rows, bodies
+
+    def pair(self, k: int) -> PairResult:
+        """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate."""
+        row = self.rows[range(len(self.rows))[k]]
+        a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
+        return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -145,7 +157,7 @@ class WorldResult:
     @property
     def names(self) -> list[tuple[str, str]]:
         """(name of a, name of b), row by row."""
-        return [(self._names[int(a)], self._names[int(b)]) for a, b in zip(self.rows["a"], self.rows["b"])]
+        return [(self._bodies[int(a)].name, self._bodies[int(b)].name) for a, b in zip(self.rows["a"], self.rows["b"])]
 
     def __repr__(self) -> str:
         return f"WorldResult({len(self.rows)} rows, {int(self.rows['hit'].sum())} hits)"

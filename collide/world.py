@@ -180,7 +180,7 @@ class World:
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
         rows, _ = self._ask(0.0)
-        return WorldResult(rows[rows["hit"]], self.names)
+        return WorldResult(rows[rows["hit"]], dict(self._bodies))
 
     def distances(self, max_distance: float = math.inf) -> WorldResult:
         """Every tested pair at most ``max_distance`` [m] apart, hits included, sorted by (a, b).
@@ -189,7 +189,7 @@ class World:
         """
         limit = check_distance("World.distances: max_distance", max_distance)
         rows, _ = self._ask(limit)
-        return WorldResult(rows[_within(rows, limit)], self.names)
+        return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
 
     def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
         """One outside shape S against every body: pairs at most ``max_distance`` apart.
@@ -206,7 +206,7 @@ class World:
         ids = np.array([*self._bodies, -1], dtype=np.int32)
         rows["b"] = ids[rows["b"]]
         rows["a"] = -1
-        return WorldResult(rows, {**self.names, -1: "query"})
+        return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)})
 
     @property
     def allowed(self) -> dict[tuple[int, int], str]:

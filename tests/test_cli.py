@@ -37,7 +37,8 @@ def fake_scene(*rows):
     }
     world = SimpleNamespace(
         distances=lambda max_distance: WorldResult(
-            answers[answers["hit"] | (answers["distance"] <= max_distance)], names
+            answers[answers["hit"] | (answers["distance"] <= max_distance)],
+            {k: SimpleNamespace(name=name) for k, name in names.items()},
         ),
         stats=stats,
     )

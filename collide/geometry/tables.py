@@ -5,6 +5,9 @@ Rows are flat because nine arrays cost 500 ns a call in Python and four addresse
 
 from __future__ import annotations
 
+from fractions import Fraction
+from typing import NamedTuple
+
 import numpy as np
 
 from collide._jit import address_of
@@ -16,8 +19,12 @@ INTS = 6
 # One row of doubles a shape; PARAMS is the first of four.
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
-# One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1).
-POSE = 13
+# One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), and the row of the exact
+# terms where R and t are a rounded product of two poses (1), else −1.
+POSE = 14
+POSE_SLOP, POSE_TERMS = 12, 13
+#: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
+TERMS = 7
 
 #: Rounding of a part's world pose when it is a product of two: at most 4u of its terms an entry, so
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
@@ -43,32 +50,103 @@ class ShapeTable:
         self.ints[:, RANK] = [order[p.content] for p in packed]
 
 
-def pose_rows(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """(k, POSE) rows of k posed parts.
+class PoseTable(NamedTuple):
+    """Posed parts as the kernels read them.
+
+    rows : (k, POSE).
+    terms : (c, 12, TERMS) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
+        the sum of TERMS doubles. What the row holds is that sum, rounded.
+    """
+
+    rows: np.ndarray
+    terms: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def followed_by(self, other: PoseTable) -> PoseTable:
+        """One table of both, this one's parts first."""
+        rows = np.concatenate([self.rows, other.rows])
+        moved = rows[len(self) :, POSE_TERMS]
+        moved[moved >= 0.0] += len(self.terms)
+        return PoseTable(rows, np.concatenate([self.terms, other.terms]))
+
+    def exact(self, part: int) -> list[Fraction]:
+        """The 12 entries of a part's pose without rounding."""
+        row = self.rows[part]
+        if row[POSE_TERMS] < 0.0:
+            return [Fraction(v) for v in row[:12].tolist()]
+        return [sum(map(Fraction, entry), Fraction(0)) for entry in self.terms[int(row[POSE_TERMS])].tolist()]
+
+
+def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTable:
+    """Poses of k parts in the world.
 
     X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
 
     A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
-    the origin. Elsewhere the product is
-    written out, so that a batch rounds as a single pose does.
+    the origin. Elsewhere the product is written out, so that a batch rounds as a single pose does.
     """
     rows = np.empty((len(X_WB), POSE))
     R_WB, p_WB = X_WB[:, :3, :3], X_WB[:, :3, 3]
     rows[:, :9] = R_WB.reshape(-1, 9)
     rows[:, 9:12] = p_WB
-    rows[:, 12] = 0.0
+    rows[:, POSE_SLOP] = 0.0
+    rows[:, POSE_TERMS] = -1.0
     identity = np.eye(4)
     own = (X_BP != identity).any(axis=(1, 2))
+    if not own.any():
+        return PoseTable(rows, _NO_TERMS)
     unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
     rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
     own = np.flatnonzero(own & ~unmoved)
-    if len(own):
-        R, p, X = R_WB[own], p_WB[own], X_BP[own]
-        rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
-        rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
-        rows[own, 12] = _PRODUCT_SLOP * (reach[own] + np.abs(X[:, :3, 3]).sum(axis=1) + np.abs(p).max(axis=1))
-    return rows
+    if not len(own):
+        return PoseTable(rows, _NO_TERMS)
+    R, p, X = R_WB[own], p_WB[own], X_BP[own]
+    rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
+    rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
+    rows[own, POSE_SLOP] = _PRODUCT_SLOP * (
+        reach[own] + np.abs(X[:, :3, 3]).sum(axis=1) + np.abs(p).max(axis=1)
+    )
+    terms, exact = _terms(R, p, X)
+    rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
+    return PoseTable(rows, np.ascontiguousarray(terms[exact]))
 
 
 def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return A[:, :, 0:1] * B[:, 0:1, :] + A[:, :, 1:2] * B[:, 1:2, :] + A[:, :, 2:3] * B[:, 2:3, :]
+
+
+def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 12, TERMS) doubles that add up to each entry of the product, whether they do exactly).
+
+    Error-free products after Dekker 1971. They are exact unless the low part of one underflows.
+    """
+    k = len(R)
+    terms = np.zeros((k, 12, TERMS))
+    rotation = terms[:, :9].reshape(k, 3, 3, TERMS)
+    shift = terms[:, 9:]
+    shift[:, :, 6] = p
+    exact = np.ones(k, dtype=bool)
+    for j in range(3):
+        for target, factor in ((rotation, X[:, None, j, :3]), (shift, X[:, j, 3][:, None])):
+            left = R[:, :, j, None] if target is rotation else R[:, :, j]
+            high, low = _two_products(left, factor)
+            target[..., 2 * j], target[..., 2 * j + 1] = high, low
+            safe = (np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
+            exact &= safe.reshape(k, -1).all(axis=1)
+    return terms, exact
+
+
+def _two_products(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(high, low) with high + low = a·b exactly."""
+    high = a * b
+    a_high, b_high = (134217729.0 * v for v in (a, b))
+    a_high, b_high = a_high - (a_high - a), b_high - (b_high - b)
+    a_low, b_low = a - a_high, b - b_high
+    return high, ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+#: Products larger than this have low parts that are doubles.
+_SAFE_PRODUCT = 2.0**-900
+_NO_TERMS = np.zeros((0, 12, TERMS))

@@ -299,7 +299,7 @@ def _answer(
     at_a, n_a = coordinates_of(ints, sa)
     at_b, n_b = coordinates_of(ints, sb)
     pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
-    size, slop = size_and_slop(numbers, poses, sa, pa, sb, pb)
+    size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
     for k in range(4):
         words[VERTICES_A + k] = -1
         words[VERTICES_B + k] = -1
@@ -318,5 +318,5 @@ def _answer(
     else:
         _swept(
             pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop,
-            slop == 0.0, flip,
+            known, flip,
         )  # fmt: skip

@@ -15,7 +15,7 @@ Write u = 2⁻⁵³ and, for a pair, t = p_WB − p_WA and
 4. The final sums (± r, ± error) round at most 4u·S.
 
 All of it together stays below 45u·S, and the error used is 64u·S, plus the slop of stored points
-and of composed poses (`PackedConvex.slop`, `pose_rows`). It holds whatever the matrix, not only for
+and of composed poses (`PackedConvex.slop`, `pose_table`). It holds whatever the matrix, not only for
 rotations, since ρ is measured with the rows given. Where the bracket spans zero, the exact stage
 (`decide.py`) settles the sign.
 """

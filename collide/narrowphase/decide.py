@@ -9,8 +9,8 @@ import math
 
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import HALFSPACE, POINTS
-from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH
-from collide.narrowphase.bounds import EXACT_ERROR, PROMISE_POINTS, SMALLEST_NORMAL, SUBNORMAL
+from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
+from collide.narrowphase.bounds import ERROR, EXACT_ERROR, PROMISE_POINTS, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
@@ -55,16 +55,17 @@ def _set_normal(row, vx, vy, vz, distance, flip):
         row[POINT_B + axis] = middle + 0.5 * distance * v
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)")
 def decide_pairs(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, digits_at
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
 
-    Arguments as there; digits : int64 workspace of DIGITS + 16. What stays open: curved
-    cores, and parts whose stored numbers are themselves rounded (slop).
+    Arguments as there; terms, n_terms : of the `PoseTable`; digits : int64 workspace of DIGITS + 16. What
+    stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
+    terms = view_f64(terms_at, 12 * TERMS * n_terms)
     digits = view_i64(digits_at, DIGITS)
     ids = view_i64(digits_at + 8 * DIGITS, 16)
     settled = 0
@@ -83,10 +84,11 @@ def decide_pairs(
         numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
         poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
         sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
-        size, slop = size_and_slop(numbers, poses, sa, pa, sb, pb)
+        size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
         plane = ints[INTS * sa + KIND] == HALFSPACE
-        if not (plane or ints[INTS * sa + KIND] == POINTS) or ints[INTS * sb + KIND] != POINTS or slop != 0.0:
+        if not (plane or ints[INTS * sa + KIND] == POINTS) or ints[INTS * sb + KIND] != POINTS or not known:
             continue
+        error = ERROR * size + slop
         at_a, n_a = coordinates_of(ints, sa)
         at_b, n_b = coordinates_of(ints, sb)
         pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
@@ -102,13 +104,13 @@ def decide_pairs(
             shown = 1
             apart = False
             vx = vy = vz = 0.0
-            verdict, vertex, excess = reach_plane_exactly(pair, digits, low_b, reach_b, radius_b, size)
+            verdict, vertex, excess = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error)
             ids[0] = -1
             ids[1] = vertex
         else:
             verdict, shown, apart, excess, vx, vy, vz, rounds = touch_exactly(
-                pair, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
-                numbers[NUMBERS * sa + RADIUS], radius_b, size,
+                pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+                numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
             )  # fmt: skip
         distance = row[DISTANCE]
         lower = row[LOWER]

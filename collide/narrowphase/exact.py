@@ -27,7 +27,8 @@ from collide.geometry.digits import (
     grid_of,
     lowest_bit,
 )
-from collide.narrowphase.bounds import ERROR, EXACT_ROUNDS
+from collide.geometry.tables import POSE_TERMS, TERMS
+from collide.narrowphase.bounds import EXACT_ROUNDS
 
 #: What the stage says. UNDONE: the magnitudes span more bits than the workspace holds.
 TOUCHING, SEPARATE, UNDONE = range(3)
@@ -92,34 +93,56 @@ def lowest_and_largest(numbers, at, n):
 
 
 @kernel
-def _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
+def exact_pose(poses, p, terms):
+    """(numbers, where, k): entry j of the pose is exactly the sum of numbers[where + k·j …], k of them."""
+    if poses[p + POSE_TERMS] < 0.0:
+        return poses, p, 1
+    return terms, 12 * TERMS * int(poses[p + POSE_TERMS]), TERMS
+
+
+@kernel
+def span_of_entries(pose, first, count):
+    """(grid, digits) that hold each of ``count`` entries of an exact pose; (0, 1) where all are 0."""
+    numbers, at, k = pose
+    lowest, largest = lowest_and_largest(numbers, at + k * first, k * count)
+    if lowest == 2000:
+        return 0, 1
+    if k > 1:
+        largest += 3  # a sum of up to seven
+    return grid_of(lowest), grid_of(largest - 1) - grid_of(lowest) + 1
+
+
+@kernel
+def add_entry(digits, at, pose, j, grid, sign):
+    """Add or subtract entry j of an exact pose."""
+    numbers, start, k = pose
+    for i in range(k):
+        add_double(digits, at, sign * numbers[start + k * j + i], grid)
+
+
+@kernel
+def _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
     """(D, grid of coordinates, grid and digits of R_A, grid and digits of a's coordinates, same of B).
 
     A grid is the exponent of a number's digit 0 over BITS; all of a pair's coordinates share one.
     """
-    low_p, high_p = lowest_and_largest(poses, p, 9)
-    low_q, high_q = lowest_and_largest(poses, q, 9)
-    rot_a = grid_of(low_p)
-    rot_b = grid_of(low_q)
+    rot_a, digits_rot_a = span_of_entries(pose_a, 0, 9)
+    rot_b, digits_rot_b = span_of_entries(pose_b, 0, 9)
     core_a = grid_of(min(lowest_a, 1000))
     core_b = grid_of(min(lowest_b, 1000))
-    low_s, _ = lowest_and_largest(poses, p + 9, 3)
-    low_t, _ = lowest_and_largest(poses, q + 9, 3)
+    low_s, high_s = lowest_and_largest(pose_a[0], pose_a[1] + 9 * pose_a[2], 3 * pose_a[2])
+    low_t, high_t = lowest_and_largest(pose_b[0], pose_b[1] + 9 * pose_b[2], 3 * pose_b[2])
     grid = grid_of(min(low_s, low_t, lowest_bit(radius_a), lowest_bit(radius_b), 1000))
     if lowest_a < 2000:
         grid = min(grid, rot_a + core_a)
     if lowest_b < 2000:
         grid = min(grid, rot_b + core_b)
     # Digits from the lowest bit to the highest: |x| < 2^e reaches up to bit e − 1.
-    digits_rot_a = grid_of(high_p - 1) - rot_a + 1
-    digits_rot_b = grid_of(high_q - 1) - rot_b + 1
     digits_a = max(grid_of(math.frexp(reach_a)[1] - 1) - core_a + 1, 1) if lowest_a < 2000 else 0
     digits_b = max(grid_of(math.frexp(reach_b)[1] - 1) - core_b + 1, 1) if lowest_b < 2000 else 0
     # A coordinate is less than 2·size; the highest digit is signed and may be as large as a factor.
     d = grid_of(math.frexp(size)[1]) - grid + 1
-    for k in range(3):
-        d = max(d, grid_of(math.frexp(poses[p + 9 + k])[1]) - grid + 1)
-        d = max(d, grid_of(math.frexp(poses[q + 9 + k])[1]) - grid + 1)
+    d = max(d, grid_of(max(high_s, high_t, -1000)) - grid + 1)
     if lowest_a < 2000:
         d = max(d, digits_rot_a + digits_a - 1 + rot_a + core_a - grid)
     if lowest_b < 2000:
@@ -128,16 +151,21 @@ def _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b
 
 
 @kernel
-def _load(digits, d, poses, p, q, grid, rot_a, rot_b):
+def _load(digits, scale, pose_a, pose_b):
     """Rotations and the shift p_WB − p_WA into the workspace."""
+    d, grid, rot_a, digits_rot_a, _, _, rot_b, digits_rot_b, _, _ = scale
     clear(digits, 0, 21 * d)
     for k in range(9):
-        add_double(digits, k * d, poses[p + k], rot_a)
-        add_double(digits, (9 + k) * d, poses[q + k], rot_b)
+        add_entry(digits, k * d, pose_a, k, rot_a, 1.0)
+        add_entry(digits, (9 + k) * d, pose_b, k, rot_b, 1.0)
+        if pose_a[2] > 1:
+            carry(digits, k * d, digits_rot_a)
+        if pose_b[2] > 1:
+            carry(digits, (9 + k) * d, digits_rot_b)
     for k in range(3):
         at = _shift_at(d) + k * d
-        add_double(digits, at, poses[q + 9 + k], grid)
-        add_double(digits, at, -poses[p + 9 + k], grid)
+        add_entry(digits, at, pose_b, 9 + k, grid, 1.0)
+        add_entry(digits, at, pose_a, 9 + k, grid, -1.0)
         carry(digits, at, d)
 
 
@@ -378,45 +406,65 @@ def _extreme_vertex(
             least = value
             first = i
     best = -1
+    turned = False
     for i in range(count):
         value = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
         if value > least + slack:
             continue
-        if best < 0 or _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, best) * sign < 0:
+        if best < 0:
+            best = i
+            continue
+        if not turned:
+            _turn_direction(digits, d, n, rotation, digits_rot)
+            turned = True
+        if _compare(digits, d, n + digits_rot, coordinates, m, core, digits_core, i, best) * sign < 0:
             best = i
     return best if best >= 0 else first
 
 
 @kernel
-def _compare(digits, d, n, coordinates, m, rotation, digits_rot, core, digits_core, i, j):
-    """Sign of v·R (a_i − a_j)."""
-    at = _scratch_at(d, 1)
+def _turn_direction(digits, d, n, rotation, digits_rot):
+    """Rᵀv into scratch 1: comparing vertices then takes three products each instead of twenty-one."""
+    for j in range(3):
+        at = _scratch_at(d, 1) + 5 * d * j
+        clear(digits, at, n + digits_rot)
+        for axis in range(3):
+            add_product(digits, at, _direction_at(d, axis), n, (rotation + 3 * axis + j) * d, digits_rot, 1)
+        carry(digits, at, n + digits_rot)
+
+
+@kernel
+def _compare(digits, d, n, coordinates, m, core, digits_core, i, j):
+    """Sign of (Rᵀv)·(a_i − a_j), Rᵀv of n digits standing in scratch 1."""
     out = _scratch_at(d, 2)
-    length = digits_rot + digits_core
-    clear(digits, at, 3 * d)
+    at = _scratch_at(d, 3)
+    clear(digits, out, n + digits_core)
     for axis in range(3):
-        clear(digits, at + axis * d, d)
-    _add_vertex(digits, d, at, rotation, digits_rot, coordinates, m, i, core, digits_core, 0, 1)
-    _add_vertex(digits, d, at, rotation, digits_rot, coordinates, m, j, core, digits_core, 0, -1)
-    clear(digits, out, n + length)
-    for axis in range(3):
-        carry(digits, at + axis * d, min(length, d))
-        add_product(digits, out, _direction_at(d, axis), n, at + axis * d, min(length, d), 1)
-    return carry(digits, out, n + length)
+        if coordinates[axis * m + i] != coordinates[axis * m + j]:
+            clear(digits, at, digits_core)
+            add_double(digits, at, coordinates[axis * m + i], core)
+            add_double(digits, at, -coordinates[axis * m + j], core)
+            carry(digits, at, digits_core)
+            add_product(digits, out, _scratch_at(d, 1) + 5 * d * axis, n, at, digits_core, 1)
+    return carry(digits, out, n + digits_core)
 
 
 # --- the search ---------------------------------------------------------------------------------
 
 
 @kernel
-def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size):
+def touch_exactly(
+    pair, terms, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size, error
+):
     """Decide whether two swept hulls share a point.
 
     pair : as in `difference_point`, both cores hulls of points.
+    terms : exact terms of poses that are products (`PoseTable.terms`).
     digits : int64 workspace of `INTEGERS`.
     boolean : stop at the first plane that separates, which need not be the nearest point's.
     ids : vertex pairs of a first simplex of n ≥ 1 points in, of the deciding one out.
     lowest_a, lowest_b, reach_a, reach_b : of the shapes (`PackedConvex`).   size : S of `bounds.py`.
+    error : of a support value in doubles.
 
     Returns
     -------
@@ -428,18 +476,17 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
     vx, vy, vz : unit vector from B to A, exact but for its own rounding.
     rounds used.
     """
-    poses = pair[13]
-    p = pair[5]
-    q = pair[11]
-    scale = _scale(poses, p, q, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
+    pose_a = exact_pose(pair[13], pair[5], terms)
+    pose_b = exact_pose(pair[13], pair[11], terms)
+    scale = _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
     d = scale[0]
     if d > _LONGEST:
         return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, 0
-    _load(digits, d, poses, p, q, scale[1], scale[2], scale[6])
+    _load(digits, scale, pose_a, pose_b)
     for k in range(n):
         _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
     if boolean and n == 3 and radius_a == 0.0 and radius_b == 0.0:
-        verdict, shown = _try_face(digits, scale, pair, ids, size)
+        verdict, shown = _try_face(digits, scale, pair, ids, error)
         if verdict != UNDONE:
             return verdict, shown, False, 0.0, 0.0, 0.0, 0.0, 1
     for k in range(n):
@@ -453,7 +500,7 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
         length, zero = _set_direction(digits, d, mask)
         if zero:
             return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
-        i, j, vx, vy, vz = _support_pair(digits, scale, pair, length, size)
+        i, j, vx, vy, vz = _support_pair(digits, scale, pair, length, error)
         known = False
         for k in range(n):
             known = known or (ids[2 * k] == i and ids[2 * k + 1] == j)
@@ -480,13 +527,13 @@ def touch_exactly(pair, digits, boolean, ids, n, lowest_a, lowest_b, reach_a, re
 
 
 @kernel
-def _support_pair(digits, scale, pair, length, size):
+def _support_pair(digits, scale, pair, length, error):
     """(vertex of A, vertex of B) whose difference is the last one against the direction; unit v in doubles."""
     d, _, _, digits_rot_a, core_a, digits_a, _, digits_rot_b, core_b, digits_b = scale
     (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _) = pair
     vx, vy, vz = _direction_double(digits, d, length)
     along = math.sqrt(vx * vx + vy * vy + vz * vz)
-    slack = 2.0 * ERROR * along * size
+    slack = 2.0 * error * along
     i = _extreme_vertex(
         digits, d, length, coords_a, n_a, m_a, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0
     )
@@ -497,7 +544,7 @@ def _support_pair(digits, scale, pair, length, size):
 
 
 @kernel
-def _try_face(digits, scale, pair, ids, size):
+def _try_face(digits, scale, pair, ids, error):
     """(verdict, points) from the plane of points 0, 1, 2 alone: most flush faces need no more.
 
     The plane separates, or its support point makes a tetrahedron around the origin; else UNDONE.
@@ -506,7 +553,7 @@ def _try_face(digits, scale, pair, ids, size):
     length, zero = _set_normal(digits, d)
     if zero:
         return UNDONE, 3
-    i, j, _, _, _ = _support_pair(digits, scale, pair, length, size)
+    i, j, _, _, _ = _support_pair(digits, scale, pair, length, error)
     for k in range(3):
         if ids[2 * k] == i and ids[2 * k + 1] == j:
             return SEPARATE, 3  # nothing lies farther back than the plane itself

@@ -11,8 +11,15 @@ import math
 
 from collide._jit import kernel
 from collide.geometry.digits import BITS, add_double, add_product, as_double, carry, clear, grid_of, lowest_bit
-from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.exact import SEPARATE, TOUCHING, UNDONE, lowest_and_largest
+from collide.narrowphase.exact import (
+    SEPARATE,
+    TOUCHING,
+    UNDONE,
+    add_entry,
+    exact_pose,
+    lowest_and_largest,
+    span_of_entries,
+)
 from collide.narrowphase.halfspace_convex import plane_in_world
 
 #: Most digits of any number that is multiplied once more.
@@ -36,11 +43,12 @@ def _slot(k):
 
 
 @kernel
-def _set_plane(digits, poses, p, numbers, at, rot, n_rot, low_m, n_m):
+def _set_plane(digits, pose, numbers, at, rot, n_rot, low_m, n_m):
     """Slots 12 … 14 become n = cof(R) m, slot 15 becomes det R; slots 0 … 11 are R and m."""
     clear(digits, 0, _slot(19))
     for k in range(9):
-        add_double(digits, _slot(k), poses[p + k], rot)
+        add_entry(digits, _slot(k), pose, k, rot, 1.0)
+        carry(digits, _slot(k), n_rot)
     for k in range(3):
         add_double(digits, _slot(9 + k), numbers[at + k], low_m)
     length = 2 * n_rot + n_m + 1
@@ -65,28 +73,28 @@ def _set_plane(digits, poses, p, numbers, at, rot, n_rot, low_m, n_m):
 
 
 @kernel
-def reach_plane_exactly(pair, digits, lowest_b, reach_b, radius, size):
+def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, error):
     """(verdict, vertex of B, excess): whether a swept hull B reaches the half-space A of the pair.
 
     Arguments as in `exact.touch_exactly`. The vertex is one that reaches it, or the nearest; excess is
     then its distance minus the radius, to a relative 1e-14.
     """
     (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, tx, ty, tz) = pair
-    rot, n_rot = _span(poses, p, 9)
+    pose_a = exact_pose(poses, p, terms)
+    pose_b = exact_pose(poses, q, terms)
+    rot, n_rot = span_of_entries(pose_a, 0, 9)
     low_m, n_m = _span(numbers, at_a, 3)
     low_b, n_b = _span(numbers, at_a + 3, 1)
-    rot_b, n_rot_b = _span(poses, q, 9)
-    low_s, _ = _span(poses, p + 9, 3)
-    low_t, _ = _span(poses, q + 9, 3)
+    rot_b, n_rot_b = span_of_entries(pose_b, 0, 9)
+    low_s, n_s = span_of_entries(pose_a, 9, 3)
+    low_t, n_t = span_of_entries(pose_b, 9, 3)
     core = grid_of(min(lowest_b, 1000))
     n_core = max(grid_of(math.frexp(reach_b)[1] - 1) - core + 1, 1) if lowest_b < 2000 else 0
     grid = min(low_s, low_t)
     if lowest_b < 2000:
         grid = min(grid, rot_b + core)
     d = grid_of(math.frexp(size)[1]) - grid + 1
-    for k in range(3):
-        d = max(d, grid_of(math.frexp(poses[p + 9 + k])[1]) - grid + 1)
-        d = max(d, grid_of(math.frexp(poses[q + 9 + k])[1]) - grid + 1)
+    d = max(d, low_s + n_s - grid + 1, low_t + n_t - grid + 1)
     if lowest_b < 2000:
         d = max(d, n_rot_b + n_core - 1 + rot_b + core - grid)
     # Two terms of different degree meet in s: their digits are brought to the lower grid of both.
@@ -97,7 +105,7 @@ def reach_plane_exactly(pair, digits, lowest_b, reach_b, radius, size):
     n_sum = max(n_plane + d + low_first - low, 3 * n_rot + 2 + n_b + low_second - low) + 1
     if n_sum > _LONGEST or d > _LONGEST // 2:
         return UNDONE, 0, 0.0
-    _set_plane(digits, poses, p, numbers, at_a, rot, n_rot, low_m, n_m)
+    _set_plane(digits, pose_a, numbers, at_a, rot, n_rot, low_m, n_m)
     # The part of s that no vertex changes, in slot 17: −b·det R.
     add_double(digits, _slot(18), numbers[at_a + 3], low_b)
     constant = _slot(17)
@@ -109,17 +117,18 @@ def reach_plane_exactly(pair, digits, lowest_b, reach_b, radius, size):
     for k in range(count):
         lowest = min(lowest, _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset))
     # Only vertices that may be the lowest are looked at exactly: usually one.
-    threshold = lowest + 2.0 * ERROR * size * length
+    threshold = lowest + 2.0 * error * length
     best = 0
     least = math.inf
     clear(digits, _slot(20), 9 * 2 * _LONGEST)
     for k in range(9):
-        add_double(digits, _slot(20 + k), poses[q + k], rot_b)
+        add_entry(digits, _slot(20 + k), pose_b, k, rot_b, 1.0)
+        carry(digits, _slot(20 + k), n_rot_b)
     for k in range(count):
         if _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset) > threshold:
             continue
         verdict, excess = _reaches(
-            digits, poses, p, q, coords, m, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
+            digits, pose_a, pose_b, coords, m, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
             low_first - low, n_sum, low, 2 * rot + low_m, radius, length,
         )  # fmt: skip
         if verdict != SEPARATE:
@@ -144,7 +153,7 @@ def _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset):
 
 @kernel
 def _reaches(
-    digits, poses, p, q, coords, m, k, n_rot_b, core, n_core, at_product, grid, d, n_plane, at_first, n_sum, low,
+    digits, pose_a, pose_b, coords, m, k, n_rot_b, core, n_core, at_product, grid, d, n_plane, at_first, n_sum, low,
     low_plane, radius, length,
 ):  # fmt: skip
     """(verdict, excess) of vertex k of B: whether it lies within the radius of the half-space, exactly."""
@@ -161,8 +170,8 @@ def _reaches(
                 clear(digits, vertex, n_core)
                 add_double(digits, vertex, coords[j * m + k], core)
                 add_product(digits, y + at_product, _slot(20 + 3 * axis + j), n_rot_b, vertex, n_core, 1)
-        add_double(digits, y, poses[q + 9 + axis], grid)
-        add_double(digits, y, -poses[p + 9 + axis], grid)
+        add_entry(digits, y, pose_b, 9 + axis, grid, 1.0)
+        add_entry(digits, y, pose_a, 9 + axis, grid, -1.0)
         carry(digits, y, d)
         add_product(digits, total + at_first, _slot(12 + axis), n_plane, y, d, 1)
     sign = carry(digits, total, n_sum)

@@ -38,12 +38,12 @@ def plane_in_world(numbers, at, poses, p):
 
 @kernel
 def opposite_halfspaces(numbers, at_a, p, at_b, q, poses):
-    """(whether the outward normals are opposite within rounding, nhat_A)."""
+    """(whether the outward normals are opposite within rounding, also of composed poses; nhat_A)."""
     ax, ay, az, _, length_a = plane_in_world(numbers, at_a, poses, p)
     bx, by, bz, _, length_b = plane_in_world(numbers, at_b, poses, q)
     cx = ay * bz - az * by
     cy = az * bx - ax * bz
     cz = ax * by - ay * bx
     across = math.sqrt(cx * cx + cy * cy + cz * cz)
-    opposite = ax * bx + ay * by + az * bz < 0.0 and across <= 64.0 * 2.0**-53 * length_a * length_b
+    opposite = ax * bx + ay * by + az * bz < 0.0 and across <= 512.0 * 2.0**-53 * length_a * length_b
     return opposite, ax / length_a, ay / length_a, az / length_a

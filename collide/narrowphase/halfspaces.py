@@ -12,11 +12,11 @@ from fractions import Fraction
 import numpy as np
 
 from collide.geometry.packing import HALFSPACE
-from collide.geometry.tables import ShapeTable
+from collide.geometry.tables import PoseTable, ShapeTable
 from collide.results import EXACT
 
 
-def settle(rows: np.ndarray, open_rows: np.ndarray, pairs: np.ndarray, table: ShapeTable, poses, shape_of) -> None:
+def settle(rows: np.ndarray, open_rows: np.ndarray, pairs: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of) -> None:
     """Settle those of the open rows (their numbers) that are pairs of half-spaces, in place."""
     for k in open_rows:
         one, other = (int(part) for part in pairs[k])
@@ -24,7 +24,7 @@ def settle(rows: np.ndarray, open_rows: np.ndarray, pairs: np.ndarray, table: Sh
         if packed[0].kind != HALFSPACE or packed[1].kind != HALFSPACE:
             continue
         # Worked out on the same numbers whichever way the pair is asked.
-        flip = (packed[0].content, poses[one].tobytes()) > (packed[1].content, poses[other].tobytes())
+        flip = (packed[0].content, poses.rows[one].tobytes()) > (packed[1].content, poses.rows[other].tobytes())
         if flip:
             one, other = other, one
         _settle(rows[k : k + 1], *(_plane(table.packed[shape_of[part]].params, poses[part]) for part in (one, other)))
@@ -54,10 +54,9 @@ def _settle(row: np.ndarray, A, B) -> None:
     row["point_b"] = row["point_a"] + distance * row["normal"]
 
 
-def _plane(params: np.ndarray, pose: np.ndarray):
+def _plane(params: np.ndarray, pose: list[Fraction]):
     """(n, offset, p): the half-space is {x : n·x ≤ offset} in the world; p is its frame's origin."""
-    R = [[Fraction(v) for v in row] for row in pose[:9].reshape(3, 3).tolist()]
-    p = [Fraction(v) for v in pose[9:12].tolist()]
+    R, p = [pose[0:3], pose[3:6], pose[6:9]], pose[9:12]
     cofactor = [
         [
             R[(i + 1) % 3][(j + 1) % 3] * R[(i + 2) % 3][(j + 2) % 3]

@@ -10,7 +10,22 @@ import math
 
 from collide._jit import kernel
 from collide.geometry.packing import HALFSPACE
-from collide.geometry.tables import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, RANK, REACH, SLOP
+from collide.geometry.tables import (
+    ADDRESS,
+    COUNT,
+    INTS,
+    KIND,
+    NUMBERS,
+    PADDED,
+    PARAMS,
+    POSE,
+    POSE_SLOP,
+    POSE_TERMS,
+    RADIUS,
+    RANK,
+    REACH,
+    SLOP,
+)
 
 
 @kernel
@@ -52,7 +67,11 @@ def in_order(ints, poses, sa, pa, sb, pb):
 
 @kernel
 def size_and_slop(numbers, poses, sa, pa, sb, pb):
-    """S of `bounds.py` for the pair, and how far its stored points may be from those described."""
+    """(S of `bounds.py`, how far stored points may be from those described, whether exact terms tell better).
+
+    The last one says that the numbers the exact stage reads are those described: shapes stored as they
+    are, and poses given or known as exact sums.
+    """
     p = POSE * pa
     q = POSE * pb
     at_a = NUMBERS * sa
@@ -63,7 +82,11 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     size = numbers[at_a + REACH] * _longest_row(poses, p) + numbers[at_b + REACH] * _longest_row(poses, q)
     # The largest coordinate too: squares of tiny ones vanish, and such a pair must be refused, not 0.
     size += max(math.sqrt(tx * tx + ty * ty + tz * tz), abs(tx), abs(ty), abs(tz)) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
-    return size, numbers[at_a + SLOP] + numbers[at_b + SLOP] + poses[p + 12] + poses[q + 12]
+    shapes = numbers[at_a + SLOP] + numbers[at_b + SLOP]
+    known = (poses[p + POSE_SLOP] == 0.0 or poses[p + POSE_TERMS] >= 0.0) and (
+        poses[q + POSE_SLOP] == 0.0 or poses[q + POSE_TERMS] >= 0.0
+    )
+    return size, shapes + poses[p + POSE_SLOP] + poses[q + POSE_SLOP], known and shapes == 0.0
 
 
 @kernel

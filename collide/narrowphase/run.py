@@ -8,7 +8,7 @@ import numpy as np
 
 from collide._jit import address_of
 from collide.errors import UnsupportedQuery
-from collide.geometry.tables import ShapeTable
+from collide.geometry.tables import PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
 from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.narrowphase.halfspaces import settle
@@ -21,7 +21,7 @@ distrust_doubles = False
 
 def run_pairs(
     table: ShapeTable,
-    poses: np.ndarray,
+    poses: PoseTable,
     shape_of: np.ndarray,
     pairs: np.ndarray,
     *,
@@ -31,12 +31,12 @@ def run_pairs(
 ) -> np.ndarray:
     """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
 
-    poses : (parts, POSE).   shape_of : (parts,) int64, rows of ``table``.
+    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.
     Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-    tables = address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of)
+    tables = address_of(table.ints), address_of(table.numbers), address_of(poses.rows), address_of(shape_of)
     done = 0
     while done < len(pairs):
         todo, out = pairs[done:], rows[done:]
@@ -52,8 +52,9 @@ def run_pairs(
             fresh["how"], fresh["lower"], fresh["upper"], fresh["beyond"] = UNDECIDED, -np.inf, np.inf, False
         if (fresh["how"] == UNDECIDED).any():
             decide_pairs(
-                *tables, address_of(todo), answered, boolean, limit, address_of(out), address_of(_workspace.digits)
-            )
+                *tables, address_of(todo), answered, boolean, limit, address_of(out), address_of(poses.terms),
+                len(poses.terms), address_of(_workspace.digits),
+            )  # fmt: skip
             settle(out, np.flatnonzero(fresh["how"] == UNDECIDED), todo, table, poses, shape_of)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
