@@ -76,8 +76,9 @@ class Entry:
     Compiled at its first call for the one signature given, or read from the disk cache.
     """
 
-    def __init__(self, function: Callable, signature: str):
+    def __init__(self, function: Callable, signature: str, nogil: bool = True):
         self.__doc__, self.name = function.__doc__, function.__name__
+        self._flags = {**_FLAGS, "nogil": nogil}
         self._function, self._signature = function, signature
         self._ready: Callable | None = function if PLAIN_PYTHON else None
         self._lock = threading.Lock()
@@ -87,12 +88,30 @@ class Entry:
             self._compile()
         return self._ready(*args)
 
+    @property
+    def ready(self) -> Callable:
+        """The compiled function itself, without this object's own call in front of it."""
+        if self._ready is None:
+            self._compile()
+        return self._ready  # type: ignore[return-value]
+
+    @property
+    def address(self) -> int:
+        """Where the machine code starts, for `native_call`: kernels of another entry call it there.
+
+        A second entry that called the kernels themselves would compile the whole narrowphase again.
+        """
+        if PLAIN_PYTHON:
+            return _plain_address(self._function)
+        (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]
+        return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
     def _compile(self) -> None:
         with self._lock:
             if self._ready is not None:
                 return
             started = time.perf_counter()
-            dispatcher = numba.njit(self._function, **_FLAGS)
+            dispatcher = numba.njit(self._function, **self._flags)
             dispatcher._cache = _KernelCache.of(self._function)
             with on_compile(self.name):
                 dispatcher.compile(self._signature)
@@ -101,9 +120,13 @@ class Entry:
             self._ready = dispatcher
 
 
-def entry(signature: str) -> Callable[[Callable], Entry]:
-    """Decorator: a kernel called from Python, with its numba signature."""
-    return lambda function: Entry(function, signature)
+def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
+    """Decorator: a kernel called from Python, with its numba signature.
+
+    nogil : let other Python threads run meanwhile. A kernel of a microsecond that shares one
+        workspace among all threads keeps the lock instead.
+    """
+    return lambda function: Entry(function, signature, nogil)
 
 
 #: Seconds each entry took to become callable in this process, by compiling or by loading.
@@ -227,6 +250,50 @@ else:
             return array(types.int64, types.int64), codegen
 
         return view
+
+if PLAIN_PYTHON:
+    _functions: list[Callable] = []
+
+    def _plain_address(function: Callable) -> int:
+        if function not in _functions:
+            _functions.append(function)
+        return _functions.index(function)
+
+    def native_call(_signature: str):
+        return lambda address, arguments: _functions[int(address)](*arguments)
+
+    def address_in_kernel(array):
+        return array.ctypes.data
+
+else:
+
+    def native_call(signature: str):
+        """A kernel ``call(address, arguments)``: runs the `Entry` of this signature that stands there."""
+        arguments, result = numba.core.sigutils.normalize_signature(signature)
+
+        def make(_context, address, given):
+            def codegen(cgctx, builder, _signature, args):
+                convention = cgctx.call_conv
+                kind = convention.get_function_type(result, arguments)
+                unpacked = [builder.extract_value(args[1], k) for k in range(len(arguments))]
+                place = builder.inttoptr(args[0], kind.as_pointer())
+                _status, value = convention.call_function(builder, place, result, arguments, unpacked)
+                return value
+
+            return result(types.int64, types.Tuple(arguments)), codegen
+
+        return intrinsic(make)
+
+    @intrinsic
+    def address_in_kernel(_context, array):
+        """Address of an array's first element, inside a kernel."""
+
+        def codegen(cgctx, builder, signature, args):
+            data = make_array(signature.args[0])(cgctx, builder, args[0]).data
+            return builder.ptrtoint(data, cgctx.get_value_type(types.int64))
+
+        return types.int64(array), codegen
+
 
 #: ``view_f64(address, n)``: n doubles at an address, as a one-dimensional array; the caller keeps
 #: the buffer alive. Siblings for other element types.

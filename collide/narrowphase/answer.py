@@ -258,7 +258,11 @@ def _halves(pair, row, marks, flip):
     )
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)")
+#: How `answer_pairs` is called.
+SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def answer_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, stop_at_hit, limit, rows_at, doubles_at,
     integers_at,

@@ -27,7 +27,7 @@ def settle(rows: np.ndarray, open_rows: np.ndarray, pairs: np.ndarray, table: Sh
         flip = (packed[0].content, poses.rows[one].tobytes()) > (packed[1].content, poses.rows[other].tobytes())
         if flip:
             one, other = other, one
-        _settle(rows[k : k + 1], *(_plane(table.packed[shape_of[part]].params, poses[part]) for part in (one, other)))
+        _settle(rows[k : k + 1], *(_plane(table.packed[shape_of[part]].params, poses.exact(part)) for part in (one, other)))
         if flip:
             rows["normal"][k] = 0.0 - rows["normal"][k]
             rows["point_a"][k], rows["point_b"][k] = rows["point_b"][k].copy(), rows["point_a"][k].copy()

@@ -8,10 +8,11 @@ import numpy as np
 
 from collide._jit import address_of
 from collide.errors import UnsupportedQuery
-from collide.geometry.tables import PoseTable, ShapeTable
+from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
 from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.narrowphase.halfspaces import settle
+from collide.narrowphase.poses import ANSWERED, BAD_POSE, BLOCK, HEADER, answer_poses, distance_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
@@ -41,36 +42,121 @@ def run_pairs(
     while done < len(pairs):
         todo, out = pairs[done:], rows[done:]
         answered = answer_pairs(
-            *tables, address_of(todo), len(todo), boolean, stop_at_hit, limit, address_of(out), *_workspace.addresses
-        )
-        fresh = out[:answered]
-        if (fresh["how"] == REFUSED).any():
-            raise UnsupportedQuery(
-                f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
-            )
-        if distrust_doubles:
-            fresh["how"], fresh["lower"], fresh["upper"], fresh["beyond"] = UNDECIDED, -np.inf, np.inf, False
-        if (fresh["how"] == UNDECIDED).any():
-            decide_pairs(
-                *tables, address_of(todo), answered, boolean, limit, address_of(out), address_of(poses.terms),
-                len(poses.terms), address_of(_workspace.digits),
-            )  # fmt: skip
-            settle(out, np.flatnonzero(fresh["how"] == UNDECIDED), todo, table, poses, shape_of)
+            *tables, address_of(todo), len(todo), boolean, stop_at_hit, limit, address_of(out),
+            *_of_thread.space.addresses,
+        )  # fmt: skip
+        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
-        if stop_at_hit and fresh["hit"][-1]:
+        if stop_at_hit and out["hit"][answered - 1]:
             break
     return rows[:done]
 
 
-class _Workspace(local):
-    """Scratch memory of one thread, made when the thread first asks."""
+def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float) -> None:
+    """Settle in place what doubles left open."""
+    if (rows["how"] == REFUSED).any():
+        raise UnsupportedQuery(
+            f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
+        )
+    if distrust_doubles:
+        rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
+    if (rows["how"] == UNDECIDED).any():
+        decide_pairs(
+            address_of(table.ints), address_of(table.numbers), address_of(poses.rows), address_of(shape_of),
+            address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
+            address_of(_of_thread.space.digits),
+        )  # fmt: skip
+        settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
+
+
+def run_poses(
+    table: ShapeTable,
+    which: np.ndarray | None,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    check: bool,
+) -> np.ndarray | None:
+    """Two convex sets at n pairs of poses: bool[n], or rows of `PAIR_DTYPE`; None where a pose is no pose.
+
+    which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    check : refuse matrices that are no rotation.
+    """
+    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    space = _of_thread.space
+    header = space.header_of(table)
+    out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
+    done = 0
+    while done < n:
+        said = answer_poses(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, limit, check, address_of(out),
+        )  # fmt: skip
+        if said == BAD_POSE:
+            return None
+        done = int(header[ANSWERED])
+        if said:
+            start = done - 1 - (done - 1) % BLOCK
+            rows = space.rows[: done - start] if boolean else out[start:done]
+            _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit)
+            if boolean:
+                out[start:done] = rows["hit"]
+    return out
+
+
+class _Workspace:
+    """Scratch memory of the kernels."""
 
     def __init__(self) -> None:
         self.doubles = np.zeros(DOUBLES)
         self.integers = np.zeros(INTEGERS, dtype=np.int64)
         self.digits = np.zeros(DIGITS + 16, dtype=np.int64)
+        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), np.zeros((0, 12, TERMS)))
+        self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
+        self.pairs = np.arange(2 * BLOCK, dtype=np.int64).reshape(BLOCK, 2)
+        self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)
         self.addresses = address_of(self.doubles), address_of(self.integers)
 
+    def header_of(self, table: ShapeTable) -> np.ndarray:
+        """What `poses.py` reads first: addresses of the kernel, the tables and this workspace."""
+        self.shape_of[0::2], self.shape_of[1::2] = 0, 1
+        buffers = table.ints, table.numbers, self.poses.rows, self.shape_of, self.pairs, self.rows
+        header = np.zeros(HEADER, dtype=np.int64)
+        header[:ANSWERED] = answer_pairs.address, *map(address_of, buffers), *self.addresses
+        return header
 
-_workspace = _Workspace()
+
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+_of_thread = _OfThread()
+
+
+class SinglePair:
+    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call."""
+
+    #: One for all single calls: their kernels keep Python's lock.
+    _space: _Workspace | None = None
+
+    def __init__(self, bodies: tuple, table: ShapeTable):
+        if SinglePair._space is None:
+            SinglePair._space = _Workspace()
+        self.bodies, self._table = bodies, table  # held, since kernels read their buffers
+        self._header = SinglePair._space.header_of(table)
+        self.address = address_of(self._header)
+
+    def distance(self, X_WA, X_WB) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        if distance_single(self.address, X_WA, X_WB, rows.view(np.uint8)) < 0:
+            return None
+        rows["b"] = 1
+        return rows if rows["distance"][0] > -np.inf else None

@@ -18,9 +18,11 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("_parts",)
+    __slots__ = ("_parts", "_prepared")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
+    #: Pairs made ready for single calls, by id of the other shape, which they hold (`query.py`).
+    _prepared: dict[int, Any]
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
@@ -68,11 +70,11 @@ class Shape:
 
 def alone(packed: PackedConvex) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
     """The parts of a shape that is one convex set in its own frame."""
-    return ((packed, _IDENTITY),)
+    return ((packed, IDENTITY),)
 
 
-_IDENTITY = np.eye(4)
-_IDENTITY.flags.writeable = False
+IDENTITY = np.eye(4)
+IDENTITY.flags.writeable = False
 
 
 def _rebuild(cls, values):

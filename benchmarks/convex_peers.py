@@ -1,0 +1,152 @@
+"""coal and python-fcl as `benchmarks/convex.py` asks them: Python loops over poses that are ready to be used.
+
+Geometries, transforms and requests are made beforehand; a loop makes or clears the result and asks. Both are
+asked the same three questions: the boolean without contacts, the signed distance, the unsigned one.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+QUESTIONS = ("boolean", "signed", "unsigned")
+#: How long python-fcl may take over one loop before it counts as hung [s].
+PATIENCE = 300.0
+
+
+class Coal:
+    """coal with its default settings, contacts off for the boolean."""
+
+    name = "coal"
+
+    def __init__(self, solids: list, which: np.ndarray, X_WBs: np.ndarray):
+        import coal
+
+        used = np.unique(which)
+        geometry = {k: _coal_hull(solids[k].points, solids[k].faces) for k in used.tolist()}
+        self._origin = coal.Transform3s(np.eye(3), np.zeros(3))
+        self._pairs = [
+            (geometry[a], geometry[b], coal.Transform3s(np.array(X[:3, :3]), np.array(X[:3, 3])))
+            for (a, b), X in zip(which.tolist(), X_WBs)
+        ]
+
+    def loop(self, question: str) -> Callable[[], None]:
+        """The loop to be timed; it keeps no answers."""
+        ask, request, result, origin = *self._asked(question), self._origin
+
+        def run():
+            for a, b, T in self._pairs:
+                result.clear()
+                ask(a, origin, b, T, request, result)
+
+        return run
+
+    def answers(self, question: str) -> np.ndarray:
+        ask, request, result, origin = *self._asked(question), self._origin
+        found = []
+        for a, b, T in self._pairs:
+            result.clear()  # a distance result that is not cleared keeps its answer
+            found.append(ask(a, origin, b, T, request, result))
+        return np.array(found, dtype=float)
+
+    @staticmethod
+    def _asked(question: str) -> tuple:
+        import coal
+
+        if question == "boolean":
+            request = coal.CollisionRequest()
+            request.enable_contact = False
+            return coal.collide, request, coal.CollisionResult()
+        request = coal.DistanceRequest()
+        request.enable_signed_distance = question == "signed"
+        return coal.distance, request, coal.DistanceResult()
+
+
+def _coal_hull(points: np.ndarray, faces: np.ndarray):
+    import coal
+
+    corners, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in points:
+        corners.append(point)
+    for face in faces.tolist():
+        triangles.append(coal.Triangle(*face))
+    return coal.Convex(corners, triangles)
+
+
+class Fcl:
+    """python-fcl in a child process: on some inputs it ends the interpreter, which costs one question of one cell."""
+
+    name = "fcl"
+
+    def __init__(self, solids: list, which: np.ndarray, X_WBs: np.ndarray):
+        used = np.unique(which)
+        hulls = {k: (solids[k].points, solids[k].faces) for k in used.tolist()}
+        self._job = hulls, which, X_WBs
+        self._dead: set[str] = set()
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=_fcl_child, args=(other,), daemon=True)
+        self._process.start()
+        other.close()  # or the death of the child would not close the pipe
+        try:
+            self._pipe.send(self._job)
+        except OSError:
+            pass  # dead already, which the next question will find
+
+    def seconds(self, question: str) -> float:
+        """Of one loop; NaN where python-fcl has crashed or hung on it."""
+        if question in self._dead:
+            return math.nan
+        try:
+            self._pipe.send(question)
+            if self._pipe.poll(PATIENCE):
+                return self._pipe.recv()
+        except (EOFError, OSError):
+            pass
+        self._dead.add(question)
+        self.close()
+        self._start()
+        return math.nan
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self._pipe.close()
+
+
+def _fcl_child(pipe) -> None:
+    """Times one loop for every question that comes down the pipe."""
+    import fcl
+
+    hulls, which, X_WBs = pipe.recv()
+    geometry = {
+        k: fcl.Convex(points, len(faces), np.column_stack([np.full(len(faces), 3), faces]).ravel())
+        for k, (points, faces) in hulls.items()
+    }
+    still = {k: fcl.CollisionObject(g, fcl.Transform()) for k, g in geometry.items()}
+    pairs = [
+        (still[a], fcl.CollisionObject(geometry[b], fcl.Transform(np.array(X[:3, :3]), np.array(X[:3, 3]))))
+        for (a, b), X in zip(which.tolist(), X_WBs)
+    ]
+    while True:
+        try:
+            question = pipe.recv()
+        except EOFError:
+            return
+        if question == "boolean":
+            ask, request, result = fcl.collide, fcl.CollisionRequest(), fcl.CollisionResult
+        else:
+            signed = question == "signed"
+            request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=signed)
+            ask, result = fcl.distance, fcl.DistanceResult
+        started = time.perf_counter()
+        for a, b in pairs:
+            ask(a, b, request, result())  # results accumulate, so each pair gets its own
+        pipe.send(time.perf_counter() - started)
