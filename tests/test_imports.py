@@ -27,9 +27,10 @@ ROOMS = {
     "errors": set(),
     "cache_folder": set(),
     "_jit": {"cache_folder"},
+    "_simd": set(),
     "transforms": {"errors"},
     "results": {"errors"},
-    "geometry": {"_jit", "errors"},
+    "geometry": {"_jit", "_simd", "errors"},
     "shapes": {"errors", "transforms", "geometry"},
     "broadphase": {"_jit", "errors", "geometry"},
     "narrowphase": {"_jit", "errors", "transforms", "geometry", "results"},
@@ -57,6 +58,8 @@ BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal"
 COMPILERS = {
     "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
 }  # fmt: skip
+#: The files that make code, and what they need for it: everything else goes through them.
+COMPILER_PACKAGES = {"collide/_jit.py": {"numba"}, "collide/_simd.py": {"numba", "llvmlite"}}
 BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
 
 
@@ -172,7 +175,7 @@ def test_engine_needs_numpy_and_numba_only():
     for file in sources("collide"):
         optional = LATE.get(room(dotted(file)), set())
         for package, late, line in foreign(file):
-            if package == "numba" and shown(file) == "collide/_jit.py":
+            if package in COMPILER_PACKAGES.get(shown(file), ()):
                 continue
             if package not in optional or not late:
                 wrong.append(f"{shown(file)}:{line}: the engine must not need {package} here")
@@ -230,7 +233,7 @@ def test_one_way_to_compile():
     none_of(
         f"{shown(file)}:{node.lineno}: {name} belongs in collide/_jit.py"
         for file in sources()
-        if shown(file) != "collide/_jit.py"
+        if shown(file) not in COMPILER_PACKAGES
         for node in ast.walk(tree(file))
         if isinstance(node, (ast.Name, ast.Attribute))
         for name in [node.id if isinstance(node, ast.Name) else node.attr]

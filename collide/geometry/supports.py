@@ -10,56 +10,21 @@ import math
 
 from collide._jit import kernel
 from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
+from collide.geometry.scan import farthest
 
 
-@kernel
+@kernel(inline=True)
 def support_vertex(coordinates, n, m, gx, gy, gz):
     """Id of a vertex with the largest product with g, by a scan over contiguous blocks.
 
     coordinates : 3·m doubles: all x, all y, all z, filled up to a multiple of BLOCK.
-    n, m : number of vertices, and of stored ones.
-
-    Four running maxima break the chain of comparisons: a plain loop waits for each comparison.
-    (A scan with explicit SIMD, and a structure that is logarithmic in n, are to replace this.)
+    n, m : number of vertices, and of stored ones. The filling repeats vertex 0 and never wins.
     """
-    x0 = coordinates[0] * gx + coordinates[m] * gy + coordinates[2 * m] * gz
-    best0 = x0
-    best1 = x0
-    best2 = x0
-    best3 = x0
-    k0 = 0
-    k1 = 0
-    k2 = 0
-    k3 = 0
-    for i in range(0, m, 4):
-        d0 = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
-        d1 = coordinates[i + 1] * gx + coordinates[m + i + 1] * gy + coordinates[2 * m + i + 1] * gz
-        d2 = coordinates[i + 2] * gx + coordinates[m + i + 2] * gy + coordinates[2 * m + i + 2] * gz
-        d3 = coordinates[i + 3] * gx + coordinates[m + i + 3] * gy + coordinates[2 * m + i + 3] * gz
-        if d0 > best0:
-            best0 = d0
-            k0 = i
-        if d1 > best1:
-            best1 = d1
-            k1 = i + 1
-        if d2 > best2:
-            best2 = d2
-            k2 = i + 2
-        if d3 > best3:
-            best3 = d3
-            k3 = i + 3
-    if best1 > best0:
-        best0 = best1
-        k0 = k1
-    if best3 > best2:
-        best2 = best3
-        k2 = k3
-    if best2 > best0:
-        k0 = k2
-    return k0 if k0 < n else 0  # the filling repeats vertex 0
+    k, _ = farthest(coordinates, 0, m, m, gx, gy, gz)
+    return k
 
 
-@kernel
+@kernel(inline=True)
 def support(kind, coordinates, n, m, params, at, gx, gy, gz):
     """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
 

@@ -109,7 +109,7 @@ def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids, 
         weights[2] = 0.0
 
 
-@kernel
+@kernel(inline=True)
 def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved, exactly):
     """Two convex cores by GJK, and by EPA where they overlap.
 
@@ -148,7 +148,7 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     return depth, -depth, above, nx, ny, nz, n if outcome == FLAT else 3, shown, rounds + 65536 * added
 
 
-@kernel
+@kernel(inline=True)
 def _swept(
     pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
 ):
@@ -175,6 +175,8 @@ def _swept(
     words[ITERATIONS] = rounds
     width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
     write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
+    if boolean and marks[HOW] != UNDECIDED:
+        return
     ax = _combine(points, weights, n, 3)
     ay = _combine(points, weights, n, 4)
     az = _combine(points, weights, n, 5)
@@ -200,7 +202,7 @@ def _swept(
     write_vertices(words, marks, ids, vertices, flip)
 
 
-@kernel
+@kernel(inline=True)
 def _combine(points, weights, n, j):
     """Coordinate j of the weighted sum of n stored points."""
     total = 0.0
@@ -270,7 +272,7 @@ def answer_pairs(
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
     ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   shape_of : a shape row a part.
-    pairs : two part numbers a pair.   boolean : only hit, certified and how are wanted.
+    pairs : two part numbers a pair.   boolean : only hit and how are wanted; little else of a decided row is set.
     stop_at_hit : stop after the first hit.   limit : farther apart than this is not looked at.
     rows : PAIR_DTYPE, zeroed.   doubles, integers : workspace, see `run`.
     """
@@ -289,7 +291,7 @@ def answer_pairs(
     return n_pairs
 
 
-@kernel
+@kernel(inline=True)
 def _answer(
     ints_at, numbers_at, poses_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at, integers_at
 ):

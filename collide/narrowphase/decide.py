@@ -92,8 +92,10 @@ def decide_pairs(
         at_a, n_a = coordinates_of(ints, sa)
         at_b, n_b = coordinates_of(ints, sb)
         pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
-        count = marks[COUNT]
-        for j in range(count):
+        count = max(int(marks[COUNT]), 1)
+        ids[0] = 0  # a row decided as a boolean names no vertices (asked again only where tests distrust doubles)
+        ids[1] = 0
+        for j in range(marks[COUNT]):
             ids[2 * j] = words[(VERTICES_B if flip else VERTICES_A) + j]
             ids[2 * j + 1] = words[(VERTICES_A if flip else VERTICES_B) + j]
         low_b = ints[INTS * sb + LOWEST]

@@ -11,7 +11,7 @@ import math
 
 from collide._jit import kernel
 from collide.narrowphase.minkowski import copy_point, difference_point
-from collide.narrowphase.simplex import across_simplex, clearance_in_tetrahedron, nearest_in_simplex
+from collide.narrowphase.simplex import across_simplex, faces_in_sight, nearest_in_simplex
 
 #: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
 #: rounding can tell, or no plane separates and no tetrahedron encloses provably. ENCLOSED: the origin lies in a
@@ -19,7 +19,7 @@ from collide.narrowphase.simplex import across_simplex, clearance_in_tetrahedron
 NEAREST, MEETING, ENCLOSED, APART = range(4)
 
 
-@kernel
+@kernel(inline=True)
 def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
     """Run GJK on the cores of a pair.
 
@@ -59,7 +59,7 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     return status, n, lower, clearance, used
 
 
-@kernel
+@kernel(inline=True)
 def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
     """The rounds of GJK; see `gjk` for arguments and results."""
     tx = pair[14]
@@ -69,8 +69,15 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         tx = 1.0
     difference_point(pair, points, ids, 0, tx, ty, tz)
     n = 1
-    square = nearest_in_simplex(points, n, weights)
-    lower = -math.inf
+    square = nearest_in_simplex(points, n, weights, 15)
+    # The first support plane already parts most pairs that are farther apart than asked about.
+    span = math.sqrt(tx * tx + ty * ty + tz * tz)
+    lower = -(tx * points[0] + ty * points[1] + tz * points[2]) / span
+    if lower - error - radius > limit:
+        weights[4] = -tx * (lower / span)
+        weights[5] = -ty * (lower / span)
+        weights[6] = -tz * (lower / span)
+        return APART, n, lower, 0.0, 0
     for used in range(1, rounds + 1):
         length = math.sqrt(square)
         if length <= error:
@@ -88,12 +95,13 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             return APART, n, lower, 0.0, used
         if length - bound <= 0.125 * error or _repeated(ids, n):
             return NEAREST, n, lower, 0.0, used
-        before = (weights[0], weights[1], weights[2], weights[3])
-        closer = nearest_in_simplex(points, n + 1, weights)
+        faces = 15
         if n == 3:
-            clearance = clearance_in_tetrahedron(points, error)
-            if clearance > error:
+            faces, clearance = faces_in_sight(points, error)
+            if faces == 0:
                 return ENCLOSED, 4, lower, clearance, used
+        before = (weights[0], weights[1], weights[2], weights[3])
+        closer = nearest_in_simplex(points, n + 1, weights, faces)
         if not closer < square:
             weights[0], weights[1], weights[2], weights[3] = before
             weights[4] = vx
@@ -105,7 +113,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     return NEAREST, n, lower, 0.0, rounds
 
 
-@kernel
+@kernel(inline=True)
 def _repeated(ids, n):
     """Whether point n is one of the n before it (curved cores have no ids and never repeat)."""
     if ids[2 * n] < 0 or ids[2 * n + 1] < 0:
@@ -116,7 +124,7 @@ def _repeated(ids, n):
     return False
 
 
-@kernel
+@kernel(inline=True)
 def _drop_unused(points, ids, weights, n):
     """Keep the points with a positive weight; returns their number."""
     kept = 0

@@ -13,7 +13,7 @@ from collide.geometry.supports import support
 POINT = 9
 
 
-@kernel
+@kernel(inline=True)
 def difference_point(pair, points, ids, k, dx, dy, dz):
     """Store as point k the one of A ⊖ B farthest in direction d.
 
@@ -54,7 +54,7 @@ def difference_point(pair, points, ids, k, dx, dy, dz):
     ids[2 * k + 1] = ib
 
 
-@kernel
+@kernel(inline=True)
 def copy_point(points, ids, source, target):
     """Point ``target`` becomes point ``source``."""
     for j in range(POINT):

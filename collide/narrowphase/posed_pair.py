@@ -28,7 +28,7 @@ from collide.geometry.tables import (
 )
 
 
-@kernel
+@kernel(inline=True)
 def _longest_row(poses, p):
     longest = 0.0
     for k in range(3):
@@ -39,7 +39,7 @@ def _longest_row(poses, p):
     return math.sqrt(longest)
 
 
-@kernel
+@kernel(inline=True)
 def _exchange(ints, poses, sa, pa, sb, pb):
     """Whether to work on (B, A): by content of the shapes, then by the numbers of the poses."""
     rank_a = ints[INTS * sa + RANK]
@@ -52,7 +52,7 @@ def _exchange(ints, poses, sa, pa, sb, pb):
     return False
 
 
-@kernel
+@kernel(inline=True)
 def in_order(ints, poses, sa, pa, sb, pb):
     """(shape of A, part A, shape of B, part B, exchanged): a half-space first, else as the module says."""
     flip = _exchange(ints, poses, sa, pa, sb, pb)
@@ -65,7 +65,7 @@ def in_order(ints, poses, sa, pa, sb, pb):
     return sa, pa, sb, pb, False
 
 
-@kernel
+@kernel(inline=True)
 def size_and_slop(numbers, poses, sa, pa, sb, pb):
     """(S of `bounds.py`, how far stored points may be from those described, whether exact terms tell better).
 
@@ -89,7 +89,7 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     return size, shapes + poses[p + POSE_SLOP] + poses[q + POSE_SLOP], known and shapes == 0.0
 
 
-@kernel
+@kernel(inline=True)
 def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
     """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA."""
     p = POSE * pa
@@ -102,7 +102,7 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
     )  # fmt: skip
 
 
-@kernel
+@kernel(inline=True)
 def coordinates_of(ints, s):
     """Address and length of a shape's coordinates."""
     return ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED]

@@ -21,7 +21,7 @@ COUNT, HOW, EXACT_ROUNDS, HIT = _at("count", 1), _at("how", 1), _at("exact", 1),
 CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
 
 
-@kernel
+@kernel(inline=True)
 def write_vectors(row, nx, ny, nz, ax, ay, az, bx, by, bz, flip):
     """Normal and witness points of the pair as asked, from those of the pair as worked on."""
     sign = -1.0 if flip else 1.0
@@ -38,7 +38,7 @@ def write_vectors(row, nx, ny, nz, ax, ay, az, bx, by, bz, flip):
     row[second + 2] = bz
 
 
-@kernel
+@kernel(inline=True)
 def write_vertices(words, marks, ids, n, flip):
     first = VERTICES_B if flip else VERTICES_A
     second = VERTICES_A if flip else VERTICES_B
@@ -48,7 +48,7 @@ def write_vertices(words, marks, ids, n, flip):
         words[second + k] = ids[2 * k + 1]
 
 
-@kernel
+@kernel(inline=True)
 def write_verdict(row, marks, distance, lower, upper, how, width, limit):
     """The numbers and flags of a row; rounding must not put the distance outside its own bracket."""
     row[LOWER] = lower

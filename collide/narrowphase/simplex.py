@@ -13,90 +13,97 @@ from collide._jit import kernel
 from collide.narrowphase.minkowski import POINT
 
 
-@kernel
-def _try(points, n, weights, best, w0, w1, w2, w3):
-    """Keep the combination if it lies nearer the origin than the best one so far."""
-    x = w0 * points[0]
-    y = w0 * points[1]
-    z = w0 * points[2]
-    if n > 1:
-        x += w1 * points[POINT]
-        y += w1 * points[POINT + 1]
-        z += w1 * points[POINT + 2]
-    if n > 2:
-        x += w2 * points[2 * POINT]
-        y += w2 * points[2 * POINT + 1]
-        z += w2 * points[2 * POINT + 2]
-    if n > 3:
-        x += w3 * points[3 * POINT]
-        y += w3 * points[3 * POINT + 1]
-        z += w3 * points[3 * POINT + 2]
-    square = x * x + y * y + z * z
-    if square < best:
-        weights[0] = w0
-        weights[1] = w1
-        weights[2] = w2
-        weights[3] = w3
-        weights[4] = x
-        weights[5] = y
-        weights[6] = z
-        return square
-    return best
-
-
-@kernel
-def _weight(k, i, wi, j, wj, l, wl):
-    """Weight of vertex k where i, j, l carry wi, wj, wl."""
-    return wi if k == i else (wj if k == j else (wl if k == l else 0.0))
-
-
-@kernel
-def nearest_in_simplex(points, n, weights):
+@kernel(inline=True)
+def nearest_in_simplex(points, n, weights, faces):
     """Squared distance of the origin from the hull of the first n ≤ 4 points.
 
     weights : 7 doubles out: a weight for each point (0 beyond n), then the nearest point.
+    faces : of four points, the faces that may hold the nearest one (`faces_in_sight`): bit k is the one
+        across point k. Ignored for fewer.
     """
     best = math.inf
-    for i in range(n):
-        best = _try(
-            points, n, weights, best,
-            1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0, 1.0 if i == 3 else 0.0,
-        )  # fmt: skip
+    i0 = 0
+    i1 = -1
+    i2 = -1
+    w1 = 0.0
+    w2 = 0.0
+    x = 0.0
+    y = 0.0
+    z = 0.0
     for i in range(n):
         a = POINT * i
+        square = points[a] * points[a] + points[a + 1] * points[a + 1] + points[a + 2] * points[a + 2]
+        if square < best:
+            best = square
+            i0 = i
+            x = points[a]
+            y = points[a + 1]
+            z = points[a + 2]
+    for i in range(n - 1):
+        a = POINT * i
         for j in range(i + 1, n):
+            if n == 4 and faces & ~((1 << i) | (1 << j)) == 0:
+                continue
             b = POINT * j
             ex = points[b] - points[a]
             ey = points[b + 1] - points[a + 1]
             ez = points[b + 2] - points[a + 2]
             along = -(points[a] * ex + points[a + 1] * ey + points[a + 2] * ez)
-            square = ex * ex + ey * ey + ez * ez
-            if 0.0 < along < square:
-                wj = along / square
-                wi = 1.0 - wj
-                best = _try(
-                    points, n, weights, best,
-                    _weight(0, i, wi, j, wj, -1, 0.0), _weight(1, i, wi, j, wj, -1, 0.0),
-                    _weight(2, i, wi, j, wj, -1, 0.0), _weight(3, i, wi, j, wj, -1, 0.0),
-                )  # fmt: skip
-    if n < 3:
-        return best
-    for left_out in range(4 if n == 4 else 1):
-        # The face opposite one vertex; with three points, the only face.
-        i = 0 if (n == 3 or left_out != 0) else 1
-        j = 1 if (n == 3 or left_out > 1) else 2
-        k = 2 if (n == 3 or left_out == 3) else 3
-        wi, wj, wk = face_weights(points, POINT * i, POINT * j, POINT * k, 0.0, 0.0, 0.0)
-        if wi > 0.0 and wj > 0.0 and wk > 0.0:
-            best = _try(
-                points, n, weights, best,
-                _weight(0, i, wi, j, wj, k, wk), _weight(1, i, wi, j, wj, k, wk),
-                _weight(2, i, wi, j, wj, k, wk), _weight(3, i, wi, j, wj, k, wk),
-            )  # fmt: skip
+            length = ex * ex + ey * ey + ez * ez
+            if 0.0 < along < length:
+                w = along / length
+                px = points[a] + w * ex
+                py = points[a + 1] + w * ey
+                pz = points[a + 2] + w * ez
+                square = px * px + py * py + pz * pz
+                if square < best:
+                    best = square
+                    i0 = i
+                    i1 = j
+                    w1 = w
+                    x = px
+                    y = py
+                    z = pz
+    if n > 2:
+        for across in range(4 if n == 4 else 1):
+            if n == 4 and faces & (1 << across) == 0:
+                continue
+            # The face across one point; with three points, the only face.
+            i = 0 if (n == 3 or across != 0) else 1
+            j = 1 if (n == 3 or across > 1) else 2
+            k = 2 if (n == 3 or across == 3) else 3
+            wi, wj, wk = face_weights(points, POINT * i, POINT * j, POINT * k, 0.0, 0.0, 0.0)
+            if wi > 0.0 and wj > 0.0 and wk > 0.0:
+                px = wi * points[POINT * i] + wj * points[POINT * j] + wk * points[POINT * k]
+                py = wi * points[POINT * i + 1] + wj * points[POINT * j + 1] + wk * points[POINT * k + 1]
+                pz = wi * points[POINT * i + 2] + wj * points[POINT * j + 2] + wk * points[POINT * k + 2]
+                square = px * px + py * py + pz * pz
+                if square < best:
+                    best = square
+                    i0 = i
+                    i1 = j
+                    i2 = k
+                    w1 = wj
+                    w2 = wk
+                    x = px
+                    y = py
+                    z = pz
+    weights[0] = 0.0
+    weights[1] = 0.0
+    weights[2] = 0.0
+    weights[3] = 0.0
+    weights[i0] = 1.0 - w1 - w2 if i1 >= 0 else 1.0
+    if i1 >= 0:
+        weights[i1] = w1
+    if i2 >= 0:
+        weights[i2] = w2
+    weights[4] = x
+    weights[5] = y
+    weights[6] = z
     return best
 
 
-@kernel
+@kernel(inline=True)
 def across_simplex(points, n, vx, vy, vz):
     """The direction v made orthogonal to the edge or face of the first n = 2 or 3 points.
 
@@ -130,7 +137,7 @@ def across_simplex(points, n, vx, vy, vz):
     return nx, ny, nz
 
 
-@kernel
+@kernel(inline=True)
 def face_weights(points, a, b, c, x, y, z):
     """Barycentric coordinates of the projection of (x, y, z) on the plane of three points.
 
@@ -170,6 +177,13 @@ def clearance_behind(points, a, b, c, error):
     test a tetrahedron as thin as rounding "contained" an origin 0.29 m outside it. The distance is
     the least of the three corners' along the computed normal, a lower bound for any unit normal.
     """
+    height, square = _height_behind(points, a, b, c, error)
+    return height / math.sqrt(square) if height > 0.0 and square > 0.0 else -1.0
+
+
+@kernel(inline=True)
+def _height_behind(points, a, b, c, error):
+    """(clearance·|n|, |n|²) of `clearance_behind`, or (−1, 0). Lengths are bounded by sums: no roots."""
     px = points[a]
     py = points[a + 1]
     pz = points[a + 2]
@@ -182,29 +196,26 @@ def clearance_behind(points, a, b, c, error):
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
-    e = math.sqrt(ex * ex + ey * ey + ez * ez)
-    f = math.sqrt(fx * fx + fy * fy + fz * fz)
-    p = math.sqrt(px * px + py * py + pz * pz)
-    if not px * nx + py * ny + pz * nz > 2.0 * error * (e * f + 2.0 * p * (e + f)):
-        return -1.0
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if length == 0.0:
-        return -1.0
-    return (
-        min(
-            nx * px + ny * py + nz * pz,
-            nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
-            nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
-        )
-        / length
+    height = px * nx + py * ny + pz * nz
+    e = abs(ex) + abs(ey) + abs(ez)
+    f = abs(fx) + abs(fy) + abs(fz)
+    p = abs(px) + abs(py) + abs(pz)
+    if not height > 2.0 * error * (e * f + 2.0 * p * (e + f)):
+        return -1.0, 0.0
+    height = min(
+        height,
+        nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
+        nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
     )
+    return height, nx * nx + ny * ny + nz * nz
 
 
-@kernel
-def clearance_in_tetrahedron(points, error):
-    """How deep the origin provably lies in the hull of the first four points; −1 where it may not.
+@kernel(inline=True)
+def faces_in_sight(points, error):
+    """(faces, clearance): which faces of the first four points the origin may lie in front of.
 
-    The least clearance behind the four faces, which are oriented by the sign of the volume.
+    Bit k of ``faces`` is the face across point k; a face the origin provably lies behind cannot hold the
+    nearest point. Where it lies behind all four, clearance is how deep it provably is in the hull, else −1.
     """
     ex = points[POINT] - points[0]
     ey = points[POINT + 1] - points[1]
@@ -218,13 +229,20 @@ def clearance_in_tetrahedron(points, error):
     volume = gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
     one = POINT if volume < 0.0 else 2 * POINT  # vertex 3 behind (0, one, other)
     other = 2 * POINT if volume < 0.0 else POINT
+    faces = 0
     least = math.inf
-    for face in range(4):
-        a = 0 if face < 2 else (one if face == 2 else other)
-        b = one if face == 0 else 3 * POINT
-        c = other if face == 0 or face == 2 else (one if face == 1 else 0)
-        clearance = clearance_behind(points, a, b, c, error)
-        if clearance <= error:
-            return -1.0
-        least = min(least, clearance)
-    return least
+    for k in range(4):
+        # Across 3: (0, one, other); across other: (0, 3, one); across 0: (one, 3, other); across one: (other, 3, 0).
+        a = 0 if k < 2 else (one if k == 2 else other)
+        b = one if k == 0 else 3 * POINT
+        c = other if k == 0 or k == 2 else (one if k == 1 else 0)
+        height, square = _height_behind(points, a, b, c, error)
+        if height <= 0.0:
+            across = 3 if k == 0 else (other // POINT if k == 1 else (0 if k == 2 else one // POINT))
+            faces |= 1 << across
+        elif faces == 0:
+            least = min(least, height * height / square if square > 0.0 else 0.0)
+    if faces != 0:
+        return faces, -1.0
+    clearance = math.sqrt(least)
+    return (15, -1.0) if clearance <= error else (0, clearance)

@@ -1,0 +1,170 @@
+"""Code written in LLVM's own vectors, for the loops that the compiler does not vectorise by itself.
+
+A running maximum with its index is such a loop: without fastmath LLVM must keep the comparisons in
+their order. Vectors of eight doubles are asked for whatever the processor has; LLVM splits them into
+two of four (AVX2) or four of two (NEON, SSE2), so the bits of an answer are the same everywhere.
+
+`collide/geometry/scan.py` has the same functions one number at a time, for plain Python and for tests.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+
+#: Doubles to a vector.
+LANES = 8
+
+_F64, _I64 = ir.DoubleType(), ir.IntType(64)
+_VALUES, _INDICES = ir.VectorType(_F64, LANES), ir.VectorType(_I64, LANES)
+_RESULT = types.Tuple((types.int64, types.float64))  # type: ignore[attr-defined]
+#: Above every index: never wins a tie.
+_NOWHERE = 1 << 62
+
+
+@intrinsic
+def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
+    """(index, value) of the largest x·gx + y·gy + z·gz; described in `geometry/scan.py`."""
+    if not (isinstance(coordinates, types.Array) and coordinates.ndim == 1 and coordinates.layout == "C"):
+        raise TypingError("coordinates must be a contiguous one-dimensional view")
+    if coordinates.dtype != types.float64:
+        raise TypingError("coordinates must be doubles")
+    whole, real = types.int64, types.float64
+    signature = _RESULT(coordinates, whole, whole, whole, real, real, real)
+
+    def codegen(context, builder, signature, args):
+        data = make_array(signature.args[0])(context, builder, args[0]).data
+        value, index = _scan(builder, data, *args[1:])
+        return context.make_tuple(builder, signature.return_type, [index, value])
+
+    return signature, codegen
+
+
+def _scan(builder: ir.IRBuilder, data, start, stride, count, gx, gy, gz):
+    """Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
+
+    The last block ends with the last point, so it may overlap the one before: what is seen twice ties
+    with itself. Blocks come in the order of their indices, which is why `_later` may ask for more.
+    """
+    g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]
+    planes = [builder.gep(data, [at]) for at in (
+        start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]  # fmt: skip
+    lanes = ir.Constant(_INDICES, list(range(LANES)))
+
+    def block(at):
+        """The eight values from index ``at`` on, and their indices."""
+        x, y, z = (_load(builder, plane, at) for plane in planes)
+        xy = builder.fadd(builder.fmul(x, g[0]), builder.fmul(y, g[1]))
+        return builder.fadd(xy, builder.fmul(z, g[2])), builder.add(lanes, _splat(builder, at, _INDICES))
+
+    zero, one, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
+    first = block(zero)
+    last = builder.sub(count, one)
+    none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
+    begin = builder.block
+    several, pairs, odd, left, merge, reduce = (
+        builder.append_basic_block(name) for name in ("several", "pairs", "odd", "left_over", "merge", "reduce")
+    )
+    builder.cbranch(builder.icmp_signed("==", last, zero), reduce, several)
+
+    builder.position_at_end(several)
+    builder.cbranch(builder.icmp_signed("<", two, last), pairs, odd)
+
+    builder.position_at_end(pairs)  # the blocks at ``at`` and ``at + 8``, while a later one is left
+    at, even_best, odd_best = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
+    odd_next = _later(builder, odd_best, block(at))
+    even_next = _later(builder, even_best, block(builder.add(at, one)))
+    following = builder.add(at, two)
+    builder.cbranch(builder.icmp_signed("<", builder.add(following, one), last), pairs, odd)
+
+    builder.position_at_end(odd)  # one block before the last may be left
+    at_left, even_left, odd_left = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
+    builder.cbranch(builder.icmp_signed("<", at_left, last), left, merge)
+    for states in ((at, *even_best, *odd_best), (at_left, *even_left, *odd_left)):
+        for phi, initial, again in zip(states, (one, *first, *none), (following, *even_next, *odd_next)):
+            phi.add_incoming(initial, several)
+            phi.add_incoming(again, pairs)
+
+    builder.position_at_end(left)
+    odd_more = _later(builder, odd_left, block(at_left))
+    builder.branch(merge)
+
+    builder.position_at_end(merge)
+    odd_all = _phi_pair(builder)
+    for phi, without, with_it in zip(odd_all, odd_left, odd_more):
+        phi.add_incoming(without, odd)
+        phi.add_incoming(with_it, left)
+    merged = _earlier_of(builder, _later(builder, even_left, block(last)), odd_all)
+    builder.branch(reduce)
+
+    builder.position_at_end(reduce)
+    best = _phi_pair(builder)
+    for phi, only, larger in zip(best, first, merged):
+        phi.add_incoming(only, begin)
+        phi.add_incoming(larger, merge)
+    return _reduced(builder, best)
+
+
+def _later(builder, best, found):
+    """Running maximum: what comes later has to be strictly larger."""
+    larger = builder.fcmp_ordered(">", found[0], best[0])
+    return builder.select(larger, found[0], best[0]), builder.select(larger, found[1], best[1])
+
+
+def _earlier_of(builder, a, b):
+    """The larger value, lane by lane; the lower index where they are equal."""
+    larger = builder.fcmp_ordered(">", b[0], a[0])
+    equal = builder.fcmp_ordered("==", b[0], a[0])
+    lower = builder.icmp_signed("<", b[1], a[1])
+    take = builder.or_(larger, builder.and_(equal, lower))
+    return builder.select(take, b[0], a[0]), builder.select(take, b[1], a[1])
+
+
+def _reduced(builder, best):
+    """One value and index out of eight: the largest value, then the lowest index among the lanes that hold it.
+
+    The second half waits only for a comparison; carrying pairs down three times takes twice as long.
+    """
+    largest = _halved(builder, best[0], lambda a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+    holds_it = builder.fcmp_ordered("==", best[0], _splat(builder, largest, _VALUES))
+    indices = builder.select(holds_it, best[1], ir.Constant(_INDICES, [_NOWHERE] * LANES))
+    lowest = _halved(builder, indices, lambda a, b: builder.select(builder.icmp_signed("<", b, a), b, a))
+    return builder.fadd(largest, ir.Constant(_F64, 0.0)), lowest  # −0 becomes 0: lanes may hold both
+
+
+def _halved(builder, vector, better):
+    """Fold a vector's upper half onto its lower one until a number is left.
+
+    The halves get narrower: rotations of whole vectors have come back with wrong lanes.
+    """
+    nothing = ir.Constant(vector.type, ir.Undefined)
+    width = LANES
+    while width > 1:
+        width //= 2
+        masks = [[*range(begin, begin + width)] for begin in (0, width)]
+        low, high = (
+            builder.shuffle_vector(vector, nothing, ir.Constant(ir.VectorType(ir.IntType(32), width), mask))
+            for mask in masks
+        )
+        vector = better(low, high)
+        nothing = ir.Constant(vector.type, ir.Undefined)
+    return builder.extract_element(vector, ir.Constant(ir.IntType(32), 0))
+
+
+def _phi_pair(builder):
+    return builder.phi(_VALUES), builder.phi(_INDICES)
+
+
+def _load(builder, plane, at):
+    """Eight doubles, which need not stand on a multiple of 64 bytes."""
+    pointer = builder.bitcast(builder.gep(plane, [at]), _VALUES.as_pointer())
+    return builder.load(pointer, align=8)
+
+
+def _splat(builder, scalar, kind):
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), mask)

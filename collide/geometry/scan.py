@@ -1,0 +1,37 @@
+"""The farthest of many points in a direction, by a scan over blocks of coordinates.
+
+Support queries end here: small point sets are scanned as a whole, large ones through the short lists
+of `support_tree`. Products and sums round one by one in the order x·gx + y·gy + z·gz, so the value of
+a point does not depend on its place, on the processor, or on whether kernels are compiled.
+"""
+
+from __future__ import annotations
+
+from collide._jit import PLAIN_PYTHON, kernel
+
+
+@kernel
+def farthest_one_by_one(coordinates, start, stride, count, gx, gy, gz):
+    """`farthest`, one point at a time: what plain Python runs, and what tests compare with."""
+    best = coordinates[start] * gx + coordinates[start + stride] * gy + coordinates[start + 2 * stride] * gz
+    index = 0
+    for i in range(1, count):
+        at = start + i
+        value = coordinates[at] * gx + coordinates[at + stride] * gy + coordinates[at + 2 * stride] * gz
+        if value > best:
+            best = value
+            index = i
+    return index, best + 0.0  # −0 becomes 0
+
+
+if PLAIN_PYTHON:
+    farthest = farthest_one_by_one
+else:
+    from collide._simd import farthest_of_blocks as farthest
+
+#: ``farthest(coordinates, start, stride, count, gx, gy, gz) -> (index, value)``: the largest
+#: x·gx + y·gy + z·gz among ``count`` points, 8 or more. Point i has its x at
+#: ``start + i`` of the view, its y ``stride`` later, its z 2·``stride`` later. The lowest index wins
+#: among equal values (−0 equals 0, and is given as 0), so copies that fill up a block never win over what they copy.
+#: Values must not be NaN. O(count).
+__all__ = ["farthest", "farthest_one_by_one"]
