@@ -14,6 +14,65 @@ from collide.narrowphase.minkowski import POINT
 
 
 @kernel(inline=True)
+def _on_edge(ax, ay, az, bx, by, bz):
+    """(square, weight of b, x, y, z) of the point nearest the origin inside an edge; infinite where it is an end."""
+    ex = bx - ax
+    ey = by - ay
+    ez = bz - az
+    along = -(ax * ex + ay * ey + az * ez)
+    length = ex * ex + ey * ey + ez * ez
+    if 0.0 < along < length:
+        w = along / length
+        x = ax + w * ex
+        y = ay + w * ey
+        z = az + w * ez
+        return x * x + y * y + z * z, w, x, y, z
+    return math.inf, 0.0, 0.0, 0.0, 0.0
+
+
+@kernel(inline=True)
+def _on_triangle(points, a, b, c):
+    """(square, weights of b and c, x, y, z) of the point of a triangle nearest the origin."""
+    ax = points[a]
+    ay = points[a + 1]
+    az = points[a + 2]
+    bx = points[b]
+    by = points[b + 1]
+    bz = points[b + 2]
+    cx = points[c]
+    cy = points[c + 1]
+    cz = points[c + 2]
+    wa, wb, wc = face_weights(points, a, b, c, 0.0, 0.0, 0.0)
+    if wa > 0.0 and wb > 0.0 and wc > 0.0:
+        x = wa * ax + wb * bx + wc * cx
+        y = wa * ay + wb * by + wc * cy
+        z = wa * az + wb * bz + wc * cz
+        best = x * x + y * y + z * z
+    else:
+        best = math.inf
+        x = y = z = 0.0
+    square, w, px, py, pz = _on_edge(ax, ay, az, bx, by, bz)
+    if square < best:
+        best, wb, wc, x, y, z = square, w, 0.0, px, py, pz
+    square, w, px, py, pz = _on_edge(ax, ay, az, cx, cy, cz)
+    if square < best:
+        best, wb, wc, x, y, z = square, 0.0, w, px, py, pz
+    square, w, px, py, pz = _on_edge(bx, by, bz, cx, cy, cz)
+    if square < best:
+        best, wb, wc, x, y, z = square, 1.0 - w, w, px, py, pz
+    square = ax * ax + ay * ay + az * az
+    if square <= best:
+        best, wb, wc, x, y, z = square, 0.0, 0.0, ax, ay, az
+    square = bx * bx + by * by + bz * bz
+    if square <= best:
+        best, wb, wc, x, y, z = square, 1.0, 0.0, bx, by, bz
+    square = cx * cx + cy * cy + cz * cz
+    if square <= best:
+        best, wb, wc, x, y, z = square, 0.0, 1.0, cx, cy, cz
+    return best, wb, wc, x, y, z
+
+
+@kernel(inline=True)
 def nearest_in_simplex(points, n, weights, faces):
     """Squared distance of the origin from the hull of the first n ≤ 4 points.
 
@@ -21,82 +80,50 @@ def nearest_in_simplex(points, n, weights, faces):
     faces : of four points, the faces that may hold the nearest one (`faces_in_sight`): bit k is the one
         across point k. Ignored for fewer.
     """
-    best = math.inf
-    i0 = 0
-    i1 = -1
-    i2 = -1
-    w1 = 0.0
-    w2 = 0.0
-    x = 0.0
-    y = 0.0
-    z = 0.0
-    for i in range(n):
-        a = POINT * i
-        square = points[a] * points[a] + points[a + 1] * points[a + 1] + points[a + 2] * points[a + 2]
-        if square < best:
-            best = square
-            i0 = i
-            x = points[a]
-            y = points[a + 1]
-            z = points[a + 2]
-    for i in range(n - 1):
-        a = POINT * i
-        for j in range(i + 1, n):
-            if n == 4 and faces & ~((1 << i) | (1 << j)) == 0:
-                continue
-            b = POINT * j
-            ex = points[b] - points[a]
-            ey = points[b + 1] - points[a + 1]
-            ez = points[b + 2] - points[a + 2]
-            along = -(points[a] * ex + points[a + 1] * ey + points[a + 2] * ez)
-            length = ex * ex + ey * ey + ez * ez
-            if 0.0 < along < length:
-                w = along / length
-                px = points[a] + w * ex
-                py = points[a + 1] + w * ey
-                pz = points[a + 2] + w * ez
-                square = px * px + py * py + pz * pz
-                if square < best:
-                    best = square
-                    i0 = i
-                    i1 = j
-                    w1 = w
-                    x = px
-                    y = py
-                    z = pz
-    if n > 2:
-        for across in range(4 if n == 4 else 1):
-            if n == 4 and faces & (1 << across) == 0:
-                continue
-            # The face across one point; with three points, the only face.
-            i = 0 if (n == 3 or across != 0) else 1
-            j = 1 if (n == 3 or across > 1) else 2
-            k = 2 if (n == 3 or across == 3) else 3
-            wi, wj, wk = face_weights(points, POINT * i, POINT * j, POINT * k, 0.0, 0.0, 0.0)
-            if wi > 0.0 and wj > 0.0 and wk > 0.0:
-                px = wi * points[POINT * i] + wj * points[POINT * j] + wk * points[POINT * k]
-                py = wi * points[POINT * i + 1] + wj * points[POINT * j + 1] + wk * points[POINT * k + 1]
-                pz = wi * points[POINT * i + 2] + wj * points[POINT * j + 2] + wk * points[POINT * k + 2]
-                square = px * px + py * py + pz * pz
-                if square < best:
-                    best = square
-                    i0 = i
-                    i1 = j
-                    i2 = k
-                    w1 = wj
-                    w2 = wk
-                    x = px
-                    y = py
-                    z = pz
     weights[0] = 0.0
     weights[1] = 0.0
     weights[2] = 0.0
     weights[3] = 0.0
-    weights[i0] = 1.0 - w1 - w2 if i1 >= 0 else 1.0
-    if i1 >= 0:
-        weights[i1] = w1
-    if i2 >= 0:
-        weights[i2] = w2
+    if n < 3:
+        x = points[0]
+        y = points[1]
+        z = points[2]
+        best = x * x + y * y + z * z
+        w = 0.0
+        if n == 2:
+            bx = points[POINT]
+            by = points[POINT + 1]
+            bz = points[POINT + 2]
+            square, w, px, py, pz = _on_edge(x, y, z, bx, by, bz)
+            if square < best:
+                best, x, y, z = square, px, py, pz
+            else:
+                w = 0.0
+            square = bx * bx + by * by + bz * bz
+            if square < best:
+                best, w, x, y, z = square, 1.0, bx, by, bz
+        weights[0] = 1.0 - w
+        weights[1] = w
+    else:
+        best = math.inf
+        x = y = z = 0.0
+        first = 0
+        second = 1
+        third = 2
+        wb = 0.0
+        wc = 0.0
+        for across in range(3 if n == 3 else 0, 4):
+            if n == 4 and faces & (1 << across) == 0:
+                continue
+            i = 1 if across == 0 else 0
+            j = 2 if across < 2 else 1
+            k = 2 if across == 3 else 3
+            square, ub, uc, px, py, pz = _on_triangle(points, POINT * i, POINT * j, POINT * k)
+            if square < best:
+                best, first, second, third, wb, wc, x, y, z = square, i, j, k, ub, uc, px, py, pz
+        weights[first] = max(1.0 - wb - wc, 0.0)
+        weights[second] = wb
+        weights[third] = wc
     weights[4] = x
     weights[5] = y
     weights[6] = z
