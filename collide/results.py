@@ -88,20 +88,26 @@ class PairResult:
         """
         from collide.certificates import certificate_of
 
-        A, B, X_WA, X_WB = self._question
-        found = [certificate_of(A, B, X_WA[k], X_WB[k], row) for k, row in enumerate(self.rows)]
+        asked = (self._asked(k) for k in range(len(self.rows)))
+        found = [certificate_of(A, B, X_WA[0], X_WB[0], row) for (A, B, X_WA, X_WB), row in zip(asked, self.rows)]
         return found[0] if self._single else found
+
+    def _asked(self, k: int) -> tuple:
+        """(A, B, X_WA, X_WB) of row k, poses (1, 4, 4)."""
+        A, B, X_WA, X_WB = self._question
+        shapes = (S[k] if isinstance(S, tuple) else S for S in (A, B))
+        poses = (X if len(X) == 1 else X[k : k + 1] for X in (X_WA, X_WB))
+        return (*shapes, *poses)
 
     @property
     def question(self) -> tuple:
-        """(A, B, X_WA, X_WB): the shapes and poses that were asked, poses with a leading N."""
+        """(A, B, X_WA, X_WB) as asked: shapes, or tuples of them, and poses with a leading N or 1."""
         return self._question
 
     def __getitem__(self, k: int) -> PairResult:
         """Result k of a batch."""
-        A, B, X_WA, X_WB = self._question
         k = range(len(self.rows))[k]
-        return PairResult(self.rows[k : k + 1], True, (A, B, X_WA[k : k + 1], X_WB[k : k + 1]))
+        return PairResult(self.rows[k : k + 1], True, self._asked(k))
 
     def __getattr__(self, name: str):
         if name not in FIELDS:

@@ -1,0 +1,202 @@
+"""The ways to ask the same question: one pair, a batch, many shapes, several threads. All give the same bits."""
+
+from __future__ import annotations
+
+import gc
+import threading
+
+import numpy as np
+import pytest
+
+import collide
+from collide.errors import InvalidArgument, InvalidPose
+
+EYE = np.eye(4)
+
+
+def _shapes(rng):
+    return [
+        collide.Box((1, 0.5, 0.25)),
+        collide.Sphere(0.4),
+        collide.Capsule(0.2, 0.7),
+        collide.Cylinder(0.3, 0.8),
+        collide.ConvexHull(rng.normal(size=(9, 3)) * 0.5),
+        collide.ConvexHull(rng.normal(size=(60, 3)) * 0.4, radius=0.05),
+        collide.Halfspace((0, 0.3, 1), -0.2),
+        collide.Compound([(collide.Box((1, 1, 0.1)), collide.pose((0, 0, 0.3))), (collide.Sphere(0.2), EYE)]),
+    ]
+
+
+def _poses(rng, n, spread=0.8):
+    return np.array([collide.pose(rng.uniform(-spread, spread, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(n)])
+
+
+def _many(rng, n):
+    """n pairs of shapes and poses, none of two half-spaces."""
+    shapes = _shapes(rng)
+    picks = [(shapes[i], shapes[j]) for i, j in rng.integers(0, len(shapes), size=(4 * n, 2)) if min(i, j) != 6 or i != j]
+    A, B = zip(*picks[:n])
+    return list(A), list(B), _poses(rng, n), _poses(rng, n)
+
+
+def test_single_calls_give_the_bits_of_batches():
+    rng = np.random.default_rng(1)
+    hits = 0
+    for A in _shapes(rng):
+        for B in _shapes(rng)[:6]:
+            X_WA, X_WB = _poses(rng, 1)[0], _poses(rng, 20)
+            X_WB[::5] = X_WA  # deep, and for equal shapes the exact stage
+            batch = collide.distance(A, B, X_WA, X_WB)
+            booleans = collide.collide(A, B, X_WA, X_WB)
+            for k in range(20):
+                for _ in range(2):  # the first call prepares the pair, the second finds it prepared
+                    one = collide.distance(A, B, X_WA, X_WB[k])
+                    assert one.rows.tobytes() == batch.rows[k : k + 1].tobytes(), (A, B, X_WA.tolist(), X_WB[k].tolist())
+                    said = collide.collide(A, B, X_WA, X_WB[k])
+                    assert isinstance(said, bool) and said == booleans[k] == one.hit
+            hits += booleans.sum()
+    assert 300 < hits < 900
+
+
+def test_sequences_of_shapes_answer_like_pairs():
+    rng = np.random.default_rng(2)
+    A, B, X_WA, X_WB = _many(rng, 150)
+    hits, rows = collide.collide(A, B, X_WA, X_WB), collide.distance(A, B, X_WA, X_WB)
+    assert 20 < hits.sum() < 130
+    for k in range(150):
+        one = collide.distance(A[k], B[k], X_WA[k], X_WB[k])
+        assert np.array_equal(rows[k].rows, one.rows) and hits[k] == one.hit
+        assert rows[k].question[:2] == (A[k], B[k])
+    certificates = rows.certificate
+    for k in range(0, 150, 10):
+        if certificates[k] is not None:
+            collide.verify(A[k], B[k], X_WA[k], X_WB[k], rows[k], certificate=certificates[k])
+    against_one = collide.collide(A, B[0], X_WA, X_WB)
+    assert [bool(h) for h in against_one] == [collide.collide(A[k], B[0], X_WA[k], X_WB[k]) for k in range(150)]
+
+
+@pytest.mark.parametrize("threads", [2, 3, 8])
+def test_threads_give_the_same_bits(threads):
+    rng = np.random.default_rng(3)
+    A, B, X_WA, X_WB = _many(rng, 200)
+    assert np.array_equal(collide.collide(A, B, X_WA, X_WB, threads=threads), collide.collide(A, B, X_WA, X_WB))
+    hull = _shapes(rng)[4]
+    X_WB[::2] = EYE  # half of them with an exact stage
+    for boolean in (collide.collide, lambda *args, **options: collide.distance(*args, **options).rows):
+        one = boolean(hull, hull, EYE, X_WB)
+        assert np.array_equal(boolean(hull, hull, EYE, X_WB, threads=threads), one)
+
+
+def test_single_calls_from_many_threads_do_not_mix():
+    rng = np.random.default_rng(4)
+    A, B = collide.ConvexHull(rng.normal(size=(20, 3))), collide.Box((1, 1, 1))
+    X_WB = _poses(rng, 400, 2.0)
+    expected = collide.distance(A, B, EYE, X_WB).rows
+    wrong = []
+
+    def work(offset):
+        for k in range(offset, 400, 4):
+            if collide.distance(A, B, EYE, X_WB[k]).rows.tobytes() != expected[k : k + 1].tobytes():
+                wrong.append(k)
+            if collide.collide(A, B, EYE, X_WB[k]) != expected["hit"][k]:
+                wrong.append(k)
+
+    workers = [threading.Thread(target=work, args=(t,)) for t in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert not wrong and 50 < expected["hit"].sum() < 350
+
+
+@pytest.mark.parametrize("n", [1, 63, 64, 65, 130])
+def test_blocks_end_where_they_should(n):
+    """The exact stage takes the rows of one block; open rows stand at either end of it."""
+    box = collide.Box((1, 1, 1))
+    X_WB = np.tile(collide.pose((0, 0, 2)), (n, 1, 1))
+    X_WB[[0, n // 2, -1]] = collide.pose((0, 0, 1))
+    expected = np.zeros(n, dtype=bool)
+    expected[[0, n // 2, -1]] = True
+    assert np.array_equal(collide.collide(box, box, EYE, X_WB), expected)
+    r = collide.distance(box, box, EYE, X_WB)
+    assert np.array_equal(r.hit, expected) and (r.exact[expected] > 0).all() and not r.exact[~expected].any()
+
+
+@pytest.mark.parametrize("form", ["read-only", "Fortran", "strided", "float32", "list", "tuple"])
+def test_poses_in_any_form(form):
+    rng = np.random.default_rng(5)
+    A, B = collide.Box((1, 1, 1)), collide.ConvexHull(rng.normal(size=(12, 3)))
+    exact32 = np.eye(4)
+    exact32[:3, 3] = 0.5, 0.25, 1.25
+    given = {
+        "read-only": np.array(exact32), "Fortran": np.asfortranarray(exact32),
+        "strided": np.repeat(np.repeat(exact32, 2, 0), 2, 1)[::2, ::2], "float32": exact32.astype(np.float32),
+        "list": exact32.tolist(), "tuple": (exact32[:3, :3], exact32[:3, 3]),
+    }[form]  # fmt: skip
+    if form == "read-only":
+        given.flags.writeable = False
+    expected = collide.distance(A, B, EYE, exact32.copy()).rows.tobytes()
+    for _ in range(2):
+        assert collide.distance(A, B, EYE, given).rows.tobytes() == expected
+        assert collide.collide(A, B, EYE, given) is True
+
+
+def test_a_bad_pose_in_a_single_call_and_anywhere_in_a_batch_is_named():
+    box = collide.Box((1, 1, 1))
+    collide.collide(box, box, EYE, EYE)  # prepared
+    X = np.tile(EYE, (300, 1, 1))
+    for fault, value in (("nan", np.nan), ("large", 1e60), ("stretched", 1.5), ("mirrored", -1.0)):
+        bad = EYE.copy()
+        bad[0, 0] = value
+        with pytest.raises(InvalidPose, match="X_WB"):
+            collide.collide(box, box, EYE, bad)
+        with pytest.raises(InvalidPose, match="X_WA"):
+            collide.distance(box, box, bad, EYE)
+        for threads in (1, 3):
+            X[:] = EYE
+            X[217] = bad
+            with pytest.raises(InvalidPose, match=r"X_WB\[217\]"):
+                collide.collide(box, box, EYE, X, threads=threads)
+        if fault in ("stretched", "mirrored"):
+            assert collide.collide(box, box, EYE, bad, check_poses=False)
+    bent = EYE.copy()
+    bent[3, 0] = 1e-9
+    with pytest.raises(InvalidPose, match=r"\(0, 0, 0, 1\)"):
+        collide.collide(box, box, EYE, bent)
+    with pytest.raises(InvalidPose, match="shape"):
+        collide.collide(box, box, EYE, np.eye(3))
+
+
+def test_wrong_arguments_are_named():
+    box = collide.Box((1, 1, 1))
+    with pytest.raises(InvalidArgument, match="sequence of 2 shapes"):
+        collide.collide([box, box], box, EYE, np.tile(EYE, (3, 1, 1)))
+    with pytest.raises(InvalidArgument, match="sequence of 2 shapes"):
+        collide.collide([box, box], box, EYE, EYE)
+    with pytest.raises(InvalidArgument, match="B must be a shape"):
+        collide.collide(box, [], EYE, EYE)
+    with pytest.raises(InvalidArgument, match="threads"):
+        collide.collide(box, box, EYE, np.tile(EYE, (3, 1, 1)), threads=0)
+
+
+def test_a_prepared_pair_is_never_taken_for_another():
+    """Partners are looked up by id; one that is gone must not lend its id to a different shape."""
+    A = collide.Box((1, 1, 1))
+    X = collide.pose((0, 0, 1.2))
+    for k in range(300):
+        B = collide.Sphere(0.1 + 0.002 * k)
+        assert collide.collide(A, B, EYE, X) == (0.1 + 0.002 * k >= 0.7), k
+        del B
+        if k % 50 == 0:
+            gc.collect()
+    assert len(A._prepared) <= 64
+
+
+def test_a_result_keeps_the_poses_it_was_asked_at():
+    box = collide.Box((1, 1, 1))
+    for poses in (collide.pose((0, 0, 3)), np.tile(collide.pose((0, 0, 3)), (2, 1, 1))):
+        r = collide.distance(box, box, EYE, poses)
+        asked = poses.copy()
+        poses[..., 2, 3] = 0.0
+        first = r if poses.ndim == 2 else r[0]
+        collide.verify(box, box, EYE, asked if poses.ndim == 2 else asked[0], first)
