@@ -46,8 +46,9 @@ def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
 def _scan(builder: ir.IRBuilder, data, start, stride, count, gx, gy, gz):
     """Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
 
-    The last block ends with the last point, so it may overlap the one before: what is seen twice ties
-    with itself. Blocks come in the order of their indices, which is why `_later` may ask for more.
+    The last two blocks end with the last point, so they may overlap those before: what is seen twice ties with
+    itself. No branch but the loop's depends on the number of points, since mispredicted ones cost more than
+    blocks. Blocks of one maximum come in the order of their indices, as `_later` takes for granted.
     """
     g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]
     planes = [builder.gep(data, [at]) for at in (
@@ -61,42 +62,34 @@ def _scan(builder: ir.IRBuilder, data, start, stride, count, gx, gy, gz):
         return builder.fadd(xy, builder.fmul(z, g[2])), builder.add(lanes, _splat(builder, at, _INDICES))
 
     zero, one, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
+    none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
     first = block(zero)
     last = builder.sub(count, one)
-    none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
+    last_but_one = builder.sub(last, one)
     begin = builder.block
-    several, pairs, odd, left, merge, reduce = (
-        builder.append_basic_block(name) for name in ("several", "pairs", "odd", "left_over", "merge", "reduce")
-    )
+    several, pairs, ends, reduce = (builder.append_basic_block(name) for name in ("several", "pairs", "ends", "reduce"))
     builder.cbranch(builder.icmp_signed("==", last, zero), reduce, several)
 
     builder.position_at_end(several)
-    builder.cbranch(builder.icmp_signed("<", two, last), pairs, odd)
+    builder.cbranch(builder.icmp_signed("<", one, last_but_one), pairs, ends)
 
-    builder.position_at_end(pairs)  # the blocks at ``at`` and ``at + 8``, while a later one is left
+    builder.position_at_end(pairs)  # blocks ``at`` and ``at + 8``, before the last two
     at, even_best, odd_best = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
     odd_next = _later(builder, odd_best, block(at))
     even_next = _later(builder, even_best, block(builder.add(at, one)))
     following = builder.add(at, two)
-    builder.cbranch(builder.icmp_signed("<", builder.add(following, one), last), pairs, odd)
+    builder.cbranch(builder.icmp_signed("<", following, last_but_one), pairs, ends)
 
-    builder.position_at_end(odd)  # one block before the last may be left
-    at_left, even_left, odd_left = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
-    builder.cbranch(builder.icmp_signed("<", at_left, last), left, merge)
-    for states in ((at, *even_best, *odd_best), (at_left, *even_left, *odd_left)):
-        for phi, initial, again in zip(states, (one, *first, *none), (following, *even_next, *odd_next)):
-            phi.add_incoming(initial, several)
-            phi.add_incoming(again, pairs)
-
-    builder.position_at_end(left)
-    odd_more = _later(builder, odd_left, block(at_left))
-    builder.branch(merge)
-
-    builder.position_at_end(merge)
-    odd_all = _phi_pair(builder)
-    for phi, without, with_it in zip(odd_all, odd_left, odd_more):
-        phi.add_incoming(without, odd)
-        phi.add_incoming(with_it, left)
+    builder.position_at_end(ends)
+    even_left, odd_left = _phi_pair(builder), _phi_pair(builder)
+    for phi, initial, again in zip((at, *even_best, *odd_best), (one, *first, *none), (following, *even_next, *odd_next)):
+        phi.add_incoming(initial, several)
+        phi.add_incoming(again, pairs)
+    for phi, initial, again in zip((*even_left, *odd_left), (*first, *none), (*even_next, *odd_next)):
+        phi.add_incoming(initial, several)
+        phi.add_incoming(again, pairs)
+    within = builder.select(builder.icmp_signed("<", last_but_one, zero), zero, last_but_one)
+    odd_all = _later(builder, odd_left, block(within))
     merged = _earlier_of(builder, _later(builder, even_left, block(last)), odd_all)
     builder.branch(reduce)
 
@@ -104,7 +97,7 @@ def _scan(builder: ir.IRBuilder, data, start, stride, count, gx, gy, gz):
     best = _phi_pair(builder)
     for phi, only, larger in zip(best, first, merged):
         phi.add_incoming(only, begin)
-        phi.add_incoming(larger, merge)
+        phi.add_incoming(larger, ends)
     return _reduced(builder, best)
 
 

@@ -6,12 +6,22 @@ import math
 
 from collide._jit import entry, kernel, view_f64, view_i64
 from collide.geometry.packing import HALFSPACE
-from collide.geometry.supports import support
-from collide.geometry.tables import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, REACH, SLOP
+from collide.geometry.supports import settled_vertex, support
+from collide.geometry.tables import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, REACH, SLOP, TREE
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
 #: derivation in `narrowphase/bounds.py` needs fewer.
 _OUTWARD = 32 * 2.0**-53
+
+
+@kernel
+def _proven(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
+    """`support`, of a support tree the vertex that is farthest for certain."""
+    k, x, y, z = support(kind, coordinates, n, m, params, at, tree, gx, gy, gz)
+    if tree != 0:
+        k = settled_vertex(coordinates, n, m, tree, k, gx, gy, gz)
+        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]
+    return k, x, y, z
 
 
 @kernel
@@ -25,9 +35,10 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
     n = ints[INTS * s + COUNT]
     m = ints[INTS * s + PADDED]
     t = poses[POSE * p + 9 + axis]
-    _, x, y, z = support(kind, coordinates, n, m, numbers, at + PARAMS, rx, ry, rz)
+    tree = ints[INTS * s + TREE]
+    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, rx, ry, rz)
     high = (x * rx + y * ry + z * rz) + t
-    _, x, y, z = support(kind, coordinates, n, m, numbers, at + PARAMS, -rx, -ry, -rz)
+    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, -rx, -ry, -rz)
     low = (x * rx + y * ry + z * rz) + t
     row = math.sqrt(rx * rx + ry * ry + rz * rz)
     radius = numbers[at + RADIUS]

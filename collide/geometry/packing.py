@@ -7,7 +7,7 @@ half-space. Spheres are one point, capsules two, boxes eight: one kernel answers
 from __future__ import annotations
 
 import hashlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class PackedConvex(NamedTuple):
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.
+    tree : the points' support tree, made when its address is first asked for; None for few points.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
         integers times 2 to it.
     content : digest of the numbers above; equal for equal sets, in every process. It orders the
@@ -44,19 +45,23 @@ class PackedConvex(NamedTuple):
     params: np.ndarray
     points: np.ndarray
     coordinates: np.ndarray
+    tree: Any
     lowest: int
     content: bytes
 
 
-def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0) -> PackedConvex:
-    """The hull of ``points`` (n, 3), swept by a ball of ``radius``."""
+def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, tree: Any = None) -> PackedConvex:
+    """The hull of ``points`` (n, 3), swept by a ball of ``radius``.
+
+    tree : something with the ``address`` of the points' support tree (`support_tree.planted`).
+    """
     n = len(points)
     columns = np.empty((3, -(-n // BLOCK) * BLOCK))
     columns[:, :n] = points.T
     columns[:, n:] = points[0][:, None]
     # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
     reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns))
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree)
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
@@ -69,13 +74,13 @@ def pack_halfspace(normal, offset: float) -> PackedConvex:
     return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
 
 
-def _packed(kind, radius, reach, slop, params, points, coordinates) -> PackedConvex:
+def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None) -> PackedConvex:
     row = np.zeros(4)
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
     lowest = lowest_exponent(points)
-    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, lowest, digest.digest())
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, lowest, digest.digest())
 
 
 def lowest_exponent(values: np.ndarray) -> int:

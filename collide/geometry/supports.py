@@ -11,6 +11,8 @@ import math
 from collide._jit import kernel
 from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
+from collide.geometry.support_tree.query import extreme_vertex
+from collide.geometry.support_tree.settle import settle_vertex
 
 
 @kernel(inline=True)
@@ -24,12 +26,22 @@ def support_vertex(coordinates, n, m, gx, gy, gz):
     return k
 
 
+@kernel
+def settled_vertex(coordinates, n, m, tree, vertex, gx, gy, gz):
+    """Id of a vertex that is farthest in direction g for certain, near one that is likely to be."""
+    proven = settle_vertex(tree, vertex, gx, gy, gz)
+    return proven if proven >= 0 else support_vertex(coordinates, n, m, gx, gy, gz)
+
+
 @kernel(inline=True)
-def support(kind, coordinates, n, m, params, at, gx, gy, gz):
+def support(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
     """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
 
+    tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
     params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
     """
+    if tree != 0:
+        return extreme_vertex(tree, gx, gy, gz)
     if kind == POINTS:
         k = support_vertex(coordinates, n, m, gx, gy, gz)
         return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]

@@ -14,8 +14,8 @@ from collide._jit import address_of
 from collide.geometry.packing import PackedConvex
 
 # One row of integers a shape.
-KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK = range(6)
-INTS = 6
+KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE = range(7)
+INTS = 7
 # One row of doubles a shape; PARAMS is the first of four.
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
@@ -34,6 +34,8 @@ _PRODUCT_SLOP = 16 * 2.0**-53
 class ShapeTable:
     """Distinct convex sets, row by row, with everything they point to kept alive.
 
+    Support trees are made when a row is first to be asked about: `plant`.
+
     ``rank`` orders the rows by content, so that a pair is worked on in the same order whichever
     way it is asked: that makes swapped answers the exact mirror of each other.
     """
@@ -43,11 +45,19 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0
+            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
         self.ints[:, RANK] = [order[p.content] for p in packed]
+        self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
+
+    def plant(self, rows: np.ndarray) -> None:
+        """Have the support trees of these rows, so far as their shapes are large enough for one."""
+        if self._without_tree:
+            for k in self._without_tree.intersection(np.unique(rows).tolist()):
+                self.ints[k, TREE] = self.packed[k].tree.address
+            self._without_tree.difference_update(rows.ravel().tolist())
 
 
 class PoseTable(NamedTuple):

@@ -11,7 +11,7 @@ import math
 
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import POINTS
-from collide.geometry.supports import support
+from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
 from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS, TOLERANCE_CURVED
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
@@ -52,7 +52,7 @@ DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
 @kernel
 def _segment_differences(pair, points, ids):
     """The four differences of two cores of at most two points, each core's ends in order."""
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz) = pair
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz, _, _) = pair
     for k in range(4):
         i = min(k & 1, n_a - 1)
         j = min(k >> 1, n_b - 1)
@@ -153,7 +153,7 @@ def _swept(
     pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
 ):
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
-    (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _) = pair
+    (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
     radius_b = numbers[NUMBERS * shape_b + RADIUS]
     radius = radius_a + radius_b
@@ -214,18 +214,21 @@ def _combine(points, weights, n, j):
 @kernel
 def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size, error, flip):
     """A half-space A and a convex B: the point of B deepest behind the plane."""
-    (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz) = pair
+    (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b) = pair
     ids = view_i64(integers_at, 10)
     nx, ny, nz, offset, length = plane_in_world(numbers, at_a, poses, p)
     nx /= length
     ny /= length
     nz /= length
-    k, x, y, z = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b,
-        -(poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz),
-        -(poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz),
-        -(poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz),
-    )  # fmt: skip
+    gx = -(poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz)
+    gy = -(poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz)
+    gz = -(poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz)
+    k, x, y, z = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, gx, gy, gz)
+    if tree_b != 0:
+        k = settled_vertex(coords_b, n_b, m_b, tree_b, k, gx, gy, gz)
+        x = coords_b[k]
+        y = coords_b[m_b + k]
+        z = coords_b[2 * m_b + k]
     bx = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
     by = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
     bz = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
@@ -247,7 +250,7 @@ def _halves(pair, row, marks, flip):
 
     Opposite within rounding is left open, for `halfspaces.py` to settle.
     """
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _) = pair
+    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _) = pair
     opposite, nx, ny, nz = opposite_halfspaces(numbers, at_a, p, at_b, q, poses)
     row[LOWER] = -math.inf
     row[DISTANCE] = -math.inf

@@ -21,7 +21,7 @@ import math
 
 from collide._jit import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import EPA_FACETS, EPA_VERTICES
-from collide.narrowphase.minkowski import POINT, copy_point, difference_point
+from collide.narrowphase.minkowski import POINT, copy_point, difference_point, has_trees, settle_point
 from collide.narrowphase.simplex import clearance_behind, face_weights
 
 #: Doubles and integers of workspace one run needs (see `workspace`).
@@ -378,6 +378,10 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
         if value < depth:
             depth = value
             facet = f
+        if overlap_suffices and value < -error and has_trees(pair):
+            settle_point(pair, points, ids, vertices, planes[4 * f], planes[4 * f + 1], planes[4 * f + 2])
+            value = planes[4 * f] * points[at] + planes[4 * f + 1] * points[at + 1] + planes[4 * f + 2] * points[at + 2]
+            depth = value
         if overlap_suffices and value < -error:
             return EXPANDED, depth, -1.0, planes[4 * facet], planes[4 * facet + 1], planes[4 * facet + 2], facet, rounds
         final = depth - distance <= tolerance or _is_corner(ids, facets, f, vertices)
@@ -395,6 +399,8 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
     nx = planes[4 * facet]
     ny = planes[4 * facet + 1]
     nz = planes[4 * facet + 2]
+    if has_trees(pair):
+        depth = _extent(pair, points, ids, nx, ny, nz)
     facet = _facet_of(
         points, planes, facets, count, facet, depth * nx, depth * ny, depth * nz, tolerance + 2.0 * error
     )
@@ -427,9 +433,11 @@ def _facet_of(points, planes, facets, count, best, x, y, z, slack):
 
 @kernel
 def _extent(pair, points, ids, nx, ny, nz):
-    """Support value of A ⊖ B in a unit direction."""
+    """Support value of A ⊖ B in a unit direction, for certain."""
     k = EPA_VERTICES + 2
     difference_point(pair, points, ids, k, nx, ny, nz)
+    if has_trees(pair):
+        settle_point(pair, points, ids, k, nx, ny, nz)
     return points[POINT * k] * nx + points[POINT * k + 1] * ny + points[POINT * k + 2] * nz
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
-from collide.narrowphase.minkowski import copy_point, difference_point
+from collide.narrowphase.minkowski import POINT, copy_point, difference_point, has_trees, settle_point
 from collide.narrowphase.simplex import across_simplex, faces_in_sight, nearest_in_simplex
 
 #: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
@@ -47,7 +47,9 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
             along = math.sqrt(dx * dx + dy * dy + dz * dz)
             if along > 0.0:
                 difference_point(pair, points, ids, 4, -dx, -dy, -dz)
-                refined = (dx * points[36] + dy * points[37] + dz * points[38]) / along
+                if has_trees(pair):
+                    settle_point(pair, points, ids, 4, -dx, -dy, -dz)
+                refined = _height(points, 4, dx, dy, dz) / along
                 if refined > lower:
                     lower = refined
                     weights[7] = dx / along
@@ -72,7 +74,14 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     square = nearest_in_simplex(points, n, weights, 15)
     # The first support plane already parts most pairs that are farther apart than asked about.
     span = math.sqrt(tx * tx + ty * ty + tz * tz)
-    lower = -(tx * points[0] + ty * points[1] + tz * points[2]) / span
+    trees = has_trees(pair)
+    lower = -_height(points, 0, tx, ty, tz) / span
+    if trees:
+        if lower - error - radius > limit:
+            settle_point(pair, points, ids, 0, tx, ty, tz)
+            lower = -_height(points, 0, tx, ty, tz) / span
+        else:
+            lower = -math.inf  # not proven
     if lower - error - radius > limit:
         weights[4] = -tx * (lower / span)
         weights[5] = -ty * (lower / span)
@@ -88,9 +97,15 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         vy = weights[5]
         vz = weights[6]
         difference_point(pair, points, ids, n, -vx, -vy, -vz)
-        at = 9 * n
-        bound = (vx * points[at] + vy * points[at + 1] + vz * points[at + 2]) / length
-        lower = max(lower, bound)
+        bound = _height(points, n, vx, vy, vz) / length
+        if trees and (
+            bound - error - radius > limit or length - bound <= 0.125 * error or _repeated(ids, n) or used == rounds
+        ):
+            settle_point(pair, points, ids, n, -vx, -vy, -vz)
+            bound = _height(points, n, vx, vy, vz) / length
+            lower = max(lower, bound)
+        elif not trees:
+            lower = max(lower, bound)
         if lower - error - radius > limit:
             return APART, n, lower, 0.0, used
         if length - bound <= 0.125 * error or _repeated(ids, n):
@@ -107,10 +122,19 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             weights[4] = vx
             weights[5] = vy
             weights[6] = vz
+            if trees:
+                settle_point(pair, points, ids, n, -vx, -vy, -vz)
+                lower = max(lower, _height(points, n, vx, vy, vz) / length)
             return NEAREST, n, lower, 0.0, used
         square = closer
         n = _drop_unused(points, ids, weights, n + 1)
     return NEAREST, n, lower, 0.0, rounds
+
+
+@kernel(inline=True)
+def _height(points, k, dx, dy, dz):
+    """Point k along a direction."""
+    return points[POINT * k] * dx + points[POINT * k + 1] * dy + points[POINT * k + 2] * dz
 
 
 @kernel(inline=True)

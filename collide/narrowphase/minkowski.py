@@ -7,7 +7,7 @@ is closest where this set is nearest the origin, overlaps where it contains the 
 from __future__ import annotations
 
 from collide._jit import kernel
-from collide.geometry.supports import support
+from collide.geometry.supports import settled_vertex, support
 
 #: Doubles stored a difference point: w, then a and b in W's axes from their own body's origin.
 POINT = 9
@@ -15,43 +15,97 @@ POINT = 9
 
 @kernel(inline=True)
 def difference_point(pair, points, ids, k, dx, dy, dz):
-    """Store as point k the one of A ⊖ B farthest in direction d.
+    """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
 
-    pair : (coordinates, n, m, kind, row of numbers, pose row start) of A, the same of B, then
-        numbers, poses, t.
+    pair : `posed_pair.posed_pair`.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
     """
-    (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz) = pair
-    ia, x, y, z = support(
-        kind_a, coords_a, n_a, m_a, numbers, at_a,
+    (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b) = pair
+    ia, ax, ay, az = support(
+        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a,
         poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
         poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
         poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
     )  # fmt: skip
-    ax = poses[p] * x + poses[p + 1] * y + poses[p + 2] * z
-    ay = poses[p + 3] * x + poses[p + 4] * y + poses[p + 5] * z
-    az = poses[p + 6] * x + poses[p + 7] * y + poses[p + 8] * z
-    ib, x, y, z = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b,
+    ib, bx, by, bz = support(
+        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b,
         -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
         -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
         -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
     )  # fmt: skip
-    bx = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
-    by = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
-    bz = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
-    at = POINT * k
-    points[at] = (ax - bx) - tx
-    points[at + 1] = (ay - by) - ty
-    points[at + 2] = (az - bz) - tz
-    points[at + 3] = ax
-    points[at + 4] = ay
-    points[at + 5] = az
-    points[at + 6] = bx
-    points[at + 7] = by
-    points[at + 8] = bz
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
+    _place(pair, points, k, ax, ay, az, bx, by, bz)
+
+
+@kernel(inline=True)
+def _place(pair, points, k, ax, ay, az, bx, by, bz):
+    """Point k becomes the difference of a and b, given in their bodies' frames."""
+    (_, _, _, _, _, p, _, _, _, _, _, q, _, poses, tx, ty, tz, _, _) = pair
+    at = POINT * k
+    points[at + 3] = poses[p] * ax + poses[p + 1] * ay + poses[p + 2] * az
+    points[at + 4] = poses[p + 3] * ax + poses[p + 4] * ay + poses[p + 5] * az
+    points[at + 5] = poses[p + 6] * ax + poses[p + 7] * ay + poses[p + 8] * az
+    points[at + 6] = poses[q] * bx + poses[q + 1] * by + poses[q + 2] * bz
+    points[at + 7] = poses[q + 3] * bx + poses[q + 4] * by + poses[q + 5] * bz
+    points[at + 8] = poses[q + 6] * bx + poses[q + 7] * by + poses[q + 8] * bz
+    points[at] = (points[at + 3] - points[at + 6]) - tx
+    points[at + 1] = (points[at + 4] - points[at + 7]) - ty
+    points[at + 2] = (points[at + 5] - points[at + 8]) - tz
+
+
+@kernel
+def settle_point(pair, points, ids, k, dx, dy, dz):
+    """Make point k, found by `difference_point`, one that is farthest in direction d for certain.
+
+    Support trees propose; nothing may be concluded from a plane before their vertices are settled.
+    """
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b) = pair
+    ia = ids[2 * k]
+    ib = ids[2 * k + 1]
+    if tree_a != 0:
+        ia = settled_vertex(
+            coords_a, n_a, m_a, tree_a, ia,
+            poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
+            poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
+            poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
+        )  # fmt: skip
+    if tree_b != 0:
+        ib = settled_vertex(
+            coords_b, n_b, m_b, tree_b, ib,
+            -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
+            -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
+            -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
+        )  # fmt: skip
+    if ia == ids[2 * k] and ib == ids[2 * k + 1]:
+        return
+    at = POINT * k
+    # A curved core has no id; its point stays as it is.
+    if ia != ids[2 * k]:
+        x = coords_a[ia]
+        y = coords_a[m_a + ia]
+        z = coords_a[2 * m_a + ia]
+        points[at + 3] = poses[p] * x + poses[p + 1] * y + poses[p + 2] * z
+        points[at + 4] = poses[p + 3] * x + poses[p + 4] * y + poses[p + 5] * z
+        points[at + 5] = poses[p + 6] * x + poses[p + 7] * y + poses[p + 8] * z
+    if ib != ids[2 * k + 1]:
+        x = coords_b[ib]
+        y = coords_b[m_b + ib]
+        z = coords_b[2 * m_b + ib]
+        points[at + 6] = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
+        points[at + 7] = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
+        points[at + 8] = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
+    ids[2 * k] = ia
+    ids[2 * k + 1] = ib
+    points[at] = (points[at + 3] - points[at + 6]) - pair[14]
+    points[at + 1] = (points[at + 4] - points[at + 7]) - pair[15]
+    points[at + 2] = (points[at + 5] - points[at + 8]) - pair[16]
+
+
+@kernel(inline=True)
+def has_trees(pair):
+    """Whether a support point of the pair is to be settled before anything is concluded from it."""
+    return pair[17] != 0 or pair[18] != 0
 
 
 @kernel(inline=True)

@@ -25,6 +25,7 @@ from collide.geometry.tables import (
     RANK,
     REACH,
     SLOP,
+    TREE,
 )
 
 
@@ -91,7 +92,8 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
 
 @kernel(inline=True)
 def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
-    """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA."""
+    """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA,
+    support trees of A and B (addresses, or 0)."""
     p = POSE * pa
     q = POSE * pb
     return (
@@ -99,6 +101,7 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
         coords_b, ints[INTS * sb + COUNT], ints[INTS * sb + PADDED], ints[INTS * sb + KIND], NUMBERS * sb + PARAMS, q,
         numbers, poses,
         poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11],
+        ints[INTS * sa + TREE], ints[INTS * sb + TREE],
     )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ def run_pairs(
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+    table.plant(shape_of[pairs])
     tables = address_of(table.ints), address_of(table.numbers), address_of(poses.rows), address_of(shape_of)
     done = 0
     while done < len(pairs):
@@ -87,6 +88,7 @@ def run_poses(
     check : refuse matrices that are no rotation.
     """
     n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    table.plant(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
@@ -149,6 +151,7 @@ class SinglePair:
     def __init__(self, bodies: tuple, table: ShapeTable):
         if SinglePair._space is None:
             SinglePair._space = _Workspace()
+        table.plant(np.arange(2))
         self.bodies, self._table = bodies, table  # held, since kernels read their buffers
         self._header = SinglePair._space.header_of(table)
         self.address = address_of(self._header)

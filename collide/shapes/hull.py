@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import zipfile
+
 import numpy as np
 
 from collide.errors import InvalidShape
+from collide.geometry.hulls.hull import Hull, convex_hull
+from collide.geometry.hulls.validate import validate_hull
 from collide.geometry.packing import pack_points
+from collide.geometry.support_tree.planted import FEWEST_POINTS, PlantedTree
 from collide.shapes.base import Shape, alone, positive, rows
 from collide.transforms import SMALLEST
 
@@ -15,14 +21,16 @@ class ConvexHull(Shape):
 
     points : (n, 3) in any order [m]: a solid, a flat or a straight set, one point; points that
         are doubled, collinear, coplanar or inside are fine and change nothing.
-    faces : (m, 3) vertex ids, optional; checked for shape and range. The set does not depend on
-        them.
+    faces : (m, 3) vertex ids, optional: checked for shape and range, and by `validate` for being the
+        hull's surface. The set does not depend on them.
     radius : of the ball swept over the hull [m], ≥ 0.
 
-    Ids in results are rows of ``points`` as given.
+    Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support
+    tree, which answers in logarithmic time: made when a query first needs it (about 6 µs a point), kept with the shape,
+    and saved with it by `save` and by pickle.
     """
 
-    __slots__ = ("faces", "points", "radius")
+    __slots__ = ("_hull", "_tree", "faces", "points", "radius")
     _fields = ("points", "faces", "radius")
     points: np.ndarray
     faces: np.ndarray | None
@@ -43,11 +51,83 @@ class ConvexHull(Shape):
         )
 
     @classmethod
-    def _from_fields(cls, points, faces, radius):
-        return cls(points, faces=faces, radius=radius)
+    def _from_fields(cls, points, faces, radius, tree=None):
+        made = cls(points, faces=faces, radius=radius)
+        if tree is not None:
+            object.__setattr__(made, "_tree", PlantedTree(made.points, tree))
+        return made
+
+    def __reduce__(self):
+        rebuild, (cls, values) = super().__reduce__()
+        return rebuild, (cls, (*values, self._tree_arrays()))
+
+    def _tree_arrays(self) -> dict[str, np.ndarray] | None:
+        """The support tree as plain arrays, where it has been made."""
+        planted = getattr(self, "_tree", None)
+        return planted.to_arrays() if planted is not None else None
 
     def _pack(self):
-        return alone(pack_points(self.points, self.radius))
+        if not hasattr(self, "_tree"):
+            object.__setattr__(
+                self, "_tree", PlantedTree(self.points) if len(self.points) >= FEWEST_POINTS else None
+            )
+        return alone(pack_points(self.points, self.radius, tree=self._tree))
+
+    @property
+    def hull(self) -> Hull:
+        """The surface, exactly: ``dimension`` (3 solid … 0 point), ``vertices`` and ``facets`` by rows of
+        ``points``, facets counter-clockwise from outside. Worked out when first asked for, O(n log n)."""
+        if not hasattr(self, "_hull"):
+            object.__setattr__(self, "_hull", convex_hull(self.points))
+        return self._hull
+
+    def validate(self) -> None:
+        """Check exactly that `hull` and the faces given are the surface of the hull of all points.
+
+        Raises InvalidShape with the defect and where it is. For tests and for data of doubtful origin.
+        """
+        given = self.hull._replace(facets=self.faces) if self.faces is not None else None
+        for what, surface in (("hull", self.hull), ("faces", given)):
+            if surface is None:
+                continue
+            if what == "faces":
+                facets = surface.facets.astype(np.int32)
+                surface = surface._replace(facets=facets, vertices=np.unique(facets))
+            try:
+                validate_hull(self.points, surface)
+            except AssertionError as error:
+                raise InvalidShape(f"ConvexHull: {what}: {error}") from None
+
+    def save(self, path) -> None:
+        """Write points, faces, radius and, where it has been made, the support tree to an ``.npz`` file."""
+        arrays = {"points": self.points, "radius": np.array(self.radius)}
+        if self.faces is not None:
+            arrays["faces"] = self.faces
+        tree = self._tree_arrays()
+        arrays.update({f"tree_{name}": array for name, array in tree.items()} if tree is not None else {})
+        with open(path, "wb") as file:
+            np.savez(file, format=np.array(_FILE_FORMAT), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path) -> ConvexHull:
+        """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
+        try:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as found:
+                arrays = {name: found[name] for name in found.files}
+        except OSError as error:
+            raise InvalidShape(f"ConvexHull.load: {path}: {error.strerror or error}") from None
+        except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+            raise InvalidShape(f"ConvexHull.load: {path} is no file that ConvexHull.save wrote ({error})") from None
+        stamp, digest = arrays.pop("format", None), arrays.pop("digest", None)
+        if stamp is None or digest is None or int(stamp) != _FILE_FORMAT or not {"points", "radius"} <= set(arrays):
+            raise InvalidShape(f"ConvexHull.load: {path} is of another format; save the shape again")
+        if not np.array_equal(digest, _digest(arrays)):
+            raise InvalidShape(f"ConvexHull.load: {path} is damaged: its contents do not fit their digest")
+        tree = {name[5:]: array for name, array in arrays.items() if name.startswith("tree_")}
+        try:
+            return cls._from_fields(arrays["points"], arrays.get("faces"), float(arrays["radius"]), tree or None)
+        except ValueError as error:
+            raise InvalidShape(f"ConvexHull.load: {path}: {error}; build the shape anew from its points") from None
 
     def without_repeats(self) -> ConvexHull:
         """The same set with every point once, in the order of first appearance.
@@ -59,6 +139,20 @@ class ConvexHull(Shape):
         if len(distinct) == len(self.points):
             return self
         return ConvexHull(self.points[np.sort(first)], radius=self.radius)
+
+
+#: Changes whenever files written before would be read wrongly.
+_FILE_FORMAT = 1
+
+
+def _digest(arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Of all arrays by name: a file that was damaged must not lend its neighbours to a proof."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def _check_faces(faces, n: int) -> np.ndarray:

@@ -1,0 +1,123 @@
+"""The exact sign of (a − b)·g for points a, b and a direction g, all of doubles.
+
+A bound on the rounding error decides almost always. Otherwise the product is written as a sum of
+doubles without any error, by Knuth's sum and Dekker's product (T. J. Dekker, "A floating-point
+technique for extending the available precision", 1971), and the sum is distilled until its sign
+shows. Ties are common, since directions are often facet normals: this stage has to be fast, too.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+
+#: Six roundings of relative size 2⁻⁵³ lead to the product: three products of differences, two sums. Seven
+#: cover the rounding of the bound itself, and the last summand products below the smallest normal double.
+_ROUNDING = 7.0 * 2.0**-53
+_TINY = 2.0**-1060
+_SPLITTER = 134217729.0  # 2²⁷ + 1
+
+
+@kernel
+def product_and_bound(ax, ay, az, bx, by, bz, gx, gy, gz):
+    """(value, bound): (a − b)·g in doubles, and a bound of its error. Not finite where that overflows."""
+    x = (ax - bx) * gx
+    y = (ay - by) * gy
+    z = (az - bz) * gz
+    return x + y + z, (abs(x) + abs(y) + abs(z)) * _ROUNDING + _TINY
+
+
+@kernel
+def _two_sum(a, b):
+    """(s, e): s = fl(a + b), s + e = a + b."""
+    s = a + b
+    virtual = s - a
+    return s, (a - (s - virtual)) + (b - virtual)
+
+
+@kernel
+def _two_product(a, b):
+    """(p, e): p = fl(a·b), p + e = a·b, for factors below 2⁹⁹⁶ and an error that is a double."""
+    p = a * b
+    c = _SPLITTER * a
+    a_high = c - (c - a)
+    a_low = a - a_high
+    c = _SPLITTER * b
+    b_high = c - (c - b)
+    b_low = b - b_high
+    return p, a_low * b_low - (((p - a_high * b_high) - a_low * b_high) - a_high * b_low)
+
+
+@kernel
+def _sign_of_sum(a, b, c, d, e, f):
+    """Sign of the exact sum of six doubles.
+
+    Each sweep adds from the left and leaves the errors behind: the sum stays, the rest shrinks by 2⁴⁸.
+    """
+    while True:
+        s, a = _two_sum(a, b)
+        s, b = _two_sum(s, c)
+        s, c = _two_sum(s, d)
+        s, d = _two_sum(s, e)
+        s, e = _two_sum(s, f)
+        rest = abs(a) + abs(b) + abs(c) + abs(d) + abs(e)
+        if abs(s) > 2.0 * rest or rest == 0.0:
+            return 1 if s > 0.0 else (-1 if s < 0.0 else 0)
+        f = s
+
+
+@kernel
+def _sign_of_long_sum(a, b, c, d, e, f, g, h, i, j, k, m):
+    """The same for twelve."""
+    while True:
+        s, a = _two_sum(a, b)
+        s, b = _two_sum(s, c)
+        s, c = _two_sum(s, d)
+        s, d = _two_sum(s, e)
+        s, e = _two_sum(s, f)
+        s, f = _two_sum(s, g)
+        s, g = _two_sum(s, h)
+        s, h = _two_sum(s, i)
+        s, i = _two_sum(s, j)
+        s, j = _two_sum(s, k)
+        s, k = _two_sum(s, m)
+        rest = abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) + abs(i) + abs(j) + abs(k)
+        if abs(s) > 2.0 * rest or rest == 0.0:
+            return 1 if s > 0.0 else (-1 if s < 0.0 else 0)
+        m = s
+
+
+@kernel
+def exact_sign(ax, ay, az, bx, by, bz, gx, gy, gz):
+    """Sign of (a − b)·g. The direction must lie in the range that `layout.exact_range` tells."""
+    dx, ex = _two_sum(ax, -bx)
+    dy, ey = _two_sum(ay, -by)
+    dz, ez = _two_sum(az, -bz)
+    x, x_low = _two_product(dx, gx)
+    y, y_low = _two_product(dy, gy)
+    z, z_low = _two_product(dz, gz)
+    if ex == 0.0 and ey == 0.0 and ez == 0.0:
+        return _sign_of_sum(x, y, z, x_low, y_low, z_low)
+    u, u_low = _two_product(ex, gx)
+    v, v_low = _two_product(ey, gy)
+    w, w_low = _two_product(ez, gz)
+    return _sign_of_long_sum(x, y, z, x_low, y_low, z_low, u, v, w, u_low, v_low, w_low)
+
+
+@kernel
+def scaled_into_range(least, most, target, gx, gy, gz):
+    """(certain, gx, gy, gz): the direction times a power of two, and whether `exact_sign` is exact for it."""
+    x = abs(gx)
+    y = abs(gy)
+    z = abs(gz)
+    largest = max(x, y, z)
+    smallest = min(x if x > 0.0 else largest, y if y > 0.0 else largest, z if z > 0.0 else largest)
+    if not (x < math.inf and y < math.inf and z < math.inf):
+        return False, gx, gy, gz
+    if largest == 0.0 or (smallest >= least and largest <= most):
+        return True, gx, gy, gz
+    shift = int(target) - math.frexp(largest)[1]
+    # Smaller components may be lost on the way down: then they are below range, too.
+    certain = math.ldexp(smallest, shift) >= least
+    return certain, math.ldexp(gx, shift), math.ldexp(gy, shift), math.ldexp(gz, shift)

@@ -1,0 +1,53 @@
+"""The support tree of a shape's points, made when a query first needs it and kept with the shape."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from collide.geometry.hulls.hull import convex_hull
+from collide.geometry.support_tree.build import build_support_tree
+from collide.geometry.support_tree.layout import SupportTree
+
+#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
+#: so that an answer does not depend on what was asked before.
+FEWEST_POINTS = 384
+#: A hull of so few vertices is scanned as well, however many points were given.
+FEWEST_VERTICES = 32
+
+
+class PlantedTree:
+    """points : (n, 3).   arrays : a tree that was saved (`SupportTree.to_arrays`), to be used instead of building."""
+
+    def __init__(self, points: np.ndarray, arrays=None):
+        self._points = points
+        self._lock = threading.Lock()
+        self._tree = SupportTree.from_arrays(points, arrays) if arrays is not None else None
+        self._hopeless = False
+
+    @property
+    def tree(self) -> SupportTree | None:
+        """The tree; None where the hull has too few vertices for one."""
+        if self._tree is None and not self._hopeless:
+            with self._lock:
+                if self._tree is None and not self._hopeless:
+                    self._tree = _grown(self._points)
+                    self._hopeless = self._tree is None
+        return self._tree
+
+    @property
+    def address(self) -> int:
+        """What kernels take: the tree's address, 0 where there is none."""
+        return self.tree.address if self.tree is not None else 0
+
+    def to_arrays(self) -> dict[str, np.ndarray] | None:
+        """The tree as plain arrays, where it has been made already."""
+        return self._tree.to_arrays() if self._tree is not None else None
+
+
+def _grown(points: np.ndarray) -> SupportTree | None:
+    hull = convex_hull(points)
+    if hull.dimension < 2 or len(hull.vertices) < FEWEST_VERTICES:
+        return None
+    return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)

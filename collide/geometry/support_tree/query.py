@@ -1,0 +1,114 @@
+"""Walks down a support tree: scan the coarsest subset, then the candidate list of the winner, and so on.
+
+Every list holds the vertices of the next subset whose normal cones meet the normal cone of the list's
+owner, so the walk ends at the extreme vertex, up to the rounding of the products compared. The number
+of lists is logarithmic in the number of vertices, the length of a list does not depend on it.
+The search in nested subsets is Dobkin and Kirkpatrick's; lists of a whole normal cone in place of
+neighbours, and random subsets, follow the ε-net trees for point location of the project's mesh notes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
+from collide.geometry.scan import farthest
+from collide.geometry.support_tree.layout import (
+    AT_ENTRIES,
+    AT_LIST_COORDINATES,
+    AT_NODES,
+    AT_RING,
+    AT_RING_STARTS,
+    DEPTH,
+    ENTRIES,
+    HEADER,
+    LINKS,
+    NODES,
+    POINTS,
+    SupportTree,
+)  # fmt: skip
+from collide.geometry.support_tree.settle import SCANNED, climb
+
+#: Operations counted: see `extreme_vertices`.
+COUNTERS = 4
+
+
+@kernel
+def walk(nodes, entries, coordinates, depth, gx, gy, gz, counters):
+    """(entry, x, y, z) that ``depth`` scans lead to; counts entries scanned where counters has room."""
+    node = 0
+    at = 0
+    count = 0
+    for _ in range(depth):
+        begin = nodes[node]
+        count = nodes[node + 1] - begin
+        k, _ = farthest(coordinates, 3 * begin, count, count, gx, gy, gz)
+        node = entries[begin + k]
+        at = 3 * begin + k
+        if len(counters) > 0:
+            counters[SCANNED] += count
+    return node, coordinates[at], coordinates[at + count], coordinates[at + 2 * count]
+
+
+@kernel
+def extreme_vertex_counted(tree_at, gx, gy, gz, counters):
+    """`extreme_vertex`, adding to ``counters`` (COUNTERS,) int64 unless that is empty."""
+    header = view_i64(tree_at, HEADER)
+    nodes = view_i32(header[AT_NODES], header[NODES] + 1)
+    entries = view_i32(header[AT_ENTRIES], header[ENTRIES])
+    coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES])
+    return walk(nodes, entries, coordinates, header[DEPTH], gx, gy, gz, counters)
+
+
+@kernel
+def extreme_vertex(tree_at, gx, gy, gz):
+    """(id, x, y, z): a vertex farthest in direction g, up to rounding, and its coordinates. O(log n).
+
+    tree_at : `SupportTree.address`. id : row of the tree's points. Not proven: see `settle_vertex`.
+    """
+    return extreme_vertex_counted(tree_at, gx, gy, gz, view_i64(0, 0))
+
+
+@kernel
+def rings_of(tree_at):
+    """(starts, ring): the hull neighbours of row i are ring[starts[i]] … ring[starts[i + 1] − 1]."""
+    header = view_i64(tree_at, HEADER)
+    return view_i32(header[AT_RING_STARTS], header[POINTS] + 1), view_i32(header[AT_RING], header[LINKS])
+
+
+@entry("void(int64, int64, int64, boolean, int64, int64)")
+def many_extreme_vertices(tree_at, directions_at, n, settled, ids_at, counters_at):
+    """Ids for n directions; ``counters_at`` is 0 where nothing is to be counted."""
+    directions = view_f64(directions_at, 3 * n)
+    ids = view_i64(ids_at, n)
+    counters = view_i64(counters_at, COUNTERS if counters_at != 0 else 0)
+    for i in range(n):
+        gx = directions[3 * i]
+        gy = directions[3 * i + 1]
+        gz = directions[3 * i + 2]
+        vertex, _, _, _ = extreme_vertex_counted(tree_at, gx, gy, gz, counters)
+        if settled:
+            vertex = climb(tree_at, vertex, gx, gy, gz, counters)
+        ids[i] = vertex
+
+
+def extreme_vertices(
+    tree: SupportTree, directions: np.ndarray, settled: bool = True, counters: np.ndarray | None = None
+) -> np.ndarray:
+    """(n,) ids of vertices farthest in ``directions`` (n, 3).
+
+    settled : proven exactly; an id below 0 is then ``-1 - id`` of a vertex that could not be proven, since
+        the direction's components differ by too many powers of two (see `settle.py`).
+    counters : (COUNTERS,) int64 that entries scanned, climbing steps, neighbours looked at and exact
+        signs are added to.
+    """
+    directions = np.ascontiguousarray(directions, dtype=np.float64)
+    if directions.ndim != 2 or directions.shape[1] != 3 or not np.isfinite(directions).all():
+        raise ValueError("directions must be (n, 3) and finite")
+    if counters is not None and (counters.dtype != np.int64 or counters.shape != (COUNTERS,)):
+        raise ValueError(f"counters must be ({COUNTERS},) of int64")
+    ids = np.empty(len(directions), dtype=np.int64)
+    many_extreme_vertices(
+        tree.address, address_of(directions), len(directions), settled, address_of(ids), 0 if counters is None else address_of(counters),
+    )  # fmt: skip
+    return ids

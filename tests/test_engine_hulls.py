@@ -1,0 +1,206 @@
+"""Large hulls: support trees propose, settled vertices prove. Same answers as scans, saved and loaded, validated."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+import collide
+from collide.errors import InvalidShape
+from collide.geometry.support_tree import planted
+from collide.results import EXACT
+from collide.scenes.families import generate, names
+from collide.shapes import hull as hull_shape
+
+EYE = np.eye(4)
+
+
+def _ball(rng, n, axes=(1, 1, 1)):
+    points = rng.normal(size=(n, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None] * axes
+
+
+@pytest.fixture()
+def trees_everywhere(monkeypatch):
+    """Every hull gets a support tree, however small, so that the hard families meet them."""
+    monkeypatch.setattr(hull_shape, "FEWEST_POINTS", 4)
+    monkeypatch.setattr(planted, "FEWEST_VERTICES", 4)
+
+
+def _planted(shape) -> bool:
+    return getattr(shape, "_tree", None) is not None and shape._tree.tree is not None
+
+
+@pytest.mark.parametrize("family", names())
+def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
+    """Booleans as without trees (which the oracle has judged), brackets that share the truth."""
+    trees = 0
+    for case in generate(family, 12, 31):
+        A, B, X_WA, X_WB = case.shapes()
+        with_trees = collide.distance(A, B, X_WA, X_WB)
+        trees += _planted(A) + _planted(B)
+        plain = [collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)]
+        for S in plain:
+            if isinstance(S, collide.ConvexHull):
+                object.__setattr__(S, "_tree", None)
+        scanned = collide.distance(*plain, X_WA, X_WB)
+        assert with_trees.hit == scanned.hit == collide.collide(A, B, X_WA, X_WB), case.snippet()
+        assert max(with_trees.lower, scanned.lower) <= min(with_trees.upper, scanned.upper), case.snippet()
+        if with_trees.certificate is not None:
+            collide.verify(A, B, X_WA, X_WB, with_trees)
+    if not family.startswith(("box", "halfspace", "swept", "flat", "degenerate", "touch_scaled", "long", "padded", "tiny_m")):
+        assert trees >= 8, f"{trees} trees in {family}: the test no longer tests them"
+
+
+@pytest.mark.parametrize("axes", [(1, 1, 1), (1, 3, 10), (1, 1, 0.02)])
+def test_large_hulls_answer_as_scans_do(axes):
+    rng = np.random.default_rng(8)
+    A, B = (collide.ConvexHull(_ball(rng, 3000, axes)) for _ in range(2))
+    scans = [collide.ConvexHull(S.points) for S in (A, B)]
+    for S in scans:
+        object.__setattr__(S, "_tree", None)
+    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+    r, scanned = collide.distance(A, B, EYE, X_WB), collide.distance(*scans, EYE, X_WB)
+    assert _planted(A) and _planted(B)
+    assert 20 < r.hit.sum() < 280 and np.array_equal(r.hit, scanned.hit)
+    assert np.array_equal(collide.collide(A, B, EYE, X_WB), r.hit)
+    np.testing.assert_allclose(r.distance, scanned.distance, rtol=0, atol=1e-12)
+    assert (np.maximum(r.lower, scanned.lower) <= np.minimum(r.upper, scanned.upper)).all()
+    for k in range(0, 300, 60):
+        collide.verify(A, B, EYE, X_WB[k], r[k])
+
+
+def test_large_hulls_that_touch_are_decided_exactly():
+    """A vertex of one on a facet of the other: exact by dyadic coordinates, then moved by one ulp."""
+    rng = np.random.default_rng(9)
+    half = np.round(_ball(rng, 4000) * 2**20) / 2**20
+    top = np.concatenate([half, [[0, 0, 1.5]]])
+    A = collide.ConvexHull(top)
+    slab = np.array([[x, y, z] for x in (-4, 4) for y in (-4, 4) for z in (0, 1)], dtype=float)
+    B = collide.ConvexHull(slab)
+    for z, expected in ((1.5, True), (np.nextafter(1.5, 2), False), (np.nextafter(1.5, 1), True)):
+        r = collide.distance(A, B, EYE, collide.pose((0.25, -0.5, z)))
+        assert r.hit is expected and r.how == EXACT and collide.collide(A, B, EYE, collide.pose((0.25, -0.5, z))) is expected
+        collide.verify(A, B, EYE, collide.pose((0.25, -0.5, z)), r)
+    mirrored = collide.ConvexHull(top * (1, 1, -1))
+    r = collide.distance(A, mirrored, EYE, collide.pose((0, 0, 3)))
+    assert r.hit and r.how == EXACT
+    assert not collide.collide(A, mirrored, EYE, collide.pose((0, 0, np.nextafter(3, 4))))
+
+
+def test_prisms_on_their_caps_meet_exactly():
+    """Hundreds of vertices tie in the deciding direction."""
+    angles = 2 * np.pi * np.arange(700) / 700
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    prism = collide.ConvexHull(np.concatenate([np.hstack([ring, np.full((700, 1), z)]) for z in (-0.5, 0.5)]))
+    for shift in (0.0, 0.3, 1.2):
+        assert collide.collide(prism, prism, EYE, collide.pose((shift, 0, 1)))
+        assert not collide.collide(prism, prism, EYE, collide.pose((shift, 0, np.nextafter(1, 2))))
+        r = collide.distance(prism, prism, EYE, collide.pose((shift, 0.1, 1)))
+        assert r.hit and r.distance == 0.0 and r.how == EXACT
+        collide.verify(prism, prism, EYE, collide.pose((shift, 0.1, 1)), r)
+    assert _planted(prism)
+
+
+def test_interior_and_repeated_points_change_nothing():
+    rng = np.random.default_rng(10)
+    surface = _ball(rng, 500)
+    cloud = np.concatenate([surface * 0.9, surface, surface[::3], np.zeros((3, 3)), surface * 0.5])
+    A, B = collide.ConvexHull(surface), collide.ConvexHull(cloud)
+    assert len(B.hull.vertices) == len(np.unique(surface, axis=0))
+    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(1.5, 2.5)) for _ in range(200)])
+    one, other = collide.distance(A, A, EYE, X_WB), collide.distance(A, B, EYE, X_WB)
+    assert np.array_equal(one.hit, other.hit) and 40 < one.hit.sum() < 160
+    np.testing.assert_allclose(one.distance, other.distance, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("flatten", [(1, 1, 0), (1, 0, 0), (0, 0, 0)])
+def test_large_clouds_without_volume(flatten):
+    rng = np.random.default_rng(11)
+    flat = collide.ConvexHull(_ball(rng, 900) * flatten)
+    ball = collide.Sphere(0.25)
+    assert collide.collide(flat, ball, EYE, collide.pose((0, 0, 0.25)))
+    assert not collide.collide(flat, ball, EYE, collide.pose((0, 0, np.nextafter(0.25, 1))))
+    assert flat.hull.dimension == sum(flatten)
+    r = collide.distance(flat, flat, EYE, collide.pose((0.5 * flatten[0], 0.25 * flatten[1], 1)))
+    assert abs(r.distance - 1) < 1e-15 and not r.hit
+    collide.verify(flat, flat, EYE, collide.pose((0.5 * flatten[0], 0.25 * flatten[1], 1)), r)
+
+
+def test_trees_are_made_once_when_first_needed_also_by_many_threads():
+    A = collide.ConvexHull(_ball(np.random.default_rng(12), 2000))
+    A.parts()
+    assert A._tree._tree is None, "packing alone needs no tree"
+    seen = []
+    threads = [threading.Thread(target=lambda: seen.append(A._tree.address)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(set(seen)) == 1 and seen[0] != 0
+    world = collide.World()
+    B = collide.ConvexHull(A.points)
+    world.add(B)
+    world.add(B, collide.pose((50, 0, 0)))
+    assert not world.collides() and B._tree._tree is None, "nothing near: nothing to build"
+    world.add(collide.Sphere(0.5))
+    assert world.collides() and B._tree._tree is not None
+
+
+def test_pickles_and_files_carry_the_tree(tmp_path):
+    rng = np.random.default_rng(13)
+    A = collide.ConvexHull(_ball(rng, 1500), radius=0.01)
+    small = collide.ConvexHull(rng.normal(size=(20, 3)), faces=None)
+    bare = pickle.loads(pickle.dumps(A))
+    assert bare == A and getattr(bare, "_tree", None) is None
+    X = collide.pose((2.0, 0.03, 0.01))
+    expected = collide.distance(A, A, EYE, X).rows.tobytes()
+    A.save(tmp_path / "a.npz")
+    small.save(tmp_path / "small.npz")
+    for again in (pickle.loads(pickle.dumps(A)), collide.ConvexHull.load(tmp_path / "a.npz")):
+        assert again == A and again._tree._tree is not None
+        assert collide.distance(again, again, EYE, X).rows.tobytes() == expected
+    assert collide.ConvexHull.load(tmp_path / "small.npz") == small
+
+
+def test_files_that_are_damaged_or_others_are_refused(tmp_path):
+    A = collide.ConvexHull(_ball(np.random.default_rng(14), 600))
+    collide.collide(A, A, EYE, EYE)
+    A.save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as found:
+        arrays = {name: found[name] for name in found.files}
+    ring = arrays["tree_ring"].copy()
+    ring[100] = ring[101]
+    for name, change, word in (
+        ("ring", {"tree_ring": ring}, "damaged"), ("old", {"format": np.array(0)}, "another format"),
+        ("points", {"points": arrays["points"] + 1}, "damaged"),
+    ):  # fmt: skip
+        np.savez(tmp_path / f"{name}.npz", **{**arrays, **change})
+        with pytest.raises(InvalidShape, match=word):
+            collide.ConvexHull.load(tmp_path / f"{name}.npz")
+    (tmp_path / "text.npz").write_text("nothing")
+    with pytest.raises(InvalidShape, match="no file that"):
+        collide.ConvexHull.load(tmp_path / "text.npz")
+    cut = (tmp_path / "a.npz").read_bytes()[:5000]
+    (tmp_path / "cut.npz").write_bytes(cut)
+    with pytest.raises(InvalidShape):
+        collide.ConvexHull.load(tmp_path / "cut.npz")
+    with pytest.raises(InvalidShape, match="No such file"):
+        collide.ConvexHull.load(tmp_path / "missing.npz")
+
+
+def test_given_faces_are_checked_not_trusted():
+    rng = np.random.default_rng(15)
+    points = _ball(rng, 100)
+    facets = collide.ConvexHull(points).hull.facets
+    collide.ConvexHull(points, faces=facets).validate()
+    flipped, missing = facets.copy(), facets[1:]
+    flipped[7] = flipped[7][::-1]
+    for wrong in (flipped, missing):
+        shape = collide.ConvexHull(points, faces=wrong)
+        with pytest.raises(InvalidShape, match="faces"):
+            shape.validate()
+        assert collide.collide(shape, shape, EYE, collide.pose((1.0, 0, 0))), "the set does not depend on them"
