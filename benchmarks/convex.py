@@ -89,11 +89,11 @@ def ours(asked: Scene, table: str) -> dict:
         posed = Posed(solids)
 
         def gaps():
-            apart = ~posed.rows(which, X_WBs, boolean=True)["hit"]
+            apart = ~posed.hits(which, X_WBs)
             return posed.rows(which[apart], X_WBs[apart])
 
         return {
-            "boolean": lambda: posed.rows(which, X_WBs, boolean=True)["hit"],
+            "boolean": lambda: posed.hits(which, X_WBs),
             "signed": lambda: posed.rows(which, X_WBs)["distance"],
             "unsigned": gaps,
         }
@@ -144,7 +144,7 @@ def disagreements(asked: Scene, coal: Coal) -> str:
     posed = Posed(asked.solids)
     clear = np.abs(asked.distances) > TOUCHING * LENGTH
     hits, signed = coal.answers("boolean") > 0, coal.answers("signed")
-    differ = clear & (posed.rows(asked.which, asked.X_WBs, boolean=True)["hit"] != hits)
+    differ = clear & (posed.hits(asked.which, asked.X_WBs) != hits)
     text = f"{differ.sum()} of {clear.sum()} booleans differ from coal's"
     if differ.any():
         text += f" (in {(differ & (hits != (signed <= 0))).sum()} coal's own distance contradicts its boolean)"

@@ -22,6 +22,7 @@ STRETCH = {"sphere": (1.0, 1.0, 1.0), "ellipsoid": (0.1, 0.3, 1.0), "pancake": (
 CLASSES = ("separated", "near", "overlap")
 #: What all shapes measure from end to end, about; gaps and depths are parts of it.
 LENGTH = 2.0
+_EYE = np.eye(4)[None]
 #: Hulls of this many points on a sphere hold a ball of radius 0.9; EPA on concentric ones is slow, and not needed.
 ROUND_ENOUGH = 512
 
@@ -103,29 +104,22 @@ class Scene(NamedTuple):
 
 
 class Posed:
-    """collide's batch over a scene of many shapes, asked of the narrowphase itself: no public call takes such a list.
-
-    The shapes are packed once; poses are taken as (4, 4) matrices each time, unchecked.
-    """
+    """collide's batch over a scene of many shapes: a pair of them at every pose."""
 
     def __init__(self, solids: list[Solid]):
-        from collide.geometry.tables import ShapeTable
+        import collide
 
-        self._packed = [solid.shape.parts()[0][0] for solid in solids]
-        self._table = ShapeTable(self._packed)
-        self._reach = np.array([packed.reach for packed in self._packed])
+        self._set = collide.ShapeSet([solid.shape for solid in solids])
 
-    def rows(self, which: np.ndarray, X_WBs: np.ndarray, boolean: bool = False) -> np.ndarray:
-        from collide.geometry.tables import pose_rows
-        from collide.narrowphase.run import run_pairs
+    def hits(self, which: np.ndarray, X_WBs: np.ndarray) -> np.ndarray:
+        import collide
 
-        shapes, n = len(self._packed), len(which)
-        shape_of = np.concatenate([np.arange(shapes), which[:, 1]])
-        X = np.concatenate([np.broadcast_to(np.eye(4), (shapes, 4, 4)), X_WBs])
-        poses = pose_rows(X, np.broadcast_to(np.eye(4), X.shape), self._reach[shape_of])
-        pairs = np.column_stack([which[:, 0], shapes + np.arange(n)])
-        limit = 0.0 if boolean else np.inf
-        return run_pairs(self._table, poses, shape_of, pairs, boolean=boolean, limit=limit)
+        return collide.collide(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs)
+
+    def rows(self, which: np.ndarray, X_WBs: np.ndarray) -> np.ndarray:
+        import collide
+
+        return collide.distance(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs).rows
 
 
 def scene(kind: str, n: int, poses: int, shapes: int = 2) -> Scene:

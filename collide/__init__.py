@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         Halfspace,
         HPolytope,
         Shape,
+        ShapeSet,
         Sphere,
     )
     from collide.transforms import pose
@@ -57,7 +58,7 @@ _HOMES = {
     "collide.robot": ("Robot",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-        "Halfspace", "Shape", "Sphere",
+        "Halfspace", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
@@ -67,7 +68,7 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
     "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "PairResult", "Robot",
-    "SceneError", "Shape", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
+    "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
     "distance", "pose", "verify",
 ]
 

@@ -23,15 +23,19 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache, lru_cache
 from pathlib import Path
 
 import numba
 import numpy as np
+from numba import _dynfunc
 from numba.core import types
 from numba.core.caching import FunctionCache, _CacheLocator
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.cpu import CPUContext
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
@@ -54,7 +58,7 @@ def kernel(function: Callable | None = None, *, inline: bool = False) -> Callabl
     """
     if function is None:
         return lambda wrapped: kernel(wrapped, inline=inline)
-    dispatcher = numba.njit(function, **_FLAGS, forceinline=inline)
+    dispatcher = numba.njit(function, **_FLAGS, forceinline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True)
     if not PLAIN_PYTHON:
         _compile_once_for_all_constants(dispatcher)
     return dispatcher
@@ -119,11 +123,50 @@ class Entry:
             started = time.perf_counter()
             dispatcher = numba.njit(self._function, **self._flags)
             dispatcher._cache = _KernelCache.of(self._function)
-            with on_compile(self.name):
+            with on_compile(self.name), _once_at_the_end(self._function):
                 dispatcher.compile(self._signature)
             dispatcher.disable_compile()
             seconds[self.name] = time.perf_counter() - started
             self._ready = dispatcher
+
+
+@contextmanager
+def _once_at_the_end(function: Callable) -> Iterator[None]:
+    """While an entry is compiled: optimise and translate the entry, with all it calls linked in, and nothing else.
+
+    Numba does both for every callee as well, and once more for each caller on the way up: of 40 s for
+    a cold narrowphase that was half. Kernels are reached through entries only, so that work is lost.
+    """
+    if not all(hasattr(CPUCodeLibrary, name) for name in ("_optimize_final_module", "_finalize_final_module")):
+        yield  # another numba: slower, not wrong
+        return
+    own = function.__qualname__
+    optimise, finish = CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module
+    executable = CPUContext.get_executable
+
+    def optimise_entry(library):
+        if library.name == own:
+            optimise(library)
+
+    def finish_entry(library):
+        if library.name == own:
+            finish(library)
+        else:
+            library._finalized = True
+
+    def executable_of_entry(context, library, fndesc, env):
+        if library.name == own:
+            return executable(context, library, fndesc, env)
+        return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "not callable", 0, env, (library,))
+
+    with global_compiler_lock:
+        CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise_entry, finish_entry
+        CPUContext.get_executable = executable_of_entry
+        try:
+            yield
+        finally:
+            CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise, finish
+            CPUContext.get_executable = executable
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from collide.batches import ask
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.geometry.tables import ShapeTable, pose_table
+from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
 from collide.narrowphase.poses import collide_single
-from collide.results import PAIR_DTYPE, PairResult
-from collide.shapes.base import IDENTITY, Shape
+from collide.results import PairResult
+from collide.shapes.base import Shape, is_plain
+from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
-from collide.unions import Union, combine
 
 
-def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1):
+def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axes: np.ndarray | None = None):
     """Whether the closed sets A and B share a point.
 
     Parameters
     ----------
-    A, B : shapes; or sequences of shapes, one a pose, and then X_WA and X_WB are batches of that length.
+    A, B : shapes; or sequences of shapes, one a pose (a list, or picked from a `ShapeSet`), and then X_WA and
+        X_WB are batches of that length.
     X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every
         pose of the other's batch. ``(R, t)`` tuples are accepted.
     check_poses : refuse matrices that are no rotation.
     threads : answer a batch in this many threads; the answers are the same bits.
+    axes : warm start, float64 (N, 3): for each pose an axis that may part the bodies, zeros where none is
+        known. Tried first, and replaced where the bodies are apart by an axis that does: hand the same
+        array to the next call, when they have moved a little. It can only save time; answers are the same.
 
     Returns
     -------
@@ -35,6 +39,8 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1):
 
     Raises InvalidPose, InvalidArgument.
     """
+    if axes is not None:
+        return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     try:
         hit = collide_single.ready(A._prepared[id(B)].address, X_WA, X_WB)
         if hit >= 0:
@@ -44,7 +50,25 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1):
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     if single:
         _prepare(A, B)
-    hits = _ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
+    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
+    return bool(hits[0]) if single else hits
+
+
+#: Longest warm-start axis: its square is far from overflow.
+_LONGEST_AXIS = 1e100
+
+
+def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
+    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    wanted = (max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0, 3)
+    if not isinstance(axes, np.ndarray) or axes.dtype != np.float64 or axes.shape != wanted:
+        given = f"{axes.dtype} {axes.shape}" if isinstance(axes, np.ndarray) else type(axes).__name__
+        raise InvalidArgument(f"axes must be a float64 array {wanted}, one row a pose, got {given}")
+    if not (axes.flags.c_contiguous and axes.flags.writeable and np.isfinite(axes).all()):
+        raise InvalidArgument("axes must be contiguous, writeable and finite: it is read and updated in place")
+    if len(axes) and np.abs(axes).max() > _LONGEST_AXIS:
+        raise InvalidArgument(f"axes must not be longer than {_LONGEST_AXIS:g}: only their directions count")
+    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads, axes)
     return bool(hits[0]) if single else hits
 
 
@@ -77,7 +101,7 @@ def distance(
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
     if single:
         _prepare(A, B)
-    rows = _ask(A, B, X_WA, X_WB, False, limit, check_poses, threads)
+    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads)
     rows["b"] = 1
     endless = np.isneginf(rows["distance"])
     if endless.any():
@@ -110,9 +134,13 @@ def _poses(A, B, X_WA, X_WB):
     X_WB, single_b = _batch(X_WB, "X_WB")
     n = len(X_WA) if len(X_WB) == 1 else len(X_WB)
     for name, given in (("A", A), ("B", B)):
-        if isinstance(given, (list, tuple)) and given and all(isinstance(shape, Shape) for shape in given):
+        if isinstance(given, Picked) or (
+            isinstance(given, (list, tuple)) and given and all(isinstance(shape, Shape) for shape in given)
+        ):
             if len(given) != n or single_a or single_b:
-                raise InvalidArgument(f"{name} is a sequence of {len(given)} shapes: give X_WA and X_WB as batches of as many")
+                raise InvalidArgument(
+                    f"{name} is a sequence of {len(given)} shapes: give X_WA and X_WB as batches of as many"
+                )
         elif not isinstance(given, Shape):
             raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {given!r}")
     if len(X_WA) != len(X_WB) and 1 not in (len(X_WA), len(X_WB)):
@@ -139,94 +167,10 @@ def _one(shapes, k: int) -> Shape:
 
 
 def _held(shapes):
-    return shapes if isinstance(shapes, Shape) else tuple(shapes)
+    return tuple(shapes) if isinstance(shapes, list) else shapes
 
 
-# --- answers ------------------------------------------------------------------------------------
-
-
-def _ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int) -> np.ndarray:
-    """bool[n], or a row a pose, of a batch in as many threads."""
-    workers = _workers(threads)
-    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
-    if workers == 1 or n < 2 * workers:
-        return _answers(A, B, X_WA, X_WB, boolean, limit, check)
-    bounds = np.linspace(0, n, workers + 1).astype(int)
-
-    def piece(k: int) -> np.ndarray:
-        part = slice(bounds[k], bounds[k + 1])
-        shapes = (S if isinstance(S, Shape) else S[part] for S in (A, B))
-        poses = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
-        try:
-            return _answers(*shapes, *poses, boolean, limit, check)
-        except InvalidPose:
-            _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
-            raise
-
-    with ThreadPoolExecutor(workers) as pool:
-        return np.concatenate(list(pool.map(piece, range(workers))))
-
-
-def _workers(threads) -> int:
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
-    return int(threads)
-
-
-def _refuse_poses(X_WA, X_WB, check: bool) -> None:
-    as_poses(X_WA, "X_WA", check=check)
-    as_poses(X_WB, "X_WB", check=check)
-
-
-def _answers(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool) -> np.ndarray:
-    if not len(X_WA) or not len(X_WB):
-        return np.zeros(0, dtype=bool if boolean else PAIR_DTYPE)
-    sides = [[S] if isinstance(S, Shape) else S for S in (A, B)]
-    if all(_is_plain(shape) for side in sides for shape in side) and not run.distrust_doubles:
-        out = _plain(*sides, X_WA, X_WB, boolean, limit, check)
-        if out is None:
-            _refuse_poses(X_WA, X_WB, check)
-            out = _plain(*sides, X_WA, X_WB, boolean, limit, False)  # a pose on the brink of the tolerance
-            assert out is not None
-        return out
-    _refuse_poses(X_WA, X_WB, check)
-    n = max(len(X_WA), len(X_WB))
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit)
-    else:
-        rows = np.concatenate(
-            [
-                _parts(_one(A, k), _one(B, k), X_WA[k : k + 1], X_WB[k : k + 1], boolean=boolean, limit=limit)
-                for k in range(n)
-            ]
-        )
-    return rows["hit"] if boolean else rows
-
-
-def _is_plain(shape: Shape) -> bool:
-    """Whether a shape is one convex set in its own frame."""
-    parts = shape.parts()
-    return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
-
-
-def _plain(side_a, side_b, X_WA, X_WB, boolean: bool, limit: float, check: bool) -> np.ndarray | None:
-    if len(side_a) == len(side_b) == 1:
-        table = ShapeTable([side_a[0].parts()[0][0], side_b[0].parts()[0][0]])
-        return run.run_poses(table, None, X_WA, X_WB, boolean=boolean, limit=limit, check=check)
-    n = max(len(X_WA), len(X_WB))
-    rows: dict[int, int] = {}
-    packed = []
-    which = np.empty((n, 2), dtype=np.int64)
-    for column, side in enumerate((side_a, side_b)):
-        for k, shape in enumerate(side):
-            one = shape.parts()[0][0]
-            if id(one) not in rows:
-                rows[id(one)] = len(packed)
-                packed.append(one)
-            which[k if len(side) > 1 else slice(None), column] = rows[id(one)]
-    return run.run_poses(ShapeTable(packed), which, X_WA, X_WB, boolean=boolean, limit=limit, check=check)
-
+# --- single calls -------------------------------------------------------------------------------
 
 #: A shape keeps this many partners prepared for single calls.
 _PARTNERS = 64
@@ -241,44 +185,10 @@ def _prepare(A: Shape, B: Shape) -> run.SinglePair | None:
         object.__setattr__(A, "_prepared", {})
     except KeyError:
         pass
-    if not (_is_plain(A) and _is_plain(B)):
+    if not (is_plain(A) and is_plain(B)):
         return None
     if len(A._prepared) >= _PARTNERS:
         A._prepared.clear()
     pair = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
     A._prepared[id(B)] = pair
     return pair
-
-
-def _parts(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float) -> np.ndarray:
-    """One row a pose: every part of A against every part of B, combined."""
-    parts_a, parts_b = A.parts(), B.parts()
-    parts = [*parts_a, *parts_b]
-    n, many = len(X_WA), len(parts_a) * len(parts_b)
-    X_WBs = np.concatenate([np.concatenate([X_WA] * len(parts_a)), np.concatenate([X_WB] * len(parts_b))])
-    X_BPs = np.repeat(np.array([X for _, X in parts]), n, axis=0)
-    poses = pose_table(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
-    # Part k stands at rows k·n … k·n + n − 1 of the pose table; pairs of one pose stand together.
-    which = np.arange(n)[:, None, None] + n * np.zeros((1, len(parts_a), len(parts_b)), dtype=np.int64)
-    first = which + n * np.arange(len(parts_a))[None, :, None]
-    second = which + n * (len(parts_a) + np.arange(len(parts_b)))[None, None, :]
-    table = ShapeTable([packed for packed, _ in parts])
-    pairs = np.stack([first.ravel(), second.ravel()], axis=1)
-    rows = run.run_pairs(table, poses, np.repeat(np.arange(len(parts)), n), pairs, boolean=boolean, limit=limit)
-    if many == 1:
-        return rows
-    rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
-
-    def sides(k: int) -> tuple[Union, Union]:
-        own = poses.rows.reshape(len(parts), n, -1)[:, k]
-        return (
-            Union([packed for packed, _ in parts_a], own[: len(parts_a)]),
-            Union([packed for packed, _ in parts_b], own[len(parts_a) :]),
-        )
-
-    if boolean:
-        hits = rows["hit"].reshape(n, many).any(axis=1)
-        rows = rows[::many].copy()
-        rows["hit"] = hits
-        return rows
-    return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)

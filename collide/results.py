@@ -27,6 +27,8 @@ Invariants, asserted in the tests: lower ≤ distance ≤ upper; hit ⇔ distanc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 #: What `how` indexes. A proof stands against both poses as given, entries taken as exact reals.
@@ -95,13 +97,13 @@ class PairResult:
     def _asked(self, k: int) -> tuple:
         """(A, B, X_WA, X_WB) of row k, poses (1, 4, 4)."""
         A, B, X_WA, X_WB = self._question
-        shapes = (S[k] if isinstance(S, tuple) else S for S in (A, B))
+        shapes = (S[k] if isinstance(S, Sequence) else S for S in (A, B))
         poses = (X if len(X) == 1 else X[k : k + 1] for X in (X_WA, X_WB))
         return (*shapes, *poses)
 
     @property
     def question(self) -> tuple:
-        """(A, B, X_WA, X_WB) as asked: shapes, or tuples of them, and poses with a leading N or 1."""
+        """(A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1."""
         return self._question
 
     def __getitem__(self, k: int) -> PairResult:

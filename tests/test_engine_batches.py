@@ -75,6 +75,31 @@ def test_sequences_of_shapes_answer_like_pairs():
     assert [bool(h) for h in against_one] == [collide.collide(A[k], B[0], X_WA[k], X_WB[k]) for k in range(150)]
 
 
+def test_shape_sets_answer_like_lists():
+    rng = np.random.default_rng(21)
+    shapes = _shapes(rng)
+    i, j = rng.integers(0, 6, size=(2, 200))
+    X_WA, X_WB = _poses(rng, 200), _poses(rng, 200)
+    for members in (shapes[:6], shapes):  # the second holds a union, so nothing of it goes the short way
+        library = collide.ShapeSet(members)
+        assert len(library) == len(members) and library[3] is members[3]
+        A, B = library[i], library[j]
+        lists = [members[k] for k in i], [members[k] for k in j]
+        for threads in (1, 3):
+            hits = collide.collide(A, B, X_WA, X_WB, threads=threads)
+            assert 40 < hits.sum() < 160 and np.array_equal(hits, collide.collide(*lists, X_WA, X_WB))
+            r = collide.distance(A, B, X_WA, X_WB, threads=threads)
+            assert np.array_equal(r.rows, collide.distance(*lists, X_WA, X_WB).rows)
+        assert np.array_equal(collide.collide(A, members[0], X_WA, X_WB), collide.collide(lists[0], members[0], X_WA, X_WB))
+        assert r[7].question[:2] == (members[i[7]], members[j[7]])
+    with pytest.raises(InvalidArgument, match="0 … 7"):
+        library[np.array([0, 8])]
+    with pytest.raises(InvalidArgument, match="integers"):
+        library[np.array([0.5])]
+    with pytest.raises(collide.InvalidShape, match=r"shapes\[1\]"):
+        collide.ShapeSet([shapes[0], 3])
+
+
 @pytest.mark.parametrize("threads", [2, 3, 8])
 def test_threads_give_the_same_bits(threads):
     rng = np.random.default_rng(3)
@@ -200,3 +225,39 @@ def test_a_result_keeps_the_poses_it_was_asked_at():
         poses[..., 2, 3] = 0.0
         first = r if poses.ndim == 2 else r[0]
         collide.verify(box, box, EYE, asked if poses.ndim == 2 else asked[0], first)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_axes_save_time_and_change_nothing(threads):
+    rng = np.random.default_rng(6)
+    A, B, X_WA, X_WB = _many(rng, 150)
+    for pair in ((A, B, X_WA, X_WB), (_shapes(rng)[4], _shapes(rng)[0], EYE, X_WB), (_shapes(rng)[0], _shapes(rng)[6], EYE, X_WB)):
+        expected = collide.collide(*pair)
+        assert 10 < expected.sum() < 140
+        for start in (np.zeros((150, 3)), rng.normal(size=(150, 3)), rng.normal(size=(150, 3)) * 1e-200):
+            axes = start.copy()
+            assert np.array_equal(collide.collide(*pair, axes=axes, threads=threads), expected)
+            assert np.array_equal(axes[expected], start[expected]), "axes of hits are left alone"
+            assert np.array_equal(collide.collide(*pair, axes=axes, threads=threads), expected)
+
+
+def test_axes_that_come_back_part_the_bodies():
+    rng = np.random.default_rng(7)
+    A, B = collide.ConvexHull(rng.normal(size=(30, 3))), collide.ConvexHull(rng.normal(size=(30, 3)), radius=0.2)
+    X_WB = _poses(rng, 200, 3.0)
+    axes = np.zeros((200, 3))
+    hits = collide.collide(A, B, EYE, X_WB, axes=axes)
+    assert 20 < hits.sum() < 180
+    for n, X in zip(axes[~hits], X_WB[~hits]):
+        assert abs((n * n).sum() - 1) < 1e-12
+        assert (A.points @ n).max() + B.radius < ((B.points @ X[:3, :3].T + X[:3, 3]) @ n).min() + 1e-12
+
+
+def test_axes_that_are_none_are_refused():
+    box, X = collide.Box((1, 1, 1)), np.tile(EYE, (4, 1, 1))
+    for axes, word in (
+        ([0, 0, 1], "list"), (np.zeros((3, 3)), r"\(4, 3\)"), (np.zeros((4, 3), dtype=np.float32), "float32"),
+        (np.full((4, 3), np.nan), "finite"), (np.full((4, 3), 1e200), "longer"), (np.zeros((3, 4)).T, "contiguous"),
+    ):  # fmt: skip
+        with pytest.raises(InvalidArgument, match=word):
+            collide.collide(box, box, EYE, X, axes=axes)

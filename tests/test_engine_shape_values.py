@@ -28,7 +28,7 @@ NAMES = tuple(shapes())
 def arrays_of(shape):
     """Every array a shape hands out."""
     for field in (*type(shape).__slots__, *shape._fields):
-        value = getattr(shape, field)
+        value = getattr(shape, field, None)  # worked out when first asked for
         if isinstance(value, np.ndarray):
             yield value
     if isinstance(shape, collide.Compound):

@@ -335,6 +335,16 @@ def test_larger_clouds():
         check_supports(rng, points, hull)
 
 
+def test_a_crowd_over_a_ring():
+    """Wide fans over many points, and more tests than a hull should take: both ways out are taken."""
+    t = np.linspace(0, 1, 1500)
+    for crowd in (1e-8 * 2.0 ** (-50 * t), 1e-4 * 2.0 ** (-50 * t)):
+        arc = np.column_stack([crowd, 0 * t, 0.3 - crowd * crowd])
+        spiral = np.column_stack([crowd * np.cos(9 * t), crowd * np.sin(9 * t), 0.3 - crowd])
+        for points in (np.concatenate([ring(2000), arc]), turned(np.concatenate([ring(2000), arc, spiral]))):
+            validate_hull(points, convex_hull(points))
+
+
 def test_support_values_of_a_lattice_are_equal():
     """In integers the comparison is exact."""
     rng = np.random.default_rng(7)
@@ -398,7 +408,9 @@ from fractions import Fraction
 import numpy as np
 from collide import _jit
 from collide.geometry.hulls import orientation as O
+from collide.geometry.hulls import quickhull as Q
 from collide.geometry.hulls.hull import convex_hull
+from collide.geometry.hulls.validate import validate_hull
 assert _jit.PLAIN_PYTHON
 
 def sign(x):
@@ -452,7 +464,21 @@ for _ in range(1500):
     assert got == truth, originals.tolist()
 assert min(seen[name] for name in ("by_expansions", "pair_determinant")) > 200, seen
 
-pickle.dump([tuple(convex_hull(points)) for points in pickle.load(sys.stdin.buffer)], sys.stdout.buffer)
+clouds = pickle.load(sys.stdin.buffer)
+pickle.dump([tuple(convex_hull(points)) for points in clouds], sys.stdout.buffer)
+
+# What only large crowded clouds bring about: fans searched by halving, corners in a shuffled order.
+sure = [0, 0]
+known = Q.locate
+def counted(*args):
+    answer = known(*args)
+    sure[answer[1]] += 1
+    return answer
+Q.locate, Q.WIDE_FAN = counted, 4
+for Q.BUDGET, some in ((100, clouds[::2]), (0, clouds[1::2])):
+    for points in some:
+        validate_hull(points, convex_hull(points))
+assert min(sure) > 20, sure
 """
 
 

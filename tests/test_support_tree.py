@@ -48,7 +48,7 @@ def _settle_from(tree_at, points_at, n, starts_at, directions_at, m, out_at):
             _, out[4 * i + 1], out[4 * i + 2], out[4 * i + 3] = extreme_vertex(tree_at, g[3 * i], g[3 * i + 1], g[3 * i + 2])
             continue
         out[4 * i] = settle_vertex(
-            tree_at, view_f64(points_at, 3 * n), int(from_view[i]), g[3 * i], g[3 * i + 1], g[3 * i + 2]
+            tree_at, int(from_view[i]), g[3 * i], g[3 * i + 1], g[3 * i + 2]
         )
 
 
@@ -111,6 +111,16 @@ def test_no_number_is_no_proof_and_no_endless_loop():
     assert (out[:, 0] == -1).all()
     with pytest.raises(ValueError, match="finite"):
         extreme_vertices(tree, directions)
+
+
+def test_a_point_inside_proves_nothing():
+    points, _, tree = made("points inside")
+    inside = int(np.flatnonzero(np.diff(tree.ring_starts) == 0)[0])
+    starts, out, g = np.array([float(inside)]), np.zeros((1, 4)), np.array([(1.0, 2.0, 3.0)])
+    settle_from(
+        tree.address, address_of(tree.points), len(points), address_of(starts), address_of(g), 1, address_of(out)
+    )
+    assert out[0, 0] == -1 - inside
 
 
 def _signs(rows_at, n, out_at):

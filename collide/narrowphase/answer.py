@@ -30,6 +30,7 @@ from collide.narrowphase.rows import (
     HOW,
     ITERATIONS,
     LOWER,
+    NORMAL,
     ROW,
     UPPER,
     VERTICES_A,
@@ -161,6 +162,10 @@ def _swept(
     weights = view_f64(doubles_at + 8 * _WEIGHTS, 10)
     ids = view_i64(integers_at, 10)
     curved = kind_a != POINTS or kind_b != POINTS
+    # A boolean may begin with an axis that parted the bodies before; reported numbers never do.
+    sign = (-1.0 if flip else 1.0) if boolean else 0.0
+    for axis in range(3):
+        weights[7 + axis] = sign * row[NORMAL + axis]
     closed_form = method(kind_a, n_a, kind_b, n_b) == CAPSULES
     if closed_form:
         depth, bound, above, nx, ny, nz = _segments(pair, points, ids, weights, error)
@@ -176,6 +181,10 @@ def _swept(
     width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
     write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
     if boolean and marks[HOW] != UNDECIDED:
+        if marks[HIT] == 0:
+            row[NORMAL] = sign * nx
+            row[NORMAL + 1] = sign * ny
+            row[NORMAL + 2] = sign * nz
         return
     ax = _combine(points, weights, n, 3)
     ay = _combine(points, weights, n, 4)
@@ -275,9 +284,11 @@ def answer_pairs(
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
     ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   shape_of : a shape row a part.
-    pairs : two part numbers a pair.   boolean : only hit and how are wanted; little else of a decided row is set.
+    pairs : two part numbers a pair.
+    boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
+        normal that is there is the axis to try first.
     stop_at_hit : stop after the first hit.   limit : farther apart than this is not looked at.
-    rows : PAIR_DTYPE, zeroed.   doubles, integers : workspace, see `run`.
+    rows : PAIR_DTYPE, zeroed but for that.   doubles, integers : workspace, see `run`.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     for k in range(n_pairs):

@@ -10,7 +10,14 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
-from collide.narrowphase.minkowski import POINT, copy_point, difference_point, has_trees, settle_point
+from collide.narrowphase.minkowski import (
+    POINT,
+    copy_point,
+    difference_point,
+    has_trees,
+    inlined_difference_point,
+    settle_point,
+)
 from collide.narrowphase.simplex import across_simplex, faces_in_sight, nearest_in_simplex
 
 #: How a run ends. NEAREST: the nearest point is known and clear of rounding. MEETING: nearer than
@@ -24,7 +31,7 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     """Run GJK on the cores of a pair.
 
     points, ids : workspace for five difference points; the simplex found stands first.
-    weights : 10 doubles out: weights of the simplex, its nearest point v, and the unit axis (along v,
+    weights : 10 doubles. In, the last three: a direction from A to B to begin with, or zeros. Out: weights of the simplex, its nearest point v, and the unit axis (along v,
         from the simplex's own edges where v is too short to have a direction).
     touch_suffices : stop as soon as an overlap is proven (a boolean is asked).
     radius : sum of the swept radii.   limit : stop once proven farther apart than this.
@@ -64,12 +71,16 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
 @kernel(inline=True)
 def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
     """The rounds of GJK; see `gjk` for arguments and results."""
-    tx = pair[14]
-    ty = pair[15]
-    tz = pair[16]
+    tx = weights[7]
+    ty = weights[8]
+    tz = weights[9]
+    if tx == 0.0 and ty == 0.0 and tz == 0.0:
+        tx = pair[14]
+        ty = pair[15]
+        tz = pair[16]
     if tx == 0.0 and ty == 0.0 and tz == 0.0:
         tx = 1.0
-    difference_point(pair, points, ids, 0, tx, ty, tz)
+    inlined_difference_point(pair, points, ids, 0, tx, ty, tz)
     n = 1
     square = nearest_in_simplex(points, n, weights, 15)
     # The first support plane already parts most pairs that are farther apart than asked about.
@@ -96,7 +107,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         vx = weights[4]
         vy = weights[5]
         vz = weights[6]
-        difference_point(pair, points, ids, n, -vx, -vy, -vz)
+        inlined_difference_point(pair, points, ids, n, -vx, -vy, -vz)
         bound = _height(points, n, vx, vy, vz) / length
         if trees and (
             bound - error - radius > limit or length - bound <= 0.125 * error or _repeated(ids, n) or used == rounds

@@ -12,7 +12,7 @@ import math
 from collide._jit import address_in_kernel, entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.geometry.tables import POSE, POSE_SLOP, POSE_TERMS
 from collide.narrowphase.answer import SIGNATURE
-from collide.narrowphase.rows import HIT, HOW, ROW
+from collide.narrowphase.rows import HIT, HOW, NORMAL, ROW
 from collide.results import REFUSED, UNDECIDED
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
@@ -64,14 +64,17 @@ def _is_rotation(R, at):
     )
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, float64, boolean, int64)")
-def answer_poses(header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, limit, check, out_at):
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, float64, boolean, int64, int64)")
+def answer_poses(
+    header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, limit, check, axes_at, out_at
+):
     """Answer poses ``first`` … n − 1 of a pair, or of n pairs; 0, OPEN or BAD_POSE.
 
     header : HEADER integers; [ANSWERED] becomes the number of poses answered in all. Where it stops OPEN,
         the rows of the last block are left where the block's rows stand, for the exact stage.
     which : 0, or two shape rows a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
     check : refuse matrices that are no rotation.
+    axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by one that parts the bodies.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed, which is where rows stand.
     """
     header = view_i64(header_at, HEADER)
@@ -95,6 +98,12 @@ def answer_poses(header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, bo
         if boolean:
             for k in range(count * ROW // 8):
                 scratch[k] = 0
+            if axes_at != 0:
+                for k in range(count):
+                    row = view_f64(rows_at + ROW * k, 12)
+                    axis = view_f64(axes_at + 24 * (done + k), 3)
+                    for j in range(3):
+                        row[NORMAL + j] = axis[j]
         else:
             rows_at = out_at + ROW * done
         _answer_at(
@@ -110,6 +119,11 @@ def answer_poses(header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, bo
             left_open = left_open or marks[HOW] == UNDECIDED or marks[HOW] == REFUSED
             if boolean:
                 view_u8(out_at + done + k, 1)[0] = marks[HIT]
+                if axes_at != 0 and marks[HIT] == 0:
+                    row = view_f64(rows_at + ROW * k, 12)
+                    axis = view_f64(axes_at + 24 * (done + k), 3)
+                    for j in range(3):
+                        axis[j] = row[NORMAL + j]
         done += count
         header[ANSWERED] = done
         if left_open:

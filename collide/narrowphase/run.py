@@ -80,12 +80,14 @@ def run_poses(
     boolean: bool,
     limit: float,
     check: bool,
+    axes: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """Two convex sets at n pairs of poses: bool[n], or rows of `PAIR_DTYPE`; None where a pose is no pose.
 
     which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
     X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
     check : refuse matrices that are no rotation.
+    axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
     """
     n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
     table.plant(np.arange(2) if which is None else which)
@@ -96,7 +98,8 @@ def run_poses(
     while done < n:
         said = answer_poses(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
-            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, limit, check, address_of(out),
+            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, limit, check,
+            0 if axes is None else address_of(axes), address_of(out),
         )  # fmt: skip
         if said == BAD_POSE:
             return None

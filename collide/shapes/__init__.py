@@ -1,7 +1,7 @@
 """What a user hands in: immutable shapes, validated when made.
 
 One file per family: primitives (a few numbers), hull (points), hpolytope (half-spaces),
-compound (a union). A triangle mesh as itself arrives with the box-trees over facets; until then
+compound (a union), shape_set (many, picked from by number). A triangle mesh as itself arrives with the box-trees over facets; until then
 `collide.scenes` turns meshes into hulls or unions of hulls and says so for every body.
 """
 
@@ -10,8 +10,9 @@ from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.hull import ConvexHull
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
+from collide.shapes.shape_set import ShapeSet
 
 __all__ = [
     "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
-    "HPolytope", "Halfspace", "Shape", "Sphere",
+    "HPolytope", "Halfspace", "Shape", "ShapeSet", "Sphere",
 ]

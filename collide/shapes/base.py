@@ -77,6 +77,12 @@ IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
 
 
+def is_plain(shape: Shape) -> bool:
+    """Whether a shape is one convex set in its own frame."""
+    parts = shape.parts()
+    return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
+
+
 def _rebuild(cls, values):
     return cls._from_fields(*values) if hasattr(cls, "_from_fields") else cls(*values)
 

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.errors import InvalidShape
-from collide.geometry.hulls.hull import Hull, convex_hull
-from collide.geometry.hulls.validate import validate_hull
 from collide.geometry.packing import pack_points
-from collide.geometry.support_tree.planted import FEWEST_POINTS, PlantedTree
 from collide.shapes.base import Shape, alone, positive, rows
 from collide.transforms import SMALLEST
+
+if TYPE_CHECKING:
+    from collide.geometry.hulls.hull import Hull
+
+# Hulls and support trees are kernels: imported where used, so that shapes can be made without a compiler.
+
+#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
+#: so that an answer does not depend on what was asked before.
+FEWEST_POINTS = 384
 
 
 class ConvexHull(Shape):
@@ -54,6 +61,8 @@ class ConvexHull(Shape):
     def _from_fields(cls, points, faces, radius, tree=None):
         made = cls(points, faces=faces, radius=radius)
         if tree is not None:
+            from collide.geometry.support_tree.planted import PlantedTree
+
             object.__setattr__(made, "_tree", PlantedTree(made.points, tree))
         return made
 
@@ -68,17 +77,23 @@ class ConvexHull(Shape):
 
     def _pack(self):
         if not hasattr(self, "_tree"):
-            object.__setattr__(
-                self, "_tree", PlantedTree(self.points) if len(self.points) >= FEWEST_POINTS else None
-            )
+            from collide.geometry.support_tree.planted import PlantedTree
+
+            large = len(self.points) >= FEWEST_POINTS
+            object.__setattr__(self, "_tree", PlantedTree(self.points) if large else None)
         return alone(pack_points(self.points, self.radius, tree=self._tree))
 
     @property
     def hull(self) -> Hull:
         """The surface, exactly: ``dimension`` (3 solid … 0 point), ``vertices`` and ``facets`` by rows of
         ``points``, facets counter-clockwise from outside. Worked out when first asked for, O(n log n)."""
+        from collide.geometry.hulls.hull import convex_hull
+
         if not hasattr(self, "_hull"):
-            object.__setattr__(self, "_hull", convex_hull(self.points))
+            hull = convex_hull(self.points)
+            for array in (hull.vertices, hull.facets):
+                array.flags.writeable = False
+            object.__setattr__(self, "_hull", hull)
         return self._hull
 
     def validate(self) -> None:
@@ -86,6 +101,8 @@ class ConvexHull(Shape):
 
         Raises InvalidShape with the defect and where it is. For tests and for data of doubtful origin.
         """
+        from collide.geometry.hulls.validate import validate_hull
+
         given = self.hull._replace(facets=self.faces) if self.faces is not None else None
         for what, surface in (("hull", self.hull), ("faces", given)):
             if surface is None:

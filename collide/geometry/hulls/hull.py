@@ -31,8 +31,8 @@ class Hull(NamedTuple):
 def convex_hull(points: np.ndarray) -> Hull:
     """The hull of points (n, 3), any finite doubles, repeated, collinear, coplanar or inside as they may be.
 
-    The same points in the same order give the same rows. O(n log n) for clouds met in practice; what
-    is slow, and by how much, is told in `quickhull`. Raises ValueError for anything but finite rows.
+    The same points in the same order give the same rows. About O(n log n), see
+    `quickhull`. Raises ValueError for anything but finite rows.
     """
     given = np.asarray(points, dtype=np.float64)
     if given.ndim != 2 or given.shape[1] != 3 or not len(given):

@@ -33,7 +33,7 @@ _ACROSS, _POINT, _BEFORE, _AFTER, _ROUND = 3, 6, 7, 8, 9
 #: Doubles of a facet: normal, a corner, how far its plane's doubles may be off, its farthest point's distance.
 PLANE = 8
 _ERROR, _FARTHEST = 6, 7
-#: Fans of more facets than this are searched by halving.
+#: Fans of more facets than this are searched by halving; at least 4, since the first four facets are no fan.
 WIDE_FAN = 48
 #: Tests per point after which corners are no longer chosen by distance. Ordinary clouds need 10 to 50.
 BUDGET = 100
@@ -41,7 +41,8 @@ BUDGET = 100
 _PLANE_ERROR = 2.0**-48
 
 #: Integers of the state: free facets as a chain, facets ever used, first and last of the queue of
-#: facets with points, the round; and what is told of the run: tests of a point against a facet.
+#: facets with points, the round, tests of a point against a plane, facets made, how far the shuffled order
+#: was followed (−1: not begun), four corners to begin with.
 STATE = 12
 _FREE, _USED, _FIRST, _LAST, _NOW, _TESTS, _MADE, _CURSOR, _CORNERS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
@@ -162,7 +163,7 @@ def distribute(points, originals, work, digits, facets, planes, following, owner
         owner[i] = -1
         tries = k
         if k > WIDE_FAN:
-            t, sure = locate(points, originals, work, digits, facets, fan, k, i)
+            t, sure = locate(points, originals, work, digits, facets, state, fan, k, i)
             if sure:
                 tries = 1
         for _ in range(tries):
@@ -179,7 +180,7 @@ def distribute(points, originals, work, digits, facets, planes, following, owner
 
 
 @kernel
-def locate(points, originals, work, digits, facets, fan, k, i):
+def locate(points, originals, work, digits, facets, state, fan, k, i):
     """(place in the fan, whether point i is above that facet if it is above any).
 
     The half-planes from the line through the fan's apex and one corner of its rim to the other corners
@@ -197,6 +198,7 @@ def locate(points, originals, work, digits, facets, fan, k, i):
         high = k
         place = 1
         while high - low > 1:
+            state[_TESTS] += 1
             corner = np.int64(facets[FACET * fan[(start + place) % k]])
             sign = orientation(points, originals, work, digits, apex, first, corner, i, -1)
             if sign == 0 and (low == 0 or high == k):
@@ -357,9 +359,7 @@ def write_surface(facets, state, count, marks, surface):
     return many
 
 
-@entry(
-    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
-)
+@entry(f"int64({', '.join(['int64'] * 17)})")
 def quickhull(
     count, originals_at, points_at, work_at, digits_at, facets_at, planes_at, following_at, orphans_at, starting_at,
     owner_at, order_at, region_at, rim_at, fan_at, surface_at, state_at,

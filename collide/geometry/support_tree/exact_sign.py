@@ -12,8 +12,8 @@ import math
 
 from collide._jit import kernel
 
-#: Six roundings of relative size 2⁻⁵³ lead to the product: three products of differences, two sums. Seven
-#: cover the rounding of the bound itself, and the last summand products below the smallest normal double.
+#: Each term goes through four roundings of relative size 2⁻⁵³: a difference, a product, two sums. Seven cover
+#: those of the bound itself, too, and the last summand products below the smallest normal double.
 _ROUNDING = 7.0 * 2.0**-53
 _TINY = 2.0**-1060
 _SPLITTER = 134217729.0  # 2²⁷ + 1

@@ -10,9 +10,6 @@ from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.support_tree.build import build_support_tree
 from collide.geometry.support_tree.layout import SupportTree
 
-#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
-#: so that an answer does not depend on what was asked before.
-FEWEST_POINTS = 384
 #: A hull of so few vertices is scanned as well, however many points were given.
 FEWEST_VERTICES = 32
 

@@ -3,8 +3,9 @@
 Every list holds the vertices of the next subset whose normal cones meet the normal cone of the list's
 owner, so the walk ends at the extreme vertex, up to the rounding of the products compared. The number
 of lists is logarithmic in the number of vertices, the length of a list does not depend on it.
-The search in nested subsets is Dobkin and Kirkpatrick's; lists of a whole normal cone in place of
-neighbours, and random subsets, follow the ε-net trees for point location of the project's mesh notes.
+Nested subsets of a hull's vertices are Dobkin and Kirkpatrick's ("Fast detection of polyhedral
+intersection", 1983); random ones, with lists of all that a coarse answer leaves possible, are Clarkson's
+("A randomized algorithm for closest-point queries", 1988).
 """
 
 from __future__ import annotations

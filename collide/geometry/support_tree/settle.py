@@ -39,7 +39,8 @@ _TRIPLE_ROUNDING = 64.0 * 2.0**-53
 def settle_vertex(tree_at, vertex, gx, gy, gz):
     """Id of a vertex farthest in direction g, exactly, near ``vertex``.
 
-    Returns −1 − id where nothing can be proven: components of g differ by some 2¹⁸⁰⁰, or are no numbers.
+    Returns −1 − id where nothing can be proven: components of g differ by some 2¹⁸⁰⁰, or are no numbers, or
+    ``vertex`` is a point inside the hull.
     O(1) steps from what `extreme_vertex` gives, each O(log degree) unless the vertex has long thin facets or
     coplanar ones, which take O(degree); O(n) in the middle of a facet across g.
     """
@@ -55,7 +56,7 @@ def climb(tree_at, vertex, gx, gy, gz, counters):
     coordinates = view_f64(header[AT_POINTS], 3 * header[POINTS])
     limits = view_f64(header[AT_RANGE], 3)
     certain, gx, gy, gz = scaled_into_range(limits[0], limits[1], limits[2], gx, gy, gz)
-    if not certain:
+    if not certain or starts[vertex + 1] == starts[vertex]:
         return -1 - vertex
     if gx == 0.0 and gy == 0.0 and gz == 0.0:
         return vertex

@@ -1,0 +1,139 @@
+"""Batches: from shapes and poses as checked by `query.py` to rows, in as many threads as asked for.
+
+Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py` as they are;
+unions are taken apart into pairs of parts and put together again by `unions.py`.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from collide.errors import InvalidArgument, InvalidPose
+from collide.geometry.packing import PackedConvex
+from collide.geometry.tables import ShapeTable, pose_table
+from collide.narrowphase import run
+from collide.results import PAIR_DTYPE
+from collide.shapes.base import Shape, is_plain
+from collide.shapes.shape_set import Picked
+from collide.transforms import as_poses
+from collide.unions import Union, combine
+
+
+def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None) -> np.ndarray:
+    """bool[n], or a row a pose, of a batch in as many threads."""
+    workers = _workers(threads)
+    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    if workers == 1 or n < 2 * workers:
+        return _answers(A, B, X_WA, X_WB, boolean, limit, check, axes)
+    bounds = np.linspace(0, n, workers + 1).astype(int)
+
+    def piece(k: int) -> np.ndarray:
+        part = slice(bounds[k], bounds[k + 1])
+        shapes = (S if isinstance(S, Shape) else S[part] for S in (A, B))
+        poses = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
+        try:
+            return _answers(*shapes, *poses, boolean, limit, check, None if axes is None else axes[part])
+        except InvalidPose:
+            _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
+            raise
+
+    with ThreadPoolExecutor(workers) as pool:
+        return np.concatenate(list(pool.map(piece, range(workers))))
+
+
+def _workers(threads) -> int:
+    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
+    return int(threads)
+
+
+def _refuse_poses(X_WA, X_WB, check: bool) -> None:
+    as_poses(X_WA, "X_WA", check=check)
+    as_poses(X_WB, "X_WB", check=check)
+
+
+def _answers(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, axes=None) -> np.ndarray:
+    if not len(X_WA) or not len(X_WB):
+        return np.zeros(0, dtype=bool if boolean else PAIR_DTYPE)
+    if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
+        table, which = _table(A, B, max(len(X_WA), len(X_WB)))
+        for checked in (check, False):
+            out = run.run_poses(table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=checked, axes=axes)
+            if out is not None:
+                return out
+            _refuse_poses(X_WA, X_WB, check)  # unless it is a pose on the brink of the tolerance
+        raise AssertionError("a pose that is none")
+    _refuse_poses(X_WA, X_WB, check)
+    n = max(len(X_WA), len(X_WB))
+    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit)
+    else:
+        sides = ([S] * n if isinstance(S, Shape) else S for S in (A, B))
+        asked = zip(*sides, X_WA[:, None], X_WB[:, None])
+        rows = np.concatenate([_parts(*pair, boolean=boolean, limit=limit) for pair in asked])
+    return rows["hit"] if boolean else rows
+
+
+def _all_plain(side) -> bool:
+    if isinstance(side, Picked):
+        return side.shape_set.plain
+    return is_plain(side) if isinstance(side, Shape) else all(is_plain(shape) for shape in side)
+
+
+def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
+    """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        return ShapeTable([A.parts()[0][0], B.parts()[0][0]]), None
+    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+        return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)
+    rows: dict[int, int] = {}
+    packed: list[PackedConvex] = []
+
+    def row_of(shape: Shape) -> int:
+        one = shape.parts()[0][0]
+        if id(one) not in rows:  # held by packed as long as this dictionary lives
+            rows[id(one)] = len(packed)
+            packed.append(one)
+        return rows[id(one)]
+
+    which = np.empty((n, 2), dtype=np.int64)
+    for column, side in enumerate((A, B)):
+        which[:, column] = row_of(side) if isinstance(side, Shape) else [row_of(shape) for shape in side]
+    return ShapeTable(packed), which
+
+
+def _parts(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float) -> np.ndarray:
+    """One row a pose: every part of A against every part of B, combined."""
+    parts_a, parts_b = A.parts(), B.parts()
+    parts = [*parts_a, *parts_b]
+    n, many = len(X_WA), len(parts_a) * len(parts_b)
+    X_WBs = np.concatenate([np.concatenate([X_WA] * len(parts_a)), np.concatenate([X_WB] * len(parts_b))])
+    X_BPs = np.repeat(np.array([X for _, X in parts]), n, axis=0)
+    poses = pose_table(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
+    # Part k stands at rows k·n … k·n + n − 1 of the pose table; pairs of one pose stand together.
+    which = np.arange(n)[:, None, None] + n * np.zeros((1, len(parts_a), len(parts_b)), dtype=np.int64)
+    first = which + n * np.arange(len(parts_a))[None, :, None]
+    second = which + n * (len(parts_a) + np.arange(len(parts_b)))[None, None, :]
+    table = ShapeTable([packed for packed, _ in parts])
+    pairs = np.stack([first.ravel(), second.ravel()], axis=1)
+    rows = run.run_pairs(table, poses, np.repeat(np.arange(len(parts)), n), pairs, boolean=boolean, limit=limit)
+    if many == 1:
+        return rows
+    rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
+
+    def sides(k: int) -> tuple[Union, Union]:
+        own = poses.rows.reshape(len(parts), n, -1)[:, k]
+        return (
+            Union([packed for packed, _ in parts_a], own[: len(parts_a)]),
+            Union([packed for packed, _ in parts_b], own[len(parts_a) :]),
+        )
+
+    if boolean:
+        hits = rows["hit"].reshape(n, many).any(axis=1)
+        rows = rows[::many].copy()
+        rows["hit"] = hits
+        return rows
+    return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)

@@ -1,0 +1,73 @@
+"""ShapeSet: many shapes, picked from by number, for batches that ask about a different pair at every pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide.errors import InvalidArgument, InvalidShape
+from collide.shapes.base import Shape, is_plain
+
+if TYPE_CHECKING:
+    from collide.geometry.tables import ShapeTable
+
+
+class ShapeSet:
+    """Shapes laid out once, however often they are asked about.
+
+        library = collide.ShapeSet(shapes)
+        collide.collide(library[i], library[j], X_WA, X_WB)     # i, j: (N,) numbers of shapes
+
+    shapes : a sequence of shapes. Picking by an integer gives the shape, by an integer array a `Picked`.
+    """
+
+    def __init__(self, shapes: Sequence[Shape]):
+        self.shapes = tuple(shapes)
+        for k, shape in enumerate(self.shapes):
+            if not isinstance(shape, Shape):
+                raise InvalidShape(f"ShapeSet: shapes[{k}] must be a shape, got {type(shape).__name__}")
+        if not self.shapes:
+            raise InvalidShape("ShapeSet: shapes is empty; at least one is needed")
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def __getitem__(self, rows):
+        if isinstance(rows, (int, np.integer)):
+            return self.shapes[rows]
+        numbers = np.asarray(rows)
+        if numbers.ndim != 1 or not np.issubdtype(numbers.dtype, np.integer):
+            raise InvalidArgument(f"ShapeSet: pick by integers (N,), got {numbers.dtype} {numbers.shape}")
+        if len(numbers) and not (0 <= numbers.min() and numbers.max() < len(self)):
+            raise InvalidArgument(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}")
+        return Picked(self, numbers.astype(np.int64))
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether each shape is one convex set in its own frame."""
+        return all(is_plain(shape) for shape in self.shapes)
+
+    @cached_property
+    def table(self) -> ShapeTable:
+        """What kernels read, a row a shape; for plain sets only."""
+        from collide.geometry.tables import ShapeTable
+
+        return ShapeTable([shape.parts()[0][0] for shape in self.shapes])
+
+
+class Picked(Sequence):
+    """Shapes of a set, by their numbers: a sequence of shapes."""
+
+    def __init__(self, shape_set: ShapeSet, rows: np.ndarray):
+        self.shape_set, self.rows = shape_set, rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, k):
+        if isinstance(k, slice):
+            return Picked(self.shape_set, self.rows[k])
+        return self.shape_set.shapes[self.rows[k]]

@@ -1,0 +1,236 @@
+"""What a support tree costs, counted; how it is kept, checked and refused; the same bits without compilation."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hull_families import HULLS, LARGE, bipyramid, directions_for, ellipsoid, hull_of, made, normals_of
+
+from collide.geometry.support_tree import build
+from collide.geometry.support_tree.build import LONGEST_LIST, build_support_tree, subset_sizes
+from collide.geometry.support_tree.layout import SupportTree
+from collide.geometry.support_tree.query import COUNTERS, extreme_vertices
+from collide.geometry.support_tree.settle import LOOKED_AT, SCANNED, STEPS
+from collide.geometry.support_tree.validate import validate_support_tree
+
+pytest.importorskip("scipy.spatial")
+
+
+# --- size and speed, counted --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_lists_are_short_and_memory_is_linear(name):
+    points, facets, tree = made(name, large=True)
+    lengths = np.diff(tree.nodes)
+    assert lengths.max() <= LONGEST_LIST and lengths.mean() < 55
+    assert tree.nbytes <= 100 * len(points) + 2000, tree.nbytes / len(points)
+    counters = np.zeros(COUNTERS, dtype=np.int64)
+    directions = np.random.default_rng(11).normal(size=(2000, 3))
+    settled = extreme_vertices(tree, directions, True, counters)
+    assert (settled != extreme_vertices(tree, directions, False)).sum() < 2
+    assert counters[STEPS] < 2
+    assert counters[SCANNED] / 2000 < 230
+    assert counters[LOOKED_AT] / 2000 < 30
+    # Exact ties: facet normals, and those of the flat faces again and again.
+    normals = normals_of(points, facets[:: len(facets) // 2000])
+    counters[:] = 0
+    assert (extreme_vertices(tree, np.concatenate([normals, np.eye(3), -np.eye(3)]), True, counters) >= 0).all()
+    assert counters[STEPS] < 2 * len(normals) and counters[LOOKED_AT] < 100 * len(normals)
+
+
+def test_operations_grow_like_the_logarithm():
+    sizes, scanned = [256, 1024, 4096, 16384], []
+    for n in sizes:
+        points, facets = ellipsoid(n, seed=12)
+        tree = build_support_tree(points, np.arange(n), facets, hull_of)
+        assert tree.depth == len(subset_sizes(n))
+        counters = np.zeros(COUNTERS, dtype=np.int64)
+        extreme_vertices(tree, np.random.default_rng(13).normal(size=(2000, 3)), True, counters)
+        scanned.append(counters[SCANNED] / 2000)
+        assert counters[LOOKED_AT] / 2000 < 8
+    assert all(count < 14 * np.log2(n) for n, count in zip(sizes, scanned)), scanned
+
+
+def test_owners_of_long_lists_leave_the_coarse_subsets(monkeypatch):
+    """What the degree alone does not show: here it is told to look at nothing."""
+    monkeypatch.setattr(build, "HIGHEST_DEGREE", 10**9)
+    usual = build.mixed
+    monkeypatch.setattr(build, "mixed", lambda rows: np.where(rows < 4000, usual(rows), np.uint64(0)))  # apexes first
+    points, facets = bipyramid(4000)
+    tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
+    assert np.diff(tree.nodes).max() <= LONGEST_LIST
+    assert not {4000, 4001} & set(tree.owners.tolist())
+    validate_support_tree(tree, samples=50)
+    monkeypatch.setattr(build, "_ATTEMPTS", 1)
+    assert np.diff(build_support_tree(points, np.arange(len(points)), facets, hull_of).nodes).max() > 2000
+
+
+def test_a_vertex_of_many_neighbours_is_proven_by_few():
+    """Directions inside the apex's cone, from the apex: work that is logarithmic in its degree."""
+    tree = made("bipyramid", large=True)[2]
+    directions = np.random.default_rng(14).normal(size=(500, 3)) * (0.3, 0.3, 0) + (0, 0, 1)
+    counters = np.zeros(COUNTERS, dtype=np.int64)
+    assert (extreme_vertices(tree, directions, True, counters) == 30000).mean() > 0.8
+    assert counters[LOOKED_AT] / 500 < 6 * np.log2(30000)
+
+
+# --- keeping and checking -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", HULLS)
+def test_validation_passes(name):
+    validate_support_tree(made(name)[2], samples=25)
+
+
+def test_saved_and_loaded(tmp_path):
+    points, facets, tree = made("sphere")
+    np.savez(tmp_path / "tree.npz", **tree.to_arrays())
+    with np.load(tmp_path / "tree.npz") as arrays:
+        again = SupportTree.from_arrays(points, dict(arrays))
+    directions = directions_for(points, facets, seed=15)
+    assert np.array_equal(extreme_vertices(again, directions), extreme_vertices(tree, directions))
+    with pytest.raises(ValueError):
+        again.ring[0] = 1
+
+
+def test_building_twice_gives_the_same_bytes():
+    points, facets, tree = made("sphere")
+    again = build_support_tree(points, np.arange(len(points)), facets, hull_of).to_arrays()
+    assert all(np.array_equal(part, again[name]) for name, part in tree.to_arrays().items())
+
+
+def changed(name, place, value):
+    def change(arrays):
+        arrays[name] = arrays[name].copy()
+        arrays[name][place] = value
+
+    return change
+
+
+DAMAGES = {
+    "version": changed("support_tree", 0, 99),
+    "depth too large": changed("support_tree", 2, 3),
+    "depth too small": changed("support_tree", 2, 1),
+    "depth 0": changed("support_tree", 2, 0),
+    "depth below 0": changed("support_tree", 2, -1),
+    "a missing array": lambda arrays: arrays.pop("ring"),
+    "another type": lambda arrays: arrays.update(nodes=arrays["nodes"].astype(np.int64)),
+    "another shape": lambda arrays: arrays.update(ring=arrays["ring"].reshape(-1, 2)),
+    "no nodes": lambda arrays: arrays.update(nodes=arrays["nodes"][:0]),
+    "nodes out of order": changed("nodes", 5, 2**30),
+    "nodes cut short": lambda arrays: arrays.update(nodes=arrays["nodes"][:-1]),
+    "a node too far": changed("entries", 3, 10**6),
+    "a node below 0": changed("entries", 3, -2),
+    "a node twice": lambda arrays: changed("entries", 3, arrays["entries"][4])(arrays),
+    "a row too far": changed("entries", -1, 10**6),
+    "a row below 0": changed("entries", -1, -1),
+    "another row": lambda arrays: changed("entries", -1, arrays["entries"][-2])(arrays),
+    "entries cut short": lambda arrays: arrays.update(entries=arrays["entries"][:-1]),
+    "an owner too far": changed("owners", 3, 10**6),
+    "another owner": lambda arrays: changed("owners", 3, arrays["owners"][4])(arrays),
+    "another coordinate": changed("list_coordinates", 100, 0.123),
+    "not a number": changed("list_coordinates", 100, np.nan),
+    "coordinates cut short": lambda arrays: arrays.update(list_coordinates=arrays["list_coordinates"][:-3]),
+    "a neighbour too far": changed("ring", 7, 10**6),
+    "a neighbour below 0": changed("ring", 7, -1),
+    "rings out of order": changed("ring_starts", 7, 10**6),
+    "rings cut short": lambda arrays: arrays.update(ring_starts=arrays["ring_starts"][:-1]),
+}
+
+
+@pytest.mark.parametrize("what", DAMAGES)
+def test_damaged_arrays_are_refused(what):
+    points, _, tree = made("sphere")
+    arrays = tree.to_arrays()
+    DAMAGES[what](arrays)
+    with pytest.raises(ValueError, match="support tree"):
+        SupportTree.from_arrays(points, arrays)
+
+
+def test_other_points_are_refused():
+    points, _, tree = made("sphere")
+    with pytest.raises(ValueError, match="coordinates"):
+        SupportTree.from_arrays(points[::-1], tree.to_arrays())
+    with pytest.raises(ValueError, match="points"):
+        SupportTree.from_arrays(points[:-1], tree.to_arrays())
+
+
+def test_validation_sees_what_loading_cannot():
+    points, _, tree = made("sphere")
+    arrays = tree.to_arrays()
+    changed("ring", 0, (arrays["ring"][0] + 100) % len(points))(arrays)
+    with pytest.raises(AssertionError):
+        validate_support_tree(SupportTree.from_arrays(points, arrays))
+    # Every list of the last level shrunk to copies of its owner: complete in form, wrong in most directions.
+    arrays = tree.to_arrays()
+    entries, coordinates = arrays["entries"].copy(), arrays["list_coordinates"].copy()
+    for node in range(1, len(tree.owners)):
+        begin, end = tree.nodes[node], tree.nodes[node + 1]
+        entries[begin:end] = tree.owners[node]
+        coordinates[3 * begin : 3 * end] = np.repeat(points[tree.owners[node]], end - begin)
+    arrays.update(entries=entries, list_coordinates=coordinates)
+    crippled = SupportTree.from_arrays(points, arrays)
+    with pytest.raises(AssertionError, match="climbing"):
+        validate_support_tree(crippled)
+    # Answers stay exact all the same.
+    directions = np.random.default_rng(16).normal(size=(50, 3))
+    assert np.array_equal(extreme_vertices(crippled, directions), extreme_vertices(tree, directions))
+
+
+def test_wrong_input_is_refused():
+    points, facets = ellipsoid(50, seed=17)
+    rows = np.arange(50)
+    for bad_points, vertices, bad_facets in (
+        (points * np.nan, rows, facets),
+        (points[:, :2], rows, facets),
+        (points, rows, facets[1:]),
+        (points, rows, np.concatenate([facets, facets[:1]])),
+        (points, rows, np.concatenate([facets[1:], facets[:1, ::-1]])),
+        (points, rows[1:], facets),
+        (points, rows[[0, *range(50)]], facets),
+        (points, rows, facets + 1),
+        (points, rows, facets[:1]),
+        (points, rows, facets[:, :2]),
+    ):
+        with pytest.raises(ValueError):
+            build_support_tree(bad_points, vertices, bad_facets, hull_of)
+
+
+PLAIN = """
+import sys, numpy as np
+from collide import _jit
+assert _jit.PLAIN_PYTHON
+from collide.geometry.support_tree.build import build_support_tree
+from collide.geometry.support_tree.query import extreme_vertices
+given = dict(np.load(sys.argv[1]))
+tree = build_support_tree(given["points"], given["vertices"], given["facets"], lambda points: given["none"])
+np.savez(sys.argv[2], ids=extreme_vertices(tree, given["directions"]), **tree.to_arrays())
+"""
+
+
+@pytest.mark.parametrize("name", ["small sphere", "sphere", "bipyramid"])
+def test_without_compilation_the_bits_are_the_same(name, tmp_path):
+    points, facets = {
+        "small sphere": lambda: ellipsoid(100), "sphere": lambda: ellipsoid(400, seed=18), "bipyramid": lambda: bipyramid(250),
+    }[name]()  # fmt: skip
+    tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
+    directions = directions_for(points, facets, seed=19, each=10)
+    directions = directions[np.abs(directions).max(axis=1) < 1e100]
+    np.savez(
+        tmp_path / "in.npz", points=points, vertices=np.arange(len(points)), facets=facets, directions=directions,
+        none=np.zeros((0, 3)),
+    )  # fmt: skip
+    child = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", PLAIN, str(tmp_path / "in.npz"), str(tmp_path / "out.npz")],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False, timeout=100,
+    )  # fmt: skip
+    assert child.returncode == 0, child.stderr[-2000:]
+    with np.load(tmp_path / "out.npz") as plain:
+        for part, array in tree.to_arrays().items():
+            assert np.array_equal(plain[part], array), part
+        assert np.array_equal(plain["ids"], extreme_vertices(tree, directions))
