@@ -92,6 +92,7 @@ class Entry:
         self._function, self._signature = function, signature
         self._ready: Callable | None = function if PLAIN_PYTHON else None
         self._lock = threading.Lock()
+        self._address = 0
 
     def __call__(self, *args):
         if self._ready is None:
@@ -106,6 +107,16 @@ class Entry:
         return self._ready  # type: ignore[return-value]
 
     @property
+    def unchecked(self) -> Callable:
+        """The compiled function without numba's look at the types of its arguments, which takes as long as
+        a pair of boxes. It trusts its caller with everything but that an array is one, of the right number of
+        dimensions and size of items: strides and what the bytes mean are for the kernel to check."""
+        if PLAIN_PYTHON:
+            return self._function
+        (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]
+        return compiled.entry_point
+
+    @property
     def address(self) -> int:
         """Where the machine code starts, for `native_call`: kernels of another entry call it there.
 
@@ -113,8 +124,10 @@ class Entry:
         """
         if PLAIN_PYTHON:
             return _plain_address(self._function)
-        (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]
-        return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+        if self._address == 0:
+            (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]
+            self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+        return self._address
 
     def _compile(self) -> None:
         with self._lock:

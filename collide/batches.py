@@ -86,7 +86,8 @@ def _all_plain(side) -> bool:
 def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
     if isinstance(A, Shape) and isinstance(B, Shape):
-        return ShapeTable([A.parts()[0][0], B.parts()[0][0]]), None
+        prepared = getattr(A, "_prepared", {}).get(id(B))
+        return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)
     rows: dict[int, int] = {}

@@ -10,7 +10,6 @@ from collide.batches import ask
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
-from collide.narrowphase.poses import collide_single
 from collide.results import PairResult
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
@@ -42,14 +41,15 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axe
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     try:
-        hit = collide_single.ready(A._prepared[id(B)].address, X_WA, X_WB)
-        if hit >= 0:
-            return hit == 1
+        if X_WB.ndim == 2:
+            pair = A._prepared[id(B)]
+            hit = pair.collide(pair.address, X_WA, X_WB)
+            if hit >= 0:
+                return hit == 1
     except (AttributeError, KeyError, TypeError):
         pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
-    if single:
-        _prepare(A, B)
+    _prepare(A, B)
     hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
     return bool(hits[0]) if single else hits
 
@@ -99,8 +99,7 @@ def distance(
             pass  # as in `collide`
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
-    if single:
-        _prepare(A, B)
+    _prepare(A, B)
     rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads)
     rows["b"] = 1
     endless = np.isneginf(rows["distance"])
@@ -176,19 +175,17 @@ def _held(shapes):
 _PARTNERS = 64
 
 
-def _prepare(A: Shape, B: Shape) -> run.SinglePair | None:
-    """The pair made ready for single calls, kept with A; None for unions. Never used for its identity alone:
-    the entry holds B, so that no other shape can take its id."""
-    try:
-        return A._prepared[id(B)]
-    except AttributeError:
+def _prepare(A, B) -> None:
+    """Make a pair of convex shapes ready for single calls, and keep it with A.
+
+    Looked up by id, and never mistaken: the entry holds B, so that no other shape can take its id.
+    """
+    if not (isinstance(A, Shape) and isinstance(B, Shape) and is_plain(A) and is_plain(B)):
+        return
+    if not hasattr(A, "_prepared"):
         object.__setattr__(A, "_prepared", {})
-    except KeyError:
-        pass
-    if not (is_plain(A) and is_plain(B)):
-        return None
+    if id(B) in A._prepared:
+        return
     if len(A._prepared) >= _PARTNERS:
         A._prepared.clear()
-    pair = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
-    A._prepared[id(B)] = pair
-    return pair
+    A._prepared[id(B)] = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))

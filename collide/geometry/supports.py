@@ -11,7 +11,7 @@ import math
 from collide._jit import kernel
 from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
-from collide.geometry.support_tree.query import extreme_vertex
+from collide.geometry.support_tree.query import coarse_vertex, extreme_vertex
 from collide.geometry.support_tree.settle import settle_vertex
 
 
@@ -34,13 +34,16 @@ def settled_vertex(coordinates, n, m, tree, vertex, gx, gy, gz):
 
 
 @kernel(inline=True)
-def support(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
+def support(kind, coordinates, n, m, params, at, tree, coarse, gx, gy, gz):
     """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
 
     tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
+    coarse : of a support tree, ask its coarsest subset alone.
     params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
     """
     if tree != 0:
+        if coarse:
+            return coarse_vertex(tree, gx, gy, gz)
         return extreme_vertex(tree, gx, gy, gz)
     if kind == POINTS:
         k = support_vertex(coordinates, n, m, gx, gy, gz)

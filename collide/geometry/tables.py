@@ -50,6 +50,7 @@ class ShapeTable:
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
         self.ints[:, RANK] = [order[p.content] for p in packed]
+        self.addresses = address_of(self.ints), address_of(self.numbers)
         self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
 
     def plant(self, rows: np.ndarray) -> None:

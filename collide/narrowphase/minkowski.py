@@ -16,25 +16,25 @@ POINT = 9
 @kernel
 def difference_point(pair, points, ids, k, dx, dy, dz):
     """`inlined_difference_point`, called: a copy at every place where one is asked for took 8 s to compile."""
-    inlined_difference_point(pair, points, ids, k, dx, dy, dz)
+    inlined_difference_point(pair, points, ids, k, dx, dy, dz, False)
 
 
 @kernel(inline=True)
-def inlined_difference_point(pair, points, ids, k, dx, dy, dz):
+def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse):
     """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
 
-    pair : `posed_pair.posed_pair`.
+    pair : `posed_pair.posed_pair`.   coarse : of support trees, ask the coarsest subsets alone.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
     """
     (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b) = pair
     ia, ax, ay, az = support(
-        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a,
+        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse,
         poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
         poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
         poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
     )  # fmt: skip
     ib, bx, by, bz = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b,
+        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse,
         -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
         -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
         -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),

@@ -106,6 +106,26 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
 
 
 @kernel(inline=True)
+def reach_of_both(pair):
+    """How far from 0 a point of A ⊖ B + t can be: both balls about the frames' origins, stretched as R does."""
+    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _) = pair
+    reach_a = numbers[at_a - PARAMS + REACH] * _stretch(poses, p)
+    return reach_a + numbers[at_b - PARAMS + REACH] * _stretch(poses, q)
+
+
+@kernel(inline=True)
+def _stretch(R, p):
+    """No vector gets longer by more than this factor: |R|² is at most the largest row sum of |RᵀR|."""
+    xx = R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6]
+    yy = R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7]
+    zz = R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8]
+    xy = abs(R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7])
+    yz = abs(R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8])
+    zx = abs(R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6])
+    return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx))
+
+
+@kernel(inline=True)
 def coordinates_of(ints, s):
     """Address and length of a shape's coordinates."""
     return ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED]

@@ -82,19 +82,30 @@ def answer_poses(
     shape_of = view_i64(header[SHAPE_OF_AT], 2 * BLOCK)
     rows_at = header[ROWS_AT]
     scratch = view_i64(rows_at, BLOCK * ROW // 8)
+    pairs = view_i64(header[PAIRS_AT], 2 * BLOCK)
+    for k in range(BLOCK):
+        pairs[2 * k] = k if step_a != 0 or which_at != 0 else 0
+        pairs[2 * k + 1] = BLOCK + (k if step_b != 0 or which_at != 0 else 0)
+        shape_of[k] = 0
+        shape_of[BLOCK + k] = 1
     done = first
     while done < n:
         count = min(BLOCK, n - done)
+        good = True
         for k in range(count):
             if which_at != 0:
                 which = view_i64(which_at + 16 * (done + k), 2)
-                shape_of[2 * k] = which[0]
-                shape_of[2 * k + 1] = which[1]
-            good_a = _set_pose(poses, 2 * k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), 0, check)
-            good_b = _set_pose(poses, (2 * k + 1) * POSE, view_f64(XB_at + 8 * step_b * (done + k), 16), 0, check)
-            if not (good_a and good_b):
-                header[ANSWERED] = done
-                return BAD_POSE
+                shape_of[k] = which[0]
+                shape_of[BLOCK + k] = which[1]
+            # A pose that goes with all of the other's is laid out once, where shapes are.
+            if pairs[2 * k] == k:
+                good = _set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), 0, check) and good
+            if pairs[2 * k + 1] == BLOCK + k:
+                at = (BLOCK + k) * POSE
+                good = _set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), 0, check) and good
+        if not good:
+            header[ANSWERED] = done
+            return BAD_POSE
         if boolean:
             for k in range(count * ROW // 8):
                 scratch[k] = 0
@@ -131,15 +142,25 @@ def answer_poses(
     return 0
 
 
+@kernel(inline=True)
+def _is_matrix(X):
+    """Whether this is a C-contiguous (4, 4) array: nobody has looked yet (`Entry.unchecked`).
+
+    That its items are doubles shows in the last one being 1.0, which `_set_pose` asks: no integer,
+    pointer, pair of floats or double of the other byte order that is a pose has that bit pattern.
+    """
+    return X.shape[0] == 4 and X.shape[1] == 4 and X.strides[0] == 32 and X.strides[1] == 8
+
+
 @kernel
 def _single(header_at, X_WA, X_WB, boolean, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for."""
-    if X_WA.shape[0] != 4 or X_WA.shape[1] != 4 or X_WB.shape[0] != 4 or X_WB.shape[1] != 4:
+    if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
         return -1
     header = view_i64(header_at, HEADER)
-    poses = view_f64(header[POSES_AT], 2 * POSE)
+    poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
     good_a = _set_pose(poses, 0, view_f64(address_in_kernel(X_WA), 16), 0, True)
-    good_b = _set_pose(poses, POSE, view_f64(address_in_kernel(X_WB), 16), 0, True)
+    good_b = _set_pose(poses, BLOCK * POSE, view_f64(address_in_kernel(X_WB), 16), 0, True)
     if not (good_a and good_b):
         return -1
     _answer_at(

@@ -12,7 +12,16 @@ from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
 from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.narrowphase.halfspaces import settle
-from collide.narrowphase.poses import ANSWERED, BAD_POSE, BLOCK, HEADER, answer_poses, distance_single
+from collide.narrowphase.poses import (
+    ANSWERED,
+    BAD_POSE,
+    BLOCK,
+    HEADER,
+    POSES_AT,
+    answer_poses,
+    collide_single,
+    distance_single,
+)
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
@@ -38,7 +47,7 @@ def run_pairs(
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     table.plant(shape_of[pairs])
-    tables = address_of(table.ints), address_of(table.numbers), address_of(poses.rows), address_of(shape_of)
+    tables = *table.addresses, address_of(poses.rows), address_of(shape_of)
     done = 0
     while done < len(pairs):
         todo, out = pairs[done:], rows[done:]
@@ -64,8 +73,7 @@ def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boole
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
         decide_pairs(
-            address_of(table.ints), address_of(table.numbers), address_of(poses.rows), address_of(shape_of),
-            address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
+            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
             address_of(_of_thread.space.digits),
         )  # fmt: skip
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
@@ -122,16 +130,19 @@ class _Workspace:
         self.digits = np.zeros(DIGITS + 16, dtype=np.int64)
         self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), np.zeros((0, 12, TERMS)))
         self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
-        self.pairs = np.arange(2 * BLOCK, dtype=np.int64).reshape(BLOCK, 2)
+        self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
         self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)
         self.addresses = address_of(self.doubles), address_of(self.integers)
 
+        self.shape_of[BLOCK:] = 1
+        buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
+        self._header = np.zeros(HEADER, dtype=np.int64)
+        self._header[POSES_AT:ANSWERED] = *map(address_of, buffers), *self.addresses
+
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `poses.py` reads first: addresses of the kernel, the tables and this workspace."""
-        self.shape_of[0::2], self.shape_of[1::2] = 0, 1
-        buffers = table.ints, table.numbers, self.poses.rows, self.shape_of, self.pairs, self.rows
-        header = np.zeros(HEADER, dtype=np.int64)
-        header[:ANSWERED] = answer_pairs.address, *map(address_of, buffers), *self.addresses
+        header = self._header.copy()
+        header[:POSES_AT] = answer_pairs.address, *table.addresses
         return header
 
 
@@ -155,14 +166,15 @@ class SinglePair:
         if SinglePair._space is None:
             SinglePair._space = _Workspace()
         table.plant(np.arange(2))
-        self.bodies, self._table = bodies, table  # held, since kernels read their buffers
+        self.bodies, self.table = bodies, table  # held, since kernels read their buffers
         self._header = SinglePair._space.header_of(table)
         self.address = address_of(self._header)
+        self.collide, self._distance = collide_single.unchecked, distance_single.unchecked
 
     def distance(self, X_WA, X_WB) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        if distance_single(self.address, X_WA, X_WB, rows.view(np.uint8)) < 0:
+        if self._distance(self.address, X_WA, X_WB, rows.view(np.uint8)) < 0:
             return None
         rows["b"] = 1
         return rows if rows["distance"][0] > -np.inf else None
