@@ -17,6 +17,15 @@ POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
 
+#: As many points stand for many in a first, coarse look: those farthest along a spiral of directions.
+COARSE = 32
+_FEWEST_COARSE = 2 * COARSE
+_HEIGHTS = (2 * np.arange(COARSE) + 1) / COARSE - 1
+_ANGLES = np.pi * (3 - 5**0.5) * np.arange(COARSE)  # the golden angle
+_DIRECTIONS = np.stack(
+    [np.sqrt(1 - _HEIGHTS**2) * np.cos(_ANGLES), np.sqrt(1 - _HEIGHTS**2) * np.sin(_ANGLES), _HEIGHTS], axis=1
+)
+
 
 class PackedConvex(NamedTuple):
     """One convex set, in its own frame.
@@ -31,6 +40,8 @@ class PackedConvex(NamedTuple):
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.
+    coarse : (4·COARSE,) a few of many points that span most of their hull: x, y, z, and ids as int64 bits;
+        None for few points.
     tree : the points' support tree, made when its address is first asked for; None for few points.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
         integers times 2 to it.
@@ -46,6 +57,7 @@ class PackedConvex(NamedTuple):
     points: np.ndarray
     coordinates: np.ndarray
     tree: Any
+    coarse: np.ndarray | None
     lowest: int
     content: bytes
 
@@ -61,7 +73,7 @@ def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, tree
     columns[:, n:] = points[0][:, None]
     # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
     reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree)
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree, _coarse(points))
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
@@ -74,13 +86,29 @@ def pack_halfspace(normal, offset: float) -> PackedConvex:
     return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
 
 
-def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None) -> PackedConvex:
+def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None, coarse=None) -> PackedConvex:
     row = np.zeros(4)
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
     lowest = lowest_exponent(points)
-    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, lowest, digest.digest())
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, coarse, lowest, digest.digest())
+
+
+def _coarse(points: np.ndarray) -> np.ndarray | None:
+    """Points that are farthest in COARSE directions, of their cloud stretched to a cube; None for few points."""
+    if len(points) < _FEWEST_COARSE:
+        return None
+    low, high = points.min(axis=0), points.max(axis=0)
+    stretched = (points - 0.5 * (low + high)) / np.where(high > low, high - low, 1.0)
+    found: list[int] = []
+    for x, y, z in _DIRECTIONS:
+        found.append(int(np.argmax(x * stretched[:, 0] + y * stretched[:, 1] + z * stretched[:, 2])))
+    ids = np.array([*dict.fromkeys(found), *found][:COARSE], dtype=np.int64)
+    block = np.empty(4 * COARSE)
+    block[: 3 * COARSE] = points[ids].T.ravel()
+    block[3 * COARSE :].view(np.int64)[:] = ids
+    return _frozen(block)
 
 
 def lowest_exponent(values: np.ndarray) -> int:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
-from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
+from collide._jit import kernel, view_f64, view_i64
+from collide.geometry.packing import COARSE, CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
-from collide.geometry.support_tree.query import coarse_vertex, extreme_vertex
+from collide.geometry.support_tree.query import extreme_vertex
 from collide.geometry.support_tree.settle import settle_vertex
 
 
@@ -27,6 +27,18 @@ def support_vertex(coordinates, n, m, gx, gy, gz):
 
 
 @kernel
+def coarse_vertex(coarse_at, gx, gy, gz):
+    """(id, x, y, z): of the COARSE points that stand for many, the one farthest in direction g.
+
+    Their hull lies in the whole one: what it overlaps is overlapped; what it misses may be hit.
+    """
+    coordinates = view_f64(coarse_at, 3 * COARSE)
+    k, _ = farthest(coordinates, 0, COARSE, COARSE, gx, gy, gz)
+    ids = view_i64(coarse_at + 24 * COARSE, COARSE)
+    return ids[k], coordinates[k], coordinates[COARSE + k], coordinates[2 * COARSE + k]
+
+
+@kernel
 def settled_vertex(coordinates, n, m, tree, vertex, gx, gy, gz):
     """Id of a vertex that is farthest in direction g for certain, near one that is likely to be."""
     proven = settle_vertex(tree, vertex, gx, gy, gz)
@@ -38,12 +50,12 @@ def support(kind, coordinates, n, m, params, at, tree, coarse, gx, gy, gz):
     """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
 
     tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
-    coarse : of a support tree, ask its coarsest subset alone.
+    coarse : address of a few of the points, to be asked alone (`coarse_vertex`), or 0.
     params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
     """
+    if coarse != 0:
+        return coarse_vertex(coarse, gx, gy, gz)
     if tree != 0:
-        if coarse:
-            return coarse_vertex(tree, gx, gy, gz)
         return extreme_vertex(tree, gx, gy, gz)
     if kind == POINTS:
         k = support_vertex(coordinates, n, m, gx, gy, gz)

@@ -14,8 +14,8 @@ from collide._jit import address_of
 from collide.geometry.packing import PackedConvex
 
 # One row of integers a shape.
-KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE = range(7)
-INTS = 7
+KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)
+INTS = 8
 # One row of doubles a shape; PARAMS is the first of four.
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
@@ -45,7 +45,7 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0
+            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, address_of(p.coarse) if p.coarse is not None else 0
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}

@@ -53,7 +53,7 @@ DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
 @kernel
 def _segment_differences(pair, points, ids):
     """The four differences of two cores of at most two points, each core's ends in order."""
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz, _, _) = pair
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
     for k in range(4):
         i = min(k & 1, n_a - 1)
         j = min(k >> 1, n_b - 1)
@@ -154,7 +154,7 @@ def _swept(
     pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
 ):
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
-    (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _) = pair
+    (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
     radius_b = numbers[NUMBERS * shape_b + RADIUS]
     radius = radius_a + radius_b
@@ -223,7 +223,7 @@ def _combine(points, weights, n, j):
 @kernel
 def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size, error, flip):
     """A half-space A and a convex B: the point of B deepest behind the plane."""
-    (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b) = pair
+    (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b, _, _) = pair
     ids = view_i64(integers_at, 10)
     nx, ny, nz, offset, length = plane_in_world(numbers, at_a, poses, p)
     nx /= length
@@ -232,7 +232,7 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size
     gx = -(poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz)
     gy = -(poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz)
     gz = -(poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz)
-    k, x, y, z = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, False, gx, gy, gz)
+    k, x, y, z = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, 0, gx, gy, gz)
     if tree_b != 0:
         k = settled_vertex(coords_b, n_b, m_b, tree_b, k, gx, gy, gz)
         x = coords_b[k]
@@ -259,7 +259,7 @@ def _halves(pair, row, marks, flip):
 
     Opposite within rounding is left open, for `halfspaces.py` to settle.
     """
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _) = pair
+    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
     opposite, nx, ny, nz = opposite_halfspaces(numbers, at_a, p, at_b, q, poses)
     row[LOWER] = -math.inf
     row[DISTANCE] = -math.inf

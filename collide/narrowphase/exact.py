@@ -563,7 +563,7 @@ def touch_exactly(
 def _support_pair(digits, scale, pair, length, error):
     """(vertex of A, vertex of B) whose difference is the last one against the direction; unit v in doubles."""
     d, _, _, digits_rot_a, core_a, digits_a, _, digits_rot_b, core_b, digits_b = scale
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b) = pair
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
     vx, vy, vz = _direction_double(digits, d, length)
     along = math.sqrt(vx * vx + vy * vy + vz * vz)
     slack = 2.0 * error * along

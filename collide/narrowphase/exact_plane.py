@@ -79,7 +79,7 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     Arguments as in `exact.touch_exactly`. The vertex is one that reaches it, or the nearest; excess is
     then its distance minus the radius, to a relative 1e-14.
     """
-    (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, tx, ty, tz, _, _) = pair
+    (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, tx, ty, tz, _, _, _, _) = pair
     pose_a = exact_pose(poses, p, terms)
     pose_b = exact_pose(poses, q, terms)
     rot, n_rot = span_of_entries(pose_a, 0, 9)

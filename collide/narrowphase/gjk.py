@@ -109,7 +109,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         weights[6] = -tz * (lower / span)
         return APART, n, lower, 0.0, 0
     # Coarse hulls that overlap are a proof, at a tenth of the price.
-    coarse = trees and touch_suffices
+    coarse = touch_suffices and (pair[19] != 0 or pair[20] != 0)
     for used in range(1, rounds + 1):
         length = math.sqrt(square)
         if length <= error:

@@ -23,18 +23,18 @@ def difference_point(pair, points, ids, k, dx, dy, dz):
 def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse):
     """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
 
-    pair : `posed_pair.posed_pair`.   coarse : of support trees, ask the coarsest subsets alone.
+    pair : `posed_pair.posed_pair`.   coarse : ask the coarse points alone, where there are any.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
     """
-    (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b) = pair
+    (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b, coarse_a, coarse_b) = pair
     ia, ax, ay, az = support(
-        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse,
+        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse_a if coarse else 0,
         poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
         poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
         poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
     )  # fmt: skip
     ib, bx, by, bz = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse,
+        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse_b if coarse else 0,
         -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
         -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
         -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
@@ -47,7 +47,7 @@ def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse):
 @kernel(inline=True)
 def _place(pair, points, k, ax, ay, az, bx, by, bz):
     """Point k becomes the difference of a and b, given in their bodies' frames."""
-    (_, _, _, _, _, p, _, _, _, _, _, q, _, poses, tx, ty, tz, _, _) = pair
+    (_, _, _, _, _, p, _, _, _, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
     at = POINT * k
     points[at + 3] = poses[p] * ax + poses[p + 1] * ay + poses[p + 2] * az
     points[at + 4] = poses[p + 3] * ax + poses[p + 4] * ay + poses[p + 5] * az
@@ -66,7 +66,7 @@ def settle_point(pair, points, ids, k, dx, dy, dz):
 
     Support trees propose; nothing may be concluded from a plane before their vertices are settled.
     """
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b) = pair
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
     ia = ids[2 * k]
     ib = ids[2 * k + 1]
     if tree_a != 0:

@@ -12,6 +12,7 @@ from collide._jit import kernel
 from collide.geometry.packing import HALFSPACE
 from collide.geometry.tables import (
     ADDRESS,
+    COARSE_AT,
     COUNT,
     INTS,
     KIND,
@@ -93,7 +94,7 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
 @kernel(inline=True)
 def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
     """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA,
-    support trees of A and B (addresses, or 0)."""
+    support trees of A and B, and their coarse points (addresses, or 0)."""
     p = POSE * pa
     q = POSE * pb
     return (
@@ -101,14 +102,14 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
         coords_b, ints[INTS * sb + COUNT], ints[INTS * sb + PADDED], ints[INTS * sb + KIND], NUMBERS * sb + PARAMS, q,
         numbers, poses,
         poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11],
-        ints[INTS * sa + TREE], ints[INTS * sb + TREE],
+        ints[INTS * sa + TREE], ints[INTS * sb + TREE], ints[INTS * sa + COARSE_AT], ints[INTS * sb + COARSE_AT],
     )  # fmt: skip
 
 
 @kernel(inline=True)
 def reach_of_both(pair):
     """How far from 0 a point of A ⊖ B + t can be: both balls about the frames' origins, stretched as R does."""
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _) = pair
+    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
     reach_a = numbers[at_a - PARAMS + REACH] * _stretch(poses, p)
     return reach_a + numbers[at_b - PARAMS + REACH] * _stretch(poses, q)
 

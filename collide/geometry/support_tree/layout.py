@@ -20,7 +20,7 @@ from collide.geometry.packing import lowest_exponent
 VERSION = 1
 #: Header entries: how many of what, then addresses.
 (POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,
- FLAT, AT_POINTS, AT_OWNERS, HEADER) = range(15)  # fmt: skip
+ FLAT, AT_POINTS, HEADER) = range(14)  # fmt: skip
 #: No coordinate may be larger in size: products with a direction, and their halves, stay finite.
 LARGEST_COORDINATE = 2.0**480
 #: Fewest entries of a list: a block of the scan.
@@ -55,7 +55,7 @@ class SupportTree:
         self.header = np.array(
             [len(self.points), self.depth, len(self.nodes) - 1, len(self.entries), len(self.ring),
              *(address_of(part) for part in (
-                 self.nodes, self.entries, self.list_coordinates, self.ring_starts, self.ring, self.range)), self.flat, address_of(self.points), address_of(self.owners)],
+                 self.nodes, self.entries, self.list_coordinates, self.ring_starts, self.ring, self.range)), self.flat, address_of(self.points)],
             dtype=np.int64,
         )  # fmt: skip
         self.address = address_of(self.header)

@@ -18,7 +18,6 @@ from collide.geometry.support_tree.layout import (
     AT_ENTRIES,
     AT_LIST_COORDINATES,
     AT_NODES,
-    AT_OWNERS,
     AT_RING,
     AT_RING_STARTS,
     DEPTH,
@@ -69,24 +68,6 @@ def extreme_vertex(tree_at, gx, gy, gz):
     tree_at : `SupportTree.address`. id : row of the tree's points. Not proven: see `settle_vertex`.
     """
     return extreme_vertex_counted(tree_at, gx, gy, gz, view_i64(0, 0))
-
-
-@kernel
-def coarse_vertex(tree_at, gx, gy, gz):
-    """(id, x, y, z): the vertex of the coarsest subset that is farthest in direction g. One scan, a few ns.
-
-    Its hull lies in the whole one: what it overlaps is overlapped, what it misses may be hit.
-    """
-    header = view_i64(tree_at, HEADER)
-    nodes = view_i32(header[AT_NODES], header[NODES] + 1)
-    entries = view_i32(header[AT_ENTRIES], header[ENTRIES])
-    coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES])
-    count = nodes[1]
-    k, _ = farthest(coordinates, 0, count, count, gx, gy, gz)
-    row = entries[k]
-    if header[DEPTH] > 1:
-        row = view_i32(header[AT_OWNERS], header[NODES])[row]
-    return row, coordinates[k], coordinates[k + count], coordinates[k + 2 * count]
 
 
 @kernel
