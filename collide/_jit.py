@@ -109,8 +109,7 @@ class Entry:
     @property
     def unchecked(self) -> Callable:
         """The compiled function without numba's look at the types of its arguments, which takes as long as
-        a pair of boxes. It trusts its caller with everything but that an array is one, of the right number of
-        dimensions and size of items: strides and what the bytes mean are for the kernel to check."""
+        a pair of boxes. For integers, and arrays that are what the signature says: anything else may crash."""
         if PLAIN_PYTHON:
             return self._function
         (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]

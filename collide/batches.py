@@ -86,7 +86,7 @@ def _all_plain(side) -> bool:
 def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
     if isinstance(A, Shape) and isinstance(B, Shape):
-        prepared = getattr(A, "_prepared", {}).get(id(B))
+        prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
         return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -41,12 +42,13 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axe
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     try:
-        if X_WB.ndim == 2:
-            pair = A._prepared[id(B)]
-            hit = pair.collide(pair.address, X_WA, X_WB)
-            if hit >= 0:
-                return hit == 1
-    except (AttributeError, KeyError, TypeError):
+        pair = A._prepared[B._serial]
+        hit = pair.collide(pair.address, id(X_WA), id(X_WB))
+        if hit == 1:
+            return True
+        if hit == 0:
+            return False
+    except (AttributeError, KeyError):
         pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     _prepare(A, B)
@@ -92,10 +94,10 @@ def distance(
     limit = check_distance("max_distance", max_distance)
     if limit == math.inf:
         try:
-            rows = A._prepared[id(B)].distance(X_WA, X_WB)
+            rows = A._prepared[B._serial].distance(X_WA, X_WB)
             if rows is not None:
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
-        except (AttributeError, KeyError, TypeError):
+        except (AttributeError, KeyError):
             pass  # as in `collide`
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
@@ -171,21 +173,24 @@ def _held(shapes):
 
 # --- single calls -------------------------------------------------------------------------------
 
+#: Numbers of shapes within this process, never used again.
+_serials = itertools.count()
 #: A shape keeps this many partners prepared for single calls.
 _PARTNERS = 64
 
 
 def _prepare(A, B) -> None:
-    """Make a pair of convex shapes ready for single calls, and keep it with A.
-
-    Looked up by id, and never mistaken: the entry holds B, so that no other shape can take its id.
-    """
+    """Make a pair of convex shapes ready for single calls, and keep it with A, by the number B has then."""
     if not (isinstance(A, Shape) and isinstance(B, Shape) and is_plain(A) and is_plain(B)):
+        return
+    if not run.single_calls_are_safe():
         return
     if not hasattr(A, "_prepared"):
         object.__setattr__(A, "_prepared", {})
-    if id(B) in A._prepared:
+    if not hasattr(B, "_serial"):
+        object.__setattr__(B, "_serial", next(_serials))
+    if B._serial in A._prepared:
         return
     if len(A._prepared) >= _PARTNERS:
         A._prepared.clear()
-    A._prepared[id(B)] = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    A._prepared[B._serial] = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))

@@ -7,7 +7,11 @@ compiled (`_jit.native_call`), not compiled once more.
 
 from __future__ import annotations
 
+import ctypes
 import math
+import sys
+
+import numpy as np
 
 from collide._jit import address_in_kernel, entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.geometry.tables import POSE, POSE_SLOP, POSE_TERMS
@@ -27,41 +31,71 @@ OPEN, BAD_POSE = range(1, 3)
 # Workspace, integers: addresses of everything (see `Workspace` in `run.py`).
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED,
-) = range(10)  # fmt: skip
+    ARRAY_TYPE, ARRAY_DTYPE,
+) = range(12)  # fmt: skip
 #: Integers of the header.
-HEADER = 10
+HEADER = 12
+
+# Words of an array object.
+_TYPE, _DATA, _DIMENSIONS, _SHAPE, _STRIDES, _, _DTYPE = range(1, 8)
+_FIELDS = 8
+_F8 = np.dtype(np.float64)
+
+
+@kernel(inline=True)
+def _set_pose(R, at, X, check):
+    """Pose row at ``at`` becomes the matrix X; False where it is no pose (`transforms.as_poses`)."""
+    R[at] = X[0]
+    R[at + 1] = X[1]
+    R[at + 2] = X[2]
+    R[at + 3] = X[4]
+    R[at + 4] = X[5]
+    R[at + 5] = X[6]
+    R[at + 6] = X[8]
+    R[at + 7] = X[9]
+    R[at + 8] = X[10]
+    R[at + 9] = X[3]
+    R[at + 10] = X[7]
+    R[at + 11] = X[11]
+    R[at + POSE_SLOP] = 0.0
+    R[at + POSE_TERMS] = -1.0
+    if not (X[12] == 0.0 and X[13] == 0.0 and X[14] == 0.0 and X[15] == 1.0):
+        return False
+    # Six products instead of nine comparisons; what is no number fails them too.
+    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8] - 1.0
+    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9] - 1.0
+    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10] - 1.0
+    xy = X[0] * X[1] + X[4] * X[5] + X[8] * X[9]
+    yz = X[1] * X[2] + X[5] * X[6] + X[9] * X[10]
+    zx = X[2] * X[0] + X[6] * X[4] + X[10] * X[8]
+    off = xx * xx + yy * yy + zz * zz + xy * xy + yz * yz + zx * zx
+    shift = abs(X[3]) + abs(X[7]) + abs(X[11])
+    if off <= ROTATION_TOLERANCE * ROTATION_TOLERANCE and shift <= LARGEST:
+        return _determinant(X) > 0.0 or not check
+    return _is_pose(X, check)
+
+
+@kernel(inline=True)
+def _determinant(X):
+    return (
+        X[0] * (X[5] * X[10] - X[6] * X[9]) + X[1] * (X[6] * X[8] - X[4] * X[10]) + X[2] * (X[4] * X[9] - X[5] * X[8])
+    )
 
 
 @kernel
-def _set_pose(poses, at, X, x, check):
-    """Pose row at ``at`` becomes the matrix at X[x …]; False where it is no pose (`transforms.as_poses`)."""
-    good = X[x + 12] == 0.0 and X[x + 13] == 0.0 and X[x + 14] == 0.0 and X[x + 15] == 1.0
-    for i in range(3):
-        for j in range(3):
-            value = X[x + 4 * i + j]
-            good = good and abs(value) <= LARGEST
-            poses[at + 3 * i + j] = value
-        value = X[x + 4 * i + 3]
-        good = good and abs(value) <= LARGEST
-        poses[at + 9 + i] = value
-    poses[at + POSE_SLOP] = 0.0
-    poses[at + POSE_TERMS] = -1.0
-    return good and (not check or _is_rotation(poses, at))
-
-
-@kernel
-def _is_rotation(R, at):
+def _is_pose(X, check):
+    """The same entry by entry, for poses on the brink and for any matrix where ``check`` is off."""
+    for i in range(12):
+        if not abs(X[i]) <= LARGEST:
+            return False
+    if not check:
+        return True
     for i in range(3):
         for j in range(i + 1):
-            product = R[at + i] * R[at + j] + R[at + 3 + i] * R[at + 3 + j] + R[at + 6 + i] * R[at + 6 + j]
+            product = X[i] * X[j] + X[4 + i] * X[4 + j] + X[8 + i] * X[8 + j]
             if not abs(product - (1.0 if i == j else 0.0)) <= ROTATION_TOLERANCE:
                 return False
-    return (
-        R[at] * (R[at + 4] * R[at + 8] - R[at + 5] * R[at + 7])
-        + R[at + 1] * (R[at + 5] * R[at + 6] - R[at + 3] * R[at + 8])
-        + R[at + 2] * (R[at + 3] * R[at + 7] - R[at + 4] * R[at + 6])
-        > 0.0
-    )
+    return _determinant(X) > 0.0
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, float64, boolean, int64, int64)")
@@ -99,10 +133,10 @@ def answer_poses(
                 shape_of[BLOCK + k] = which[1]
             # A pose that goes with all of the other's is laid out once, where shapes are.
             if pairs[2 * k] == k:
-                good = _set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), 0, check) and good
+                good = _set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
             if pairs[2 * k + 1] == BLOCK + k:
                 at = (BLOCK + k) * POSE
-                good = _set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), 0, check) and good
+                good = _set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
         if not good:
             header[ANSWERED] = done
             return BAD_POSE
@@ -143,24 +177,36 @@ def answer_poses(
 
 
 @kernel(inline=True)
-def _is_matrix(X):
-    """Whether this is a C-contiguous (4, 4) array: nobody has looked yet (`Entry.unchecked`).
+def _matrix_at(object_at, header):
+    """Address of the 16 doubles of a C-contiguous (4, 4) numpy array of float64, given where the object is; else 0.
 
-    That its items are doubles shows in the last one being 1.0, which `_set_pose` asks: no integer,
-    pointer, pair of floats or double of the other byte order that is a pose has that bit pattern.
+    Read from the array object itself, whose layout is part of numpy's binary interface (and is looked at once
+    before anything relies on it: `array_layout_is_known`). numba's own reading of two arrays takes as long
+    as GJK takes for two boxes.
     """
-    return X.shape[0] == 4 and X.shape[1] == 4 and X.strides[0] == 32 and X.strides[1] == 8
+    fields = view_i64(object_at, _FIELDS)
+    if fields[_TYPE] != header[ARRAY_TYPE] or fields[_DTYPE] != header[ARRAY_DTYPE]:
+        return 0
+    if fields[_DIMENSIONS] & 0xFFFFFFFF != 2 or fields[_DATA] & 7 != 0:
+        return 0
+    shape = view_i64(fields[_SHAPE], 2)
+    strides = view_i64(fields[_STRIDES], 2)
+    if shape[0] != 4 or shape[1] != 4 or strides[0] != 32 or strides[1] != 8:
+        return 0
+    return fields[_DATA]
 
 
 @kernel
-def _single(header_at, X_WA, X_WB, boolean, row_at):
+def _single(header_at, A_object, B_object, boolean, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for."""
-    if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
-        return -1
     header = view_i64(header_at, HEADER)
+    XA_at = _matrix_at(A_object, header)
+    XB_at = _matrix_at(B_object, header)
+    if XA_at == 0 or XB_at == 0:
+        return -1
     poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
-    good_a = _set_pose(poses, 0, view_f64(address_in_kernel(X_WA), 16), 0, True)
-    good_b = _set_pose(poses, BLOCK * POSE, view_f64(address_in_kernel(X_WB), 16), 0, True)
+    good_a = _set_pose(poses, 0, view_f64(XA_at, 16), True)
+    good_b = _set_pose(poses, BLOCK * POSE, view_f64(XB_at, 16), True)
     if not (good_a and good_b):
         return -1
     _answer_at(
@@ -176,17 +222,35 @@ def _single(header_at, X_WA, X_WB, boolean, row_at):
     return int(marks[HIT])
 
 
-@entry("int64(int64, float64[:, ::1], float64[:, ::1])", nogil=False)
-def collide_single(header_at, X_WA, X_WB):
-    """The boolean of one pair, as `_single` says it. All threads share its workspace: it keeps Python's lock."""
+@entry("int64(int64, int64, int64)", nogil=False)
+def collide_single(header_at, A_object, B_object):
+    """The boolean of one pair, as `_single` says it; the poses by `id`, and held by the caller.
+
+    All threads share its workspace: it keeps Python's lock.
+    """
     rows_at = view_i64(header_at, HEADER)[ROWS_AT]
     row = view_i64(rows_at, ROW // 8)
     for k in range(ROW // 8):
         row[k] = 0
-    return _single(header_at, X_WA, X_WB, True, rows_at)
+    return _single(header_at, A_object, B_object, True, rows_at)
 
 
-@entry("int64(int64, float64[:, ::1], float64[:, ::1], uint8[::1])", nogil=False)
-def distance_single(header_at, X_WA, X_WB, row):
+@entry("int64(int64, int64, int64, uint8[::1])", nogil=False)
+def distance_single(header_at, A_object, B_object, row):
     """The row of one pair into ``row``, ROW zero bytes; returns as `collide_single` does."""
-    return _single(header_at, X_WA, X_WB, False, address_in_kernel(row))
+    return _single(header_at, A_object, B_object, False, address_in_kernel(row))
+
+
+def array_layout_is_known() -> bool:
+    """Whether array objects lie in memory as `_matrix_at` reads them: CPython with its lock, 64 bits."""
+    if sys.implementation.name != "cpython" or sys.maxsize < 2**60 or not getattr(sys, "_is_gil_enabled", lambda: True)():
+        return False
+    probe = np.zeros((4, 4))
+    fields = (ctypes.c_int64 * _FIELDS).from_address(id(probe))
+    words = (ctypes.c_int64 * 2).from_address
+    return (
+        (fields[_TYPE], fields[_DTYPE], fields[_DATA]) == (id(np.ndarray), id(_F8), probe.ctypes.data)
+        and fields[_DIMENSIONS] & 0xFFFFFFFF == 2
+        and tuple(words(fields[_SHAPE])) == (4, 4)
+        and tuple(words(fields[_STRIDES])) == (32, 8)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from threading import local
 
 import numpy as np
@@ -14,11 +15,14 @@ from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
     ANSWERED,
+    ARRAY_DTYPE,
+    ARRAY_TYPE,
     BAD_POSE,
     BLOCK,
     HEADER,
     POSES_AT,
     answer_poses,
+    array_layout_is_known,
     collide_single,
     distance_single,
 )
@@ -138,6 +142,7 @@ class _Workspace:
         buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
         self._header = np.zeros(HEADER, dtype=np.int64)
         self._header[POSES_AT:ANSWERED] = *map(address_of, buffers), *self.addresses
+        self._header[ARRAY_TYPE], self._header[ARRAY_DTYPE] = id(np.ndarray), id(np.dtype(np.float64))
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `poses.py` reads first: addresses of the kernel, the tables and this workspace."""
@@ -154,6 +159,11 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
+
+
+@cache
+def single_calls_are_safe() -> bool:
+    return array_layout_is_known()
 
 
 class SinglePair:
@@ -174,7 +184,7 @@ class SinglePair:
     def distance(self, X_WA, X_WB) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        if self._distance(self.address, X_WA, X_WB, rows.view(np.uint8)) < 0:
+        if self._distance(self.address, id(X_WA), id(X_WB), rows.view(np.uint8)) < 0:
             return None
         rows["b"] = 1
         return rows if rows["distance"][0] > -np.inf else None

@@ -18,11 +18,12 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("_parts", "_prepared")
+    __slots__ = ("_parts", "_prepared", "_serial")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
-    #: Pairs made ready for single calls, by id of the other shape, which they hold (`query.py`).
+    #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
+    _serial: int
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
