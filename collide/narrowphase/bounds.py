@@ -9,7 +9,8 @@ Write u = 2⁻⁵³ and, for a pair, t = p_WB − p_WA and
    a coordinate, so |error of w| ≤ √3·5u·S < 9u·S. Curved supports place the point to 6u·ρ more
    across its normal, and its value along the direction to as much: < 16u·S in all.
 2. A plane. Direction d; g = R_Aᵀd is good to 3√3·u·|d|·(longest row), the scan's products to γ₃, so the
-   vertex chosen is within 2·(3√3 + 3)u·ρ|d| < 17u·ρ|d| of the best one, for each body. With w·d itself
+   vertex chosen is within 2·(3√3 + 3)u·ρ|d| < 17u·ρ|d| of the best one, for each body (one of a support tree,
+   settled, is the best one for g exactly). With w·d itself
    rounded (3u·|w||d|) and step 1: every point x of A ⊖ B has x·d/|d| ≥ fl(w·d)/|d| − (16 + 17 + 3 + 2)u·S.
 3. A point of A ⊖ B: Σ λ_k w_k with λ ≥ 0 and |Σ λ − 1| ≤ 3u is within (16 + 3 + 4)u·S of a true one.
 4. The final sums (± r, ± error) round at most 4u·S.
