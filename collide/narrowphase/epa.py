@@ -21,11 +21,21 @@ import math
 
 from collide._jit import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import EPA_FACETS, EPA_VERTICES
-from collide.narrowphase.minkowski import POINT, copy_point, difference_point, has_trees, settle_point
-from collide.narrowphase.simplex import clearance_behind, face_weights
+from collide.narrowphase.minkowski import (
+    POINT,
+    copy_point,
+    difference_point,
+    has_trees,
+    inlined_difference_point,
+    settle_point,
+)
+from collide.narrowphase.simplex import face_weights
+
+#: Doubles stored a facet: unit normal, distance of the plane, proven clearance of the origin behind it or −1.
+PLANE = 5
 
 #: Doubles and integers of workspace one run needs (see `workspace`).
-DOUBLES = POINT * (EPA_VERTICES + 8) + 4 * EPA_FACETS
+DOUBLES = POINT * (EPA_VERTICES + 8) + PLANE * EPA_FACETS
 INTEGERS = 2 * (EPA_VERTICES + 8) + 7 * EPA_FACETS + EPA_FACETS + 2 * EPA_VERTICES + 4 * EPA_FACETS
 
 #: Facets kept free for one expansion, so that a run ends at its cap with its surface whole.
@@ -38,9 +48,9 @@ EXPANDED, FLAT = range(2)
 
 @kernel
 def workspace(doubles_at, integers_at):
-    """Workspace: points, planes (n and distance) | ids, facets, heap, edge starts, stack."""
+    """Workspace: points, planes | ids, facets, heap, edge starts, stack."""
     points = view_f64(doubles_at, POINT * (EPA_VERTICES + 8))
-    planes = view_f64(doubles_at + 8 * POINT * (EPA_VERTICES + 8), 4 * EPA_FACETS)
+    planes = view_f64(doubles_at + 8 * POINT * (EPA_VERTICES + 8), PLANE * EPA_FACETS)
     at = integers_at
     ids = view_i64(at, 2 * (EPA_VERTICES + 8))
     at += 8 * 2 * (EPA_VERTICES + 8)
@@ -146,8 +156,8 @@ def _across(x, y, z):
 # --- facets and the heap ------------------------------------------------------------------------
 
 
-@kernel
-def _set_facet(points, planes, facets, f, i, j, k):
+@kernel(inline=True)
+def _set_facet(points, planes, facets, f, i, j, k, error):
     """Facet f on vertices i, j, k, counter-clockwise from outside; its plane's signed distance.
 
     The distance is the least of the three vertices': for any unit normal, however badly a thin
@@ -169,41 +179,51 @@ def _set_facet(points, planes, facets, f, i, j, k):
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if length == 0.0:
-        planes[4 * f] = 0.0
-        planes[4 * f + 1] = 0.0
-        planes[4 * f + 2] = 0.0
-        planes[4 * f + 3] = math.inf
+    square = nx * nx + ny * ny + nz * nz
+    at = PLANE * f
+    if square == 0.0:
+        planes[at] = 0.0
+        planes[at + 1] = 0.0
+        planes[at + 2] = 0.0
+        planes[at + 3] = math.inf
+        planes[at + 4] = -1.0
         return False
-    nx /= length
-    ny /= length
-    nz /= length
-    planes[4 * f] = nx
-    planes[4 * f + 1] = ny
-    planes[4 * f + 2] = nz
-    planes[4 * f + 3] = min(
+    # Whether the origin is provably behind it: `simplex.clearance_behind`, here from what is at hand.
+    edges = (abs(ex) + abs(ey) + abs(ez)) * (abs(fx) + abs(fy) + abs(fz))
+    sides = abs(ex) + abs(ey) + abs(ez) + abs(fx) + abs(fy) + abs(fz)
+    corner = abs(points[a]) + abs(points[a + 1]) + abs(points[a + 2])
+    behind = nx * points[a] + ny * points[a + 1] + nz * points[a + 2] > 2.0 * error * (edges + 2.0 * corner * sides)
+    shorten = 1.0 / math.sqrt(square)
+    nx *= shorten
+    ny *= shorten
+    nz *= shorten
+    distance = min(
         nx * points[a] + ny * points[a + 1] + nz * points[a + 2],
         nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
         nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
     )
+    planes[at] = nx
+    planes[at + 1] = ny
+    planes[at + 2] = nz
+    planes[at + 3] = distance
+    planes[at + 4] = distance if behind else -1.0
     return True
 
 
-@kernel
+@kernel(inline=True)
 def _push(heap, size, planes, f):
     k = size
     heap[k] = f
     while k > 0:
         parent = (k - 1) // 2
-        if planes[4 * heap[parent] + 3] <= planes[4 * heap[k] + 3]:
+        if planes[PLANE * heap[parent] + 3] <= planes[PLANE * heap[k] + 3]:
             break
         heap[parent], heap[k] = heap[k], heap[parent]
         k = parent
     return size + 1
 
 
-@kernel
+@kernel(inline=True)
 def _pop(heap, size, planes):
     top = heap[0]
     size -= 1
@@ -211,9 +231,9 @@ def _pop(heap, size, planes):
     k = 0
     while 2 * k + 1 < size:
         child = 2 * k + 1
-        if child + 1 < size and planes[4 * heap[child + 1] + 3] < planes[4 * heap[child] + 3]:
+        if child + 1 < size and planes[PLANE * heap[child + 1] + 3] < planes[PLANE * heap[child] + 3]:
             child += 1
-        if planes[4 * heap[k] + 3] <= planes[4 * heap[child] + 3]:
+        if planes[PLANE * heap[k] + 3] <= planes[PLANE * heap[child] + 3]:
             break
         heap[k], heap[child] = heap[child], heap[k]
         k = child
@@ -223,7 +243,7 @@ def _pop(heap, size, planes):
 # --- expansion ----------------------------------------------------------------------------------
 
 
-@kernel
+@kernel(inline=True)
 def _horizon(points, planes, facets, stack, f, apex, slack):
     """Kill the facets that see the apex, spreading from f over shared edges; returns horizon edges.
 
@@ -244,7 +264,7 @@ def _horizon(points, planes, facets, stack, f, apex, slack):
             h = facets[7 * g + 3 + e]
             if facets[7 * h + 6] == 0:
                 continue
-            if planes[4 * h] * x + planes[4 * h + 1] * y + planes[4 * h + 2] * z > planes[4 * h + 3] + slack:
+            if planes[PLANE * h] * x + planes[PLANE * h + 1] * y + planes[PLANE * h + 2] * z > planes[PLANE * h + 3] + slack:
                 facets[7 * h + 6] = 0
                 stack[pending] = h
                 pending += 1
@@ -260,14 +280,14 @@ def _horizon(points, planes, facets, stack, f, apex, slack):
     return edges
 
 
-@kernel
-def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, slack):
+@kernel(inline=True)
+def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, error):
     """Replace the facets that see the apex by a cone to it; returns (heap size, facets used, sound).
 
     Not sound: the horizon is pinched or a new facet has no area. The surface is then not to be
     used any further.
     """
-    edges = _horizon(points, planes, facets, stack, f, apex, slack)
+    edges = _horizon(points, planes, facets, stack, f, apex, 0.0625 * error)
     top = 4 * EPA_FACETS
     sound = count + edges <= EPA_FACETS
     if not sound:
@@ -282,7 +302,7 @@ def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, s
             sound = False
         starts[2 * start] = new
         starts[2 * start + 1] = apex
-        sound = _set_facet(points, planes, facets, new, start, end, apex) and sound
+        sound = _set_facet(points, planes, facets, new, start, end, apex, error) and sound
         facets[7 * new + 3] = h
         facets[7 * h + 3 + edge] = new
     for k in range(edges):
@@ -301,7 +321,7 @@ def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, s
     return size, count + edges, sound
 
 
-@kernel
+@kernel(inline=True)
 def _is_corner(ids, facets, f, k):
     """Whether point k is a vertex of facet f or of a neighbour, by its support vertices."""
     if ids[2 * k] < 0 or ids[2 * k + 1] < 0:
@@ -315,19 +335,14 @@ def _is_corner(ids, facets, f, k):
     return False
 
 
-@kernel
-def _surface_clearance(points, facets, count, error):
+@kernel(inline=True)
+def _surface_clearance(planes, facets, count, error):
     """Least distance of a facet from the origin, or −1 unless every facet provably faces outwards."""
     least = math.inf
     for g in range(count):
         if facets[7 * g + 6] == 1:
-            clearance = clearance_behind(
-                points, POINT * facets[7 * g], POINT * facets[7 * g + 1], POINT * facets[7 * g + 2], error
-            )
-            if clearance <= error:
-                return -1.0
-            least = min(least, clearance)
-    return least
+            least = min(least, planes[PLANE * g + 4])
+    return least if least > error else -1.0
 
 
 @kernel
@@ -355,7 +370,7 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
         if down < up:
             return FLAT, down, -1.0, -nx, -ny, -nz, -1, 0
         return FLAT, up, -1.0, nx, ny, nz, -1, 0
-    count, size = _tetrahedron(points, planes, ids, facets, heap)
+    count, size = _tetrahedron(points, planes, ids, facets, heap, error)
     for v in range(4):
         starts[2 * v + 1] = -1
     depth = math.inf
@@ -367,38 +382,40 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
         f, size = _pop(heap, size, planes)
         if facets[7 * f + 6] == 0:
             continue
-        distance = planes[4 * f + 3]
+        distance = planes[PLANE * f + 3]
         if overlap_suffices and distance > 2.0 * error:
-            clearance = _surface_clearance(points, facets, count, error)
+            clearance = _surface_clearance(planes, facets, count, error)
             if clearance > error:
                 break
-        difference_point(pair, points, ids, vertices, planes[4 * f], planes[4 * f + 1], planes[4 * f + 2])
+        inlined_difference_point(
+            pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2], False
+        )
         at = POINT * vertices
-        value = planes[4 * f] * points[at] + planes[4 * f + 1] * points[at + 1] + planes[4 * f + 2] * points[at + 2]
+        value = planes[PLANE * f] * points[at] + planes[PLANE * f + 1] * points[at + 1] + planes[PLANE * f + 2] * points[at + 2]
         if value < depth:
             depth = value
             facet = f
         if overlap_suffices and value < -error and has_trees(pair):
-            settle_point(pair, points, ids, vertices, planes[4 * f], planes[4 * f + 1], planes[4 * f + 2])
-            value = planes[4 * f] * points[at] + planes[4 * f + 1] * points[at + 1] + planes[4 * f + 2] * points[at + 2]
+            settle_point(pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2])
+            value = planes[PLANE * f] * points[at] + planes[PLANE * f + 1] * points[at + 1] + planes[PLANE * f + 2] * points[at + 2]
             depth = value
         if overlap_suffices and value < -error:
-            return EXPANDED, depth, -1.0, planes[4 * facet], planes[4 * facet + 1], planes[4 * facet + 2], facet, rounds
+            return EXPANDED, depth, -1.0, planes[PLANE * facet], planes[PLANE * facet + 1], planes[PLANE * facet + 2], facet, rounds
         final = depth - distance <= tolerance or _is_corner(ids, facets, f, vertices)
         if final or vertices + 1 >= EPA_VERTICES or count + _WIDEST_HORIZON > EPA_FACETS:
-            clearance = _surface_clearance(points, facets, count, error)
+            clearance = _surface_clearance(planes, facets, count, error)
             break
         starts[2 * vertices + 1] = -1
         rounds += 1
         size, count, sound = _expand(
-            points, planes, facets, heap, size, starts, stack, f, vertices, count, 0.0625 * error
+            points, planes, facets, heap, size, starts, stack, f, vertices, count, error
         )
         vertices += 1
         if not sound:
             break
-    nx = planes[4 * facet]
-    ny = planes[4 * facet + 1]
-    nz = planes[4 * facet + 2]
+    nx = planes[PLANE * facet]
+    ny = planes[PLANE * facet + 1]
+    nz = planes[PLANE * facet + 2]
     if has_trees(pair):
         depth = _extent(pair, points, ids, nx, ny, nz)
     facet = _facet_of(
@@ -419,7 +436,7 @@ def _facet_of(points, planes, facets, count, best, x, y, z, slack):
     for g in range(count):
         if facets[7 * g + 6] == 0:
             continue
-        height = planes[4 * g] * x + planes[4 * g + 1] * y + planes[4 * g + 2] * z - planes[4 * g + 3]
+        height = planes[PLANE * g] * x + planes[PLANE * g + 1] * y + planes[PLANE * g + 2] * z - planes[PLANE * g + 3]
         if abs(height) <= slack:
             w0, w1, w2 = face_weights(
                 points, POINT * facets[7 * g], POINT * facets[7 * g + 1], POINT * facets[7 * g + 2], x, y, z
@@ -442,7 +459,7 @@ def _extent(pair, points, ids, nx, ny, nz):
 
 
 @kernel
-def _tetrahedron(points, planes, ids, facets, heap):
+def _tetrahedron(points, planes, ids, facets, heap, error):
     """The first four facets, outwards, with their neighbours; returns (facets used, heap size)."""
     ex = points[POINT] - points[0]
     ey = points[POINT + 1] - points[1]
@@ -455,10 +472,10 @@ def _tetrahedron(points, planes, ids, facets, heap):
         copy_point(points, ids, 1, EPA_VERTICES)
         copy_point(points, ids, 2, 1)
         copy_point(points, ids, EPA_VERTICES, 2)
-    _set_facet(points, planes, facets, 0, 0, 1, 2)
-    _set_facet(points, planes, facets, 1, 0, 3, 1)
-    _set_facet(points, planes, facets, 2, 1, 3, 2)
-    _set_facet(points, planes, facets, 3, 2, 3, 0)
+    _set_facet(points, planes, facets, 0, 0, 1, 2, error)
+    _set_facet(points, planes, facets, 1, 0, 3, 1, error)
+    _set_facet(points, planes, facets, 2, 1, 3, 2, error)
+    _set_facet(points, planes, facets, 3, 2, 3, 0, error)
     _set_neighbours(facets, 0, 1, 2, 3)
     _set_neighbours(facets, 1, 3, 2, 0)
     _set_neighbours(facets, 2, 1, 3, 0)
