@@ -13,7 +13,7 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
-from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS, TOLERANCE_CURVED
+from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS, ROOMY, TOLERANCE_CURVED
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa import FLAT, epa, workspace
@@ -135,8 +135,10 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     if boolean and (above + error < radius or exactly):
         return -above, -math.inf, above, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
+    # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
+    roomy = status == ENCLOSED and clearance > ROOMY * size
     outcome, depth, surface, nx, ny, nz, facet, added = epa(
-        pair, doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, boolean, error, tolerance
+        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, boolean, error, tolerance
     )
     if outcome != FLAT:
         _load_facet(

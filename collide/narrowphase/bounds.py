@@ -43,6 +43,9 @@ PROMISE_CURVED = 2.0**-26
 #: facets get too thin to prove anything with, and one run in twenty ends at its cap.
 TOLERANCE_CURVED = 2.0**-36
 
+#: A tetrahedron that holds the origin this deep, in units of S, is a seed for EPA.
+ROOMY = 2.0**-10
+
 #: Rounds after which GJK hands over the bracket it has.
 GJK_ROUNDS = 128
 #: Rounds of the exact search; it ends by itself, and no case met needed 20.

@@ -281,7 +281,7 @@ def _horizon(points, planes, facets, stack, f, apex, slack):
 
 
 @kernel(inline=True)
-def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, error):
+def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, depth, error):
     """Replace the facets that see the apex by a cone to it; returns (heap size, facets used, sound).
 
     Not sound: the horizon is pinched or a new facet has no area. The surface is then not to be
@@ -315,7 +315,9 @@ def _expand(points, planes, facets, heap, size, starts, stack, f, apex, count, e
         facets[7 * following + 5] = new
     if sound and size + edges <= EPA_FACETS:
         for k in range(edges):
-            size = _push(heap, size, planes, count + k)
+            # A facet farther off than a known way out will never be the nearest.
+            if planes[PLANE * (count + k) + 3] <= depth:
+                size = _push(heap, size, planes, count + k)
     else:
         sound = False
     return size, count + edges, sound
@@ -346,9 +348,11 @@ def _surface_clearance(planes, facets, count, error):
 
 
 @kernel
-def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
+def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, error, tolerance):
     """Expand until the nearest facet of A ⊖ B is known.
 
+    simplex, simplex_ids : four points of A ⊖ B around the origin to begin with, clear of rounding by far;
+        or no doubles, and an extremal tetrahedron is found.
     overlap_suffices : stop once the origin is proven inside (a boolean is asked).
     error : absolute error of a bound.   tolerance : stop once the bracket is this narrow.
 
@@ -363,7 +367,16 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
     rounds : vertices added.
     """
     points, planes, ids, facets, heap, starts, stack = workspace(doubles_at, integers_at)
-    rank, nx, ny, nz = _seed(pair, points, ids, error)
+    rank = 3
+    nx = ny = nz = 0.0
+    if len(simplex) == 0:
+        rank, nx, ny, nz = _seed(pair, points, ids, error)
+    else:
+        for k in range(4):
+            for j in range(POINT):
+                points[POINT * k + j] = simplex[POINT * k + j]
+            ids[2 * k] = simplex_ids[2 * k]
+            ids[2 * k + 1] = simplex_ids[2 * k + 1]
     if rank < 3:
         up = _extent(pair, points, ids, nx, ny, nz)
         down = _extent(pair, points, ids, -nx, -ny, -nz)
@@ -408,11 +421,13 @@ def epa(pair, doubles_at, integers_at, overlap_suffices, error, tolerance):
         starts[2 * vertices + 1] = -1
         rounds += 1
         size, count, sound = _expand(
-            points, planes, facets, heap, size, starts, stack, f, vertices, count, error
+            points, planes, facets, heap, size, starts, stack, f, vertices, count, depth, error
         )
         vertices += 1
         if not sound:
             break
+        if size == 0:
+            clearance = _surface_clearance(planes, facets, count, error)
     nx = planes[PLANE * facet]
     ny = planes[PLANE * facet + 1]
     nz = planes[PLANE * facet + 2]
