@@ -76,13 +76,14 @@ def measured(kind: str, n: int) -> dict:
     assert (mine >= best - 1e-14 * np.abs(directions[checked]).sum(axis=1)).all(), "a settled vertex is not farthest"
     scanned, steps, looked_at, signs = counters / len(directions)
     per = 1e9 / len(directions)
+    packed = pack_points(points)
     few = directions[: max(20, 20_000_000 // n)]
     return {
         "kind": kind, "n": n, "hull_ms": least(lambda: convex_hull(points), 3) * 1e3, "tree_ms": least(build, 3) * 1e3,
         "bytes_a_vertex": tree.nbytes / n, "longest_list": int(np.diff(tree.nodes).max()),
         "tree_ns": least(lambda: extreme_vertices(tree, directions, False)) * per,
         "settled_ns": least(lambda: extreme_vertices(tree, directions, True)) * per,
-        "scan_ns": least(lambda: scanned(points, few), 3) / len(few) * 1e9,
+        "scan_ns": least(lambda: scan_all(packed, few), 3) / len(few) * 1e9,
         "scanned": scanned, "looked_at": looked_at, "steps": steps, "exact_signs": signs,
     }  # fmt: skip
 
@@ -98,12 +99,11 @@ def _scan(coordinates_at, n, m, directions_at, count, ids_at):
 scan = entry("void(int64, int64, int64, int64, int64, int64)")(_scan)
 
 
-def scanned(points: np.ndarray, directions: np.ndarray) -> None:
+def scan_all(packed, directions: np.ndarray) -> None:
     """A scan over all points for each direction."""
-    packed = pack_points(points)
     ids = np.empty(len(directions), dtype=np.int64)
     scan(
-        address_of(packed.coordinates), len(points), packed.coordinates.shape[1], address_of(directions),
+        address_of(packed.coordinates), len(packed.points), packed.coordinates.shape[1], address_of(directions),
         len(directions), address_of(ids),
     )  # fmt: skip
 
