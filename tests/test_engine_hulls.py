@@ -11,6 +11,7 @@ import pytest
 import collide
 from collide.errors import InvalidShape
 from collide.geometry.support_tree import planted
+from collide.geometry.support_tree.layout import list_coordinates_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
 from collide.shapes import hull as hull_shape
@@ -204,3 +205,32 @@ def test_given_faces_are_checked_not_trusted():
         with pytest.raises(InvalidShape, match="faces"):
             shape.validate()
         assert collide.collide(shape, shape, EYE, collide.pose((1.0, 0, 0))), "the set does not depend on them"
+
+
+@pytest.mark.parametrize("axes", [(1, 1, 1), (1, 3, 10)])
+def test_bad_proposals_cost_time_not_truth(axes):
+    """Candidate lists shuffled among their owners: what settles a vertex is the hull's edges, not the lists."""
+    rng = np.random.default_rng(16)
+    points = _ball(rng, 1200, axes)
+    A, B = collide.ConvexHull(points), collide.ConvexHull(points)
+    arrays = {name: array.copy() for name, array in planted._grown(points).to_arrays().items()}
+    nodes, entries = arrays["nodes"], arrays["entries"]
+    last = nodes[1]  # what follows the first list are rows of points
+    entries[last:] = rng.permutation(entries[last:])
+    arrays["list_coordinates"] = list_coordinates_of(points, nodes, _rows(arrays))
+    object.__setattr__(B, "_tree", planted.PlantedTree(B.points, arrays))
+    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+    good, bad = collide.distance(A, A, EYE, X_WB), collide.distance(A, B, EYE, X_WB)
+    assert 30 < good.hit.sum() < 270
+    assert np.array_equal(good.hit, bad.hit) and np.array_equal(collide.collide(A, B, EYE, X_WB), good.hit)
+    assert np.array_equal(collide.collide(B, A, X_WB, EYE), good.hit)
+    assert (np.maximum(good.lower, bad.lower) <= np.minimum(good.upper, bad.upper)).all()
+    assert (bad.upper - bad.lower > good.upper - good.lower).any(), "the lists are still good: nothing was tested"
+    for k in range(0, 300, 50):
+        collide.verify(A, B, EYE, X_WB[k], bad[k])
+
+
+def _rows(arrays) -> np.ndarray:
+    """Rows of the points that entries stand for, in a tree of two levels."""
+    first = arrays["nodes"][1]
+    return np.concatenate([arrays["owners"][arrays["entries"][:first]], arrays["entries"][first:]])

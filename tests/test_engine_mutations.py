@@ -29,7 +29,7 @@ MUTATIONS = {
     "none": ("bounds.py", "", ""),
     "error bound a hundredth": ("bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.64 * 2.0**-53"),
     "a sign swapped": ("exact.py", "if origin != across:", "if origin == across:"),
-    "support candidates dropped": ("exact.py", "if value > least + slack:", "if i != first:"),
+    "support candidates dropped": ("exact.py", "if value > least + slack:", "if i % 2 == 1:"),
     "the exact stage skipped": ("decide.py", "if marks[HOW] != UNDECIDED:", "if True:"),
     "the plane stage inverted": ("exact_plane.py", "if sign <= 0:", "if sign < 0:"),
 }
