@@ -21,6 +21,7 @@ import ctypes
 import hashlib
 import logging
 import os
+import pickle
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -128,16 +129,33 @@ class Entry:
             self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
         return self._address
 
+    def _compiled(self) -> Callable:
+        """Compiled for its signature, or read from the disk cache."""
+        dispatcher = numba.njit(self._function, **self._flags)
+        dispatcher._cache = _KernelCache.of(self._function)
+        with _once_at_the_end(self._function):
+            dispatcher.compile(self._signature)
+        dispatcher.disable_compile()
+        return dispatcher
+
+    def _forget(self, error: Exception) -> None:
+        """Remove what the disk cache has of this kernel, since it cannot be read."""
+        place = kernel_cache_folder()
+        log.warning("a compiled kernel in %s is damaged (%s: %s); it is compiled anew", place, type(error).__name__, error)
+        for file in place.glob(f"*{self._function.__name__}-*"):
+            file.unlink(missing_ok=True)
+
     def _compile(self) -> None:
         with self._lock:
             if self._ready is not None:
                 return
             started = time.perf_counter()
-            dispatcher = numba.njit(self._function, **self._flags)
-            dispatcher._cache = _KernelCache.of(self._function)
-            with on_compile(self.name), _once_at_the_end(self._function):
-                dispatcher.compile(self._signature)
-            dispatcher.disable_compile()
+            with on_compile(self.name):
+                try:
+                    dispatcher = self._compiled()
+                except (EOFError, pickle.UnpicklingError, OSError, ValueError) as error:
+                    self._forget(error)
+                    dispatcher = self._compiled()
             seconds[self.name] = time.perf_counter() - started
             self._ready = dispatcher
 
@@ -152,7 +170,14 @@ def _once_at_the_end(function: Callable) -> Iterator[None]:
     if not all(hasattr(CPUCodeLibrary, name) for name in ("_optimize_final_module", "_finalize_final_module")):
         yield  # another numba: slower, not wrong
         return
-    own = function.__qualname__
+    # The lock first: another thread may have these functions replaced, and they must not be taken for numba's.
+    with global_compiler_lock, _replaced(function.__qualname__):
+        yield
+
+
+@contextmanager
+def _replaced(own: str) -> Iterator[None]:
+    """Numba's three steps after lowering, done for the function of this name alone."""
     optimise, finish = CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module
     executable = CPUContext.get_executable
 
@@ -171,14 +196,13 @@ def _once_at_the_end(function: Callable) -> Iterator[None]:
             return executable(context, library, fndesc, env)
         return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "not callable", 0, env, (library,))
 
-    with global_compiler_lock:
-        CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise_entry, finish_entry
-        CPUContext.get_executable = executable_of_entry
-        try:
-            yield
-        finally:
-            CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise, finish
-            CPUContext.get_executable = executable
+    CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise_entry, finish_entry
+    CPUContext.get_executable = executable_of_entry
+    try:
+        yield
+    finally:
+        CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise, finish
+        CPUContext.get_executable = executable
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:

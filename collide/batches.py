@@ -6,7 +6,9 @@ unions are taken apart into pairs of parts and put together again by `unions.py`
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,26 +23,48 @@ from collide.transforms import as_poses
 from collide.unions import Union, combine
 
 
-def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None) -> np.ndarray:
-    """bool[n], or a row a pose, of a batch in as many threads."""
-    workers = _workers(threads)
-    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
-    if workers == 1 or n < 2 * workers:
-        return _answers(A, B, X_WA, X_WB, boolean, limit, check, axes)
-    bounds = np.linspace(0, n, workers + 1).astype(int)
+def length_of(A, B, X_WA, X_WB) -> int:
+    """How many pairs a question of checked lengths has."""
+    lengths = [len(X_WA), len(X_WB), *(len(S) for S in (A, B) if not isinstance(S, Shape))]
+    return max(lengths) if min(lengths) else 0
 
-    def piece(k: int) -> np.ndarray:
+
+def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None) -> np.ndarray:
+    """bool[n], or a row a pose, of a batch in at most so many threads."""
+    n = length_of(A, B, X_WA, X_WB)
+    workers = min(_workers(threads), n // _FEWEST_A_THREAD)
+    if workers < 2:
+        return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes)
+    bounds = np.linspace(0, n, workers + 1).astype(int)
+    out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
+
+    def piece(k: int) -> None:
         part = slice(bounds[k], bounds[k + 1])
         shapes = (S if isinstance(S, Shape) else S[part] for S in (A, B))
         poses = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
+        own = None if axes is None else axes[part]
         try:
-            return _answers(*shapes, *poses, boolean, limit, check, None if axes is None else axes[part])
+            out[part] = _answers(*shapes, *poses, int(bounds[k + 1] - bounds[k]), boolean, limit, check, own)
         except InvalidPose:
             _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
             raise
 
-    with ThreadPoolExecutor(workers) as pool:
-        return np.concatenate(list(pool.map(piece, range(workers))))
+    list(_pool(workers).map(piece, range(workers)))
+    return out
+
+
+#: A thread is handed at least so many poses: below, handing over takes longer than answering.
+_FEWEST_A_THREAD = 2000
+
+
+@lru_cache(maxsize=4)
+def _pool(workers: int) -> ThreadPoolExecutor:
+    """Threads are kept, and their workspaces with them."""
+    return ThreadPoolExecutor(workers, thread_name_prefix="collide")
+
+
+if hasattr(os, "register_at_fork"):  # a forked child has none of its parent's threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def _workers(threads) -> int:
@@ -54,11 +78,11 @@ def _refuse_poses(X_WA, X_WB, check: bool) -> None:
     as_poses(X_WB, "X_WB", check=check)
 
 
-def _answers(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, axes=None) -> np.ndarray:
-    if not len(X_WA) or not len(X_WB):
+def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool, axes=None) -> np.ndarray:
+    if n == 0:
         return np.zeros(0, dtype=bool if boolean else PAIR_DTYPE)
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
-        table, which = _table(A, B, max(len(X_WA), len(X_WB)))
+        table, which = _table(A, B, n)
         for checked in (check, False):
             out = run.run_poses(table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=checked, axes=axes)
             if out is not None:
@@ -66,20 +90,21 @@ def _answers(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, axes=No
             _refuse_poses(X_WA, X_WB, check)  # unless it is a pose on the brink of the tolerance
         raise AssertionError("a pose that is none")
     _refuse_poses(X_WA, X_WB, check)
-    n = max(len(X_WA), len(X_WB))
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
     if isinstance(A, Shape) and isinstance(B, Shape):
         rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit)
     else:
         sides = ([S] * n if isinstance(S, Shape) else S for S in (A, B))
         asked = zip(*sides, X_WA[:, None], X_WB[:, None])
-        rows = np.concatenate([_parts(*pair, boolean=boolean, limit=limit) for pair in asked])
+        rows = np.zeros(n, dtype=PAIR_DTYPE)
+        for k, pair in enumerate(asked):
+            rows[k : k + 1] = _parts(*pair, boolean=boolean, limit=limit)
     return rows["hit"] if boolean else rows
 
 
 def _all_plain(side) -> bool:
     if isinstance(side, Picked):
-        return side.shape_set.plain
+        return bool(side.shape_set.plain[side.rows].all())
     return is_plain(side) if isinstance(side, Shape) else all(is_plain(shape) for shape in side)
 
 

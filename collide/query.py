@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+import weakref
 
 import numpy as np
 
-from collide.batches import ask
+from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
@@ -41,6 +42,8 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axe
     """
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
+    if threads != 1:
+        return _batched(A, B, X_WA, X_WB, check_poses, threads)
     try:
         pair = A._prepared[B._serial]
         hit = pair.collide(pair.address, id(X_WA), id(X_WB))
@@ -48,8 +51,12 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axe
             return True
         if hit == 0:
             return False
-    except (AttributeError, KeyError):
+    except (AttributeError, KeyError, TypeError):
         pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
+    return _batched(A, B, X_WA, X_WB, check_poses, threads)
+
+
+def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     _prepare(A, B)
     hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
@@ -62,7 +69,7 @@ _LONGEST_AXIS = 1e100
 
 def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
-    wanted = (max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0, 3)
+    wanted = (length_of(A, B, X_WA, X_WB), 3)
     if not isinstance(axes, np.ndarray) or axes.dtype != np.float64 or axes.shape != wanted:
         given = f"{axes.dtype} {axes.shape}" if isinstance(axes, np.ndarray) else type(axes).__name__
         raise InvalidArgument(f"axes must be a float64 array {wanted}, one row a pose, got {given}")
@@ -92,12 +99,12 @@ def distance(
     half-space).
     """
     limit = check_distance("max_distance", max_distance)
-    if limit == math.inf:
+    if limit == math.inf and threads == 1:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB)
             if rows is not None:
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
-        except (AttributeError, KeyError):
+        except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
@@ -133,28 +140,30 @@ def _poses(A, B, X_WA, X_WB):
     """Shapes checked, poses as batches (n, 4, 4) or (1, 4, 4) whose entries are still to be checked."""
     X_WA, single_a = _batch(X_WA, "X_WA")
     X_WB, single_b = _batch(X_WB, "X_WB")
-    n = len(X_WA) if len(X_WB) == 1 else len(X_WB)
+    counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
+    single = single_a and single_b
     for name, given in (("A", A), ("B", B)):
         if isinstance(given, Picked) or (
-            isinstance(given, (list, tuple)) and given and all(isinstance(shape, Shape) for shape in given)
+            isinstance(given, (list, tuple)) and all(isinstance(shape, Shape) for shape in given)
         ):
-            if len(given) != n or single_a or single_b:
-                raise InvalidArgument(
-                    f"{name} is a sequence of {len(given)} shapes: give X_WA and X_WB as batches of as many"
-                )
+            counts[name] = len(given)
+            single = False
         elif not isinstance(given, Shape):
             raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {given!r}")
-    if len(X_WA) != len(X_WB) and 1 not in (len(X_WA), len(X_WB)):
-        raise InvalidPose(f"X_WA has {len(X_WA)} poses and X_WB {len(X_WB)}: batches must match, or one be single")
-    return X_WA, X_WB, single_a and single_b
+    wanted = max(counts.values()) if min(counts.values()) else 0
+    for name, count in counts.items():
+        if count != wanted and (count != 1 or name in "AB"):
+            told = ", ".join(f"{other} {n}" for other, n in counts.items())
+            kind = InvalidPose if name.startswith("X") else InvalidArgument
+            raise kind(f"lengths do not match: {told}; batches must be equally long, or a single pose")
+    return X_WA, X_WB, single
 
 
 def _batch(X, name: str) -> tuple[np.ndarray, bool]:
     """(poses (n, 4, 4), whether a single one was given)."""
     if isinstance(X, np.ndarray) and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
         return np.ascontiguousarray(X).reshape(-1, 4, 4), X.ndim == 2
-    single = _is_single(X)
-    return as_poses(X, name, check=False), single
+    return as_poses(X, name, check=False), _is_single(X)
 
 
 def _is_single(X) -> bool:
@@ -176,7 +185,7 @@ def _held(shapes):
 #: Numbers of shapes within this process, never used again.
 _serials = itertools.count()
 #: A shape keeps this many partners prepared for single calls.
-_PARTNERS = 64
+_PARTNERS = 512
 
 
 def _prepare(A, B) -> None:
@@ -189,8 +198,10 @@ def _prepare(A, B) -> None:
         object.__setattr__(A, "_prepared", {})
     if not hasattr(B, "_serial"):
         object.__setattr__(B, "_serial", next(_serials))
-    if B._serial in A._prepared:
+    prepared, serial = A._prepared, B._serial
+    if serial in prepared:
         return
-    if len(A._prepared) >= _PARTNERS:
-        A._prepared.clear()
-    A._prepared[B._serial] = run.SinglePair((A, B), ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    while len(prepared) >= _PARTNERS:
+        prepared.pop(next(iter(prepared)), None)
+    prepared[serial] = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    weakref.finalize(B, prepared.pop, serial, None)  # what is gone is not held by its partners

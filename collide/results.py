@@ -31,6 +31,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from collide.errors import InvalidArgument
+
 #: What `how` indexes. A proof stands against both poses as given, entries taken as exact reals.
 HOW = (
     "undecided",          # the bracket reaches to both sides of 0: touching within rounding
@@ -106,9 +108,14 @@ class PairResult:
         """(A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1."""
         return self._question
 
-    def __getitem__(self, k: int) -> PairResult:
-        """Result k of a batch."""
-        k = range(len(self.rows))[k]
+    def __getitem__(self, k) -> PairResult:
+        """Result k of a batch, or a batch of those in a slice."""
+        if isinstance(k, slice):
+            A, B, X_WA, X_WB = self._question
+            shapes = (S[k] if isinstance(S, Sequence) else S for S in (A, B))
+            poses = (X if len(X) == 1 else X[k] for X in (X_WA, X_WB))
+            return PairResult(self.rows[k], False, (*shapes, *poses))
+        k = _row_number(k, len(self.rows))
         return PairResult(self.rows[k : k + 1], True, self._asked(k))
 
     def __getattr__(self, name: str):
@@ -135,6 +142,15 @@ class PairResult:
         return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
 
 
+def _row_number(k, count: int) -> int:
+    try:
+        return range(count)[k]
+    except IndexError:
+        raise IndexError(f"there are results 0 … {count - 1}, not {k}" if count else "there are no results") from None
+    except TypeError:
+        raise InvalidArgument(f"a result is named by its number, got {k!r}") from None
+
+
 class WorldResult:
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
@@ -149,7 +165,7 @@ class WorldResult:
 
     def pair(self, k: int) -> PairResult:
         """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate."""
-        row = self.rows[range(len(self.rows))[k]]
+        row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
         return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]))
 

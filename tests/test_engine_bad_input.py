@@ -212,7 +212,7 @@ def test_pose_refuses_what_it_cannot_place(arguments, words):
 def test_batches_must_match():
     two, three = np.array([EYE] * 2), np.array([EYE] * 3)
     for query in (distance, meets):
-        with pytest.raises(InvalidPose, match="X_WA has 2 poses and X_WB 3"):
+        with pytest.raises(InvalidPose, match="X_WA 2, X_WB 3"):
             query(Sphere(1), Sphere(1), two, three)
 
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 import threading
 
 import numpy as np
 import pytest
 
 import collide
+from collide import batches
 from collide.errors import InvalidArgument, InvalidPose
 
 EYE = np.eye(4)
+
+
+@pytest.fixture(autouse=True)
+def threads_for_few_poses(monkeypatch):
+    monkeypatch.setattr(batches, "_FEWEST_A_THREAD", 1)
 
 
 def _shapes(rng):
@@ -194,12 +202,28 @@ def test_a_bad_pose_in_a_single_call_and_anywhere_in_a_batch_is_named():
 
 def test_wrong_arguments_are_named():
     box = collide.Box((1, 1, 1))
-    with pytest.raises(InvalidArgument, match="sequence of 2 shapes"):
+    with pytest.raises(InvalidArgument, match="X_WB 3, A 2"):
         collide.collide([box, box], box, EYE, np.tile(EYE, (3, 1, 1)))
-    with pytest.raises(InvalidArgument, match="sequence of 2 shapes"):
-        collide.collide([box, box], box, EYE, EYE)
+    with pytest.raises(InvalidArgument, match="A 1"):
+        collide.collide([box], box, EYE, np.tile(EYE, (3, 1, 1)))
+    with pytest.raises(InvalidArgument, match="A must be a shape"):
+        collide.collide(collide.Box, box, EYE, EYE)
+    with pytest.raises(InvalidPose, match="X_WA"):
+        collide.collide(box, box, [[1, 2], [3]], EYE)
+    for wrong in (None, box):
+        with pytest.raises(collide.InvalidShape, match="sequence"):
+            collide.ShapeSet(wrong)
+    with pytest.raises(IndexError, match="shapes 0 … 0"):
+        collide.ShapeSet([box])[5]
+    r = collide.distance(box, box, EYE, np.tile(EYE, (3, 1, 1)))
+    with pytest.raises(IndexError, match="results 0 … 2"):
+        r[3]
+    with pytest.raises(InvalidArgument, match="number"):
+        r["a"]
+    assert len(r[1:]) == 2 and np.array_equal(r[1:].rows, r.rows[1:])
+    collide.verify(box, box, EYE, EYE, r[1:][0])
     with pytest.raises(InvalidArgument, match="B must be a shape"):
-        collide.collide(box, [], EYE, EYE)
+        collide.collide(box, [box, 3], EYE, EYE)
     with pytest.raises(InvalidArgument, match="threads"):
         collide.collide(box, box, EYE, np.tile(EYE, (3, 1, 1)), threads=0)
 
@@ -214,7 +238,7 @@ def test_a_prepared_pair_is_never_taken_for_another():
         del B
         if k % 50 == 0:
             gc.collect()
-    assert len(A._prepared) <= 64
+    assert len(A._prepared) <= 1, "shapes that are gone are not held"
 
 
 def test_a_result_keeps_the_poses_it_was_asked_at():
@@ -261,3 +285,34 @@ def test_axes_that_are_none_are_refused():
     ):  # fmt: skip
         with pytest.raises(InvalidArgument, match=word):
             collide.collide(box, box, EYE, X, axes=axes)
+
+
+def test_a_single_pose_goes_with_lists_and_empty_lists_give_nothing():
+    rng = np.random.default_rng(33)
+    A, B, _, X_WB = _many(rng, 40)
+    expected = [collide.collide(a, b, EYE, X_WB[0]) for a, b in zip(A, B)]
+    assert [bool(h) for h in collide.collide(A, B, EYE, X_WB[0])] == expected
+    assert len(collide.collide([], [], X_WB[:0], X_WB[:0])) == 0
+    library = collide.ShapeSet(_shapes(rng))
+    assert len(library[[]]) == 0 and len(library[2:5]) == 3
+
+
+def test_a_fork_while_a_tree_grows_does_not_hang():
+    """The child has none of its parent's threads: a lock that one of them holds is never released there."""
+    code = (
+        "import os, threading, time, numpy as np, collide\n"
+        "small = collide.ConvexHull(np.random.default_rng(0).normal(size=(1000, 3)))\n"
+        "X = collide.pose((5, 0, 0))\ncollide.collide(small, small, np.eye(4), X)\n"
+        "points = np.random.default_rng(1).normal(size=(150000, 3))\n"
+        "points /= np.sqrt((points ** 2).sum(axis=1))[:, None]\n"
+        "large = collide.ConvexHull(points)\n"
+        "thread = threading.Thread(target=collide.collide, args=(large, small, np.eye(4), X))\n"
+        "thread.start()\ntime.sleep(0.25)\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    other = collide.ConvexHull(points[:2000])\n"
+        "    os._exit(0 if collide.collide(other, small, np.eye(4), np.eye(4)) else 1)\n"
+        "assert os.waitpid(child, 0)[1] == 0\nthread.join()\n"
+    )
+    run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]

@@ -105,3 +105,17 @@ def test_importing_the_package_does_not_import_numba(site):
     code = "import sys, collide, collide.errors, collide.shapes; collide.Box((1, 1, 1)); print('numba' in sys.modules)"
     child = subprocess.run([sys.executable, "-c", code], cwd=site, capture_output=True, text=True, timeout=60, check=True)
     assert child.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty"])
+def test_a_damaged_kernel_is_compiled_anew(site, tmp_path, damage):
+    cache = tmp_path / "kernels"
+    first, _ = ask(site, cache)
+    for file in cache.rglob("*bounding_boxes*.nb[ic]"):
+        data = file.read_bytes()
+        if damage == "empty" or file.suffix == ".nbc":
+            file.write_bytes(b"" if damage == "empty" else data[:500])
+    again, said = ask(site, cache)
+    assert again["box"] == first["box"] and "damaged" in said
+    last, said = ask(site, cache)
+    assert last["box"] == first["box"] and "damaged" not in said

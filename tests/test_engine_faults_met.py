@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
+from fractions import Fraction
 
 import naive
 import numpy as np
@@ -178,3 +181,94 @@ def test_a_gap_below_the_smallest_normal_double_is_bracketed():
     r = collide.distance(*case.shapes())
     truth = Fraction(exact.signed_distance(case.P, case.R1, case.t1, case.Q, case.R2, case.t2, digits=400))
     assert Fraction(r.lower) <= truth <= Fraction(r.upper) and not r.hit
+
+
+@pytest.mark.parametrize("rpy", [(np.pi, 0, 0), (0, 0, np.pi / 2), (0.3, 0.2, 0.1), (0, 1e-9, 0)])
+def test_a_turned_sphere_touches_as_one_that_is_not(rpy):
+    """The rotation of a core at its frame's origin wrote its digits over the shift: 15 m of bracket, and inverted."""
+    X = collide.pose(rpy=rpy)
+    for A in (collide.Sphere(1.0), collide.ConvexHull([[0, 0, 0]] * 3, radius=1.0)):
+        for B in (collide.Box((2, 2, 2)), collide.ConvexHull(np.eye(3)[[0, 0, 1]] - [[2, 0, 0], [1, 0, 0], [1, 1, 0]], radius=0)):
+            for x, expected in ((2.0, True), (np.nextafter(2.0, 9), False)):
+                Y = collide.pose((x, 0, 0))
+                for one, other, X_WA, X_WB in ((A, B, X, Y), (B, A, Y, X)):
+                    r = collide.distance(one, other, X_WA, X_WB)
+                    assert r.hit is expected and collide.collide(one, other, X_WA, X_WB) is expected, (one, other, rpy, x)
+                    assert r.lower <= r.distance <= r.upper and abs(r.distance) < 1e-15
+                    collide.verify(one, other, X_WA, X_WB, r)
+        spot = collide.Compound([(A, collide.pose((0.25, 0.5, 0), rpy=(1, 2, 3)))])
+        r = collide.distance(spot, collide.Box((2, 2, 2)), collide.pose(rpy=rpy), collide.pose((1, 2, 3)))
+        collide.verify(spot, collide.Box((2, 2, 2)), collide.pose(rpy=rpy), collide.pose((1, 2, 3)), r)
+
+
+@pytest.mark.parametrize("shift", [1e-150, 1e-155, 1e-160, 1e-161, 1e-163, 1e-200, 1e-300, 5e-324])
+def test_frames_that_almost_coincide_prove_no_falsehood(shift):
+    """The first support plane was divided by a length whose squares had vanished: lower = inf, 1.2 deep."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    for radius, expected in ((4.6, -1.2), (0.0, 8.0)):
+        A = collide.ConvexHull(corners + np.array([-5, 0, 0]), radius=radius)
+        B = collide.ConvexHull(corners + np.array([5, 0.1, 0.2]), radius=radius)
+        r = collide.distance(A, B, EYE, collide.pose((shift, 0, 0)))
+        assert r.lower <= expected + 1e-14 and expected - 1e-14 <= r.upper and abs(r.distance - expected) < 1e-12
+        assert collide.collide(A, B, EYE, collide.pose((shift, 0, 0))) is (expected < 0)
+
+
+def test_tiny_axes_change_no_answer():
+    rng = np.random.default_rng(31)
+    A, B = collide.ConvexHull(rng.normal(size=(20, 3))), collide.ConvexHull(rng.normal(size=(20, 3)) + np.array([1, 0, 0]))
+    X = np.array([collide.pose(rng.normal(size=3) * 2, rpy=rng.uniform(-3, 3, 3)) for _ in range(400)])
+    expected = collide.collide(A, B, EYE, X)
+    assert 40 < expected.sum() < 360
+    for size in (1e-150, 1e-162, 1e-170, 1e-300, 5e-324):
+        axes = rng.normal(size=(400, 3)) * size
+        assert np.array_equal(collide.collide(A, B, EYE, X, axes=axes), expected) and np.isfinite(axes).all(), size
+
+
+@pytest.mark.parametrize("thin", [1e-3, 1e-10, 1e-13, 1e-14, 1e-15, 1e-17, 0.0])
+def test_flat_hulls_that_are_almost_straight(thin):
+    """Slivers have facet normals of the wrong sign; the support tree refused them, with an error of its own."""
+    angle = 2 * np.pi * np.arange(500) / 500
+    c, s = np.cos(angle), thin * np.sin(angle)
+    hull = collide.ConvexHull(np.stack([0 * c, (c - s) * 0.7071, (c + s) * 0.7071], axis=1))
+    ball = collide.Sphere(0.25)
+    assert collide.collide(hull, ball, EYE, EYE) and collide.collide(hull, ball, EYE, collide.pose((0.25, 0, 0)))
+    assert not collide.collide(hull, ball, EYE, collide.pose((np.nextafter(0.25, 1), 0, 0)))
+    r = collide.distance(hull, ball, EYE, collide.pose((0, 2, 2)))
+    assert abs(r.distance - (2 * 2**0.5 - 0.7071 * 2**0.5 - 0.25)) < 1e-12
+    collide.verify(hull, ball, EYE, collide.pose((0, 2, 2)), r)
+
+
+def test_two_threads_may_make_their_first_calls_at_once(tmp_path):
+    """What is replaced in numba while an entry is compiled was read by another thread as numba's own: a crash."""
+    code = (
+        "import threading, numpy as np, collide\n"
+        "points = np.random.default_rng(0).normal(size=(500, 3))\n"
+        "shapes = [collide.Box((1, 1, 1)), collide.ConvexHull(points), collide.Sphere(1)]\n"
+        "out = []\n"
+        "def ask(k):\n"
+        "    A, B = shapes[k % 3], shapes[(k + 1) % 3]\n"
+        "    out.append(collide.distance(A, B, np.eye(4), collide.pose((0.1 * k, 0, 0))).hit)\n"
+        "threads = [threading.Thread(target=ask, args=(k,)) for k in range(6)]\n"
+        "[t.start() for t in threads]\n[t.join() for t in threads]\nassert out == [True] * 6, out\n"
+    )
+    for _ in range(4):  # kernels come from the disk cache that the other tests have filled
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+        assert run.returncode == 0, (run.returncode, run.stderr[-2000:])
+
+
+@pytest.mark.parametrize("stretch", [1.0, 30.0, 1e3, 1e5])
+def test_composed_poses_that_stretch_keep_their_bracket(stretch):
+    """The product of two poses rounds with the size of the first matrix, which need be no rotation."""
+    rng = np.random.default_rng(32)
+    for _ in range(60):
+        offset = rng.uniform(-1, 1, 3)
+        spot = collide.Compound([(collide.ConvexHull([[0, 0, 0]]), collide.pose(offset, rpy=rng.uniform(-3, 3, 3)))])
+        X = collide.pose(rpy=rng.uniform(-3, 3, 3))
+        X[:3, :3] *= stretch
+        exact = [sum(Fraction(X[i, k]) * Fraction(offset[k]) for k in range(3)) for i in range(3)]
+        gap = rng.uniform(0.5, 2) * 1e-9 * stretch
+        at = np.array([float(v) for v in exact]) + np.array([gap, 0, 0])
+        r = collide.distance(spot, collide.Sphere(1e-12), X, collide.pose(at), check_poses=False)
+        square = sum((Fraction(a) - e) ** 2 for a, e in zip(at.tolist(), exact))
+        truth = float(square) ** 0.5 - 1e-12
+        assert r.lower <= truth + 1e-15 * gap and truth - 1e-15 * gap <= r.upper, (offset.tolist(), X.tolist(), at.tolist())

@@ -116,9 +116,9 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     R, p, X = R_WB[own], p_WB[own], X_BP[own]
     rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
     rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
-    rows[own, POSE_SLOP] = _PRODUCT_SLOP * (
-        reach[own] + np.abs(X[:, :3, 3]).sum(axis=1) + np.abs(p).max(axis=1)
-    )
+    stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
+    parts = reach[own] + np.abs(X[:, :3, 3]).sum(axis=1)
+    rows[own, POSE_SLOP] = _PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
     terms, exact = _terms(R, p, X)
     rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
     return PoseTable(rows, np.ascontiguousarray(terms[exact]))

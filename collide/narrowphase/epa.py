@@ -391,6 +391,7 @@ def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, e
     clearance = -1.0
     rounds = 0
     vertices = 4
+    sound = True
     while size > 0:
         f, size = _pop(heap, size, planes)
         if facets[7 * f + 6] == 0:
@@ -426,8 +427,8 @@ def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, e
         vertices += 1
         if not sound:
             break
-        if size == 0:
-            clearance = _surface_clearance(planes, facets, count, error)
+    if sound and clearance < 0.0:  # no facet is left that could be nearer than the way out that is known
+        clearance = _surface_clearance(planes, facets, count, error)
     nx = planes[PLANE * facet]
     ny = planes[PLANE * facet + 1]
     nz = planes[PLANE * facet + 2]

@@ -127,8 +127,9 @@ def _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radiu
 
     A grid is the exponent of a number's digit 0 over BITS; all of a pair's coordinates share one.
     """
-    rot_a, digits_rot_a = span_of_entries(pose_a, 0, 9)
-    rot_b, digits_rot_b = span_of_entries(pose_b, 0, 9)
+    # A core at its frame's origin alone is not turned: its rotation takes no digits, and must have no say in D.
+    rot_a, digits_rot_a = span_of_entries(pose_a, 0, 9 if lowest_a < 2000 else 0)
+    rot_b, digits_rot_b = span_of_entries(pose_b, 0, 9 if lowest_b < 2000 else 0)
     core_a = grid_of(min(lowest_a, 1000))
     core_b = grid_of(min(lowest_b, 1000))
     low_s, high_s = lowest_and_largest(pose_a[0], pose_a[1] + 9 * pose_a[2], 3 * pose_a[2])
@@ -154,14 +155,14 @@ def _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radiu
 @kernel
 def _load(digits, scale, pose_a, pose_b):
     """Rotations and the shift p_WB − p_WA into the workspace."""
-    d, grid, rot_a, digits_rot_a, _, _, rot_b, digits_rot_b, _, _ = scale
+    d, grid, rot_a, digits_rot_a, _, digits_a, rot_b, digits_rot_b, _, digits_b = scale
     clear(digits, 0, 21 * d)
     for k in range(9):
-        add_entry(digits, k * d, pose_a, k, rot_a, 1.0)
-        add_entry(digits, (9 + k) * d, pose_b, k, rot_b, 1.0)
-        if pose_a[2] > 1:
+        if digits_a > 0:
+            add_entry(digits, k * d, pose_a, k, rot_a, 1.0)
             carry(digits, k * d, digits_rot_a)
-        if pose_b[2] > 1:
+        if digits_b > 0:
+            add_entry(digits, (9 + k) * d, pose_b, k, rot_b, 1.0)
             carry(digits, (9 + k) * d, digits_rot_b)
     for k in range(3):
         at = _shift_at(d) + k * d

@@ -79,12 +79,18 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         tx = pair[14]
         ty = pair[15]
         tz = pair[16]
-    if tx == 0.0 and ty == 0.0 and tz == 0.0:
+    largest = max(abs(tx), abs(ty), abs(tz))
+    between = touch_suffices and tx == pair[14] and ty == pair[15] and tz == pair[16]
+    if largest == 0.0:
         tx = 1.0
-    elif touch_suffices and tx == pair[14] and ty == pair[15] and tz == pair[16]:
+    else:  # squares of tiny components would vanish
+        tx /= largest
+        ty /= largest
+        tz /= largest
+    if between and largest > 0.0:
         # Balls about the origins of the bodies' frames: no support is asked.
         span = math.sqrt(tx * tx + ty * ty + tz * tz)
-        lower = span - reach_of_both(pair)
+        lower = largest * span - reach_of_both(pair)
         if lower - error - radius > limit:
             weights[4] = -tx * (lower / span)
             weights[5] = -ty * (lower / span)
@@ -131,7 +137,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             settle_point(pair, points, ids, n, -vx, -vy, -vz)
             bound = _height(points, n, vx, vy, vz) / length
             lower = max(lower, bound)
-        elif not trees:
+        elif not trees and not coarse:
             lower = max(lower, bound)
         if lower - error - radius > limit:
             return APART, n, lower, 0.0, used

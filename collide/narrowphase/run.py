@@ -7,7 +7,7 @@ from threading import local
 
 import numpy as np
 
-from collide._jit import address_of
+from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
@@ -101,7 +101,7 @@ def run_poses(
     check : refuse matrices that are no rotation.
     axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
     """
-    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    n = len(which) if which is not None else max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
     table.plant(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)
@@ -163,7 +163,7 @@ _of_thread = _OfThread()
 
 @cache
 def single_calls_are_safe() -> bool:
-    return array_layout_is_known()
+    return not PLAIN_PYTHON and array_layout_is_known()  # plain Python lets go of its lock in mid-kernel
 
 
 class SinglePair:
@@ -172,11 +172,11 @@ class SinglePair:
     #: One for all single calls: their kernels keep Python's lock.
     _space: _Workspace | None = None
 
-    def __init__(self, bodies: tuple, table: ShapeTable):
+    def __init__(self, table: ShapeTable):
         if SinglePair._space is None:
             SinglePair._space = _Workspace()
         table.plant(np.arange(2))
-        self.bodies, self.table = bodies, table  # held, since kernels read their buffers
+        self.table = table  # held, since kernels read its buffers
         self._header = SinglePair._space.header_of(table)
         self.address = address_of(self._header)
         self.collide, self._distance = collide_single.unchecked, distance_single.unchecked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,7 @@ class ConvexHull(Shape):
     radius : of the ball swept over the hull [m], ≥ 0.
 
     Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support
-    tree, which answers in logarithmic time: made when a query first needs it (about 6 µs a point), kept with the shape,
+    tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point), kept with the shape,
     and saved with it by `save` and by pickle.
     """
 
@@ -122,18 +123,21 @@ class ConvexHull(Shape):
             arrays["faces"] = self.faces
         tree = self._tree_arrays()
         arrays.update({f"tree_{name}": array for name, array in tree.items()} if tree is not None else {})
-        with open(path, "wb") as file:
-            np.savez(file, format=np.array(_FILE_FORMAT), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
+        try:
+            with Path(path).open("wb") as file:
+                np.savez(file, format=np.array(_FILE_FORMAT), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
+        except (OSError, TypeError) as error:
+            raise InvalidShape(f"ConvexHull.save: {path!r}: {getattr(error, 'strerror', None) or error}") from None
 
     @classmethod
     def load(cls, path) -> ConvexHull:
         """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as found:
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as found:
                 arrays = {name: found[name] for name in found.files}
         except OSError as error:
             raise InvalidShape(f"ConvexHull.load: {path}: {error.strerror or error}") from None
-        except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        except (TypeError, AttributeError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
             raise InvalidShape(f"ConvexHull.load: {path} is no file that ConvexHull.save wrote ({error})") from None
         stamp, digest = arrays.pop("format", None), arrays.pop("digest", None)
         if stamp is None or digest is None or int(stamp) != _FILE_FORMAT or not {"points", "radius"} <= set(arrays):

@@ -25,7 +25,10 @@ class ShapeSet:
     """
 
     def __init__(self, shapes: Sequence[Shape]):
-        self.shapes = tuple(shapes)
+        try:
+            self.shapes = tuple(shapes)
+        except TypeError:
+            raise InvalidShape(f"ShapeSet: shapes must be a sequence of shapes, got {type(shapes).__name__}") from None
         for k, shape in enumerate(self.shapes):
             if not isinstance(shape, Shape):
                 raise InvalidShape(f"ShapeSet: shapes[{k}] must be a shape, got {type(shape).__name__}")
@@ -36,9 +39,13 @@ class ShapeSet:
         return len(self.shapes)
 
     def __getitem__(self, rows):
-        if isinstance(rows, (int, np.integer)):
+        if isinstance(rows, (int, np.integer)) and not isinstance(rows, bool):
+            if not -len(self) <= rows < len(self):
+                raise IndexError(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {rows}")
             return self.shapes[rows]
-        numbers = np.asarray(rows)
+        numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else np.asarray(rows)
+        if numbers.size == 0 and numbers.ndim == 1:
+            numbers = numbers.astype(np.int64)
         if numbers.ndim != 1 or not np.issubdtype(numbers.dtype, np.integer):
             raise InvalidArgument(f"ShapeSet: pick by integers (N,), got {numbers.dtype} {numbers.shape}")
         if len(numbers) and not (0 <= numbers.min() and numbers.max() < len(self)):
@@ -46,13 +53,13 @@ class ShapeSet:
         return Picked(self, numbers.astype(np.int64))
 
     @cached_property
-    def plain(self) -> bool:
-        """Whether each shape is one convex set in its own frame."""
-        return all(is_plain(shape) for shape in self.shapes)
+    def plain(self) -> np.ndarray:
+        """(shapes,) bool: which are one convex set in their own frame."""
+        return np.array([is_plain(shape) for shape in self.shapes])
 
     @cached_property
     def table(self) -> ShapeTable:
-        """What kernels read, a row a shape; for plain sets only."""
+        """What kernels read, a row a shape; of a union its first part, which nobody asks for."""
         from collide.geometry.tables import ShapeTable
 
         return ShapeTable([shape.parts()[0][0] for shape in self.shapes])

@@ -61,8 +61,12 @@ class Rings:
         the border alone is kept: diagonals may have thousands of ends.
         """
         self.flat = True
-        first = self.normals[np.abs(self.normals).sum(axis=1).argmax()]
-        upward = (self.normals * first).sum(axis=1) > 0
+        half = len(facets) // 2
+        if np.array_equal(facets[half:], facets[:half, ::-1]):  # as `convex_hull` gives them; normals of slivers round
+            upward = np.arange(len(facets)) < half
+        else:
+            first = self.normals[np.abs(self.normals).sum(axis=1).argmax()]
+            upward = (self.normals * first).sum(axis=1) > 0
         normal = (self.normals * np.where(upward, 1.0, -1.0)[:, None]).sum(axis=0)
         upper, n = facets[upward], len(points)
         edges = np.concatenate([upper[:, [0, 1]], upper[:, [1, 2]], upper[:, [2, 0]]]).astype(np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 
 import numpy as np
@@ -19,7 +20,6 @@ class PlantedTree:
 
     def __init__(self, points: np.ndarray, arrays=None):
         self._points = points
-        self._lock = threading.Lock()
         self._tree = SupportTree.from_arrays(points, arrays) if arrays is not None else None
         self._hopeless = False
 
@@ -27,7 +27,7 @@ class PlantedTree:
     def tree(self) -> SupportTree | None:
         """The tree; None where the hull has too few vertices for one."""
         if self._tree is None and not self._hopeless:
-            with self._lock:
+            with _growing():
                 if self._tree is None and not self._hopeless:
                     self._tree = _grown(self._points)
                     self._hopeless = self._tree is None
@@ -43,8 +43,28 @@ class PlantedTree:
         return self._tree.to_arrays() if self._tree is not None else None
 
 
+_lock = threading.Lock()
+
+
+def _growing() -> threading.Lock:
+    """Held while a tree grows: one at a time, since a tree of 100,000 points is a matter of a second."""
+    return _lock
+
+
+def _new_lock() -> None:
+    global _lock
+    _lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
+    os.register_at_fork(after_in_child=_new_lock)
+
+
 def _grown(points: np.ndarray) -> SupportTree | None:
     hull = convex_hull(points)
     if hull.dimension < 2 or len(hull.vertices) < FEWEST_VERTICES:
         return None
-    return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+    try:
+        return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+    except ValueError:  # a hull so degenerate that no order of neighbours is certain: it is scanned
+        return None
