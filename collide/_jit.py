@@ -344,7 +344,7 @@ if PLAIN_PYTHON:
             _functions.append(function)
         return _functions.index(function)
 
-    def native_call(_signature: str):
+    def native_call(signature: str):
         return lambda address, arguments: _functions[int(address)](*arguments)
 
     def address_in_kernel(array):

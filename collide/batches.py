@@ -40,11 +40,12 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
 
     def piece(k: int) -> None:
         part = slice(bounds[k], bounds[k + 1])
-        shapes = (S if isinstance(S, Shape) else S[part] for S in (A, B))
-        poses = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
+        one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
+        X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
         own = None if axes is None else axes[part]
         try:
-            out[part] = _answers(*shapes, *poses, int(bounds[k + 1] - bounds[k]), boolean, limit, check, own)
+            count = int(bounds[k + 1] - bounds[k])
+            out[part] = _answers(one, other, X_WO, X_WT, count, boolean, limit, check, own)
         except InvalidPose:
             _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
             raise

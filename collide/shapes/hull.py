@@ -43,6 +43,7 @@ class ConvexHull(Shape):
     points: np.ndarray
     faces: np.ndarray | None
     radius: float
+    _hull: Hull
 
     def __init__(self, points, *, faces=None, radius: float = 0.0):
         points = rows("ConvexHull", "points", points, (None, 3))

@@ -6,7 +6,7 @@ import numpy as np
 
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
 from collide.scenes.families.gaps import set_gap
-from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, sign
+from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, rotation, sign, turn
 from collide.scenes.families.thin import flat
 from collide.scenes.families.touching import UNIT, Contact, contact, placed
 
@@ -75,4 +75,20 @@ def swept_deep(rng, index) -> Case:
     return case._replace(radius_a=radii[0], radius_b=radii[1])
 
 
-OWN = (swept_touch, swept_1ulp, padded_touch, swept_near, swept_deep)
+def turned_balls(rng, index) -> Case:
+    """A ball, turned anyhow and half the time by right angles as they round, on a face of an unturned box:
+    exactly touching, one ulp larger, one ulp smaller in turn. What is a point does not turn."""
+    half, radius = (np.round(rng.uniform(0.25, 2.0, n) * 256) / 256 for n in (3, 1))
+    where = np.round(rng.uniform(-1, 1, 3) * half * 64) / 64
+    axis = int(rng.integers(3))
+    where[axis] = sign(rng) * (half[axis] + radius[0])
+    turned = turn(int(rng.integers(3)), np.pi / 2 * int(rng.integers(1, 4))) if index % 2 else rotation(rng)
+    ball = Body(np.zeros((1, 3)), turned, where)
+    box = Body(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half, np.eye(3), np.zeros(3))
+    reach = float((radius[0], np.nextafter(radius[0], np.inf), np.nextafter(radius[0], 0.0))[index % 3])
+    if index // 3 % 2:
+        return pair(box, ball)._replace(radius_b=reach)
+    return pair(ball, box)._replace(radius_a=reach)
+
+
+OWN = (turned_balls, swept_touch, swept_1ulp, padded_touch, swept_near, swept_deep)
