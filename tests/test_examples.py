@@ -25,6 +25,7 @@ SHOWS = {
     "04_robot_in_a_scene": ["right_finger", "sweeping yaw", "free"],
     "05_scene_file_to_report": ["COLLIDING", "HOW EACH ANSWER IS KNOWN", "as data: 1 collision"],
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
+    "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
 }
 
 
