@@ -1,9 +1,4 @@
-"""Many different hulls at once: a library of shapes, a pair of them at every pose, warm starts, saving what was built.
-
-    python examples/07_many_large_hulls.py
-"""
-
-from __future__ import annotations
+"""Many different hulls at once: a library of shapes, a pair of them at every pose, warm starts, saving."""
 
 import tempfile
 from pathlib import Path
