@@ -188,7 +188,7 @@ def _set_facet(points, planes, facets, f, i, j, k, error):
         planes[at + 3] = math.inf
         planes[at + 4] = -1.0
         return False
-    # Whether the origin is provably behind it: `simplex.clearance_behind`, here from what is at hand.
+    # Whether the origin is provably behind it: the bound of `simplex._height_behind`, here from what is at hand.
     edges = (abs(ex) + abs(ey) + abs(ez)) * (abs(fx) + abs(fy) + abs(fz))
     sides = abs(ex) + abs(ey) + abs(ez) + abs(fx) + abs(fy) + abs(fz)
     corner = abs(points[a]) + abs(points[a + 1]) + abs(points[a + 2])

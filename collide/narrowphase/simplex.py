@@ -192,25 +192,19 @@ def face_weights(points, a, b, c, x, y, z):
     return 1.0 - lam - mu, lam, mu
 
 
-@kernel
-def clearance_behind(points, a, b, c, error):
-    """Distance of the origin behind the plane of a triangle, or −1 unless it is provably behind it.
+@kernel(inline=True)
+def _height_behind(points, a, b, c, error):
+    """(h, |n|²): the origin lies h / |n| behind the plane of a triangle; (−1, 0) unless it provably does.
 
     a, b, c : starts of three points, counter-clockwise as seen from outside.
     error : how far each point may be from its true place.
 
     The side is the sign of det(p, q, r) = p·(e × f). Moving the three points by ``error`` moves it by
     at most error·(|e||f| + 2|p|(|e| + |f|)) in first order, doubled here for the rest. Without this
-    test a tetrahedron as thin as rounding "contained" an origin 0.29 m outside it. The distance is
-    the least of the three corners' along the computed normal, a lower bound for any unit normal.
+    test a tetrahedron as thin as rounding "contained" an origin 0.29 m outside it. h / |n| is the least of
+    the three corners' distances along the computed normal, a lower bound for any unit normal. Lengths are
+    bounded by sums: no roots.
     """
-    height, square = _height_behind(points, a, b, c, error)
-    return height / math.sqrt(square) if height > 0.0 and square > 0.0 else -1.0
-
-
-@kernel(inline=True)
-def _height_behind(points, a, b, c, error):
-    """(clearance·|n|, |n|²) of `clearance_behind`, or (−1, 0). Lengths are bounded by sums: no roots."""
     px = points[a]
     py = points[a + 1]
     pz = points[a + 2]

@@ -24,6 +24,7 @@ import math
 
 from collide._jit import kernel
 from collide.geometry.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit
+from collide.geometry.error_free import two_product, two_sum
 
 #: Doubles in ``work``: two numbers, nine differences in two parts, a minor (≤ 16) and a determinant (≤ 192).
 WORK = 256
@@ -76,27 +77,6 @@ def survey(originals, points, count, work):
     work[0] = threshold if wide else 0.0
     work[1] = math.ldexp(1.0, -3 * bits) if bits <= _MOST_BITS and not wide else 0.0
     return exponent
-
-
-@kernel
-def two_sum(a, b):
-    """(s, e): s = a + b rounded, s + e = a + b exactly (Knuth)."""
-    total = a + b
-    other = total - a
-    return total, (a - (total - other)) + (b - other)
-
-
-@kernel
-def two_product(a, b):
-    """(p, e): p = a·b rounded, p + e = a·b exactly unless it underflows (Dekker, Veltkamp)."""
-    product = a * b
-    wide = 134217729.0 * a  # 2²⁷ + 1
-    a_high = wide - (wide - a)
-    a_low = a - a_high
-    wide = 134217729.0 * b
-    b_high = wide - (wide - b)
-    b_low = b - b_high
-    return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
 @kernel

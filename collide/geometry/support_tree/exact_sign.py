@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
+from collide.geometry.error_free import two_product, two_sum
 
 #: Each term goes through four roundings of relative size 2⁻⁵³: a difference, a product, two sums. Seven cover
 #: those of the bound itself, too, and the last summand products below the smallest normal double.
 _ROUNDING = 7.0 * 2.0**-53
 _TINY = 2.0**-1060
-_SPLITTER = 134217729.0  # 2²⁷ + 1
 
 
 @kernel
@@ -29,38 +29,17 @@ def product_and_bound(ax, ay, az, bx, by, bz, gx, gy, gz):
 
 
 @kernel
-def _two_sum(a, b):
-    """(s, e): s = fl(a + b), s + e = a + b."""
-    s = a + b
-    virtual = s - a
-    return s, (a - (s - virtual)) + (b - virtual)
-
-
-@kernel
-def _two_product(a, b):
-    """(p, e): p = fl(a·b), p + e = a·b, for factors below 2⁹⁹⁶ and an error that is a double."""
-    p = a * b
-    c = _SPLITTER * a
-    a_high = c - (c - a)
-    a_low = a - a_high
-    c = _SPLITTER * b
-    b_high = c - (c - b)
-    b_low = b - b_high
-    return p, a_low * b_low - (((p - a_high * b_high) - a_low * b_high) - a_high * b_low)
-
-
-@kernel
 def _sign_of_sum(a, b, c, d, e, f):
     """Sign of the exact sum of six doubles.
 
     Each sweep adds from the left and leaves the errors behind: the sum stays, the rest shrinks by 2⁴⁸.
     """
     while True:
-        s, a = _two_sum(a, b)
-        s, b = _two_sum(s, c)
-        s, c = _two_sum(s, d)
-        s, d = _two_sum(s, e)
-        s, e = _two_sum(s, f)
+        s, a = two_sum(a, b)
+        s, b = two_sum(s, c)
+        s, c = two_sum(s, d)
+        s, d = two_sum(s, e)
+        s, e = two_sum(s, f)
         rest = abs(a) + abs(b) + abs(c) + abs(d) + abs(e)
         if abs(s) > 2.0 * rest or rest == 0.0:
             return 1 if s > 0.0 else (-1 if s < 0.0 else 0)
@@ -71,17 +50,17 @@ def _sign_of_sum(a, b, c, d, e, f):
 def _sign_of_long_sum(a, b, c, d, e, f, g, h, i, j, k, m):
     """The same for twelve."""
     while True:
-        s, a = _two_sum(a, b)
-        s, b = _two_sum(s, c)
-        s, c = _two_sum(s, d)
-        s, d = _two_sum(s, e)
-        s, e = _two_sum(s, f)
-        s, f = _two_sum(s, g)
-        s, g = _two_sum(s, h)
-        s, h = _two_sum(s, i)
-        s, i = _two_sum(s, j)
-        s, j = _two_sum(s, k)
-        s, k = _two_sum(s, m)
+        s, a = two_sum(a, b)
+        s, b = two_sum(s, c)
+        s, c = two_sum(s, d)
+        s, d = two_sum(s, e)
+        s, e = two_sum(s, f)
+        s, f = two_sum(s, g)
+        s, g = two_sum(s, h)
+        s, h = two_sum(s, i)
+        s, i = two_sum(s, j)
+        s, j = two_sum(s, k)
+        s, k = two_sum(s, m)
         rest = abs(a) + abs(b) + abs(c) + abs(d) + abs(e) + abs(f) + abs(g) + abs(h) + abs(i) + abs(j) + abs(k)
         if abs(s) > 2.0 * rest or rest == 0.0:
             return 1 if s > 0.0 else (-1 if s < 0.0 else 0)
@@ -91,17 +70,17 @@ def _sign_of_long_sum(a, b, c, d, e, f, g, h, i, j, k, m):
 @kernel
 def exact_sign(ax, ay, az, bx, by, bz, gx, gy, gz):
     """Sign of (a − b)·g. The direction must lie in the range that `layout.exact_range` tells."""
-    dx, ex = _two_sum(ax, -bx)
-    dy, ey = _two_sum(ay, -by)
-    dz, ez = _two_sum(az, -bz)
-    x, x_low = _two_product(dx, gx)
-    y, y_low = _two_product(dy, gy)
-    z, z_low = _two_product(dz, gz)
+    dx, ex = two_sum(ax, -bx)
+    dy, ey = two_sum(ay, -by)
+    dz, ez = two_sum(az, -bz)
+    x, x_low = two_product(dx, gx)
+    y, y_low = two_product(dy, gy)
+    z, z_low = two_product(dz, gz)
     if ex == 0.0 and ey == 0.0 and ez == 0.0:
         return _sign_of_sum(x, y, z, x_low, y_low, z_low)
-    u, u_low = _two_product(ex, gx)
-    v, v_low = _two_product(ey, gy)
-    w, w_low = _two_product(ez, gz)
+    u, u_low = two_product(ex, gx)
+    v, v_low = two_product(ey, gy)
+    w, w_low = two_product(ez, gz)
     return _sign_of_long_sum(x, y, z, x_low, y_low, z_low, u, v, w, u_low, v_low, w_low)
 
 
