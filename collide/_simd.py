@@ -1,10 +1,10 @@
-"""Code written in LLVM's own vectors, for the loops that the compiler does not vectorise by itself.
+"""Code written in LLVM's own instructions, where the compiler would not find them by itself.
 
 A running maximum with its index is such a loop: without fastmath LLVM must keep the comparisons in
 their order. Vectors of eight doubles are asked for whatever the processor has; LLVM splits them into
 two of four (AVX2) or four of two (NEON, SSE2), so the bits of an answer are the same everywhere.
 
-`collide/geometry/scan.py` has the same functions one number at a time, for plain Python and for tests.
+`collide/geometry/scan.py` and `error_free.py` have the same functions for plain Python and for tests.
 """
 
 from __future__ import annotations
@@ -26,6 +26,17 @@ _NOWHERE = 1 << 62
 
 
 @intrinsic
+def product_error(_context, a, b, product):
+    """a·b − product, rounded once: the exact error of the product a·b that was rounded to ``product``."""
+    real = types.float64
+
+    def codegen(_context, builder, _signature, args):
+        return builder.fma(args[0], args[1], builder.fneg(args[2]))
+
+    return real(real, real, real), codegen
+
+
+@intrinsic
 def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
     """(index, value) of the largest x·gx + y·gy + z·gz; described in `geometry/scan.py`."""
     if not (isinstance(coordinates, types.Array) and coordinates.ndim == 1 and coordinates.layout == "C"):
@@ -37,29 +48,50 @@ def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
 
     def codegen(context, builder, signature, args):
         data = make_array(signature.args[0])(context, builder, args[0]).data
-        value, index = _scan(builder, data, *args[1:])
+        value, index = _scan(builder, _products(builder, data, *args[1:3], *args[4:]), args[3])
         return context.make_tuple(builder, signature.return_type, [index, value])
 
     return signature, codegen
 
 
-def _scan(builder: ir.IRBuilder, data, start, stride, count, gx, gy, gz):
-    """Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
+@intrinsic
+def least_of_blocks(_context, numbers, count):
+    """Index of the least of the first ``count`` numbers, 8 or more, none of them NaN; the lowest of equals."""
+
+    def codegen(context, builder, signature, args):
+        data = make_array(signature.args[0])(context, builder, args[0]).data
+        return _scan(builder, lambda at: builder.fneg(_load(builder, data, at)), args[1])[1]
+
+    return types.int64(numbers, types.int64), codegen
+
+
+def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
+    """The products with g of the eight points from an index on, as a function of the index."""
+    g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]
+    planes = [builder.gep(data, [at]) for at in (
+        start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]  # fmt: skip
+
+    def values(at):
+        x, y, z = (_load(builder, plane, at) for plane in planes)
+        xy = builder.fadd(builder.fmul(x, g[0]), builder.fmul(y, g[1]))
+        return builder.fadd(xy, builder.fmul(z, g[2]))
+
+    return values
+
+
+def _scan(builder: ir.IRBuilder, values, count):
+    """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on.
+
+    Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
 
     The last two blocks end with the last point, so they may overlap those before: what is seen twice ties with
     itself. No branch but the loop's depends on the number of points, since mispredicted ones cost more than
     blocks. Blocks of one maximum come in the order of their indices, as `_later` takes for granted.
     """
-    g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]
-    planes = [builder.gep(data, [at]) for at in (
-        start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]  # fmt: skip
     lanes = ir.Constant(_INDICES, list(range(LANES)))
 
     def block(at):
-        """The eight values from index ``at`` on, and their indices."""
-        x, y, z = (_load(builder, plane, at) for plane in planes)
-        xy = builder.fadd(builder.fmul(x, g[0]), builder.fmul(y, g[1]))
-        return builder.fadd(xy, builder.fmul(z, g[2])), builder.add(lanes, _splat(builder, at, _INDICES))
+        return values(at), builder.add(lanes, _splat(builder, at, _INDICES))
 
     zero, one, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
     none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from collide.geometry.packing import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
-from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_POINTS
+from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.results import PAIR_DTYPE
 
 #: Normals of overlapping parts that are tried as the way out of a union, deepest first.
@@ -117,6 +117,6 @@ def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> float:
         middle, half = 0.5 * (row["point_a"] + row["point_b"]), 0.5 * row["distance"] * row["normal"]
         row["point_a"], row["point_b"] = middle - half, middle + half
     curved = any(packed.kind != POINTS for body in (A, B) for packed in body.packed)
-    return (PROMISE_CURVED if curved else PROMISE_POINTS) / ERROR * error
+    return (PROMISE_CURVED if curved else PROMISE_STORED) / ERROR * error
 
 

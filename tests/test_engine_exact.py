@@ -14,7 +14,7 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
-from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_POINTS
+from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_DEPTH, PROMISE_GAP, PROMISE_STORED
 from collide.results import HOW
 
 #: Witness points, and the pose that brings to touch, in units of the size of the pair.
@@ -193,20 +193,17 @@ def test_the_bracket_holds_and_the_sign_is_right(family):
                 assert r.hit == hit == (r.distance <= 0.0), f"hit is {r.hit}, exactly {hit}"
                 assert r.lower > 0.0 or r.upper <= 0.0
             assert collide.collide(*case) == r.hit
-            assert_promise(r, naive.size(case))
+            assert_promise(r)
     _, _, least, largest = FAMILIES[family]
     assert least <= naive.share(hits) <= largest, f"{naive.share(hits):.2f} of the cases hit"
 
 
-def assert_promise(r, size):
+def assert_promise(r):
     """What `certified` says, and that it is not withheld where it is due."""
-    width = r.upper - r.lower
-    if r.certified:
-        assert HOW[r.how] != "undecided"
-        assert width <= PROMISE_POINTS * size * (1 + 1e-12)
-    else:
-        decided = r.lower > 0.0 or r.upper <= 0.0
-        assert not decided or width > PROMISE_POINTS * size * (1 - 1e-12)
+    width = Fraction(r.upper) - Fraction(r.lower)
+    promised = Fraction(abs(r.distance)) * Fraction(PROMISE_GAP if r.distance > 0.0 else PROMISE_DEPTH)
+    decided = r.lower > 0.0 or r.upper <= 0.0
+    assert r.certified == (decided and width <= promised * (1 + Fraction(naive.ULP)))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -258,15 +255,8 @@ def test_distance_beyond_a_limit_is_a_proven_lower_bound(family):
 
 
 def test_the_promises_are_no_weaker_than_documented():
-    assert ERROR <= 2.0**-47 and PROMISE_POINTS <= 2.0**-40 and PROMISE_CURVED <= 2.0**-26
-
-
-def test_error_constant_is_the_one_documented():
-    """Brackets apart are as wide as bounds.py says, no wider: a regression here is a loss of proof or of sharpness."""
-    for case in cases_of("random"):
-        r = collide.distance(*case)
-        if r.distance > 0.1:
-            assert r.upper - r.lower <= 3 * ERROR * naive.size(case)
+    assert ERROR <= 2.0**-47 and PROMISE_GAP <= 4 * 2.0**-52 and PROMISE_DEPTH <= 1e-12
+    assert PROMISE_STORED <= 2.0**-40 and PROMISE_CURVED <= 2.0**-26
 
 
 def test_magnitudes_that_span_too_many_bits_stay_open_and_say_so():

@@ -11,7 +11,7 @@ import pytest
 from naive import Case
 
 import collide
-from collide.narrowphase.bounds import PROMISE_POINTS
+from collide.narrowphase.bounds import PROMISE_DEPTH
 from collide.results import HOW
 
 CASES = naive.SHARED / "data" / "cases"
@@ -103,7 +103,7 @@ def test_pairs_on_which_peers_fail_are_right():
             assert Fraction(r.lower) <= truth + digits and truth - digits <= Fraction(r.upper)
             assert HOW[r.how] != "undecided"
             if r.certified:
-                assert abs(r.distance - float(truth)) <= PROMISE_POINTS * naive.size(case)
+                assert abs(r.distance - float(truth)) <= PROMISE_DEPTH * abs(float(truth))
 
 
 def test_hulls_that_a_peer_calls_free():

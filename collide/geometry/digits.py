@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
+from collide.geometry.error_free import two_sum
 
 #: Bits of a digit.
 BITS = 26
@@ -128,3 +129,20 @@ def as_double(digits, at, n):
     if rest != 0:
         value |= 1
     return float(value), exponent - shift
+
+
+@kernel
+def as_double_double(digits, at, n):
+    """(x, low, e): the carried number is (x + low)·2^e to a relative 2⁻⁸⁰.
+
+    From the top, without rounding, until 80 bits of it are there; 26 more at most fit in 106.
+    """
+    value = 0.0
+    low = 0.0
+    k = n - 1
+    while k >= 0 and abs(value) < 1.2e24:  # 2⁸⁰
+        value, e = two_sum(value * 67108864.0, low * 67108864.0)
+        value, low = two_sum(value, float(digits[at + k]))
+        value, low = two_sum(value, low + e)
+        k -= 1
+    return value, low, BITS * (k + 1)

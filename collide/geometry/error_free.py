@@ -1,15 +1,16 @@
 """Sums and products of doubles with the error they make, which is a double too.
 
 D. E. Knuth's sum and T. J. Dekker's product ("A floating-point technique for extending the available
-precision", 1971): what exact signs are built from, without a fused multiply-add.
+precision", 1971): what exact signs and double-doubles are built from. Compiled, the error of a product is one
+fused instruction instead of Dekker's sixteen.
 """
 
 from __future__ import annotations
 
-from collide._jit import kernel
+from collide._jit import PLAIN_PYTHON, kernel
 
 
-@kernel
+@kernel(inline=True)
 def two_sum(a, b):
     """(s, e): s = a + b rounded, s + e = a + b exactly (Knuth)."""
     total = a + b
@@ -18,8 +19,8 @@ def two_sum(a, b):
 
 
 @kernel
-def two_product(a, b):
-    """(p, e): p = a·b rounded, p + e = a·b exactly unless it underflows (Dekker, Veltkamp)."""
+def dekker_product(a, b):
+    """`two_product` by sums and products alone (Dekker, Veltkamp)."""
     product = a * b
     wide = 134217729.0 * a  # 2²⁷ + 1
     a_high = wide - (wide - a)
@@ -28,3 +29,15 @@ def two_product(a, b):
     b_high = wide - (wide - b)
     b_low = b - b_high
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+
+
+if PLAIN_PYTHON:
+    two_product = dekker_product
+else:
+    from collide._simd import product_error
+
+    @kernel(inline=True)
+    def two_product(a, b):
+        """(p, e): p = a·b rounded, p + e = a·b exactly unless it underflows."""
+        product = a * b
+        return product, product_error(a, b, product)

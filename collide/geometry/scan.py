@@ -24,14 +24,26 @@ def farthest_one_by_one(coordinates, start, stride, count, gx, gy, gz):
     return index, best + 0.0  # −0 becomes 0
 
 
+@kernel
+def least_one_by_one(numbers, count):
+    """`least`, one number at a time."""
+    index = 0
+    for i in range(1, count):
+        if numbers[i] < numbers[index]:
+            index = i
+    return index
+
+
 if PLAIN_PYTHON:
-    farthest = farthest_one_by_one
+    farthest, least = farthest_one_by_one, least_one_by_one
 else:
     from collide._simd import farthest_of_blocks as farthest
+    from collide._simd import least_of_blocks as least
 
 #: ``farthest(coordinates, start, stride, count, gx, gy, gz) -> (index, value)``: the largest
 #: x·gx + y·gy + z·gz among ``count`` points, 8 or more. Point i has its x at
 #: ``start + i`` of the view, its y ``stride`` later, its z 2·``stride`` later. The lowest index wins
 #: among equal values (−0 equals 0, and is given as 0), so copies that fill up a block never win over what they copy.
 #: Values must not be NaN. O(count).
-__all__ = ["farthest", "farthest_one_by_one"]
+#: ``least(numbers, count) -> index``: of the least of the first ``count`` numbers, 8 or more.
+__all__ = ["farthest", "farthest_one_by_one", "least", "least_one_by_one"]

@@ -13,23 +13,30 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
-from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_POINTS, ROOMY, TOLERANCE_CURVED
+from collide.geometry.double_double import add, bracket
+from collide.geometry.error_free import two_sum
+from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_DEPTH, PROMISE_STORED, ROOMY, TOLERANCE_CURVED
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
-from collide.narrowphase.epa import DOUBLES as EPA_DOUBLES
-from collide.narrowphase.epa import FLAT, epa, workspace
-from collide.narrowphase.epa import INTEGERS as EPA_INTEGERS
+from collide.narrowphase.epa.expand import FLAT, epa, facet_of
+from collide.narrowphase.epa.refine import refine
+from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
+from collide.narrowphase.epa.surface import FACET, workspace
+from collide.narrowphase.epa.surface import INTEGERS as EPA_INTEGERS
+from collide.narrowphase.gap import GAP_DOUBLES, GAP_INTEGERS, polish_gap
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
-from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world
+from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
 from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
+    EXACT_ROUNDS,
     HIT,
     HOW,
     ITERATIONS,
     LOWER,
+    NEAREST_PLANE,
     NORMAL,
     ROW,
     UPPER,
@@ -43,9 +50,11 @@ from collide.narrowphase.simplex import face_weights
 from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
 from collide.transforms import SMALLEST
 
-# Workspace ahead of what EPA needs: five difference points and their ids, weights.
+# Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits need.
 _WEIGHTS = 5 * POINT
-_OWN_DOUBLES, _OWN_INTEGERS = 64, 16
+_FINE = 64
+_NEAREST, _TIES = 10, 16
+_OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIES + GAP_INTEGERS
 #: Workspace of one thread.
 DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
 
@@ -85,11 +94,11 @@ def _segments(pair, points, ids, weights, error):
 
 
 @kernel
-def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids, x, y, z):
+def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
     """The corners of EPA's facet become points 0..2, weighted for the point (x, y, z) of it."""
-    source, _, source_ids, facets, _, _, _ = workspace(doubles_at, integers_at)
+    source, _, _, _, source_ids, facets, _, _, _ = surface
     for k in range(3):
-        v = facets[7 * facet + k]
+        v = facets[FACET * facet + k]
         for j in range(POINT):
             points[POINT * k + j] = source[POINT * v + j]
         if with_ids:
@@ -111,7 +120,7 @@ def _load_facet(doubles_at, integers_at, facet, points, ids, weights, with_ids, 
 
 
 @kernel(inline=True)
-def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved, exactly):
+def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size, slop, error, curved, exactly):
     """Two convex cores by GJK, and by EPA where they overlap.
 
     Returns
@@ -119,6 +128,7 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     depth : of the cores; minus their distance where they are apart.
     bound : lower bound of the core distance before ``error``, negative for overlap.
     above : upper bound of the signed core distance before ``error``.
+    shallowest, deepest, alone : by `refine`: proven bracket of the depth, or (−∞, ∞), and what it says of the plane.
     nx, ny, nz : from A towards B.
     n, vertices : points of the deciding feature in the workspace, and how many of its ids to show.
     rounds : of GJK, plus 65536 times those of EPA.
@@ -129,32 +139,55 @@ def _cores(pair, doubles_at, integers_at, boolean, radius, limit, size, error, c
     status, n, bound, clearance, rounds = gjk(pair, points, ids, weights, boolean, radius, limit, error, GJK_ROUNDS)
     core = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
     if status == NEAREST or status == APART:
-        return -core, bound, core, -weights[7], -weights[8], -weights[9], n, n, rounds
+        return -core, bound, core, -math.inf, math.inf, False, -weights[7], -weights[8], -weights[9], n, n, rounds
     above = -clearance if status == ENCLOSED else core
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if boolean and (above + error < radius or exactly):
-        return -above, -math.inf, above, 0.0, 0.0, 1.0, n, n, rounds
+        return -above, -math.inf, above, -math.inf, math.inf, False, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
     roomy = status == ENCLOSED and clearance > ROOMY * size
-    outcome, depth, surface, nx, ny, nz, facet, added = epa(
-        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, boolean, error, tolerance
+    epa_at = doubles_at + 8 * _OWN_DOUBLES
+    ids_at = integers_at + 8 * _OWN_INTEGERS
+    outcome, depth, surface, nx, ny, nz, facet, vertices, count = epa(
+        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, epa_at, ids_at, boolean, error, tolerance
     )
-    if outcome != FLAT:
-        _load_facet(
-            doubles_at + 8 * _OWN_DOUBLES, integers_at + 8 * _OWN_INTEGERS, facet, points, ids, weights,
-            status != ENCLOSED, depth * nx, depth * ny, depth * nz,
+    rounds += 65536 * max(vertices - 4, 0)
+    shallowest = -math.inf
+    deepest = math.inf
+    alone = False
+    if outcome == FLAT:
+        shown = n
+        if vertices == 3 and not curved and radius == 0.0:  # what spans it: for the exact stage, which may prove it flat
+            _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
+            for k in range(6):
+                ids[k] = spanning[k]
+            shown = 3
+        return depth, -depth, above, shallowest, deepest, alone, nx, ny, nz, n, shown, rounds
+    width = depth - surface + 2.0 * error
+    if exactly and not boolean and not (surface > error and 2.0 * width <= PROMISE_DEPTH * (depth + radius)):
+        sound, low, level, high, ux, uy, uz, nearest, count, alone = refine(
+            pair, terms_at, epa_at, ids_at, doubles_at + 8 * _FINE, integers_at + 8 * _NEAREST, integers_at + 8 * _TIES,
+            count, vertices, size, slop, error,
         )  # fmt: skip
+        if sound:
+            shallowest, depth, deepest, nx, ny, nz, facet = low, level, high, ux, uy, uz, nearest
+    facet = facet_of(
+        workspace(epa_at, ids_at), count, facet, depth * nx, depth * ny, depth * nz, tolerance + 2.0 * error
+    )
+    _load_facet(
+        workspace(epa_at, ids_at), facet, points, ids, weights, status != ENCLOSED, depth * nx, depth * ny, depth * nz
+    )
     if surface > error:
         above = min(above, -surface)
-    shown = 4 if status == ENCLOSED else (n if outcome == FLAT else 3)
-    return depth, -depth, above, nx, ny, nz, n if outcome == FLAT else 3, shown, rounds + 65536 * added
+    return depth, -depth, above, shallowest, deepest, alone, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds
 
 
 @kernel(inline=True)
 def _swept(
-    pair, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, exactly, flip
-):
+    pair, terms_at, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, slop, error,
+    exactly, flip,
+):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
@@ -172,16 +205,48 @@ def _swept(
     if closed_form:
         depth, bound, above, nx, ny, nz = _segments(pair, points, ids, weights, error)
         n, vertices, rounds = 4, 4, 0
+        shallowest = -math.inf
+        deepest = math.inf
+        alone = False
     else:
-        depth, bound, above, nx, ny, nz, n, vertices, rounds = _cores(
-            pair, doubles_at, integers_at, boolean, radius, limit, size, error, curved, exactly and not curved
-        )
+        depth, bound, above, shallowest, deepest, alone, nx, ny, nz, n, vertices, rounds = _cores(
+            pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size, slop, error, curved,
+            exactly and not curved,
+        )  # fmt: skip
     lower = bound - error - radius
     upper = above + error - radius
     how = FORMULA if closed_form else (PLANE if lower > 0.0 else (SIMPLEX if above < 0.0 or radius == 0.0 else SWEPT))
     words[ITERATIONS] = rounds
-    width = math.inf if boolean else (PROMISE_CURVED if curved else PROMISE_POINTS) * size
-    write_verdict(row, marks, -depth - radius, lower, upper, how, width, limit)
+    distance = -depth - radius
+    width = math.inf
+    if not boolean:
+        width = PROMISE_CURVED * size if curved else (0.0 if exactly else PROMISE_STORED * size)
+        if exactly and not curved and depth < -error and lower <= limit:
+            used, parallelogram = _nearest_of_four(ids, weights, n, integers_at)
+            proven, value, value_low, unsure, ux, uy, uz = polish_gap(
+                pair, terms_at, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, view_i64(integers_at + 8 * _NEAREST, 6),
+                used, parallelogram, size, slop, error,
+            )  # fmt: skip
+            if proven:
+                swept, swept_low = two_sum(radius_a, radius_b)
+                value, value_low = add(value, value_low, -swept, -swept_low)
+                low, distance, high = bracket(value, value_low, unsure)
+                lower = max(lower, low)
+                upper = min(upper, high)
+                nx = -ux
+                ny = -uy
+                nz = -uz
+                depth = -distance - radius
+    decided = lower > 0.0 or upper <= 0.0
+    if deepest < math.inf:
+        rounding = 4.0 * 2.0**-53 * radius
+        lower = max(lower, -deepest - radius - rounding)
+        upper = min(upper, -shallowest - radius + rounding)
+    write_verdict(row, marks, distance, lower, upper, how, width, limit)
+    if width == 0.0 and (not decided or (marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0))):
+        marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
+        if alone:
+            marks[EXACT_ROUNDS] = NEAREST_PLANE
     if boolean and marks[HOW] != UNDECIDED:
         if marks[HIT] == 0:
             row[NORMAL] = sign * nx
@@ -214,6 +279,22 @@ def _swept(
 
 
 @kernel(inline=True)
+def _nearest_of_four(ids, weights, n, integers_at):
+    """(points, whether they span a parallelogram): the vertex pairs with a weight, put where `polish_gap` reads them.
+
+    Of two segments all four have one where both are met inside; three corners tell the same plane.
+    """
+    nearest = view_i64(integers_at + 8 * _NEAREST, 6)
+    used = 0
+    for k in range(n):
+        if weights[k] > 0.0 and used < 3:
+            nearest[2 * used] = ids[2 * k]
+            nearest[2 * used + 1] = ids[2 * k + 1]
+            used += 1
+    return used, n == 4
+
+
+@kernel(inline=True)
 def _combine(points, weights, n, j):
     """Coordinate j of the weighted sum of n stored points."""
     total = 0.0
@@ -223,7 +304,7 @@ def _combine(points, weights, n, j):
 
 
 @kernel
-def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size, error, flip):
+def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, known, flip):
     """A half-space A and a convex B: the point of B deepest behind the plane."""
     (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b, _, _) = pair
     ids = view_i64(integers_at, 10)
@@ -245,7 +326,23 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, limit, size
     bz = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
     radius = numbers[NUMBERS * shape_b + RADIUS]
     gap = ((bx + tx) * nx + (by + ty) * ny + (bz + tz) * nz) - offset / length - radius
-    write_verdict(row, marks, gap, gap - error, gap + error, FORMULA, math.inf, limit)
+    lower = gap - error
+    upper = gap + error
+    decided = lower > 0.0 or upper <= 0.0
+    exactly = known and kind_b == POINTS
+    width = 0.0 if exactly else math.inf
+    if exactly and lower <= limit and not boolean:
+        proven, height, height_low, unsure = polish_height(
+            pair, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, k, size, error
+        )
+        if proven:
+            height, height_low = add(height, height_low, -radius, 0.0)
+            low, gap, high = bracket(height, height_low, unsure)
+            lower = max(lower, low)
+            upper = min(upper, high)
+    write_verdict(row, marks, gap, lower, upper, FORMULA, math.inf if boolean else width, limit)
+    if exactly and (not decided or (marks[CERTIFIED] == 0 and not boolean)):
+        marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
     bx += poses[q + 9] - radius * nx
     by += poses[q + 10] - radius * ny
     bz += poses[q + 11] - radius * nz
@@ -275,17 +372,17 @@ def _halves(pair, row, marks, flip):
 
 
 #: How `answer_pairs` is called.
-SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)"
+SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)"
 
 
 @entry(SIGNATURE)
 def answer_pairs(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, stop_at_hit, limit, rows_at, doubles_at,
-    integers_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, stop_at_hit, limit, rows_at,
+    doubles_at, integers_at,
 ):  # fmt: skip
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
-    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   shape_of : a shape row a part.
+    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.   shape_of : a shape row a part.
     pairs : two part numbers a pair.
     boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
         normal that is there is the axis to try first.
@@ -300,8 +397,9 @@ def answer_pairs(
         pa = pairs[2 * k]
         pb = pairs[2 * k + 1]
         _answer(
-            ints_at, numbers_at, poses_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at, integers_at
-        )
+            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at,
+            integers_at,
+        )  # fmt: skip
         if stop_at_hit and marks[HIT] == 1:
             return k + 1
     return n_pairs
@@ -309,8 +407,9 @@ def answer_pairs(
 
 @kernel(inline=True)
 def _answer(
-    ints_at, numbers_at, poses_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at, integers_at
-):
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at,
+    integers_at,
+):  # fmt: skip
     shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
     sa = shape_of[pa]
     sb = shape_of[pb]
@@ -336,9 +435,11 @@ def _answer(
         m1 = numbers[pair[4] + 1]
         m2 = numbers[pair[4] + 2]
         size += abs(numbers[pair[4] + 3]) / math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
-        _half(pair, sb, row, words, marks, doubles_at, integers_at, limit, size, ERROR * size + slop, flip)
+        _half(
+            pair, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop, known, flip
+        )
     else:
         _swept(
-            pair, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop,
-            known, flip,
+            pair, terms_at, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, slop,
+            ERROR * size + slop, known, flip,
         )  # fmt: skip

@@ -26,15 +26,18 @@ from __future__ import annotations
 #: Error of every bound, in units of S (see above).
 ERROR = 64 * 2.0**-53
 
-#: Relative error of a distance that the exact stage hands over in doubles: two conversions good to
-#: 2⁻⁵⁰ each, a quotient, a root and a quotient more.
-EXACT_ERROR = 2.0**-47
+#: Relative error of a distance that the exact stage hands over in double-doubles: two conversions good to
+#: 2⁻⁸⁰ each, a quotient, a root and a quotient more.
+EXACT_ERROR = 2.0**-75
 
 #: What that may be off by besides, below the size where a relative error holds.
 SUBNORMAL, SMALLEST_NORMAL = 1e-321, 1e-290
 
-#: `certified` promises a proven sign and a bracket at most this wide, in units of S: cores of points.
-PROMISE_POINTS = 2.0**-40
+#: `certified` promises a proven sign and a bracket at most this wide, for cores of points: four units in the last
+#: place of a gap, and this much of a depth.
+PROMISE_GAP, PROMISE_DEPTH = 2.0**-50, 1e-12
+#: The same in units of S for shapes whose stored points are rounded (`PackedConvex.slop`), and for unions of parts.
+PROMISE_STORED = 2.0**-40
 #: The same where a cylinder, cone or ellipsoid takes part.
 PROMISE_CURVED = 2.0**-26
 
@@ -51,5 +54,5 @@ GJK_ROUNDS = 128
 #: Rounds of the exact search; it ends by itself, and no case met needed 20.
 EXACT_ROUNDS = 100000
 #: Vertices and facets an expanding polytope may use before it hands over the bracket it has.
-EPA_VERTICES = 1024
-EPA_FACETS = 8192
+EPA_VERTICES = 4096
+EPA_FACETS = 2 * EPA_VERTICES

@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide.geometry.double_double import add, bracket
+from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
-from collide.narrowphase.bounds import ERROR, EXACT_ERROR, PROMISE_POINTS, SMALLEST_NORMAL, SUBNORMAL
+from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact import INTEGERS as HULL_DIGITS
-from collide.narrowphase.exact import SEPARATE, TOUCHING, touch_exactly
+from collide.narrowphase.exact import SEPARATE, TOUCHING, UNDONE, depth_of_plane, touch_exactly
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.exact_plane import reach_plane_exactly
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
@@ -23,6 +25,7 @@ from collide.narrowphase.rows import (
     HIT,
     HOW,
     LOWER,
+    NEAREST_PLANE,
     NORMAL,
     POINT_A,
     POINT_B,
@@ -33,7 +36,7 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
-from collide.results import EXACT, UNDECIDED
+from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: Digits of workspace; 16 integers for ids follow them.
 DIGITS = max(HULL_DIGITS, PLANE_DIGITS)
@@ -67,7 +70,8 @@ def decide_pairs(
     pairs = view_i64(pairs_at, 2 * n_pairs)
     terms = view_f64(terms_at, 12 * TERMS * n_terms)
     digits = view_i64(digits_at, DIGITS)
-    ids = view_i64(digits_at + 8 * DIGITS, 16)
+    ids = view_i64(digits_at + 8 * DIGITS, 10)
+    facet = view_i64(digits_at + 8 * (DIGITS + 10), 6)
     settled = 0
     for k in range(n_pairs):
         row = view_f64(rows_at + ROW * k, 12)
@@ -101,16 +105,20 @@ def decide_pairs(
         low_b = ints[INTS * sb + LOWEST]
         reach_b = numbers[NUMBERS * sb + REACH]
         radius_b = numbers[NUMBERS * sb + RADIUS]
+        spanned = marks[COUNT]
+        alone = marks[EXACT_ROUNDS] == NEAREST_PLANE
+        for j in range(6):
+            facet[j] = ids[j]
         if plane:
             rounds = 1
             shown = 1
             apart = False
             vx = vy = vz = 0.0
-            verdict, vertex, excess = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error)
+            verdict, vertex, excess, excess_low = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error)
             ids[0] = -1
             ids[1] = vertex
         else:
-            verdict, shown, apart, excess, vx, vy, vz, rounds = touch_exactly(
+            verdict, shown, apart, excess, excess_low, vx, vy, vz, rounds = touch_exactly(
                 pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                 numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
             )  # fmt: skip
@@ -119,23 +127,35 @@ def decide_pairs(
         upper = row[UPPER]
         # Relative errors do not hold among subnormal doubles; 0 is exact.
         slack = SUBNORMAL if 0.0 < abs(excess) < SMALLEST_NORMAL else 0.0
-        if verdict == SEPARATE and (apart or plane):
-            distance = excess
-            lower = max(lower, (1.0 - EXACT_ERROR) * excess - slack)
-            upper = min(upper, (1.0 + EXACT_ERROR) * excess + slack)
-        elif verdict == TOUCHING and apart and not plane:
-            # Swept bodies: the cores are apart by less than the radii, and the depth is as exact.
-            distance = excess
-            lower = max(lower, (1.0 + EXACT_ERROR) * excess - slack)
-            upper = min(upper, (1.0 - EXACT_ERROR) * excess + slack, 0.0)
+        if verdict == UNDONE:
+            if lower > 0.0 or upper <= 0.0:
+                marks[HOW] = PLANE if lower > 0.0 else SWEPT
+            continue
+        if apart or plane:
+            # Cores apart by less than the radii are as exact as a gap.
+            low, distance, high = bracket(excess, excess_low, EXACT_ERROR * abs(excess) + slack)
+            lower = max(lower, low)
+            upper = min(upper, high)
+            if verdict == TOUCHING:
+                upper = min(upper, 0.0)
         elif verdict == TOUCHING:
             distance = min(distance, 0.0)
-            upper = 0.0
-        elif verdict != SEPARATE:
-            continue
+            upper = min(upper, 0.0)
+            if spanned >= 3 and not boolean:
+                proven, depth, depth_low = depth_of_plane(
+                    pair, terms, digits, facet, alone, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+                    size, error,
+                )  # fmt: skip
+                if proven:
+                    slack = SUBNORMAL if 0.0 < depth < SMALLEST_NORMAL else 0.0
+                    swept, swept_low = two_sum(numbers[NUMBERS * sa + RADIUS], radius_b)
+                    total, total_low = add(depth, depth_low, swept, swept_low)
+                    low, distance, high = bracket(-total, -total_low, EXACT_ERROR * total + slack)
+                    lower = max(lower, low)
+                    upper = min(upper, high)
         if not plane and apart:
             _set_normal(row, vx, vy, vz, distance, flip)
-        width = math.inf if boolean else PROMISE_POINTS * size
+        width = math.inf if boolean else 0.0
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0

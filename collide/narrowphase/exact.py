@@ -22,11 +22,14 @@ from collide.geometry.digits import (
     add_number,
     add_product,
     as_double,
+    as_double_double,
     carry,
     clear,
     grid_of,
     lowest_bit,
 )
+from collide.geometry.double_double import add, divide, square_root
+from collide.geometry.error_free import two_sum
 from collide.geometry.support_tree.query import extreme_vertex, rings_of
 from collide.geometry.tables import POSE_TERMS, TERMS
 from collide.narrowphase.bounds import EXACT_ROUNDS
@@ -506,7 +509,7 @@ def touch_exactly(
     points of the deciding simplex: its nearest point to the origin is the separating direction, or
     lies within the sum of the radii.
     cores apart : whether the cores themselves are apart; the next two are set only then.
-    excess : distance of the cores minus the radii, without cancellation, to a relative 1e-14.
+    excess, low part : distance of the cores minus the radii, without cancellation, to EXACT_ERROR.
     vx, vy, vz : unit vector from B to A, exact but for its own rounding.
     rounds used.
     """
@@ -515,14 +518,14 @@ def touch_exactly(
     scale = _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
     d = scale[0]
     if d > _LONGEST:
-        return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, 0
+        return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     _load(digits, scale, pose_a, pose_b)
     for k in range(n):
         _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
     if boolean and n == 3 and radius_a == 0.0 and radius_b == 0.0:
         verdict, shown = _try_face(digits, scale, pair, ids, error)
         if verdict != UNDONE:
-            return verdict, shown, False, 0.0, 0.0, 0.0, 0.0, 1
+            return verdict, shown, False, 0.0, 0.0, 0.0, 0.0, 0.0, 1
     for k in range(n):
         _set_gram(digits, d, k)
     mask = _nearest_subset(digits, d, n, -1)
@@ -530,10 +533,10 @@ def touch_exactly(
         n = _compact(digits, d, ids, mask, n)
         mask = (1 << n) - 1
         if n == 4:
-            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
+            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, 0.0, used
         length, zero = _set_direction(digits, d, mask)
         if zero:
-            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, used
+            return TOUCHING, n, False, 0.0, 0.0, 0.0, 0.0, 0.0, used
         i, j, vx, vy, vz = _support_pair(digits, scale, pair, length, error)
         known = False
         for k in range(n):
@@ -543,21 +546,21 @@ def touch_exactly(
             ids[2 * n + 1] = j
             _set_point(digits, scale, pair, n, i, j)
             if boolean and radius_a == 0.0 and radius_b == 0.0 and _is_ahead(digits, d, length, n):
-                return SEPARATE, n, False, 0.0, 0.0, 0.0, 0.0, used
+                return SEPARATE, n, False, 0.0, 0.0, 0.0, 0.0, 0.0, used
             _set_gram(digits, d, n)
         if known or _set_delta(digits, d, mask, n) <= 0:
-            touching, excess = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
-            return TOUCHING if touching else SEPARATE, n, True, excess, vx, vy, vz, used
+            touching, excess, excess_low = _within_radius(digits, d, mask, scale[1], radius_a, radius_b)
+            return TOUCHING if touching else SEPARATE, n, True, excess, excess_low, vx, vy, vz, used
         if n == 3:
             outside = _faces_that_part(digits, d)
             if outside == 0:
-                return TOUCHING, 4, False, 0.0, 0.0, 0.0, 0.0, used
+                return TOUCHING, 4, False, 0.0, 0.0, 0.0, 0.0, 0.0, used
             if outside & (outside - 1) == 0:
                 # Beyond one face alone: the nearest point is on it, and the vertex across goes.
                 n = _compact(digits, d, ids, 15 & ~outside, 4) - 1
         mask = _nearest_subset(digits, d, n + 1, n)
         n += 1
-    return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, EXACT_ROUNDS
+    return UNDONE, n, False, 0.0, 0.0, 0.0, 0.0, 0.0, EXACT_ROUNDS
 
 
 @kernel
@@ -601,14 +604,114 @@ def _try_face(digits, scale, pair, ids, error):
     return TOUCHING, 4
 
 
+#: A vertex this near a plane, in units of the size, is level with it or the plane says nothing (`depth_of_plane`).
+_AS_GOOD_AS_LEVEL = 2.0**-80
+
+
 @kernel
-def _is_ahead(digits, d, length, k):
-    """Whether point k, the last one against the direction, still lies along it: then all do."""
+def depth_of_plane(pair, terms, digits, ids, alone, lowest_a, lowest_b, reach_a, reach_b, size, error):
+    """(proven, depth, low part) of cores that share a point, from three difference points on the nearest plane.
+
+    ids : their vertex pairs.   alone : as `epa.refine` says.   Other arguments as in `touch_exactly`.
+
+    No vertex lies beyond the plane. That is all where it passes through the origin: nothing is less than 0. Else all
+    other planes must be farther, but for those that `epa.refine` could not tell from this one; of these it is shown
+    that they are the same, since vertices as good as level with it are exactly level. The depth is then exact to
+    EXACT_ERROR, however small it is.
+    """
+    if pair[1] * pair[7] <= 3:
+        return True, 0.0, 0.0  # so few points span no volume
+    pose_a = exact_pose(pair[13], pair[5], terms)
+    pose_b = exact_pose(pair[13], pair[11], terms)
+    scale = _scale(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, 0.0, 0.0, size)
+    d, grid, rot_a, digits_rot_a, core_a, digits_a, rot_b, digits_rot_b, core_b, digits_b = scale
+    if d > _LONGEST:
+        return False, 0.0, 0.0
+    _load(digits, scale, pose_a, pose_b)
+    for k in range(3):
+        _set_point(digits, scale, pair, k, ids[2 * k], ids[2 * k + 1])
+    n, zero = _set_normal(digits, d)
+    if not (zero or alone):
+        return False, 0.0, 0.0
+    square = _scratch_at(d, 0)
+    clear(digits, square, 2 * n)
+    for axis in range(3):
+        add_product(digits, square, _direction_at(d, axis), n, _direction_at(d, axis), n, 1)
+    if carry(digits, square, 2 * n) == 0:
+        return False, 0.0, 0.0  # the three points are in line
+    value, value_low, exponent = as_double_double(digits, square, 2 * n)
+    odd = exponent & 1
+    length, length_low = square_root(_ldexp(value, odd), _ldexp(value_low, odd))
+    half = (exponent - odd) // 2
+    height = _scratch_at(d, 0)
+    _side_of(digits, d, n, 0)
+    value, value_low, exponent = as_double_double(digits, height, n + d)
+    depth, depth_low = divide(value, value_low, length, length_low)
+    shift = exponent - half + BITS * grid
+    for _ in range(2 if zero else 1):
+        for axis in range(3):
+            for k in range(n):
+                digits[_direction_at(d, axis) + k] = -digits[_direction_at(d, axis) + k]
+            carry(digits, _direction_at(d, axis), n)
+        # Level within the body: |dip| · 2^(BITS·(rot + core)) of what `_compare` leaves, over the length.
+        level = _ldexp(_AS_GOOD_AS_LEVEL * size * length, half)
+        i, j, vx, vy, vz = _support_pair(digits, scale, pair, n, error)
+        _set_point(digits, scale, pair, 3, i, j)
+        for axis in range(3):
+            add_number(digits, _point_at(d, 3, axis), _point_at(d, 0, axis), d, -1)
+            carry(digits, _point_at(d, 3, axis), d)
+        side = _side_of(digits, d, n, 3)
+        if side == 0 and zero:
+            return True, 0.0, 0.0
+        if side == 0:
+            slack = 2.0 * error
+            (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, _, _, _, _) = pair
+            if _level_or_far(
+                digits, d, n, coords_a, n_a, m_a, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0, i,
+                level, BITS * (rot_a + core_a),
+            ) and _level_or_far(
+                digits, d, n, coords_b, n_b, m_b, poses, q, 9, digits_rot_b, core_b, digits_b, vx, vy, vz, slack, -1.0, j,
+                level, BITS * (rot_b + core_b),
+            ):  # fmt: skip
+                return True, _ldexp(depth, shift), _ldexp(depth_low, shift)
+    return False, 0.0, 0.0
+
+
+@kernel
+def _level_or_far(
+    digits, d, n, coordinates, count, m, poses, p, rotation, digits_rot, core, digits_core, vx, vy, vz, slack, sign,
+    best, level, exponent,
+):  # fmt: skip
+    """Whether every vertex is exactly as far along the direction as the farthest one, or nearer by more than a level."""
+    gx = sign * (poses[p] * vx + poses[p + 3] * vy + poses[p + 6] * vz)
+    gy = sign * (poses[p + 1] * vx + poses[p + 4] * vy + poses[p + 7] * vz)
+    gz = sign * (poses[p + 2] * vx + poses[p + 5] * vy + poses[p + 8] * vz)
+    least = coordinates[best] * gx + coordinates[m + best] * gy + coordinates[2 * m + best] * gz
+    _turn_direction(digits, d, n, rotation, digits_rot)
+    for i in range(count):
+        if i == best or coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz > least + slack:
+            continue
+        if _compare(digits, d, n + digits_rot, coordinates, m, core, digits_core, i, best) != 0:
+            value, e = as_double(digits, _scratch_at(d, 2), n + digits_rot + digits_core)
+            if abs(_ldexp(value, e + exponent)) < level:
+                return False
+    return True
+
+
+@kernel
+def _side_of(digits, d, length, k):
+    """Sign of point k along the direction."""
     out = _scratch_at(d, 0)
     clear(digits, out, length + d)
     for axis in range(3):
         add_product(digits, out, _direction_at(d, axis), length, _point_at(d, k, axis), d, 1)
-    return carry(digits, out, length + d) > 0
+    return carry(digits, out, length + d)
+
+
+@kernel
+def _is_ahead(digits, d, length, k):
+    """Whether point k, the last one against the direction, still lies along it: then all do."""
+    return _side_of(digits, d, length, k) > 0
 
 
 @kernel
@@ -683,7 +786,7 @@ def _compact(digits, d, ids, mask, n):
 
 @kernel
 def _within_radius(digits, d, mask, grid, radius_a, radius_b):
-    """(|v| ≤ r, |v| − r) for the nearest point v of the subset and the sum r of the radii.
+    """(|v| ≤ r, |v| − r, low part) for the nearest point v of the subset and the sum r of the radii.
 
     |v|² = Σ Δ_i (y_i·y_k) / ΣΔ for any k of the subset, so the test is Σ Δ_i (y_i·y_k) ≤ r² ΣΔ.
     """
@@ -699,14 +802,18 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
             add_product(digits, square, _delta_at(d, mask, i), n, _gram_at(d, i, k), 2 * d, 1)
     carry(digits, total, n)
     sign = carry(digits, square, n + 2 * d)
-    over, over_exponent = as_double(digits, total, n)
-    value, exponent = as_double(digits, square, n + 2 * d)
+    over, over_low, over_exponent = as_double_double(digits, total, n)
+    value, value_low, exponent = as_double_double(digits, square, n + 2 * d)
     scale = 2 * BITS * grid - over_exponent
     # The root before the power of two: the square of a tiny distance would vanish.
     half = (exponent + scale) // 2
-    distance = _ldexp(math.sqrt(_ldexp(value / over, exponent + scale - 2 * half)), half)
+    ratio, ratio_low = divide(value, value_low, over, over_low)
+    rest = exponent + scale - 2 * half
+    distance, distance_low = square_root(_ldexp(ratio, rest), _ldexp(ratio_low, rest))
+    distance = _ldexp(distance, half)
+    distance_low = _ldexp(distance_low, half)
     if radius_a == 0.0 and radius_b == 0.0:
-        return sign == 0, distance
+        return sign == 0, distance, distance_low
     radius = _scratch_at(d, 2)
     clear(digits, radius, d)
     add_double(digits, radius, radius_a, grid)
@@ -718,8 +825,14 @@ def _within_radius(digits, d, mask, grid, radius_a, radius_b):
     carry(digits, power, 2 * d)
     add_product(digits, square, power, 2 * d, total, n, -1)
     sign = carry(digits, square, n + 2 * d)
-    value, exponent = as_double(digits, square, n + 2 * d)
-    excess = _ldexp(value / over, exponent + scale) / (distance + (radius_a + radius_b))
-    if excess == 0.0:  # vanished, but not 0
+    # |v| − r without cancellation, as (|v|² − r²) / (|v| + r).
+    value, value_low, exponent = as_double_double(digits, square, n + 2 * d)
+    swept, swept_low = two_sum(radius_a, radius_b)
+    both, both_low = add(distance, distance_low, swept, swept_low)
+    ratio, ratio_low = divide(value, value_low, over, over_low)
+    shift = math.frexp(both)[1]
+    ratio, ratio_low = divide(ratio, ratio_low, _ldexp(both, -shift), _ldexp(both_low, -shift))
+    excess = _ldexp(ratio, exponent + scale - shift)
+    if excess == 0.0 and sign != 0:  # vanished, but not 0
         excess = 5e-324 * sign
-    return sign <= 0, excess
+    return sign <= 0, excess, _ldexp(ratio_low, exponent + scale - shift)

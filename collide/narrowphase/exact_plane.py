@@ -10,7 +10,17 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
-from collide.geometry.digits import BITS, add_double, add_product, as_double, carry, clear, grid_of, lowest_bit
+from collide.geometry.digits import (
+    BITS,
+    add_double,
+    add_product,
+    as_double_double,
+    carry,
+    clear,
+    grid_of,
+    lowest_bit,
+)
+from collide.geometry.double_double import add, divide, square_root
 from collide.narrowphase.exact import (
     SEPARATE,
     TOUCHING,
@@ -74,10 +84,10 @@ def _set_plane(digits, pose, numbers, at, rot, n_rot, low_m, n_m):
 
 @kernel
 def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, error):
-    """(verdict, vertex of B, excess): whether a swept hull B reaches the half-space A of the pair.
+    """(verdict, vertex of B, excess, low part): whether a swept hull B reaches the half-space A of the pair.
 
-    Arguments as in `exact.touch_exactly`. The vertex is one that reaches it, or the nearest; excess is
-    then its distance minus the radius, to a relative 1e-14.
+    Arguments as in `exact.touch_exactly`. The vertex is the deepest, the excess its signed distance minus the
+    radius, to EXACT_ERROR.
     """
     (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, tx, ty, tz, _, _, _, _) = pair
     pose_a = exact_pose(poses, p, terms)
@@ -104,7 +114,7 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     n_plane = 2 * n_rot + n_m + 1
     n_sum = max(n_plane + d + low_first - low, 3 * n_rot + 2 + n_b + low_second - low) + 1
     if n_sum > _LONGEST or d > _LONGEST // 2:
-        return UNDONE, 0, 0.0
+        return UNDONE, 0, 0.0, 0.0
     _set_plane(digits, pose_a, numbers, at_a, rot, n_rot, low_m, n_m)
     # The part of s that no vertex changes, in slot 17: −b·det R.
     add_double(digits, _slot(18), numbers[at_a + 3], low_b)
@@ -120,6 +130,8 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     threshold = lowest + 2.0 * error * length
     best = 0
     least = math.inf
+    least_low = 0.0
+    decided = SEPARATE
     clear(digits, _slot(20), 9 * 2 * _LONGEST)
     for k in range(9):
         add_entry(digits, _slot(20 + k), pose_b, k, rot_b, 1.0)
@@ -127,16 +139,18 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     for k in range(count):
         if _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset) > threshold:
             continue
-        verdict, excess = _reaches(
+        verdict, excess, excess_low = _reaches(
             digits, pose_a, pose_b, coords, m, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
-            low_first - low, n_sum, low, 2 * rot + low_m, radius, length,
+            low_first - low, n_sum, low, 2 * rot + low_m, radius,
         )  # fmt: skip
-        if verdict != SEPARATE:
-            return verdict, k, 0.0
-        if excess < least:
+        if verdict == UNDONE:
+            return UNDONE, k, 0.0, 0.0
+        if excess < least or (excess == least and excess_low < least_low):
             least = excess
+            least_low = excess_low
             best = k
-    return SEPARATE, best, least
+            decided = verdict
+    return decided, best, least, least_low
 
 
 @kernel
@@ -154,9 +168,9 @@ def _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset):
 @kernel
 def _reaches(
     digits, pose_a, pose_b, coords, m, k, n_rot_b, core, n_core, at_product, grid, d, n_plane, at_first, n_sum, low,
-    low_plane, radius, length,
+    low_plane, radius,
 ):  # fmt: skip
-    """(verdict, excess) of vertex k of B: whether it lies within the radius of the half-space, exactly."""
+    """(verdict, excess, low part) of vertex k of B: whether it lies within the radius of the half-space, exactly."""
     total = _slot(30)
     clear(digits, total, n_sum)
     for c in range(n_sum):
@@ -175,12 +189,26 @@ def _reaches(
         carry(digits, y, d)
         add_product(digits, total + at_first, _slot(12 + axis), n_plane, y, d, 1)
     sign = carry(digits, total, n_sum)
-    if sign <= 0:
-        return TOUCHING, 0.0
-    value, exponent = as_double(digits, total, n_sum)
-    s = math.ldexp(value, int(exponent + BITS * low))
-    if radius == 0.0:
-        return SEPARATE, s / length
+    nn = _slot(37)
+    clear(digits, nn, 2 * n_plane + 1)
+    for axis in range(3):
+        add_product(digits, nn, _slot(12 + axis), n_plane, _slot(12 + axis), n_plane, 1)
+    carry(digits, nn, 2 * n_plane + 1)
+    square, square_low, exponent = as_double_double(digits, nn, 2 * n_plane + 1)
+    exponent += 2 * BITS * low_plane
+    odd = exponent & 1
+    length, length_low = square_root(math.ldexp(square, odd), math.ldexp(square_low, odd))
+    half = (exponent - odd) // 2  # |n| is the length times 2 to this
+    value, value_low, exponent = as_double_double(digits, total, n_sum)
+    height, height_low = divide(value, value_low, length, length_low)
+    shift = int(exponent + BITS * low - half)
+    height = math.ldexp(height, shift)
+    height_low = math.ldexp(height_low, shift)
+    if radius == 0.0 or sign <= 0:
+        if height == 0.0 and sign != 0:  # vanished, but not 0
+            height = 5e-324 * sign
+        height, height_low = add(height, height_low, -radius, 0.0)
+        return TOUCHING if sign <= 0 else SEPARATE, height, height_low
     # s² ≤ r² |n|², each side on its own grid: 2·low, and 2·low_plane + 2·(grid of r).
     low_r = grid_of(lowest_bit(radius))
     n_r = grid_of(math.frexp(radius)[1] - 1) - low_r + 1
@@ -197,23 +225,25 @@ def _reaches(
     add_double(digits, r, radius, low_r)
     add_product(digits, rr, r, n_r, r, n_r, 1)
     carry(digits, rr, 2 * n_r + 1)
-    nn = _slot(37)
-    clear(digits, nn, 2 * n_plane + 1)
-    for axis in range(3):
-        add_product(digits, nn, _slot(12 + axis), n_plane, _slot(12 + axis), n_plane, 1)
-    carry(digits, nn, 2 * n_plane + 1)
     n_left = 2 * n_sum + shift_left + 1
     n_right = 2 * n_plane + 1 + 2 * n_r + 1 + shift_right
     n = max(n_left, n_right) + 1
     if n > 2 * _slot(1):
-        return UNDONE, 0.0
+        return UNDONE, 0.0, 0.0
     add_product(digits, left + shift_left, total, n_sum, total, n_sum, 1)
     add_product(digits, right + shift_right, nn, 2 * n_plane + 1, rr, 2 * n_r + 1, 1)
     carry(digits, right, n)
     for c in range(n):
         digits[left + c] -= digits[right + c]
-    if carry(digits, left, n) <= 0:
-        return TOUCHING, 0.0
-    value, exponent = as_double(digits, left, n)
-    square = math.ldexp(value, int(exponent + BITS * min(2 * low, 2 * low_plane + 2 * low_r)))
-    return SEPARATE, square / (length * (s + radius * length))
+    sign = carry(digits, left, n)
+    # (s² − r²|n|²) / |n|² over s/|n| + r, which is s/|n| − r without cancellation.
+    value, value_low, exponent = as_double_double(digits, left, n)
+    value, value_low = divide(value, value_low, square, square_low)
+    sum_of_both, sum_low = add(height, height_low, radius, 0.0)
+    down = math.frexp(sum_of_both)[1]
+    value, value_low = divide(value, value_low, math.ldexp(sum_of_both, -down), math.ldexp(sum_low, -down))
+    shift = int(exponent + BITS * min(2 * low, 2 * low_plane + 2 * low_r) - 2 * half - odd - down)
+    excess = math.ldexp(value, shift)
+    if excess == 0.0 and sign != 0:
+        excess = 5e-324 * sign
+    return TOUCHING if sign <= 0 else SEPARATE, excess, math.ldexp(value_low, shift)

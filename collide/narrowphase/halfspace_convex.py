@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide._jit import kernel, view_f64, view_i64
+from collide.geometry.double_double import add, divide, multiply, product_of_vectors, square_root, subtract
+from collide.geometry.error_free import two_product, two_sum
+from collide.narrowphase.fine import (
+    HEIGHT_ERROR,
+    LARGEST_FINE,
+    MOST_TIES,
+    SMALLEST_FINE,
+    is_composed,
+    scale_of,
+    tied_vertices,
+)
 
 
 @kernel
@@ -47,3 +58,109 @@ def opposite_halfspaces(numbers, at_a, p, at_b, q, poses):
     across = math.sqrt(cx * cx + cy * cy + cz * cz)
     opposite = ax * bx + ay * by + az * bz < 0.0 and across <= 512.0 * 2.0**-53 * length_a * length_b
     return opposite, ax / length_a, ay / length_a, az / length_a
+
+
+@kernel(inline=True)
+def _cofactor(poses, p, i, j):
+    """Entry (i, j) of cof(R), a double-double."""
+    r = p + 3 * ((i + 1) % 3)
+    s = p + 3 * ((i + 2) % 3)
+    c = (j + 1) % 3
+    d = (j + 2) % 3
+    x, x_low = two_product(poses[r + c], poses[s + d])
+    y, y_low = two_product(poses[r + d], poses[s + c])
+    return subtract(x, x_low, y, y_low)
+
+
+@kernel
+def _set_fine_plane(numbers, at, poses, p, plane):
+    """`plane_in_world` in double-doubles: n and the offset, eight doubles."""
+    for i in range(3):
+        total = 0.0
+        total_low = 0.0
+        for j in range(3):
+            c, c_low = _cofactor(poses, p, i, j)
+            c, c_low = multiply(c, c_low, numbers[at + j], 0.0)
+            total, total_low = add(total, total_low, c, c_low)
+        plane[2 * i] = total
+        plane[2 * i + 1] = total_low
+    total = 0.0
+    total_low = 0.0
+    for j in range(3):
+        c, c_low = _cofactor(poses, p, 0, j)
+        c, c_low = multiply(c, c_low, poses[p + j], 0.0)
+        total, total_low = add(total, total_low, c, c_low)
+    total, total_low = multiply(total, total_low, numbers[at + 3], 0.0)
+    plane[6] = total
+    plane[7] = total_low
+
+
+@kernel(inline=True)
+def _fine_coordinate(coordinates, m, k, poses, p, q, axis):
+    """A coordinate of R_B b + p_WB − p_WA for vertex k, a double-double as good as `fine.fine_point`."""
+    r = q + 3 * axis
+    total, rest = two_sum(poses[q + 9 + axis], -poses[p + 9 + axis])
+    for j in range(3):
+        term, e = two_product(poses[r + j], coordinates[j * m + k])
+        total, f = two_sum(total, term)
+        rest += e + f
+    return two_sum(total, rest)
+
+
+@kernel
+def polish_height(pair, doubles_at, ties_at, vertex, size, error):
+    """(proven, height, low part, error): the signed distance of B's core from a half-space A, to its last digit.
+
+    vertex : the deepest, as doubles say.   doubles_at, ties_at : workspace of eight doubles, MOST_TIES + 1 integers.
+    Composed poses are left to the exact stage.
+    """
+    (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, _, _, _, _, tree_b, _, _) = pair
+    m0 = numbers[at_a]
+    m1 = numbers[at_a + 1]
+    m2 = numbers[at_a + 2]
+    if is_composed(poses, p) or is_composed(poses, q) or not (SMALLEST_FINE < size < LARGEST_FINE):
+        return False, 0.0, 0.0, 0.0
+    plane = view_f64(doubles_at, 8)
+    ties = view_i64(ties_at, MOST_TIES + 1)
+    _set_fine_plane(numbers, at_a, poses, p, plane)
+    square, square_low = product_of_vectors(
+        plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
+        plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
+    )  # fmt: skip
+    length, length_low = square_root(square, square_low)
+    if not (2.0**-300 < length < 2.0**300):
+        return False, 0.0, 0.0, 0.0
+    dx = plane[0] / length
+    dy = plane[2] / length
+    dz = plane[4] / length
+    gx = poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz
+    gy = poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz
+    gz = poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz
+    ties[0] = vertex
+    level, limit = tied_vertices(coords, count, m, tree_b, ties, 1, gx, gy, gz, error)
+    many = level > MOST_TIES
+    least = math.inf
+    least_low = 0.0
+    for k in range(count if many else level):
+        i = k if many else ties[k]
+        if many and coords[i] * gx + coords[m + i] * gy + coords[2 * m + i] * gz > limit:
+            continue
+        x, x_low = _fine_coordinate(coords, m, i, poses, p, q, 0)
+        y, y_low = _fine_coordinate(coords, m, i, poses, p, q, 1)
+        z, z_low = _fine_coordinate(coords, m, i, poses, p, q, 2)
+        height, height_low = product_of_vectors(
+            x, x_low, y, y_low, z, z_low, plane[0], plane[1], plane[2], plane[3], plane[4], plane[5]
+        )
+        if height < least or (height == least and height_low < least_low):
+            least = height
+            least_low = height_low
+    least, least_low = subtract(least, least_low, plane[6], plane[7])
+    least, least_low = divide(least, least_low, length, length_low)
+    # The normal, too, is rounded here, to 2⁻¹⁰⁰·3 of |row|²|m|, and the offset to as much of |row|³ times it; a matrix
+    # that is no rotation may make that much of |n|.
+    row = 0.0
+    for k in range(3):
+        r = p + 3 * k
+        row = max(row, poses[r] * poses[r] + poses[r + 1] * poses[r + 1] + poses[r + 2] * poses[r + 2])
+    skew = max(row * math.sqrt(row), row) * math.sqrt(m0 * m0 + m1 * m1 + m2 * m2) / length
+    return True, least, least_low, 8.0 * max(skew, 1.0) * HEIGHT_ERROR / scale_of(size)

@@ -61,6 +61,18 @@ def _place(pair, points, k, ax, ay, az, bx, by, bz):
 
 
 @kernel
+def place_vertices(pair, points, ids, k, i, j):
+    """Point k becomes the difference of vertex i of A and vertex j of B."""
+    (coords_a, _, m_a, _, _, _, coords_b, _, m_b, _, _, _, _, _, _, _, _, _, _, _, _) = pair
+    ids[2 * k] = i
+    ids[2 * k + 1] = j
+    _place(
+        pair, points, k, coords_a[i], coords_a[m_a + i], coords_a[2 * m_a + i],
+        coords_b[j], coords_b[m_b + j], coords_b[2 * m_b + j],
+    )  # fmt: skip
+
+
+@kernel
 def settle_point(pair, points, ids, k, dx, dy, dz):
     """Make point k, found by `difference_point`, one that is farthest in direction d for certain.
 

@@ -154,7 +154,7 @@ def answer_poses(
         _answer_at(
             header[CORE],
             (
-                header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], count,
+                header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], count,
                 boolean, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
             ),
         )  # fmt: skip
@@ -212,7 +212,7 @@ def _single(header_at, A_object, B_object, boolean, row_at):
     _answer_at(
         header[CORE],
         (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
             False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip

@@ -51,7 +51,7 @@ def run_pairs(
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     table.plant(shape_of[pairs])
-    tables = *table.addresses, address_of(poses.rows), address_of(shape_of)
+    tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
     done = 0
     while done < len(pairs):
         todo, out = pairs[done:], rows[done:]

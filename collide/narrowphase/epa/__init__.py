@@ -1,0 +1,11 @@
+"""EPA: the smallest translation that separates two overlapping cores, with a proven bracket.
+
+van den Bergen 2001. A polytope inside A ⊖ B grows towards the facet whose plane lies nearest the origin, until
+the support plane of that facet coincides with it. `seed.py` is where it begins, `surface.py` the polytope,
+`expand.py` its growth in doubles, `refine.py` the last digits.
+
+Upper bound of the depth: the value of any support plane. Lower bound: the surface is closed and oriented by
+construction (facets are exchanged for others with the same border). If each facet is seen from the origin on its
+inner side, the radial map onto the sphere has positive degree, so every ray meets a facet, and the ball as large
+as the least distance lies in A ⊖ B. Nothing of this needs the surface to be convex, which rounding may dent.
+"""

@@ -1,0 +1,169 @@
+"""The growth of EPA's polytope, in doubles."""
+
+from __future__ import annotations
+
+import math
+
+from collide._jit import kernel
+from collide.geometry.scan import least
+from collide.narrowphase.bounds import EPA_VERTICES
+from collide.narrowphase.epa.seed import extremal_tetrahedron
+from collide.narrowphase.epa.surface import (
+    FACET,
+    PLANE,
+    expand,
+    find_patch,
+    has_room,
+    set_tetrahedron,
+    workspace,
+)
+from collide.narrowphase.minkowski import (
+    POINT,
+    difference_point,
+    has_trees,
+    inlined_difference_point,
+    settle_point,
+)
+from collide.narrowphase.simplex import face_weights
+
+#: How a run ends. EXPANDED: the facet nearest the origin is final, or the cap was met. FLAT: A ⊖ B
+#: has no interior as far as rounding can tell.
+EXPANDED, FLAT = range(2)
+
+
+@kernel(inline=True)
+def _is_corner(ids, facets, f, k):
+    """Whether point k is a vertex of facet f or of a neighbour, by its support vertices."""
+    if ids[2 * k] < 0 or ids[2 * k + 1] < 0:
+        return False
+    for side in range(4):
+        g = f if side == 3 else facets[FACET * f + 3 + side]
+        for corner in range(3):
+            v = facets[FACET * g + corner]
+            if ids[2 * v] == ids[2 * k] and ids[2 * v + 1] == ids[2 * k + 1]:
+                return True
+    return False
+
+
+@kernel(inline=True)
+def _surface_clearance(clearances, count, error):
+    """Least distance of a facet from the origin, or −1 unless every facet provably faces outwards."""
+    nearest = clearances[least(clearances, max(count, 8))]
+    return nearest if nearest > error else -1.0
+
+
+@kernel
+def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, error, tolerance):
+    """Expand until the nearest facet of A ⊖ B is known.
+
+    simplex, simplex_ids : four points of A ⊖ B around the origin to begin with, clear of rounding by far;
+        or no doubles, and an extremal tetrahedron is found.
+    overlap_suffices : stop once the origin is proven inside (a boolean is asked).
+    error : absolute error of a bound.   tolerance : stop once the bracket is this narrow.
+
+    Returns
+    -------
+    status : EXPANDED or FLAT.
+    depth : least support value met: moving by it along n (plus ``error``) separates the cores;
+        negative where that plane already does.
+    clearance : proven least distance of the surface from the origin (before ``error``), or −1.
+    nx, ny, nz : unit direction of that support plane.
+    facet : the one nearest the origin, −1 where FLAT.   vertices, facets : how many there are. Where FLAT, the
+        first vertices span what there is.
+    """
+    surface = workspace(doubles_at, integers_at)
+    points, planes, reaches, clearances, ids, facets, starts, _, _ = surface
+    rank = 3
+    nx = ny = nz = 0.0
+    if len(simplex) == 0:
+        rank, nx, ny, nz = extremal_tetrahedron(pair, points, ids, error)
+    else:
+        for k in range(4):
+            for j in range(POINT):
+                points[POINT * k + j] = simplex[POINT * k + j]
+            ids[2 * k] = simplex_ids[2 * k]
+            ids[2 * k + 1] = simplex_ids[2 * k + 1]
+    if rank < 3:
+        up = _extent(pair, points, ids, nx, ny, nz)
+        down = _extent(pair, points, ids, -nx, -ny, -nz)
+        if down < up:
+            return FLAT, down, -1.0, -nx, -ny, -nz, -1, rank + 1, 0
+        return FLAT, up, -1.0, nx, ny, nz, -1, rank + 1, 0
+    set_tetrahedron(surface, error)
+    count = 4
+    depth = math.inf
+    facet = -1
+    vertices = 4
+    while True:
+        f = least(reaches, max(count, 8))
+        distance = reaches[f]
+        if distance == math.inf:  # no facet is left that could be nearer than the way out that is known
+            break
+        if overlap_suffices and distance > 2.0 * error and _surface_clearance(clearances, count, error) > error:
+            break
+        inlined_difference_point(
+            pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2], False
+        )
+        value = _height(points, planes, vertices, f)
+        if overlap_suffices and value < -error and has_trees(pair):
+            settle_point(pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2])
+            value = _height(points, planes, vertices, f)
+        facet = f  # its slot stays with the surface nearest the origin, also when it is exchanged
+        if value < depth:
+            depth = value
+            nx = planes[PLANE * f]
+            ny = planes[PLANE * f + 1]
+            nz = planes[PLANE * f + 2]
+        if overlap_suffices and value < -error:
+            return EXPANDED, depth, -1.0, nx, ny, nz, facet, vertices, count
+        if depth - distance <= tolerance or _is_corner(ids, facets, f, vertices) or not has_room(vertices, count):
+            break
+        starts[2 * vertices + 1] = -1
+        found, edges = find_patch(surface, f, vertices, 0.0625 * error)
+        count = expand(surface, f, vertices, count, found, edges, depth, error)
+        vertices += 1
+    clearance = _surface_clearance(clearances, count, error)
+    if has_trees(pair):
+        depth = _extent(pair, points, ids, nx, ny, nz)
+    return EXPANDED, depth, clearance, nx, ny, nz, facet, vertices, count
+
+
+@kernel(inline=True)
+def _height(points, planes, vertex, f):
+    """A vertex along the normal of a facet."""
+    at = POINT * vertex
+    n = PLANE * f
+    return planes[n] * points[at] + planes[n + 1] * points[at + 1] + planes[n + 2] * points[at + 2]
+
+
+@kernel
+def facet_of(surface, count, best, x, y, z, slack):
+    """The facet that holds (x, y, z), the origin's foot on the final plane: for the witness points.
+
+    It need not be the one that settled the depth. A face of A ⊖ B with more than three corners is
+    covered by several facets; and where the bodies just touch, the foot may be a corner or lie on an
+    edge of facets in other planes.
+    """
+    points, planes, _, _, _, facets, _, _, _ = surface
+    most = -math.inf
+    for g in range(count):
+        height = planes[PLANE * g] * x + planes[PLANE * g + 1] * y + planes[PLANE * g + 2] * z - planes[PLANE * g + 3]
+        if abs(height) <= slack:
+            w0, w1, w2 = face_weights(
+                points, POINT * facets[FACET * g], POINT * facets[FACET * g + 1], POINT * facets[FACET * g + 2], x, y, z
+            )
+            inside = min(w0, w1, w2)
+            if inside > most:
+                most = inside
+                best = g
+    return best
+
+
+@kernel
+def _extent(pair, points, ids, nx, ny, nz):
+    """Support value of A ⊖ B in a unit direction, for certain."""
+    k = EPA_VERTICES + 2
+    difference_point(pair, points, ids, k, nx, ny, nz)
+    if has_trees(pair):
+        settle_point(pair, points, ids, k, nx, ny, nz)
+    return points[POINT * k] * nx + points[POINT * k + 1] * ny + points[POINT * k + 2] * nz
