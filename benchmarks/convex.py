@@ -70,16 +70,6 @@ TOUCHING = 1e-6
 # --- ours ---------------------------------------------------------------------------------------
 
 
-def unsigned(A, B, X_WA, X_WBs):
-    """Gaps, 0 for pairs that meet: collide has one distance, the signed one, so the boolean is asked first."""
-    from collide import collide, distance
-
-    gaps = np.zeros(len(X_WBs))
-    apart = ~collide(A, B, X_WA, X_WBs)
-    gaps[apart] = distance(A, B, X_WA, X_WBs[apart]).distance
-    return gaps
-
-
 def ours(asked: Scene, table: str) -> dict:
     """question -> a function of no arguments that answers the whole scene."""
     from collide import collide, distance
@@ -87,15 +77,10 @@ def ours(asked: Scene, table: str) -> dict:
     solids, which, X_WBs = asked.solids, asked.which, asked.X_WBs
     if table == "shapes":
         posed = Posed(solids)
-
-        def gaps():
-            apart = ~posed.hits(which, X_WBs)
-            return posed.rows(which[apart], X_WBs[apart])
-
         return {
             "boolean": lambda: posed.hits(which, X_WBs),
             "signed": lambda: posed.rows(which, X_WBs)["distance"],
-            "unsigned": gaps,
+            "unsigned": lambda: posed.rows(which, X_WBs, signed=False)["distance"],
         }
     A, B, eye = solids[0].shape, solids[1].shape, np.eye(4)
     if table == "single":
@@ -107,7 +92,7 @@ def ours(asked: Scene, table: str) -> dict:
     return {
         "boolean": lambda: collide(A, B, eye, X_WBs),
         "signed": lambda: distance(A, B, eye, X_WBs),
-        "unsigned": lambda: unsigned(A, B, eye, X_WBs),
+        "unsigned": lambda: distance(A, B, eye, X_WBs, signed=False),
     }
 
 

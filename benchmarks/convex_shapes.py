@@ -116,10 +116,10 @@ class Posed:
 
         return collide.collide(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs)
 
-    def rows(self, which: np.ndarray, X_WBs: np.ndarray) -> np.ndarray:
+    def rows(self, which: np.ndarray, X_WBs: np.ndarray, signed: bool = True) -> np.ndarray:
         import collide
 
-        return collide.distance(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs).rows
+        return collide.distance(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs, signed=signed).rows
 
 
 def scene(kind: str, n: int, poses: int, shapes: int = 2) -> Scene:

@@ -65,6 +65,34 @@ def least_of_blocks(_context, numbers, count):
     return types.int64(numbers, types.int64), codegen
 
 
+@intrinsic
+def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
+    """Number of the first ``count`` points, a multiple of 8, with x·gx + y·gy + z·gz at most the limit."""
+    whole, real = types.int64, types.float64
+    signature = whole(coordinates, whole, whole, real, real, real, real)
+
+    def codegen(context, builder, signature, args):
+        data = make_array(signature.args[0])(context, builder, args[0]).data
+        values = _products(builder, data, ir.Constant(_I64, 0), args[1], *args[3:6])
+        limit = _splat(builder, args[6], _VALUES)
+        begin = builder.block
+        loop, done = (builder.append_basic_block(name) for name in ("loop", "done"))
+        builder.branch(loop)
+        builder.position_at_end(loop)
+        at, found = builder.phi(_I64), builder.phi(_INDICES)
+        level = builder.zext(builder.fcmp_ordered("<=", values(at), limit), _INDICES)
+        more = builder.add(found, level)
+        following = builder.add(at, ir.Constant(_I64, LANES))
+        for phi, initial, again in ((at, ir.Constant(_I64, 0), following), (found, ir.Constant(_INDICES, [0] * LANES), more)):
+            phi.add_incoming(initial, begin)
+            phi.add_incoming(again, loop)
+        builder.cbranch(builder.icmp_signed("<", following, args[2]), loop, done)
+        builder.position_at_end(done)
+        return _halved(builder, more, builder.add)
+
+    return signature, codegen
+
+
 def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
     """The products with g of the eight points from an index on, as a function of the index."""
     g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]

@@ -29,12 +29,15 @@ def length_of(A, B, X_WA, X_WB) -> int:
     return max(lengths) if min(lengths) else 0
 
 
-def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None) -> np.ndarray:
-    """bool[n], or a row a pose, of a batch in at most so many threads."""
+def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None, depths=True) -> np.ndarray:
+    """bool[n], or a row a pose, of a batch in at most so many threads.
+
+    depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
+    """
     n = length_of(A, B, X_WA, X_WB)
     workers = min(_workers(threads), n // _FEWEST_A_THREAD)
     if workers < 2:
-        return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes)
+        return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes, depths)
     bounds = np.linspace(0, n, workers + 1).astype(int)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
 
@@ -45,7 +48,7 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
         own = None if axes is None else axes[part]
         try:
             count = int(bounds[k + 1] - bounds[k])
-            out[part] = _answers(one, other, X_WO, X_WT, count, boolean, limit, check, own)
+            out[part] = _answers(one, other, X_WO, X_WT, count, boolean, limit, check, own, depths)
         except InvalidPose:
             _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
             raise
@@ -79,13 +82,15 @@ def _refuse_poses(X_WA, X_WB, check: bool) -> None:
     as_poses(X_WB, "X_WB", check=check)
 
 
-def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool, axes=None) -> np.ndarray:
+def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool, axes=None, depths=True) -> np.ndarray:
     if n == 0:
         return np.zeros(0, dtype=bool if boolean else PAIR_DTYPE)
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
         table, which = _table(A, B, n)
         for checked in (check, False):
-            out = run.run_poses(table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=checked, axes=axes)
+            out = run.run_poses(
+                table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=checked, axes=axes, depths=depths
+            )
             if out is not None:
                 return out
             _refuse_poses(X_WA, X_WB, check)  # unless it is a pose on the brink of the tolerance

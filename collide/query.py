@@ -12,7 +12,7 @@ from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
-from collide.results import PairResult
+from collide.results import UNDECIDED, PairResult
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
@@ -82,7 +82,7 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 
 
 def distance(
-    A, B, X_WA, X_WB, *, max_distance: float = math.inf, check_poses: bool = True, threads: int = 1
+    A, B, X_WA, X_WB, *, max_distance: float = math.inf, signed: bool = True, check_poses: bool = True, threads: int = 1
 ) -> PairResult:
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
@@ -90,6 +90,9 @@ def distance(
     ----------
     A, B, X_WA, X_WB, check_poses, threads : as in `collide`.
     max_distance : [m], ≥ 0. Beyond it only a proven lower bound is worked out, and ``beyond`` is set.
+    signed : False where gaps are all that is wanted: bodies that meet are then at distance 0, with a zero normal
+        and a bracket that is 0, too, unless the sign is open. How deep they overlap is not worked out, which saves
+        most of the time of overlapping pairs.
 
     Returns
     -------
@@ -99,7 +102,7 @@ def distance(
     half-space).
     """
     limit = check_distance("max_distance", max_distance)
-    if limit == math.inf and threads == 1:
+    if limit == math.inf and threads == 1 and signed:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB)
             if rows is not None:
@@ -109,8 +112,10 @@ def distance(
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
     _prepare(A, B)
-    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads)
+    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed)
     rows["b"] = 1
+    if not signed:
+        _forget_depths(rows)
     endless = np.isneginf(rows["distance"])
     if endless.any():
         k = int(np.argmax(endless))
@@ -120,6 +125,18 @@ def distance(
             "end, so no translation of finite length separates them; collide() still answers"
         )
     return PairResult(rows, single, (_held(A), _held(B), X_WA, X_WB))
+
+
+def _forget_depths(rows: np.ndarray) -> None:
+    """Overlaps become distance 0, in place."""
+    hits = rows["hit"]
+    middle = 0.5 * (rows["point_a"][hits] + rows["point_b"][hits])
+    rows["distance"][hits], rows["normal"][hits] = 0.0, 0.0
+    rows["point_a"][hits] = rows["point_b"][hits] = middle
+    rows["lower"] = np.maximum(rows["lower"], 0.0)
+    decided = rows["how"] != UNDECIDED
+    rows["upper"][hits & decided] = 0.0
+    rows["certified"][hits] = decided[hits]
 
 
 def check_distance(name: str, value) -> float:

@@ -22,21 +22,13 @@ import collide
 assert collide.__file__.startswith(sys.argv[1]), collide.__file__
 from collide.adapters.peers.stress import run
 table = run(["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"], n=int(sys.argv[2]), seed=4)
-# Doubles and double-doubles settle most of these by themselves: once more without them.
-from collide.adapters.peers.stress_truth import truth
-from collide.narrowphase import run as narrowphase
-from collide.scenes.families import generate
-narrowphase.distrust_doubles = True
-cases = [case for family in ("rand_pen", "near_sep", "touch_ee") for case in generate(family, n=6, seed=4)]
-wrong = sum(collide.collide(*case.shapes()) != truth(case).hit for case in cases)
-print(table.wrong + table.failed + wrong, table.undecided)
+print(table.wrong + table.failed, table.undecided)
 """
 
 MUTATIONS = {
     "none": ("bounds.py", "", ""),
     "error bound a hundredth": ("bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.64 * 2.0**-53"),
-    "a sign swapped": ("exact.py", "if origin != across:", "if origin == across:"),
-    "support candidates dropped": ("exact.py", "if value > least + slack:", "if i % 2 == 1:"),
+    "a sign swapped": ("exact.py", "    if side < 0:\n        for axis", "    if side > 0:\n        for axis"),
     "the exact stage skipped": ("decide.py", "if marks[HOW] != UNDECIDED:", "if True:"),
     "the plane stage inverted": ("exact_plane.py", "return TOUCHING if sign <= 0", "return TOUCHING if sign < 0"),
     "an error of a sum dropped": ("fine.py", "rest += e + f", "rest += e"),

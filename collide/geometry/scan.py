@@ -34,11 +34,22 @@ def least_one_by_one(numbers, count):
     return index
 
 
+@kernel
+def count_level_one_by_one(coordinates, stride, count, gx, gy, gz, limit):
+    """`count_level`, one point at a time."""
+    found = 0
+    for i in range(count):
+        if coordinates[i] * gx + coordinates[stride + i] * gy + coordinates[2 * stride + i] * gz <= limit:
+            found += 1
+    return found
+
+
 if PLAIN_PYTHON:
-    farthest, least = farthest_one_by_one, least_one_by_one
+    farthest, least, count_level = farthest_one_by_one, least_one_by_one, count_level_one_by_one
 else:
     from collide._simd import farthest_of_blocks as farthest
     from collide._simd import least_of_blocks as least
+    from collide._simd import level_in_blocks as count_level
 
 #: ``farthest(coordinates, start, stride, count, gx, gy, gz) -> (index, value)``: the largest
 #: x·gx + y·gy + z·gz among ``count`` points, 8 or more. Point i has its x at
@@ -46,4 +57,6 @@ else:
 #: among equal values (−0 equals 0, and is given as 0), so copies that fill up a block never win over what they copy.
 #: Values must not be NaN. O(count).
 #: ``least(numbers, count) -> index``: of the least of the first ``count`` numbers, 8 or more.
-__all__ = ["farthest", "farthest_one_by_one", "least", "least_one_by_one"]
+#: ``count_level(coordinates, stride, count, gx, gy, gz, limit) -> found``: how many of the first ``count`` points, a
+#: multiple of 8, have a product at most the limit.
+__all__ = ["count_level", "count_level_one_by_one", "farthest", "farthest_one_by_one", "least", "least_one_by_one"]

@@ -46,7 +46,7 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
-from collide.narrowphase.simplex import face_weights
+from collide.narrowphase.simplex import face_weights, weigh_enclosed
 from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
 from collide.transforms import SMALLEST
 
@@ -120,7 +120,7 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
 
 
 @kernel(inline=True)
-def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size, slop, error, curved, exactly):
+def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved, exactly):
     """Two convex cores by GJK, and by EPA where they overlap.
 
     Returns
@@ -142,7 +142,9 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size
         return -core, bound, core, -math.inf, math.inf, False, -weights[7], -weights[8], -weights[9], n, n, rounds
     above = -clearance if status == ENCLOSED else core
     # What the exact stage can settle needs no EPA to find out whether it is open.
-    if boolean and (above + error < radius or exactly):
+    if not depths and (above + error < radius or exactly):
+        if status == ENCLOSED and not boolean:
+            weigh_enclosed(points, weights)
         return -above, -math.inf, above, -math.inf, math.inf, False, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
@@ -150,7 +152,7 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size
     epa_at = doubles_at + 8 * _OWN_DOUBLES
     ids_at = integers_at + 8 * _OWN_INTEGERS
     outcome, depth, surface, nx, ny, nz, facet, vertices, count = epa(
-        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, epa_at, ids_at, boolean, error, tolerance
+        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, epa_at, ids_at, not depths, error, tolerance
     )
     rounds += 65536 * max(vertices - 4, 0)
     shallowest = -math.inf
@@ -164,8 +166,8 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size
                 ids[k] = spanning[k]
             shown = 3
         return depth, -depth, above, shallowest, deepest, alone, nx, ny, nz, n, shown, rounds
-    width = depth - surface + 2.0 * error
-    if exactly and not boolean and not (surface > error and 2.0 * width <= PROMISE_DEPTH * (depth + radius)):
+    width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
+    if exactly and depths and not (surface > error and width <= PROMISE_DEPTH * (depth + radius)):
         sound, low, level, high, ux, uy, uz, nearest, count, alone = refine(
             pair, terms_at, epa_at, ids_at, doubles_at + 8 * _FINE, integers_at + 8 * _NEAREST, integers_at + 8 * _TIES,
             count, vertices, size, slop, error,
@@ -185,8 +187,8 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size
 
 @kernel(inline=True)
 def _swept(
-    pair, terms_at, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, slop, error,
-    exactly, flip,
+    pair, terms_at, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+    slop, error, exactly, flip,
 ):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
@@ -210,7 +212,7 @@ def _swept(
         alone = False
     else:
         depth, bound, above, shallowest, deepest, alone, nx, ny, nz, n, vertices, rounds = _cores(
-            pair, terms_at, doubles_at, integers_at, boolean, radius, limit, size, slop, error, curved,
+            pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved,
             exactly and not curved,
         )  # fmt: skip
     lower = bound - error - radius
@@ -243,7 +245,8 @@ def _swept(
         lower = max(lower, -deepest - radius - rounding)
         upper = min(upper, -shallowest - radius + rounding)
     write_verdict(row, marks, distance, lower, upper, how, width, limit)
-    if width == 0.0 and (not decided or (marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0))):
+    unfinished = marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0) and (depths or upper > 0.0)
+    if width == 0.0 and (not decided or unfinished):
         marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
         if alone:
             marks[EXACT_ROUNDS] = NEAREST_PLANE
@@ -372,12 +375,14 @@ def _halves(pair, row, marks, flip):
 
 
 #: How `answer_pairs` is called.
-SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64)"
+SIGNATURE = (
+    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, boolean, float64, int64, int64, int64)"
+)
 
 
 @entry(SIGNATURE)
 def answer_pairs(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, stop_at_hit, limit, rows_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit, rows_at,
     doubles_at, integers_at,
 ):  # fmt: skip
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
@@ -397,7 +402,7 @@ def answer_pairs(
         pa = pairs[2 * k]
         pb = pairs[2 * k + 1]
         _answer(
-            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at,
+            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, depths, limit, row, words, marks, doubles_at,
             integers_at,
         )  # fmt: skip
         if stop_at_hit and marks[HIT] == 1:
@@ -407,7 +412,7 @@ def answer_pairs(
 
 @kernel(inline=True)
 def _answer(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, limit, row, words, marks, doubles_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, depths, limit, row, words, marks, doubles_at,
     integers_at,
 ):  # fmt: skip
     shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
@@ -440,6 +445,6 @@ def _answer(
         )
     else:
         _swept(
-            pair, terms_at, sa, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, slop,
-            ERROR * size + slop, known, flip,
+            pair, terms_at, sa, sb, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+            slop, ERROR * size + slop, known, flip,
         )  # fmt: skip

@@ -17,6 +17,7 @@ import math
 from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.double_double import add, cross, multiply, product_of_vectors, square_root, subtract
 from collide.geometry.error_free import two_product, two_sum
+from collide.geometry.scan import count_level
 from collide.geometry.support_tree.query import rings_of
 from collide.geometry.tables import POSE_SLOP, POSE_TERMS, TERMS
 
@@ -61,7 +62,7 @@ def is_composed(poses, p):
     return poses[p + POSE_SLOP] != 0.0
 
 
-@kernel
+@kernel(inline=True)
 def fine_points(pair, low, fine, ids, n, scale):
     """Points 0 … n − 1 become the differences of these vertex pairs, times ``scale``."""
     for k in range(n):
@@ -171,7 +172,8 @@ def set_plane(fine, i, j, k, direction):
 def set_away_from_edge(fine, direction):
     """The part of point 0 across the edge to point 1, into ``direction``, lengthened by the edge's square.
 
-    Taken twice: the first time leaves what rounding at |w| makes, the second what rounding at the result makes.
+    Taken twice where that is short: the first time leaves what rounding at |w| makes, the second what rounding at the
+    result makes.
     """
     ex, ex_low, ey, ey_low, ez, ez_low = fine_edge(fine, 1, 0)
     square, square_low = product_of_vectors(ex, ex_low, ey, ey_low, ez, ez_low, ex, ex_low, ey, ey_low, ez, ez_low)
@@ -181,7 +183,11 @@ def set_away_from_edge(fine, direction):
     y_low = fine[3]
     z = fine[4]
     z_low = fine[5]
-    for _ in range(2):
+    for turn in range(2):
+        # Where the edge is not much nearer than its length, once is enough.
+        left = abs(x) + abs(y) + abs(z)
+        if turn == 1 and left > 2.0**-20 * square * (abs(fine[0]) + abs(fine[2]) + abs(fine[4]) + math.sqrt(square)):
+            break
         along, along_low = product_of_vectors(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low)
         p, p_low = multiply(x, x_low, square, square_low)
         q, q_low = multiply(ex, ex_low, along, along_low)
@@ -213,6 +219,72 @@ def fine_length(direction):
 
 
 # --- what else is level -------------------------------------------------------------------------
+
+
+@kernel(inline=True)
+def are_alone(pair, ids, n, direction, slack):
+    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with level pairs of theirs alone.
+
+    ids : their vertex pairs.   slack : how far doubles may be wrong along |direction| = 1. False also where a pair of
+    their vertices might not be level with them: n pairs over n + 1 vertices hang together, so that it must be.
+    """
+    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
+    last = n - 1
+    middle = min(last, 1)
+    own_a = 1 + (1 if ids[2 * middle] != ids[0] else 0)
+    own_a += 1 if ids[2 * last] != ids[0] and ids[2 * last] != ids[2 * middle] else 0
+    own_b = 1 + (1 if ids[2 * middle + 1] != ids[1] else 0)
+    own_b += 1 if ids[2 * last + 1] != ids[1] and ids[2 * last + 1] != ids[2 * middle + 1] else 0
+    if own_a + own_b != n + 1:
+        return False
+    largest = max(abs(direction[0]), abs(direction[2]), abs(direction[4]))
+    dx = direction[0] / largest
+    dy = direction[2] / largest
+    dz = direction[4] / largest
+    slack *= abs(dx) + abs(dy) + abs(dz)
+    if not _no_other_is_level(
+        coords_a, n_a, m_a, tree_a, ids[0], ids[2 * middle], ids[2 * last], own_a,
+        poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
+        poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
+        poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
+        slack,
+    ):  # fmt: skip
+        return False
+    return _no_other_is_level(
+        coords_b, n_b, m_b, tree_b, ids[1], ids[2 * middle + 1], ids[2 * last + 1], own_b,
+        -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
+        -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
+        -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
+        slack,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _product(coordinates, m, i, gx, gy, gz):
+    return coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
+
+
+@kernel(inline=True)
+def _no_other_is_level(coordinates, n, m, tree, i, j, k, own, gx, gy, gz, slack):
+    """Whether no vertex but i, j, k (``own`` different ones) has a product with g within the slack of theirs.
+
+    A scan; or, where there is a support tree, a look at their neighbours: the vertices of a hull below a level hang
+    together.
+    """
+    limit = _product(coordinates, m, i, gx, gy, gz)
+    limit = min(limit, _product(coordinates, m, j, gx, gy, gz), _product(coordinates, m, k, gx, gy, gz)) + slack
+    if tree == 0:
+        # What fills up the last block are copies of vertex 0.
+        copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
+        return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
+    starts, ring = rings_of(tree)
+    for turn in range(3):
+        v = i if turn == 0 else (j if turn == 1 else k)
+        for at in range(starts[v], starts[v + 1]):
+            w = ring[at]
+            if _product(coordinates, m, w, gx, gy, gz) <= limit and w != i and w != j and w != k:
+                return False
+    return True
 
 
 @kernel
@@ -263,14 +335,14 @@ def _with_tie(ties, count, i):
 
 @kernel
 def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_at, scale):
-    """Which vertices no pair of vertices lies beyond, against a direction, and by how much.
+    """How far the least of A ⊖ B along a direction lies beyond points that nearly are the least.
 
-    ids : vertex pairs of n ≤ 3 points that are, or nearly are, the least ones of A ⊖ B along ``direction``.
+    ids : their vertex pairs, n of them.
     first, spare : index in ``fine`` of the first of them, and of a point to be used.   slack : how far doubles may be wrong, times |d̂| = 1.
     ties_at : integer workspace of 2·(MOST_TIES + 1).
 
-    Returns (alone, excess, low, i, j). Alone: the least of A ⊖ B are the n points, and level pairs of theirs. Else
-    the least height is that of the first point plus the excess, ≤ 0, at vertices i and j.
+    Returns (excess, low, i, j): the least height is that of the first point plus the excess, ≤ 0, at vertices i, j.
+    Asked where they are not alone (`are_alone`).
     """
     (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
     own_a = 0
@@ -293,9 +365,6 @@ def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_a
     bz = -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz)
     count_a, limit_a = tied_vertices(coords_a, n_a, m_a, tree_a, ties_a, own_a, ax, ay, az, slack)
     count_b, limit_b = tied_vertices(coords_b, n_b, m_b, tree_b, ties_b, own_b, bx, by, bz, slack)
-    # n pairs over n + 1 vertices hang together: levels of the pairs make all of theirs level.
-    if count_a == own_a and count_b == own_b and own_a + own_b == n + 1:
-        return True, 0.0, 0.0, ids[0], ids[1]
     base, base_low = fine_height(fine, first, direction)
     best = ids[0]
     other = ids[1]
@@ -328,18 +397,23 @@ def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_a
                 more = height
                 more_low = height_low
     excess, excess_low = add(excess, excess_low, more, more_low)
-    return False, excess, excess_low, best, other
+    return excess, excess_low, best, other
 
 
 @kernel
-def write_low_parts(pair, terms_at, low_at):
-    """Put the low parts of both poses at an address; returns their number, none where both poses are as given."""
+def _write_low_parts(pair, terms_at, low_at):
     poses = pair[13]
-    if not (is_composed(poses, pair[5]) or is_composed(poses, pair[11])):
-        return 0
     rows = int(max(poses[pair[5] + POSE_TERMS], poses[pair[11] + POSE_TERMS])) + 1
     low = view_f64(low_at, 24)
     terms = view_f64(terms_at, 12 * TERMS * rows)
     low_parts(poses, pair[5], terms, low, 0)
     low_parts(poses, pair[11], terms, low, 12)
     return 24
+
+
+@kernel(inline=True)
+def write_low_parts(pair, terms_at, low_at):
+    """Put the low parts of both poses at an address; returns their number, none where both poses are as given."""
+    if not (is_composed(pair[13], pair[5]) or is_composed(pair[13], pair[11])):
+        return 0
+    return _write_low_parts(pair, terms_at, low_at)

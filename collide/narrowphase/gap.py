@@ -19,6 +19,7 @@ from collide.narrowphase.fine import (
     MOST_TIES,
     SLOP_ERROR,
     SMALLEST_FINE,
+    are_alone,
     fine_height,
     fine_length,
     fine_points,
@@ -120,7 +121,9 @@ def polish_gap(pair, terms_at, doubles_at, ties_at, ids, n, parallelogram, size,
         other, other_low = fine_height(fine, k, direction)
         other, other_low = add(other, other_low, -height, -height_low)
         spread = max(spread, abs(other))
-    _, excess, _, _, _ = settle_level(pair, low, fine, 0, 3, ids, n, direction, error, ties_at, scale)
+    excess = 0.0
+    if not are_alone(pair, ids, n, direction, error):
+        excess, _, _, _ = settle_level(pair, low, fine, 0, 3, ids, n, direction, error, ties_at, scale)
     # Level pairs of the feature's vertices, and the foot, are within the spread of the first point's height; and
     # so is what lies beyond it.
     unsure = 3.0 * (spread + abs(excess)) / length + HEIGHT_ERROR + SLOP_ERROR * slop * scale

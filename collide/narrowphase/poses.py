@@ -98,16 +98,16 @@ def _is_pose(X, check):
     return _determinant(X) > 0.0
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, float64, boolean, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, int64, int64)")
 def answer_poses(
-    header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, limit, check, axes_at, out_at
+    header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, depths, limit, check, axes_at, out_at
 ):
     """Answer poses ``first`` … n − 1 of a pair, or of n pairs; 0, OPEN or BAD_POSE.
 
     header : HEADER integers; [ANSWERED] becomes the number of poses answered in all. Where it stops OPEN,
         the rows of the last block are left where the block's rows stand, for the exact stage.
     which : 0, or two shape rows a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
-    check : refuse matrices that are no rotation.
+    depths : as in `answer_pairs`.   check : refuse matrices that are no rotation.
     axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by one that parts the bodies.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed, which is where rows stand.
     """
@@ -155,7 +155,7 @@ def answer_poses(
             header[CORE],
             (
                 header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], count,
-                boolean, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
+                boolean, depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
             ),
         )  # fmt: skip
         left_open = False
@@ -213,7 +213,7 @@ def _single(header_at, A_object, B_object, boolean, row_at):
         header[CORE],
         (
             header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
-            False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
+            not boolean, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip
     marks = view_u8(row_at, ROW)

@@ -56,7 +56,7 @@ def run_pairs(
     while done < len(pairs):
         todo, out = pairs[done:], rows[done:]
         answered = answer_pairs(
-            *tables, address_of(todo), len(todo), boolean, stop_at_hit, limit, address_of(out),
+            *tables, address_of(todo), len(todo), boolean, not boolean, stop_at_hit, limit, address_of(out),
             *_of_thread.space.addresses,
         )  # fmt: skip
         _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit)
@@ -93,6 +93,7 @@ def run_poses(
     limit: float,
     check: bool,
     axes: np.ndarray | None = None,
+    depths: bool = True,
 ) -> np.ndarray | None:
     """Two convex sets at n pairs of poses: bool[n], or rows of `PAIR_DTYPE`; None where a pose is no pose.
 
@@ -100,6 +101,7 @@ def run_poses(
     X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
     check : refuse matrices that are no rotation.
     axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
+    depths : of rows: whether it is wanted how deep overlaps are.
     """
     n = len(which) if which is not None else max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
     table.plant(np.arange(2) if which is None else which)
@@ -110,7 +112,7 @@ def run_poses(
     while done < n:
         said = answer_poses(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
-            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, limit, check,
+            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
             0 if axes is None else address_of(axes), address_of(out),
         )  # fmt: skip
         if said == BAD_POSE:

@@ -267,3 +267,28 @@ def faces_in_sight(points, error):
         return faces, -1.0
     clearance = math.sqrt(least)
     return (15, -1.0) if clearance <= error else (0, clearance)
+
+
+@kernel
+def weigh_enclosed(points, weights):
+    """Weights of the first four points at the origin, which lies among them: ratios of volumes."""
+    ax = points[0]
+    ay = points[1]
+    az = points[2]
+    ex = points[POINT] - ax
+    ey = points[POINT + 1] - ay
+    ez = points[POINT + 2] - az
+    fx = points[2 * POINT] - ax
+    fy = points[2 * POINT + 1] - ay
+    fz = points[2 * POINT + 2] - az
+    gx = points[3 * POINT] - ax
+    gy = points[3 * POINT + 1] - ay
+    gz = points[3 * POINT + 2] - az
+    nx = fy * gz - fz * gy
+    ny = fz * gx - fx * gz
+    nz = fx * gy - fy * gx
+    volume = ex * nx + ey * ny + ez * nz
+    weights[1] = max(-(ax * nx + ay * ny + az * nz) / volume, 0.0)
+    weights[2] = max(-(ax * (gy * ez - gz * ey) + ay * (gz * ex - gx * ez) + az * (gx * ey - gy * ex)) / volume, 0.0)
+    weights[3] = max(-(ax * (ey * fz - ez * fy) + ay * (ez * fx - ex * fz) + az * (ex * fy - ey * fx)) / volume, 0.0)
+    weights[0] = max(1.0 - weights[1] - weights[2] - weights[3], 0.0)

@@ -30,6 +30,7 @@ from collide.narrowphase.fine import (
     LARGEST_FINE,
     SLOP_ERROR,
     SMALLEST_FINE,
+    are_alone,
     fine_height,
     fine_length,
     fine_point,
@@ -50,7 +51,7 @@ _LEVEL = 2.0**-44
 _PLANE_ERROR = 8.0 * HEIGHT_ERROR
 
 
-@kernel
+@kernel(inline=True)
 def _load(pair, low, fine, known, ids, v, scale):
     """Have the fine point of a vertex."""
     if known[v] == 0:
@@ -58,7 +59,7 @@ def _load(pair, low, fine, known, ids, v, scale):
         known[v] = 1
 
 
-@kernel
+@kernel(inline=True)
 def _set_distance(pair, low, surface, fine, distances, known, direction, f, unsure, scale):
     """Take the plane of facet f again; its distance becomes known, and its clearance if it faces outwards for certain.
 
@@ -210,7 +211,8 @@ def refine(
 
     Returns (sound, lower, depth, upper, nx, ny, nz, facet, count, alone): a proven bracket of the cores' depth, which is
     the distance of the facet's plane, and its direction; no lower one unless the origin is proven to lie inside.
-    Not sound: nothing was gained. Alone: facets that are not level with this one are farther for certain.
+    Not sound: nothing was gained. Alone: facets that are not level with this one are farther for certain; said only
+    of depths near rounding.
     """
     if not (SMALLEST_FINE < size < LARGEST_FINE):
         return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count, False
@@ -231,7 +233,7 @@ def refine(
         f = least(clearances, max(count, 8))
         taken = distances[2 * f] > -math.inf
         length, spread = _set_distance(pair, low, surface, fine, distances, known, direction, f, unsure, scale)
-        if not taken:
+        if not taken and least(clearances, max(count, 8)) != f:
             continue
         distance = distances[2 * f]
         for k in range(FINE):
@@ -239,15 +241,21 @@ def refine(
         for k in range(3):
             corners[2 * k] = ids[2 * facets[FACET * f + k]]
             corners[2 * k + 1] = ids[2 * facets[FACET * f + k] + 1]
-        _, excess, _, i, j = settle_level(
-            pair, low, fine, facets[FACET * f], POINTS - 1, corners, 3, direction, error, ties_at, scale
-        )
-        beyond = -excess / length
+        beyond = 0.0
+        i = j = -1
+        if not are_alone(pair, corners, 3, direction, error):
+            excess, _, i, j = settle_level(
+                pair, low, fine, facets[FACET * f], POINTS - 1, corners, 3, direction, error, ties_at, scale
+            )
+            beyond = -excess / length
         if beyond + spread <= max(_LEVEL * distance, 3.0 * unsure):  # three heights make a level pair's
             inner = clearances[f] if clearances[f] > 0.0 else -math.inf
             outer = distance + spread + beyond + 3.0 * unsure
             outer += _ROUNDED * abs(outer)
-            alone = _is_nearest_plane(surface, fine, direction, f, count, distance + 8.0 * unsure, 8.0 * unsure * length)
+            # Asked for only where doubles cannot tell the sign.
+            alone = distance * over < 4.0 * error and _is_nearest_plane(
+                surface, fine, direction, f, count, distance + 8.0 * unsure, 8.0 * unsure * length
+            )
             return (
                 True, inner * over, distance * over, outer * over,
                 -direction[0] / length, -direction[2] / length, -direction[4] / length, f, count, alone,

@@ -23,7 +23,7 @@ POINTS = EPA_VERTICES + 8
 WIDEST_BORDER = 512
 
 #: Doubles and integers of workspace one run needs (see `workspace`).
-DOUBLES = (POINT + 6) * POINTS + (PLANE + 4) * EPA_FACETS + 8
+DOUBLES = (POINT + 6) * POINTS + (PLANE + 4) * EPA_FACETS
 INTEGERS = 3 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST_BORDER
 
 
@@ -67,60 +67,67 @@ def fine_workspace(doubles_at, integers_at):
 
 
 @kernel(inline=True)
-def set_facet(surface, f, i, j, k, error, depth):
-    """Facet f on vertices i, j, k, counter-clockwise from outside; its plane's signed distance.
+def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
+    """(nx, ny, nz, distance, clearance) of a triangle, counter-clockwise from outside; n = 0 where it has no area.
 
-    The distance is the least of the three vertices': for any unit normal, however badly a thin
-    triangle defines it, no point of the facet lies nearer the origin.
+    distance : the least of the corners' along the unit normal: for any unit normal, however badly a thin triangle
+        defines it, no point of the triangle lies nearer the origin.
+    clearance : the same where the origin provably lies behind the triangle, by the bound of
+        `simplex._height_behind`, else −1.   error : how far each corner may be from its true place.
     """
-    points, planes, reaches, clearances, _, facets, _, _, _ = surface
-    facets[FACET * f] = i
-    facets[FACET * f + 1] = j
-    facets[FACET * f + 2] = k
-    facets[FACET * f + 6] = 0
-    a = POINT * i
-    b = POINT * j
-    c = POINT * k
-    ex = points[b] - points[a]
-    ey = points[b + 1] - points[a + 1]
-    ez = points[b + 2] - points[a + 2]
-    fx = points[c] - points[a]
-    fy = points[c + 1] - points[a + 1]
-    fz = points[c + 2] - points[a + 2]
+    ex = bx - ax
+    ey = by - ay
+    ez = bz - az
+    fx = cx - ax
+    fy = cy - ay
+    fz = cz - az
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
     square = nx * nx + ny * ny + nz * nz
-    at = PLANE * f
     if square == 0.0:
-        planes[at] = 0.0
-        planes[at + 1] = 0.0
-        planes[at + 2] = 0.0
-        planes[at + 3] = math.inf
-        reaches[f] = math.inf
-        clearances[f] = -1.0
-        return
-    # Whether the origin is provably behind it: the bound of `simplex._height_behind`, here from what is at hand.
-    edges = (abs(ex) + abs(ey) + abs(ez)) * (abs(fx) + abs(fy) + abs(fz))
-    sides = abs(ex) + abs(ey) + abs(ez) + abs(fx) + abs(fy) + abs(fz)
-    corner = abs(points[a]) + abs(points[a + 1]) + abs(points[a + 2])
-    behind = nx * points[a] + ny * points[a + 1] + nz * points[a + 2] > 2.0 * error * (edges + 2.0 * corner * sides)
+        return 0.0, 0.0, 0.0, math.inf, -1.0
+    e = abs(ex) + abs(ey) + abs(ez)
+    f = abs(fx) + abs(fy) + abs(fz)
+    a = abs(ax) + abs(ay) + abs(az)
+    behind = nx * ax + ny * ay + nz * az > 2.0 * error * (e * f + 2.0 * a * (e + f))
     shorten = 1.0 / math.sqrt(square)
     nx *= shorten
     ny *= shorten
     nz *= shorten
-    distance = min(
-        nx * points[a] + ny * points[a + 1] + nz * points[a + 2],
-        nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
-        nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
-    )
+    distance = nx * ax + ny * ay + nz * az
+    distance = min(distance, nx * bx + ny * by + nz * bz)
+    distance = min(distance, nx * cx + ny * cy + nz * cz)
+    return nx, ny, nz, distance, distance if behind else -1.0
+
+
+@kernel(inline=True)
+def set_facet(surface, f, i, j, k, error, depth):
+    """Slot f becomes the facet on vertices i, j, k, counter-clockwise from outside.
+
+    Eight at a time in vectors took longer than one by one: corners have to be gathered, and what is stored singly
+    is slow to load together.
+    """
+    points, planes, reaches, clearances, _, facets, _, _, _ = surface
+    a = POINT * i
+    b = POINT * j
+    c = POINT * k
+    nx, ny, nz, distance, clearance = plane_of(
+        points[a], points[a + 1], points[a + 2], points[b], points[b + 1], points[b + 2],
+        points[c], points[c + 1], points[c + 2], error,
+    )  # fmt: skip
+    facets[FACET * f] = i
+    facets[FACET * f + 1] = j
+    facets[FACET * f + 2] = k
+    facets[FACET * f + 6] = 0
+    at = PLANE * f
     planes[at] = nx
     planes[at + 1] = ny
     planes[at + 2] = nz
     planes[at + 3] = distance
     # A facet farther off than a known way out will never be the nearest.
     reaches[f] = distance if distance <= depth else math.inf
-    clearances[f] = distance if behind else -1.0
+    clearances[f] = clearance
 
 
 @kernel
