@@ -9,7 +9,14 @@ import numpy as np
 from collide._jit import address_of, entry, view_f64
 from collide.geometry import double_double
 from collide.geometry.error_free import dekker_product, two_product, two_sum
-from collide.geometry.scan import count_level, count_level_one_by_one, farthest, farthest_one_by_one, least, least_one_by_one
+from collide.geometry.scan import (
+    count_level,
+    count_level_one_by_one,
+    farthest,
+    farthest_one_by_one,
+    least,
+    least_one_by_one,
+)
 
 
 @entry("void(int64, int64, int64)")

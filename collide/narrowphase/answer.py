@@ -10,12 +10,20 @@ from __future__ import annotations
 import math
 
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide.geometry.double_double import add, bracket
+from collide.geometry.error_free import two_sum
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
-from collide.geometry.double_double import add, bracket
-from collide.geometry.error_free import two_sum
-from collide.narrowphase.bounds import ERROR, GJK_ROUNDS, PROMISE_CURVED, PROMISE_DEPTH, PROMISE_STORED, ROOMY, TOLERANCE_CURVED
+from collide.narrowphase.bounds import (
+    ERROR,
+    GJK_ROUNDS,
+    PROMISE_CURVED,
+    PROMISE_DEPTH,
+    PROMISE_STORED,
+    ROOMY,
+    TOLERANCE_CURVED,
+)
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa.expand import FLAT, epa, facet_of
 from collide.narrowphase.epa.refine import refine

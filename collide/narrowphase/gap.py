@@ -8,8 +8,6 @@ Where they are not, doubles stopped at the wrong one of several nearly level fea
 
 from __future__ import annotations
 
-import math
-
 from collide._jit import kernel, view_f64
 from collide.geometry.double_double import add, divide
 from collide.narrowphase.fine import (
@@ -50,7 +48,7 @@ def _foot_is_inside_edge(fine):
     square = ex * ex + ey * ey + ez * ez
     along = -(x * ex + y * ey + z * ez)
     margin = _WEIGHT_ERROR * (abs(x) + abs(y) + abs(z)) * (abs(ex) + abs(ey) + abs(ez))
-    return margin < along and along < square - margin
+    return margin < along < square - margin
 
 
 @kernel(inline=True)
