@@ -36,15 +36,14 @@ from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_w
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.requests import ENTRY, REQUESTS, add_request
 from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
-    EXACT_ROUNDS,
     HIT,
     HOW,
     ITERATIONS,
     LOWER,
-    NEAREST_PLANE,
     NORMAL,
     ROW,
     UPPER,
@@ -62,9 +61,11 @@ from collide.transforms import SMALLEST
 _WEIGHTS = 5 * POINT
 _FINE = 64
 _NEAREST, _TIES = 10, 16
-_OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIES + GAP_INTEGERS
-#: Workspace of one thread.
-DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
+_TIED = _TIES + GAP_INTEGERS
+_OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIED + ENTRY
+#: Workspace of one thread; the requests to the exact stage stand last.
+REQUESTS_AT = _OWN_INTEGERS + EPA_INTEGERS
+DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, REQUESTS_AT + REQUESTS
 
 
 @kernel
@@ -136,7 +137,7 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     depth : of the cores; minus their distance where they are apart.
     bound : lower bound of the core distance before ``error``, negative for overlap.
     above : upper bound of the signed core distance before ``error``.
-    shallowest, deepest, alone : by `refine`: proven bracket of the depth, or (−∞, ∞), and what it says of the plane.
+    shallowest, deepest : proven bracket of the depth by `refine`, or (−∞, ∞).
     nx, ny, nz : from A towards B.
     n, vertices : points of the deciding feature in the workspace, and how many of its ids to show.
     rounds : of GJK, plus 65536 times those of EPA.
@@ -147,13 +148,13 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     status, n, bound, clearance, rounds = gjk(pair, points, ids, weights, boolean, radius, limit, error, GJK_ROUNDS)
     core = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
     if status == NEAREST or status == APART:
-        return -core, bound, core, -math.inf, math.inf, False, -weights[7], -weights[8], -weights[9], n, n, rounds
+        return -core, bound, core, -math.inf, math.inf, -weights[7], -weights[8], -weights[9], n, n, rounds
     above = -clearance if status == ENCLOSED else core
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if not depths and (above + error < radius or exactly):
         if status == ENCLOSED and not boolean:
             weigh_enclosed(points, weights)
-        return -above, -math.inf, above, -math.inf, math.inf, False, 0.0, 0.0, 1.0, n, n, rounds
+        return -above, -math.inf, above, -math.inf, math.inf, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
     roomy = status == ENCLOSED and clearance > ROOMY * size
@@ -165,20 +166,17 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     rounds += 65536 * max(vertices - 4, 0)
     shallowest = -math.inf
     deepest = math.inf
-    alone = False
     if outcome == FLAT:
         shown = n
-        if vertices == 3 and not curved and radius == 0.0:  # what spans it: for the exact stage, which may prove it flat
+        if vertices == 3 and not curved:  # what spans it: for the exact stage, which may prove it flat
             _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
-            for k in range(6):
-                ids[k] = spanning[k]
-            shown = 3
-        return depth, -depth, above, shallowest, deepest, alone, nx, ny, nz, n, shown, rounds
+            _name_plane(spanning, view_i64(integers_at + 8 * _TIED, ENTRY))
+        return depth, -depth, above, shallowest, deepest, nx, ny, nz, n, shown, rounds
     width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
     if exactly and depths and not (surface > error and width <= PROMISE_DEPTH * (depth + radius)):
-        sound, low, level, high, ux, uy, uz, nearest, count, alone = refine(
+        sound, low, level, high, ux, uy, uz, nearest, count = refine(
             pair, terms_at, epa_at, ids_at, doubles_at + 8 * _FINE, integers_at + 8 * _NEAREST, integers_at + 8 * _TIES,
-            count, vertices, size, slop, error,
+            view_i64(integers_at + 8 * _TIED, ENTRY), count, vertices, size, slop, error,
         )  # fmt: skip
         if sound:
             shallowest, depth, deepest, nx, ny, nz, facet = low, level, high, ux, uy, uz, nearest
@@ -190,13 +188,13 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     )
     if surface > error:
         above = min(above, -surface)
-    return depth, -depth, above, shallowest, deepest, alone, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds
+    return depth, -depth, above, shallowest, deepest, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds
 
 
 @kernel(inline=True)
 def _swept(
     pair, terms_at, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
-    slop, error, exactly, flip,
+    slop, error, exactly, flip, row_number,
 ):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
@@ -211,15 +209,15 @@ def _swept(
     sign = (-1.0 if flip else 1.0) if boolean else 0.0
     for axis in range(3):
         weights[7 + axis] = sign * row[NORMAL + axis]
+    view_i64(integers_at + 8 * _TIED, 2)[1] = 0
     closed_form = method(kind_a, n_a, kind_b, n_b) == CAPSULES
     if closed_form:
         depth, bound, above, nx, ny, nz = _segments(pair, points, ids, weights, error)
         n, vertices, rounds = 4, 4, 0
         shallowest = -math.inf
         deepest = math.inf
-        alone = False
     else:
-        depth, bound, above, shallowest, deepest, alone, nx, ny, nz, n, vertices, rounds = _cores(
+        depth, bound, above, shallowest, deepest, nx, ny, nz, n, vertices, rounds = _cores(
             pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved,
             exactly and not curved,
         )  # fmt: skip
@@ -256,8 +254,11 @@ def _swept(
     unfinished = marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0) and (depths or upper > 0.0)
     if width == 0.0 and (not decided or unfinished):
         marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
-        if alone:
-            marks[EXACT_ROUNDS] = NEAREST_PLANE
+        tied = view_i64(integers_at + 8 * _TIED, ENTRY)
+        if closed_form:
+            _name_plane(ids, tied)
+        if tied[1] > 0 and not boolean:
+            add_request(view_i64(integers_at + 8 * REQUESTS_AT, REQUESTS), row_number, tied)
     if boolean and marks[HOW] != UNDECIDED:
         if marks[HIT] == 0:
             row[NORMAL] = sign * nx
@@ -287,6 +288,15 @@ def _swept(
         flip,
     )  # fmt: skip
     write_vertices(words, marks, ids, vertices, flip)
+
+
+@kernel
+def _name_plane(ids, tied):
+    """An entry of `requests.py`: the plane of three points, which may be all there is."""
+    tied[0] = 0
+    tied[1] = 1
+    for k in range(6):
+        tied[2 + k] = ids[k]
 
 
 @kernel(inline=True)
@@ -403,6 +413,7 @@ def answer_pairs(
     rows : PAIR_DTYPE, zeroed but for that.   doubles, integers : workspace, see `run`.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
+    view_i64(integers_at + 8 * REQUESTS_AT, 1)[0] = 0
     for k in range(n_pairs):
         row = view_f64(rows_at + ROW * k, 12)
         words = view_i32(rows_at + ROW * k, ROW // 4)
@@ -410,8 +421,8 @@ def answer_pairs(
         pa = pairs[2 * k]
         pb = pairs[2 * k + 1]
         _answer(
-            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, depths, limit, row, words, marks, doubles_at,
-            integers_at,
+            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, k, boolean, depths, limit, row, words, marks,
+            doubles_at, integers_at,
         )  # fmt: skip
         if stop_at_hit and marks[HIT] == 1:
             return k + 1
@@ -420,8 +431,8 @@ def answer_pairs(
 
 @kernel(inline=True)
 def _answer(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, boolean, depths, limit, row, words, marks, doubles_at,
-    integers_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, row_number, boolean, depths, limit, row, words, marks,
+    doubles_at, integers_at,
 ):  # fmt: skip
     shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
     sa = shape_of[pa]
@@ -454,5 +465,5 @@ def _answer(
     else:
         _swept(
             pair, terms_at, sa, sb, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
-            slop, ERROR * size + slop, known, flip,
+            slop, ERROR * size + slop, known, flip, row_number,
         )  # fmt: skip

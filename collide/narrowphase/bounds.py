@@ -30,12 +30,15 @@ ERROR = 64 * 2.0**-53
 #: 2⁻⁸⁰ each, a quotient, a root and a quotient more.
 EXACT_ERROR = 2.0**-75
 
-#: What that may be off by besides, below the size where a relative error holds.
-SUBNORMAL, SMALLEST_NORMAL = 1e-321, 1e-290
+#: What that may be off by besides, below the size where a relative error holds: each of two doubles is rounded to a
+#: multiple of 5e-324.
+SUBNORMAL, SMALLEST_NORMAL = 1e-323, 1e-290
 
 #: `certified` promises a proven sign and a bracket at most this wide, for cores of points: four units in the last
 #: place of a gap, and this much of a depth.
 PROMISE_GAP, PROMISE_DEPTH = 2.0**-50, 1e-12
+#: Four units in the last place of the smallest doubles.
+PROMISE_SUBNORMAL = 2e-323
 #: The same in units of S for shapes whose stored points are rounded (`PackedConvex.slop`), and for unions of parts.
 PROMISE_STORED = 2.0**-40
 #: The same where a cylinder, cone or ellipsoid takes part.

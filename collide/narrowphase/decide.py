@@ -13,11 +13,13 @@ from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
-from collide.narrowphase.exact import INTEGERS as HULL_DIGITS
-from collide.narrowphase.exact import SEPARATE, TOUCHING, UNDONE, depth_of_plane, touch_exactly
+from collide.narrowphase.exact.plane_depth import nearest_plane
+from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_exactly
+from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.exact_plane import reach_plane_exactly
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.requests import REQUESTS, find_request
 from collide.narrowphase.rows import (
     COUNT,
     DISTANCE,
@@ -25,7 +27,6 @@ from collide.narrowphase.rows import (
     HIT,
     HOW,
     LOWER,
-    NEAREST_PLANE,
     NORMAL,
     POINT_A,
     POINT_B,
@@ -58,20 +59,23 @@ def _set_normal(row, vx, vy, vz, distance, flip):
         row[POINT_B + axis] = middle + 0.5 * distance * v
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)")
 def decide_pairs(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
-):
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
+    requests_at, digits_at,
+):  # fmt: skip
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
 
-    Arguments as there; terms, n_terms : of the `PoseTable`; digits : int64 workspace of DIGITS + 16. What
+    Arguments as there; terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
+    workspace of DIGITS + 16. What
     stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     terms = view_f64(terms_at, 12 * TERMS * n_terms)
     digits = view_i64(digits_at, DIGITS)
-    ids = view_i64(digits_at + 8 * DIGITS, 10)
-    facet = view_i64(digits_at + 8 * (DIGITS + 10), 6)
+    ids = view_i64(digits_at + 8 * DIGITS, 16)
+    requests = view_i64(requests_at, REQUESTS)
+    asked_at = 1
     settled = 0
     for k in range(n_pairs):
         row = view_f64(rows_at + ROW * k, 12)
@@ -105,10 +109,6 @@ def decide_pairs(
         low_b = ints[INTS * sb + LOWEST]
         reach_b = numbers[NUMBERS * sb + REACH]
         radius_b = numbers[NUMBERS * sb + RADIUS]
-        spanned = marks[COUNT]
-        alone = marks[EXACT_ROUNDS] == NEAREST_PLANE
-        for j in range(6):
-            facet[j] = ids[j]
         if plane:
             rounds = 1
             shown = 1
@@ -141,9 +141,11 @@ def decide_pairs(
         elif verdict == TOUCHING:
             distance = min(distance, 0.0)
             upper = min(upper, 0.0)
-            if spanned >= 3 and not boolean:
-                proven, depth, depth_low = depth_of_plane(
-                    pair, terms, digits, facet, alone, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+            entry_at, asked = find_request(requests, asked_at, k)
+            asked_at = entry_at - 1
+            if not boolean:
+                proven, depth, depth_low = nearest_plane(
+                    pair, terms, digits, requests, entry_at if asked else 0, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                     size, error,
                 )  # fmt: skip
                 if proven:

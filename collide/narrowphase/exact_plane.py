@@ -21,15 +21,8 @@ from collide.geometry.digits import (
     lowest_bit,
 )
 from collide.geometry.double_double import add, divide, square_root
-from collide.narrowphase.exact import (
-    SEPARATE,
-    TOUCHING,
-    UNDONE,
-    add_entry,
-    exact_pose,
-    lowest_and_largest,
-    span_of_entries,
-)
+from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE
+from collide.narrowphase.exact.workspace import add_entry, exact_pose, lowest_and_largest, span_of_entries
 from collide.narrowphase.halfspace_convex import plane_in_world
 
 #: Most digits of any number that is multiplied once more.

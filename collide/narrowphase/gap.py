@@ -14,19 +14,17 @@ from collide.narrowphase.fine import (
     FINE,
     HEIGHT_ERROR,
     LARGEST_FINE,
-    MOST_TIES,
     SLOP_ERROR,
     SMALLEST_FINE,
-    are_alone,
     fine_height,
     fine_length,
     fine_points,
     scale_of,
     set_away_from_edge,
     set_plane,
-    settle_level,
     write_low_parts,
 )
+from collide.narrowphase.level import MOST_TIES, are_alone, settle_level
 
 #: Doubles of workspace: four points, a direction, low parts of two poses. Integers: ties.
 GAP_DOUBLES, GAP_INTEGERS = 4 * FINE + FINE + 24, 2 * (MOST_TIES + 1)

@@ -10,12 +10,11 @@ from collide.geometry.error_free import two_product, two_sum
 from collide.narrowphase.fine import (
     HEIGHT_ERROR,
     LARGEST_FINE,
-    MOST_TIES,
     SMALLEST_FINE,
     is_composed,
     scale_of,
-    tied_vertices,
 )
+from collide.narrowphase.level import MOST_TIES, tied_vertices
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
-from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP
+from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 
@@ -19,9 +19,6 @@ DISTANCE, LOWER, UPPER = _at("distance", 8), _at("lower", 8), _at("upper", 8)
 NORMAL, POINT_A, POINT_B = _at("normal", 8), _at("point_a", 8), _at("point_b", 8)
 VERTICES_A, VERTICES_B, ITERATIONS = _at("vertices_a", 4), _at("vertices_b", 4), _at("iterations", 4)
 COUNT, HOW, EXACT_ROUNDS, HIT = _at("count", 1), _at("how", 1), _at("exact", 1), _at("hit", 1)
-#: In EXACT_ROUNDS of a row that is left to the exact stage: its vertices span a plane of A ⊖ B that no other one is
-#: nearer than (see `exact.depth_of_plane`).
-NEAREST_PLANE = 1
 CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
 
 
@@ -63,6 +60,8 @@ def write_verdict(row, marks, distance, lower, upper, how, width, limit):
     distance = min(max(distance, lower), upper) + 0.0  # never −0.0
     row[DISTANCE] = distance
     width = max(width, PROMISE_GAP * distance if distance > 0.0 else -PROMISE_DEPTH * distance)
+    if distance != 0.0:
+        width = max(width, PROMISE_SUBNORMAL)
     decided = lower > 0.0 or upper <= 0.0
     marks[HOW] = how if decided else UNDECIDED
     marks[HIT] = 0 if lower > 0.0 else 1

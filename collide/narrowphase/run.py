@@ -10,7 +10,7 @@ import numpy as np
 from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
-from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
+from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.decide import DIGITS, decide_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
@@ -78,7 +78,7 @@ def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boole
     if (rows["how"] == UNDECIDED).any():
         decide_pairs(
             *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
-            address_of(_of_thread.space.digits),
+            _of_thread.space.addresses[1] + 8 * REQUESTS_AT, address_of(_of_thread.space.digits),
         )  # fmt: skip
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
 

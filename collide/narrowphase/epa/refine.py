@@ -30,16 +30,16 @@ from collide.narrowphase.fine import (
     LARGEST_FINE,
     SLOP_ERROR,
     SMALLEST_FINE,
-    are_alone,
     fine_height,
     fine_length,
     fine_point,
     scale_of,
     set_plane,
-    settle_level,
     write_low_parts,
 )
+from collide.narrowphase.level import are_alone, settle_level
 from collide.narrowphase.minkowski import place_vertices
+from collide.narrowphase.requests import MOST_TIED
 
 #: Vertices added, diagonals flipped and planes taken again before a run hands over the bracket it has.
 _STEPS = 512
@@ -183,39 +183,42 @@ def _forget(distances, clearances, f, error, scale):
 
 
 @kernel
-def _is_nearest_plane(surface, fine, direction, f, count, distance, level):
-    """Whether all facets that are not level with f, as far as can be told, are farther from the origin than this.
-
-    direction : minus the normal of f.
-    """
-    _, _, _, clearances, _, facets, _, _, _ = surface
-    base, base_low = fine_height(fine, facets[FACET * f], direction)
-    for g in range(count):
-        if clearances[g] <= distance:
-            for corner in range(3):
-                height, height_low = fine_height(fine, facets[FACET * g + corner], direction)
-                height, height_low = subtract(height, height_low, base, base_low)
-                if abs(height) > level:
-                    return False
-    return True
+def _name_tied(surface, distance, f, count, tied):
+    """Enter the corners of facet f and of all others that may be as near the origin, for the exact stage."""
+    _, _, _, clearances, ids, facets, _, _, _ = surface
+    tied[0] = 1
+    tied[1] = 0
+    for turn in range(count + 1):
+        g = f if turn == 0 else turn - 1
+        if clearances[g] > distance or (turn > 0 and g == f):
+            continue
+        if tied[1] == MOST_TIED:
+            tied[0] = 0
+            break
+        at = 2 + 6 * tied[1]
+        for k in range(3):
+            v = facets[FACET * g + k]
+            tied[at + 2 * k] = ids[2 * v]
+            tied[at + 2 * k + 1] = ids[2 * v + 1]
+        tied[1] += 1
 
 
 @kernel
 def refine(
-    pair, terms_at, doubles_at, integers_at, direction_at, corners_at, ties_at, count, vertices, size, slop, error
+    pair, terms_at, doubles_at, integers_at, direction_at, corners_at, ties_at, tied, count, vertices, size, slop, error
 ):  # fmt: skip
     """Grow the surface that `epa` left until its nearest facet is final to the last digits.
 
     direction_at, corners_at, ties_at : further workspace: FINE + 24 doubles, 6 integers and `settle_level`'s.
+    tied : an entry of `requests.py` out, where the depth is near rounding.
     count, vertices : as left.   size, slop, error : of the pair.
 
-    Returns (sound, lower, depth, upper, nx, ny, nz, facet, count, alone): a proven bracket of the cores' depth, which is
+    Returns (sound, lower, depth, upper, nx, ny, nz, facet, count): a proven bracket of the cores' depth, which is
     the distance of the facet's plane, and its direction; no lower one unless the origin is proven to lie inside.
-    Not sound: nothing was gained. Alone: facets that are not level with this one are farther for certain; said only
-    of depths near rounding.
+    Not sound: nothing was gained.
     """
     if not (SMALLEST_FINE < size < LARGEST_FINE):
-        return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count, False
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count
     surface = workspace(doubles_at, integers_at)
     points, _, _, clearances, ids, facets, starts, _, _ = surface
     fine, distances, known = fine_workspace(doubles_at, integers_at)
@@ -252,13 +255,11 @@ def refine(
             inner = clearances[f] if clearances[f] > 0.0 else -math.inf
             outer = distance + spread + beyond + 3.0 * unsure
             outer += _ROUNDED * abs(outer)
-            # Asked for only where doubles cannot tell the sign.
-            alone = distance * over < 4.0 * error and _is_nearest_plane(
-                surface, fine, direction, f, count, distance + 8.0 * unsure, 8.0 * unsure * length
-            )
+            if distance * over < 4.0 * error:
+                _name_tied(surface, distance + 8.0 * unsure, f, count, tied)
             return (
                 True, inner * over, distance * over, outer * over,
-                -direction[0] / length, -direction[2] / length, -direction[4] / length, f, count, alone,
+                -direction[0] / length, -direction[2] / length, -direction[4] / length, f, count,
             )  # fmt: skip
         v = _find_vertex(ids, vertices, i, j)
         if v >= 0:
@@ -279,4 +280,4 @@ def refine(
             if vertices == facets[FACET * g + 2]:  # the apex stands last in what was made for it
                 _forget(distances, clearances, g, error, scale)
         vertices += 1
-    return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count, False
+    return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count
