@@ -10,10 +10,11 @@ from collide._jit import kernel
 
 #: Facets an entry may name: around a corner that touches a face there are a dozen.
 MOST_TIED = 24
-#: Integers of one entry, without its row; and of a list. A block of rows that all ask fits; of a longer call, what does
-#: not fit is left out, and its depths are not proven below rounding.
+#: Rows that are answered before the exact stage has its turn; integers of one entry, without its row, and of a list that
+#: fits if all of these rows ask.
+ROWS_TOGETHER = 256
 ENTRY = 2 + 6 * MOST_TIED
-REQUESTS = 1 + 64 * (1 + ENTRY)
+REQUESTS = 1 + ROWS_TOGETHER * (1 + ENTRY)
 
 
 @kernel
@@ -21,8 +22,6 @@ def add_request(requests, row, tied):
     """Append an entry ``tied``: whether it is complete, how many facets, their corners."""
     used = requests[0]
     length = 2 + 6 * tied[1]
-    if used + 2 + length > REQUESTS:
-        return
     requests[used + 1] = row
     for k in range(length):
         requests[used + 2 + k] = tied[k]

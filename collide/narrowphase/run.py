@@ -26,6 +26,7 @@ from collide.narrowphase.poses import (
     collide_single,
     distance_single,
 )
+from collide.narrowphase.requests import ROWS_TOGETHER
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
@@ -54,7 +55,8 @@ def run_pairs(
     tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
     done = 0
     while done < len(pairs):
-        todo, out = pairs[done:], rows[done:]
+        last = len(pairs) if boolean else done + ROWS_TOGETHER
+        todo, out = pairs[done:last], rows[done:last]
         answered = answer_pairs(
             *tables, address_of(todo), len(todo), boolean, not boolean, stop_at_hit, limit, address_of(out),
             *_of_thread.space.addresses,
