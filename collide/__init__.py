@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
-    from collide.query import collide, distance
+    from collide.query import collide, distance, walk
     from collide.results import PairResult, WorldResult
     from collide.robot import Robot
     from collide.shapes import (
@@ -53,7 +53,7 @@ _HOMES = {
         "UnknownBody", "UnsupportedQuery",
     ),
     "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
-    "collide.query": ("collide", "distance"),
+    "collide.query": ("collide", "distance", "walk"),
     "collide.results": ("PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
     "collide.shapes": (
@@ -69,7 +69,7 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
     "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "PairResult", "Robot",
     "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
-    "distance", "pose", "verify",
+    "distance", "pose", "verify", "walk",
 ]
 
 

@@ -73,6 +73,15 @@ def certificate_of(A, B, X_WA, X_WB, row) -> tuple[Certificate, ...] | None:
     )
 
 
+def certificate_from(A, B, X_WA, X_WB, pairs, *, hit: bool) -> tuple[Certificate, ...]:
+    """The certificate of a boolean about two convex polytopes, from vertex pairs to begin the exact search with.
+
+    pairs : one to four (vertex of A, vertex of B) near where the bodies meet, or are nearest each other.
+    """
+    (a,), (b,) = _posed(A, X_WA), _posed(B, X_WB)
+    return (_make(a, b, 0, 0, list(pairs)[:4], hit=hit),)
+
+
 def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     """Check in Python integers that the certificate of a single result proves its boolean.
 

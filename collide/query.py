@@ -18,7 +18,17 @@ from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
 
 
-def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axes: np.ndarray | None = None):
+def collide(
+    A,
+    B,
+    X_WA,
+    X_WB,
+    *,
+    check_poses: bool = True,
+    threads: int = 1,
+    axes: np.ndarray | None = None,
+    algorithm: str | None = None,
+):
     """Whether the closed sets A and B share a point.
 
     Parameters
@@ -32,14 +42,19 @@ def collide(A, B, X_WA, X_WB, *, check_poses: bool = True, threads: int = 1, axe
     axes : warm start, float64 (N, 3): for each pose an axis that may part the bodies, zeros where none is
         known. Tried first, and replaced where the bodies are apart by an axis that does: hand the same
         array to the next call, when they have moved a little. It can only save time; answers are the same.
+    algorithm : "gjk" (or None), the default; or "barba-langerman", for two convex polytopes and one thread: the walk
+        along bounded hierarchies, in O(log n + log m) rounds (docs/barba-langerman.md). The answers are the same;
+        the default is faster. The hierarchies are built when first asked for, and kept with the shapes.
 
     Returns
     -------
     bool for single poses, bool[N] otherwise. Touching is a hit; where rounding leaves the sign
     open (`PairResult.how` is "undecided"), the answer is True.
 
-    Raises InvalidPose, InvalidArgument.
+    Raises InvalidPose, InvalidArgument; UnsupportedQuery for shapes that the algorithm does not serve.
     """
+    if algorithm is not None and algorithm != "gjk":
+        return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     if threads != 1:
@@ -61,6 +76,38 @@ def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     _prepare(A, B)
     hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
     return bool(hits[0]) if single else hits
+
+
+def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algorithm):
+    if algorithm != "barba-langerman":
+        raise InvalidArgument(f'algorithm must be "gjk" or "barba-langerman", got {algorithm!r}')
+    if axes is not None or threads != 1:
+        raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
+    found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
+    return bool(found.hit[0]) if _is_single(X_WA) and _is_single(X_WB) else found.hit
+
+
+def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
+    """What `collide` says with ``algorithm="barba-langerman"``, with its counts: `collide.walks.Walks`.
+
+    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`.   X_WA, X_WB, check_poses : as there.
+    trace : also return the rounds of the last pose one by one.
+
+    Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes.
+    """
+    from collide import walks
+
+    for shape in (A, B):
+        walks.walk_body(shape)
+    X_WA, X_WB, _ = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB = as_poses(X_WA, "X_WA", check=check_poses), as_poses(X_WB, "X_WB", check=check_poses)
+
+    def answer_open(left: np.ndarray) -> np.ndarray:
+        X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
+        hits = ask(A, B, X_WO, X_WT, True, 0.0, False, 1)
+        return np.broadcast_to(hits, (len(left),))
+
+    return walks.walk_poses(A, B, X_WA, X_WB, answer_open, trace=trace)
 
 
 #: Longest warm-start axis: its square is far from overflow.

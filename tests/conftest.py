@@ -1,4 +1,4 @@
-"""Makes the references in `naive.py` and `hull_families.py` importable by name: tests are no package and not on the path."""
+"""Makes the references `naive.py`, `hull_families.py` and `reference_walk.py` importable by name: tests are no package and not on the path."""
 
 from __future__ import annotations
 
@@ -17,3 +17,4 @@ def _register(name: str) -> None:
 
 _register("naive")
 _register("hull_families")
+_register("reference_walk")

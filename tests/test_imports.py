@@ -37,6 +37,7 @@ ROOMS = {
     "certificates": {"errors", "transforms", "geometry", "results"},
     "unions": {"geometry", "narrowphase", "results"},
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
+    "walks": {"errors", "geometry", "shapes", "narrowphase"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
@@ -47,6 +48,8 @@ ROOMS = {
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
+    "query": {"walks"},
+    "walks": {"certificates"},
     "results": {"certificates"},
     "robot": {"scenes"},
     "reports": {"rich"},

@@ -18,12 +18,14 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial")
+    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
+    #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`walks.py`).
+    _walk: Any
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True

@@ -1,0 +1,243 @@
+"""The walk of Barba and Langerman: rounds and constant-size tests against the number of vertices, and time.
+
+    python benchmarks/walk.py                # some minutes; --sizes, --kinds, --no-csv, --plot FILE
+
+Pairs of bodies of n vertices of several kinds, at poses of which about half meet and many nearly touch. Counts are
+exact, so they are fitted: rounds ≤ a + b·(log2 n + log2 m), for the mean and for the largest of all poses. Time is
+taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is compared with
+the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole bodies at once
+(early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from supports import cloud, least
+
+import collide
+from collide.narrowphase.barba_langerman.run import run_walks
+from collide.narrowphase.barba_langerman.walk import APART
+
+SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
+KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")
+#: Beyond this the vertices of "doubling" are nearer to one another than doubles tell apart.
+MOST_DOUBLING = 200_000
+POSES = 1000
+#: Poses timed together: few enough that a turn is seldom interrupted.
+CHUNK = 100
+TURNS = 9
+
+
+def degree_doubling(n: int) -> np.ndarray:
+    """The polyhedron of section 4: over every face at one vertex q of a tetrahedron a new vertex, again and again.
+
+    Each has degree three when it is made, and the degree of q doubles. At least n vertices, the first one q.
+    """
+    q = np.array([0.0, 0.0, 1.0])
+    angle = np.arange(3) * (2 * np.pi / 3)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle - 0.5], axis=1)
+    outer = np.tile([0.0, 0.0, -1.0, 0.5], (3, 1))  # the planes beyond the edges of the ring: ⟨n, x⟩ ≤ d
+    points = [q[None], ring]
+    while sum(map(len, points)) < n:
+        a, b = ring, np.roll(ring, -1, axis=0)
+        normal = np.cross(a - q, b - q)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        height = normal @ q
+        middle = (q + a + b) / 3
+        room = np.full(len(ring), np.inf)
+        for n_other, d_other in (
+            (np.roll(normal, 1, axis=0), np.roll(height, 1)), (np.roll(normal, -1, axis=0), np.roll(height, -1)),
+            (outer[:, :3], outer[:, 3]),
+        ):  # fmt: skip
+            along = (normal * n_other).sum(axis=1)
+            left = d_other - (middle * n_other).sum(axis=1)
+            with np.errstate(divide="ignore"):
+                room = np.where(along > 0, np.minimum(room, left / along), room)
+        made = middle + (0.2 * np.minimum(room, 0.1))[:, None] * normal
+        new = np.cross(made - a, b - a)
+        new *= np.sign((new * (a - q)).sum(axis=1))[:, None]
+        planes = np.concatenate([new, (new * a).sum(axis=1)[:, None]], axis=1)
+        ring = np.stack([a, made], axis=1).reshape(-1, 3)
+        outer = np.repeat(planes / np.linalg.norm(new, axis=1)[:, None], 2, axis=0)
+        points.append(made)
+    return np.concatenate(points)
+
+
+def body(kind: str, n: int, seed: int) -> collide.ConvexHull:
+    """About n vertices. "doubling" is the example of section 4: the degree of one vertex doubles level by level."""
+    if kind == "doubling":
+        return collide.ConvexHull(degree_doubling(n))
+    points = cloud(kind, n + seed)
+    return collide.ConvexHull(points)
+
+
+def poses(A, B, rng) -> np.ndarray:
+    """A turned at random about the origin, and moved so far along a random line that the bodies are near touching."""
+    X = np.tile(np.eye(4), (POSES, 1, 1))
+    q = rng.standard_normal((POSES, 4))
+    w, x, y, z = (q / np.linalg.norm(q, axis=1)[:, None]).T
+    X[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1)
+    X[:, 1, :3] = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1)
+    X[:, 2, :3] = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
+    line = rng.standard_normal((POSES, 3))
+    line /= np.linalg.norm(line, axis=1)[:, None]
+    # Extents along the line overlap by −10 % to 30 %; a random tenth is at a thousandth of that.
+    some = slice(None, None, max(1, len(A.points) // 4000)), slice(None, None, max(1, len(B.points) // 4000))
+    reach_a = np.einsum("kij,nj,ki->kn", X[:, :3, :3], A.points[some[0]], line).max(axis=1)
+    reach_b = (line @ B.points[some[1]].T).max(axis=1)
+    share = rng.uniform(-0.3, 0.1, POSES)
+    share[::10] *= 1e-3
+    X[:, :3, 3] = -line * ((reach_a + reach_b) * (1 + share))[:, None]
+    return X
+
+
+def measured(kind: str, n: int) -> dict:
+    rng = np.random.default_rng(n)
+    A, B = body(kind, n, 0), body(kind, n, 2)
+    X_WA, X_WB = poses(A, B, rng), np.eye(4)[None]
+    started = time.perf_counter()
+    found = collide.walk(A, B, X_WA, X_WB)
+    prepared = time.perf_counter() - started
+    truth = collide.collide(A, B, X_WA, X_WB)
+    assert (found.hit == truth).all(), f"{kind} {n}: the walk and the default disagree"
+    axes = found.rows["axis"] * np.where(found.exchanged, -1.0, 1.0) * (found.rows["said"] == APART)[:, None]
+    packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
+    names = "default", "walk", "walk_kernel", "early_kernel", "default_with_axes"
+    seconds = dict.fromkeys(names, 0.0)
+    for start in range(0, POSES, CHUNK):
+        own = slice(start, start + CHUNK)
+        X, X_of_B, given = X_WA[own], np.broadcast_to(X_WB, (CHUNK, 4, 4)), axes[own]
+
+        def by_kernel(early, X=X, X_of_B=X_of_B):
+            run_walks(A._walk, B._walk, packed_a, packed_b, X, X_of_B, early=early)
+
+        tasks = {
+            "default": lambda X=X: collide.collide(A, B, X, X_WB),
+            "walk": lambda X=X: collide.walk(A, B, X, X_WB),
+            "walk_kernel": lambda: by_kernel(False),
+            "early_kernel": lambda: by_kernel(True),
+            "default_with_axes": lambda X=X, given=given: collide.collide(A, B, X, X_WB, axes=given.copy()),
+        }
+        fastest = dict.fromkeys(names, np.inf)
+        for _ in range(TURNS):
+            for name in names:
+                fastest[name] = min(fastest[name], least(tasks[name], 1))
+        for name in names:
+            seconds[name] += fastest[name]
+    rows = found.rows
+    per = 1e6 / POSES
+    ladder_p, ladder_q = A._walk.ladder, B._walk.polar.ladder
+    return {
+        "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices), "facets_of_r": len(B._walk.polar.starts) - 1,
+        "depth_p": found.depth_p, "depth_q": found.depth_q, "hits": truth.mean(),
+        "rounds_mean": rows["rounds"].mean(), "rounds_most": int(rows["rounds"].max()),
+        "tests_mean": rows["tests"].mean(), "tests_most": int(rows["tests"].max()),
+        "games_mean": rows["games"].mean(), "pivots_mean": rows["pivots"].mean(),
+        "proven": found.walked.mean(), "prepare_ms": prepared * 1e3,
+        "bytes_a_vertex_p": ladder_p.bytes / n, "bytes_a_vertex_q": ladder_q.bytes / n,
+        **{f"{name}_us": taken * per for name, taken in seconds.items()},
+    }  # fmt: skip
+
+
+def fitted(rows: list[dict]) -> list[str]:
+    """rounds = a + b·(log2 n + log2 m) by kind, and how far the farthest size is off the line."""
+    lines = []
+    for kind in [*dict.fromkeys(r["kind"] for r in rows), "all"]:
+        of = [r for r in rows if kind in (r["kind"], "all")]
+        if len({r["n"] for r in of}) < 3:
+            continue
+        x = np.log2([float(r["n"]) for r in of]) + np.log2([float(r["m"]) for r in of])
+        for what in ("rounds_mean", "rounds_most", "tests_mean"):
+            y = np.array([r[what] for r in of])
+            b, a = np.polyfit(x, y, 1)
+            above = (y - b * x).max()
+            lines.append(
+                f"{kind:>10}: {what} = {a:.1f} + {b:.2f}·(log2 n + log2 m), "
+                f"all ≤ {above:.1f} + {b:.2f}·(log2 n + log2 m)"
+            )
+    return lines
+
+
+def drawn(rows: list[dict], path: str) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (rounds, times) = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+    for kind in dict.fromkeys(r["kind"] for r in rows):
+        of = [r for r in rows if r["kind"] == kind]
+        n = np.array([r["n"] for r in of])
+        line = rounds.plot(n, [r["rounds_most"] for r in of], "o-", label=f"{kind}, most")[0]
+        rounds.plot(n, [r["rounds_mean"] for r in of], "o--", color=line.get_color())
+        times.plot(n, [r["walk_kernel_us"] for r in of], "o-", color=line.get_color(), label=kind)
+        times.plot(n, [r["default_us"] for r in of], "o:", color=line.get_color())
+    rounds.set(title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None))
+    times.set(title="time of a query [µs]: walk, and (dotted) default", xscale="log", yscale="log", xlabel="vertices")
+    rounds.legend()
+    times.legend()
+    figure.savefig(path, dpi=130)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", default=",".join(map(str, SIZES)), help="numbers of vertices, with commas")
+    parser.add_argument("--kinds", default=",".join(KINDS))
+    parser.add_argument("--no-csv", action="store_true", help="print only; else sizes not asked for keep their rows")
+    parser.add_argument("--plot", metavar="FILE", help="draw rounds and times (needs matplotlib)")
+    args = parser.parse_args()
+    path = Path(__file__).parent / "results" / "walk.csv"
+    rows = {} if args.no_csv else read(path)
+    told = False
+    for kind in args.kinds.split(","):
+        for n in map(int, args.sizes.split(",")):
+            if kind == "doubling" and n > MOST_DOUBLING:
+                continue
+            row = measured(kind, n)
+            if not told:
+                print("  ".join(f"{c:>11.11}" for c in row))
+                told = True
+            rows[kind, n] = row
+            print("  ".join(f"{v:>11,.4g}" if not isinstance(v, (str, int)) else f"{v:>11}" for v in row.values()), flush=True)
+            if not args.no_csv:
+                write(path, rows)
+    print("\n".join(["", *fitted(list(rows.values()))]))
+    if args.plot:
+        drawn(list(rows.values()), args.plot)
+
+
+def read(path: Path) -> dict[tuple[str, int], dict]:
+    """Rows of an earlier run, kept where they are not measured again."""
+    if not path.exists():
+        return {}
+    with path.open(newline="") as file:
+        found = list(csv.DictReader(file))
+    return {
+        (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()} for row in found
+    }
+
+
+def write(path: Path, rows: dict[tuple[str, int], dict]) -> None:
+    ordered = [rows[key] for key in sorted(rows, key=lambda key: (KINDS.index(key[0]), key[1]))]
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({k: shown(v) for k, v in row.items()} for row in ordered)
+
+
+def shown(value) -> str:
+    if isinstance(value, str) or value == int(value):
+        return str(value if isinstance(value, str) else int(value))
+    return f"{value:.6g}"
+
+
+if __name__ == "__main__":
+    main()

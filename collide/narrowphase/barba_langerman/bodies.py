@@ -1,0 +1,153 @@
+"""What the walk keeps of a polytope, made when a query first needs it: P's hierarchy, and R's polar with its own.
+
+Barba and Langerman, section 5, "Preprocessing". The origin of the polar is a point inside R, chosen in R's own frame,
+so that a motion of R changes nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import numpy as np
+
+from collide._jit import address_of
+from collide.geometry.hierarchies.facets import Cloud, label_patches, twins_of
+from collide.geometry.hierarchies.hierarchy import build_hierarchy
+from collide.geometry.hierarchies.polar import polar_of_hull
+from collide.geometry.hulls.hull import Hull, convex_hull
+from collide.narrowphase.barba_langerman.flat import flat_hierarchy
+from collide.narrowphase.barba_langerman.ladder import Ladder
+
+
+class WalkBody:
+    """points : (n, 3) of a polytope, in its own frame.   hull : theirs, where it is known already."""
+
+    def __init__(self, points: np.ndarray, hull: Hull | None = None):
+        self.points = np.ascontiguousarray(points, dtype=np.float64)
+        self._hull = hull
+        self._ladder: Ladder | None = None
+        self._polar: PolarSide | None = None
+        self._hopeless = False
+
+    @property
+    def hull(self) -> Hull:
+        if self._hull is None:
+            self._hull = convex_hull(self.points)
+        return self._hull
+
+    @property
+    def solid(self) -> bool:
+        """Whether the body has an interior, and can play R."""
+        return self.hull.dimension == 3
+
+    @property
+    def ladder(self) -> Ladder:
+        """For the part of P."""
+        if self._ladder is None:
+            with _building():
+                if self._ladder is None:
+                    make = build_hierarchy if self.solid else flat_hierarchy
+                    self._ladder = Ladder(make(self.points, self.hull))
+        return self._ladder
+
+    @property
+    def polar(self) -> PolarSide | None:
+        """For the part of R; None where the body has no interior, or one too thin for a polar in doubles."""
+        if self._polar is None and self.solid and not self._hopeless:
+            with _building():
+                if self._polar is None and not self._hopeless:
+                    try:
+                        self._polar = PolarSide(self.points, self.hull)
+                    except ValueError:
+                        self._hopeless = True
+        return self._polar
+
+    @property
+    def depth_of_polar(self) -> int:
+        """Levels of the hierarchy of the polar; 0 where there is none."""
+        return self.polar.ladder.depth if self.polar is not None else 0
+
+
+class PolarSide:
+    """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
+
+    ladder : of Q = ρ0(R − origin).   origin : (3,), inside R.   radius : of a ball about it that R holds, proven;
+    0 where rounding leaves none, and then nothing is proven by it.   starts, triangles : facet k of R, whose polar
+    is vertex k of Q, is triangles[starts[k]:starts[k + 1]].
+    """
+
+    def __init__(self, points: np.ndarray, hull: Hull):
+        polar = polar_of_hull(points, hull)
+        self.body = polar
+        self.ladder = Ladder(polar.hierarchy)
+        self.origin = np.asarray(polar.origin, dtype=np.float64)
+        facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
+        self.radius = _inner_radius(points, facets, self.origin)
+        patch = _facet_of(points, facets)
+        order = np.argsort(patch, kind="stable")
+        self.triangles = np.ascontiguousarray(facets[order])
+        self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
+        self._centre = np.array([*self.origin, self.radius])
+        self._ball = np.array(
+            [
+                address_of(self._centre), address_of(self.starts), len(self.starts) - 1, address_of(self.triangles),
+                len(self.triangles),
+            ],
+            dtype=np.int64,
+        )  # fmt: skip
+
+    @property
+    def address(self) -> int:
+        """Of what `proof.py` reads."""
+        return address_of(self._ball)
+
+
+def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """The number of each triangle's true facet, as `PolarBody` counts them."""
+    cloud, twins = Cloud(points), twins_of(facets)
+    patch = np.empty(len(facets), dtype=np.int32)
+    waiting = np.empty(len(facets), dtype=np.int32)
+    label_patches(
+        *cloud.addresses, address_of(facets), address_of(twins), len(facets), address_of(patch), address_of(waiting)
+    )
+    return patch
+
+
+#: Rounding of a distance to a facet's plane, in units of the largest coordinate: some twenty operations, and
+#: a thin triangle's normal is as good as its shortest height is long.
+_ROUNDING = 64 * 2.0**-53
+
+
+def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) -> float:
+    """A lower bound of the distance from the origin to the planes of all facets."""
+    a, b, c = (points[facets[:, k]] - origin for k in range(3))
+    e, f = b - a, c - a
+    normal = np.cross(e, f)
+    length = np.sqrt(np.square(normal).sum(axis=1))
+    volume = (a * normal).sum(axis=1)
+    largest = float(np.abs(points).max() + np.abs(origin).max())
+    # Corners moved by u·largest move the determinant by at most that times the doubled areas around.
+    spans = [np.sqrt(np.square(v).sum(axis=1)) for v in (a, b, c, e, f)]
+    areas = spans[3] * spans[4] + (spans[0] + spans[1] + spans[2]) * (spans[3] + spans[4])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bound = (volume - 4 * _ROUNDING * largest * areas) / (length + _ROUNDING * largest * (spans[3] + spans[4]))
+    least = float(bound.min()) * (1 - 1e-12)
+    return max(0.0, least)
+
+
+_lock = threading.RLock()
+
+
+def _building() -> threading.RLock:  # type: ignore[valid-type]
+    """Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds."""
+    return _lock
+
+
+def _new_lock() -> None:
+    global _lock
+    _lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
+    os.register_at_fork(after_in_child=_new_lock)

@@ -1,0 +1,339 @@
+"""algorithm="barba-langerman" against the exact oracle, its counts, its invariants, and what it refuses."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import collide
+from collide.adapters.peers import exact
+from collide.narrowphase.barba_langerman.run import no_walks, run_walks
+from collide.narrowphase.barba_langerman.validate import validate_rounds
+from collide.narrowphase.barba_langerman.walk import APART, LOST, MEETING
+from collide.scenes.families import HULLS, generate, names
+from collide.walks import Walks, walk_body
+
+WALK = "barba-langerman"
+EYE = np.eye(4)
+
+
+def polytopes(name: str, n: int, seed: int):
+    return [c for c in generate(name, n, seed) if c.kind == HULLS and c.radius_a == c.radius_b == 0.0]
+
+
+def is_hit(case) -> bool:
+    return exact.hit(case.P, case.R1, case.t1, case.Q, case.R2, case.t2)
+
+
+def shifted(x, y=0.0, z=0.0) -> np.ndarray:
+    X = np.eye(4)
+    X[:3, 3] = x, y, z
+    return X
+
+
+def turned(rng, shift: float) -> np.ndarray:
+    w, x, y, z = rng.standard_normal(4)
+    X = np.eye(4)
+    s = 2 / (w * w + x * x + y * y + z * z)
+    X[:3, :3] = [
+        [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+        [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
+        [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
+    ]
+    direction = rng.standard_normal(3)
+    X[:3, 3] = shift * direction / np.linalg.norm(direction)
+    return X
+
+
+def ball(rng, n: int, stretch=(1.0, 1.0, 1.0)) -> collide.ConvexHull:
+    points = rng.standard_normal((n, 3))
+    return collide.ConvexHull(points / np.linalg.norm(points, axis=1)[:, None] * stretch)
+
+
+def roles(found: Walks, A, B, X_WA, X_WB):
+    return (B, A, X_WB, X_WA) if found.exchanged else (A, B, X_WA, X_WB)
+
+
+# --- equal to the oracle --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", names())
+def test_equal_to_the_oracle_on_the_hard_families(name):
+    """Both ways round, with the invariants of every round where the walk walked."""
+    large = name in ("spheres_big", "cyl1000", "bipyramids", "repeats")
+    for case in polytopes(name, 2 if large else 12, 61):
+        A, B, X_WA, X_WB = case.shapes()
+        truth = is_hit(case)
+        for one, other, X_WO, X_WT in ((A, B, X_WA, X_WB), (B, A, X_WB, X_WA)):
+            found = collide.walk(one, other, X_WO, X_WT, trace=not large)
+            assert found.hit.tolist() == [truth], case.snippet()
+            assert collide.collide(one, other, X_WO, X_WT, algorithm=WALK) is truth
+            if found.depth_p and not large:
+                P, R, X_WP, X_WR = roles(found, one, other, X_WO, X_WT)
+                try:
+                    validate_rounds(P._walk, R._walk, X_WP, X_WR, found.trace)
+                except AssertionError as error:
+                    raise AssertionError(f"{error}\n{case.snippet()}") from None
+
+
+def test_equal_to_the_default_on_many_poses():
+    rng = np.random.default_rng(5)
+    for n, m in ((4, 4), (8, 30), (60, 12), (500, 900)):
+        A, B = ball(rng, n), ball(rng, m, (1.0, 0.8, 0.6))
+        X_WA = np.array([turned(rng, rng.uniform(0.8, 2.1)) for _ in range(300)])
+        X_WB = np.array([turned(rng, 0.0) for _ in range(300)])
+        found = collide.walk(A, B, X_WA, X_WB)
+        assert (found.hit == collide.collide(A, B, X_WA, X_WB)).all()
+        assert found.walked.mean() > 0.95
+        assert 0.05 < found.hit.mean() < 0.95
+        assert (found.rows["rounds"] <= found.depth_p + found.depth_q - 1).all()
+        packed = A.parts()[0][0], B.parts()[0][0]
+        early, _ = run_walks(A._walk, B._walk, *packed, X_WA, X_WB, early=True)
+        assert ((early["said"] == MEETING) == found.hit)[early["said"] >= APART].all()
+        assert (early["rounds"] <= found.rows["rounds"]).all()
+
+
+def test_touching_is_a_hit_and_one_ulp_decides():
+    A, B = collide.Box((2, 2, 2)), collide.ConvexHull(np.argwhere(np.ones((2, 2, 2))) * 2.0 - 1.0)
+    for shift in ((2.0, 0.5, 0.25), (2.0, 2.0, 0.5), (2.0, -2.0, 2.0)):
+        assert collide.collide(A, B, EYE, shifted(*shift), algorithm=WALK)
+        beyond = (np.nextafter(shift[0], 3), *shift[1:])
+        assert not collide.collide(A, B, EYE, shifted(*beyond), algorithm=WALK)
+
+
+def test_bodies_without_interior():
+    """One of them has an interior and plays R; two flat ones go to the default narrowphase."""
+    square = collide.ConvexHull([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 0), (0.5, 0, 0)])
+    segment, point = collide.ConvexHull([(0, 0, 0), (0, 0, 3), (0, 0, 1)]), collide.ConvexHull([(0, 0, 0)])
+    angle = np.linspace(0, 2 * np.pi, 900, endpoint=False)
+    disc = collide.ConvexHull(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    box, rng = collide.Box((1, 1, 1)), np.random.default_rng(4)
+    X_WA = np.array([turned(rng, rng.uniform(0, 1.6)) for _ in range(200)])
+    for flat in (square, segment, point, disc):
+        for A, B in ((flat, box), (box, flat)):
+            found = collide.walk(A, B, X_WA, EYE[None])
+            assert found.exchanged == (B is flat) and found.depth_q > 1
+            assert (found.hit == collide.collide(A, B, X_WA, EYE)).all()
+            assert found.walked.mean() > 0.9
+        both = collide.walk(flat, square, X_WA, EYE[None])
+        assert not both.walked.any() and both.depth_p == 0
+        assert (both.hit == collide.collide(flat, square, X_WA, EYE)).all()
+    X = np.array([turned(rng, rng.uniform(0.5, 1.6)) for _ in range(100)])
+    assert max(collide.walk(disc, box, X, EYE[None]).rows["rounds"]) > 8
+
+
+def test_matrices_that_are_no_rotations():
+    """R is taken as given: its inverse is its adjugate over its determinant, not its transpose."""
+    rng = np.random.default_rng(8)
+    A, B = ball(rng, 40), ball(rng, 50)
+    for _ in range(60):
+        X_WA, X_WB = turned(rng, rng.uniform(0.5, 2.5)), turned(rng, 0.3)
+        X_WA[:3, :3] += 0.2 * rng.standard_normal((3, 3))
+        X_WB[:3, :3] += 0.2 * rng.standard_normal((3, 3))
+        truth = exact.hit(A.points, X_WA[:3, :3], X_WA[:3, 3], B.points, X_WB[:3, :3], X_WB[:3, 3])
+        found = collide.walk(A, B, X_WA, X_WB, check_poses=False)
+        assert found.hit.tolist() == [truth]
+
+
+def test_large_stars_and_facets():
+    """Bipyramids, prisms: a vertex, or a facet, with thousands of neighbours."""
+    rng, angle = np.random.default_rng(2), np.linspace(0, 2 * np.pi, 3000, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    up = np.array([[0.0, 0.0, 1.0]])
+    bipyramid = collide.ConvexHull(np.concatenate([ring, [(0, 0, 1), (0, 0, -1)]]))
+    prism = collide.ConvexHull(np.concatenate([ring + up, ring - up]))
+    for A, B in ((bipyramid, prism), (prism, bipyramid), (bipyramid, bipyramid)):
+        X_WA = np.array([turned(rng, rng.uniform(0.5, 2.4)) for _ in range(150)])
+        X_WA[:40, :3, :3] = np.eye(3)  # apex against facet, apex against apex
+        X_WA[:40, :3, 3] = [(0.01 * k, 0, 1.9 + 0.005 * k) for k in range(40)]
+        found = collide.walk(A, B, X_WA, EYE[None])
+        assert (found.hit == collide.collide(A, B, X_WA, EYE)).all()
+        assert found.walked.mean() > 0.8
+
+
+# --- proofs, counts, sameness -----------------------------------------------------------------------
+
+
+def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
+    """In rational numbers: the plane against all vertices, or the point against all facets."""
+    rng = np.random.default_rng(12)
+    A, B = ball(rng, 60), ball(rng, 80)
+    X_WA = np.array([turned(rng, rng.uniform(0.5, 2.5)) for _ in range(40)])
+    found = collide.walk(A, B, X_WA, EYE[None])
+    assert found.walked.all()
+    Q, _ = exact.world_points(B.points, EYE[:3, :3], EYE[:3, 3])
+    for X, row, hit in zip(X_WA, found.rows, found.hit):
+        assert row["said"] == (MEETING if hit else APART)
+        if not hit:
+            P, e_p = exact.world_points(A.points, X[:3, :3], X[:3, 3])
+            Q, e_q = exact.world_points(B.points, EYE[:3, :3], EYE[:3, 3])
+            (axis,), _ = exact.world_points([row["axis"]], EYE[:3, :3], EYE[:3, 3])
+            P = [tuple(c << (e_p - min(e_p, e_q)) for c in p) for p in P]
+            Q = [tuple(c << (e_q - min(e_p, e_q)) for c in q) for q in Q]
+            assert max(exact.dot(axis, p) for p in P) < min(exact.dot(axis, q) for q in Q)
+        else:
+            point = X[:3, :3] @ row["point"] + X[:3, 3]
+            normals = B.points[B.hull.facets]
+            n = np.cross(normals[:, 1] - normals[:, 0], normals[:, 2] - normals[:, 0])
+            assert ((point - normals[:, 0]) * n).sum(axis=1).max() <= 1e-12
+            own = A.points[A.hull.facets]
+            n = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+            assert ((row["point"] - own[:, 0]) * n).sum(axis=1).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["rand_pen", "near_sep", "touch_ee", "touch_1ulp", "flat", "degenerate"])
+def test_every_answer_has_a_certificate_that_verifies(name):
+    for case in polytopes(name, 6, 9):
+        A, B, X_WA, X_WB = case.shapes()
+        found = collide.walk(A, B, X_WA, X_WB)
+        collide.verify(A, B, X_WA, X_WB, found)
+        (one,) = found.certificate
+        assert one.kind == ("together" if found.hit[0] else "apart")
+        with pytest.raises(collide.CertificateRefused):
+            wrong = one._replace(kind="apart" if found.hit[0] else "together")
+            collide.verify(A, B, X_WA, X_WB, found, certificate=(wrong,))
+
+
+def test_the_checking_mode_sees_what_is_wrong():
+    rng = np.random.default_rng(21)
+    A, B = ball(rng, 80), ball(rng, 80)
+    X_WA, X_WB = turned(rng, 1.85), turned(rng, 0.0)
+    found = collide.walk(A, B, X_WA, X_WB, trace=True)
+    good = found.trace
+    assert len(good) > 6
+    validate_rounds(A._walk, B._walk, X_WA, X_WB, good)
+    for number in (1, len(good) - 1):
+        one = good[number]
+        own = "z" if one.invariant == "separation" else "x"
+        for changed in (
+            one._replace(**{own: 2.0 * getattr(one, own) + 0.5}), one._replace(level_p=one.level_p + 1),
+            one._replace(vertex_p=-1, vertex_q=-1), one._replace(p_star=10**6, q_star=10**6),
+        ):  # fmt: skip
+            with pytest.raises(AssertionError):
+                validate_rounds(A._walk, B._walk, X_WA, X_WB, (*good[:number], changed, *good[number + 1 :]))
+
+
+def test_what_proofs_rest_on():
+    """Facets go with their polar points, and the ball about the origin lies inside, exactly."""
+    rng = np.random.default_rng(22)
+    lattice = collide.ConvexHull(rng.integers(-3, 4, (60, 3)).astype(float))
+    for body in (ball(rng, 40), collide.Box((1, 2, 3)), lattice):
+        side = walk_body(body).polar
+        points = walk_body(body).points
+        origin = [Fraction(c) for c in side.origin.tolist()]
+        assert side.radius > 0 and len(side.starts) == len(side.body.points) + 1
+        for k, q in enumerate(side.body.points):
+            triangles = side.triangles[side.starts[k] : side.starts[k + 1]]
+            assert len(triangles)
+            for a, b, c in points[triangles].tolist():
+                heights = (np.array([a, b, c]) - side.origin) @ q
+                assert np.abs(heights - 1).max() < 1e-9
+                a, b, c = ([Fraction(v) - o for v, o in zip(p, origin)] for p in (a, b, c))
+                n = exact.cross(exact.minus(b, a), exact.minus(c, a))
+                assert exact.dot(n, a) > 0
+                assert exact.dot(n, a) ** 2 >= Fraction(side.radius) ** 2 * exact.dot(n, n)
+
+
+def test_a_body_whose_walk_is_lost_is_handed_over(monkeypatch):
+    """Small programs that say they could not be solved: every answer comes from the default, and is right."""
+    rng = np.random.default_rng(23)
+    A, B = ball(rng, 50), ball(rng, 50)
+    X_WA = np.array([turned(rng, rng.uniform(0.8, 2.1)) for _ in range(20)])
+    truth = collide.collide(A, B, X_WA, EYE)
+
+    def lost(body_p, body_r, packed_p, packed_r, X_WP, X_WR, *, trace=False):
+        return no_walks(len(X_WP)), ()
+
+    monkeypatch.setattr("collide.walks.run_walks", lost)
+    found = collide.walk(A, B, X_WA, EYE[None])
+    assert not found.walked.any() and (found.rows["said"] == LOST).all() and (found.hit == truth).all()
+
+
+def test_rounds_grow_with_the_logarithm():
+    rng = np.random.default_rng(1)
+    most = []
+    for n in (30, 300, 3000):
+        A, B = ball(rng, n), ball(rng, n)
+        X_WA = np.array([turned(rng, rng.uniform(1.6, 2.0)) for _ in range(200)])
+        found = collide.walk(A, B, X_WA, EYE[None])
+        assert (found.rows["tests"] > 0).all()
+        most.append(int(found.rows["rounds"].max()))
+    assert most[2] <= 12 + 3.5 * 2 * np.log2(3000) and most[2] < 2.5 * most[1]
+
+
+def test_same_bits_single_batch_and_from_threads():
+    rng = np.random.default_rng(7)
+    A, B = ball(rng, 100), ball(rng, 100)
+    X_WA = np.array([turned(rng, rng.uniform(1.5, 2.1)) for _ in range(50)])
+    together = collide.walk(A, B, X_WA, EYE[None])
+    singly = np.concatenate([collide.walk(A, B, X, EYE).rows for X in X_WA])
+    assert together.rows.tobytes() == singly.tobytes()
+    again, threads = [], []
+    for _ in range(4):
+        fresh_a, fresh_b = collide.ConvexHull(A.points), collide.ConvexHull(B.points)
+        run = lambda a=fresh_a, b=fresh_b: again.append(collide.walk(a, b, X_WA, EYE[None]).rows)
+        threads.append(threading.Thread(target=run))
+        threads[-1].start()
+    for thread in threads:
+        thread.join()
+    assert len(again) == 4 and all(rows.tobytes() == together.rows.tobytes() for rows in again)
+
+
+PLAIN = """
+import pickle, sys
+import collide
+from collide import _jit
+assert _jit.PLAIN_PYTHON
+asked = pickle.load(sys.stdin.buffer)
+pickle.dump([collide.walk(*case).rows.tobytes() for case in asked], sys.stdout.buffer)
+"""
+
+
+def test_kernels_are_plain_python_too():
+    rng = np.random.default_rng(10)
+    asked = [c.shapes() for name in ("rand_pen", "touch_ff", "flat", "needles") for c in polytopes(name, 2, 3)]
+    asked.append((ball(rng, 25), ball(rng, 25), turned(rng, 1.9), turned(rng, 0.0)))
+    child = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", PLAIN], input=pickle.dumps(asked), capture_output=True, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(collide.__file__).parent.parent)},
+    )  # fmt: skip
+    assert child.returncode == 0, child.stderr.decode()
+    assert pickle.loads(child.stdout) == [collide.walk(*case).rows.tobytes() for case in asked]
+
+
+def test_shapes_that_are_polytopes():
+    box = collide.Box((1, 2, 3))
+    slab = collide.HPolytope([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], [1, 1, 1, 1, 1, 1])
+    for shift, hit in ((0.5, True), (1.4, True), (1.6, False)):
+        assert collide.collide(box, slab, EYE, shifted(shift), algorithm=WALK) is hit
+        assert collide.collide(slab, box, EYE, shifted(shift), algorithm=WALK) is hit
+    assert collide.collide(box, slab, np.array([EYE] * 3), EYE, algorithm=WALK).tolist() == [True] * 3
+    assert len(collide.collide(box, slab, np.zeros((0, 4, 4)), EYE, algorithm=WALK)) == 0
+
+
+def test_what_it_refuses():
+    box = collide.Box((1, 1, 1))
+    for shape in (
+        collide.Sphere(1), collide.Capsule(1, 1), collide.Cylinder(1, 1), collide.Halfspace((0, 0, 1), 0),
+        collide.ConvexHull(np.eye(3), radius=0.1), collide.Compound([(box, EYE), (box, shifted(2))]),
+    ):  # fmt: skip
+        for A, B in ((shape, box), (box, shape)):
+            with pytest.raises(collide.UnsupportedQuery, match=type(shape).__name__):
+                collide.collide(A, B, EYE, EYE, algorithm=WALK)
+    with pytest.raises(collide.InvalidArgument, match="gjk"):
+        collide.collide(box, box, EYE, EYE, algorithm="quick")
+    with pytest.raises(collide.InvalidArgument, match="axes"):
+        collide.collide(box, box, EYE[None], EYE, algorithm=WALK, axes=np.zeros((1, 3)))
+    with pytest.raises(collide.InvalidArgument, match="two shapes"):
+        collide.collide([box], box, EYE[None], EYE, algorithm=WALK)
+    with pytest.raises(collide.InvalidPose):
+        collide.collide(box, box, 2 * EYE, EYE, algorithm=WALK)
+    assert collide.collide(box, box, EYE, EYE, algorithm="gjk") is True

@@ -1,0 +1,67 @@
+"""Tests of the walk that could fail: small faults put into a copy of it, each of which its checks must notice.
+
+The copies run as plain Python, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+CHILD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import collide
+assert collide.__file__.startswith(sys.argv[1]), collide.__file__
+from collide.adapters.peers import exact
+from collide.narrowphase.barba_langerman.validate import validate_rounds
+from collide.scenes.families import generate
+wrong = broken = 0
+for name in ("touch_vf", "touch_1ulp", "near_pen", "near_sep", "rand_pen", "box_lattice"):
+    for case in generate(name, 7 if name == "box_lattice" else 4, 4):
+        A, B, X_WA, X_WB = case.shapes()
+        found = collide.walk(A, B, X_WA, X_WB, trace=True)
+        wrong += bool(found.hit[0]) != exact.hit(case.P, case.R1, case.t1, case.Q, case.R2, case.t2)
+        try:
+            validate_rounds(A._walk, B._walk, X_WA, X_WB, found.trace)
+        except AssertionError:
+            broken += 1
+print(wrong, broken)
+"""
+
+MUTATIONS = {
+    "none": ("proof.py", "", ""),
+    "planes need no room for rounding": ("proof.py", "> 1.000001 * error", "> -1e-3"),
+    "points need no room": ("proof.py", "+ error < room", "- 1e-3 < room"),
+    "the ball does not shrink towards the facet": ("proof.py", "room = (1.0 - s) * ", "room = 1.0 * "),
+    "cones are not looked at": ("steps.py", "t = min(t, before / (before - after))", "t = 1.0"),
+    "case 1 in the primal space always": ("steps.py", "if height + shift > 1.0:", "if height + shift > -1e300:"),
+    "case 1 in the polar space always": ("steps.py", "if -height <= 1.0:", "if -height <= 1e300:"),
+    "the vertex beyond is not looked for": ("ladder.py", "        if other < height:", "        if other < -1e300:"),
+    "the star keeps the old plane": ("steps.py", "state[Z_STAR + k] = state[Z + k]", "state[Z_STAR + k] = state[Z_STAR + k] + 0.0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(MUTATIONS))
+def test_faults_are_noticed(name, tmp_path):
+    file, old, new = MUTATIONS[name]
+    for folder, target in (("collide", "collide"), ("adapters", "collide/adapters"), ("scenes", "collide/scenes")):
+        shutil.copytree(ROOT / folder, tmp_path / target, ignore=shutil.ignore_patterns("__pycache__"))
+    source = tmp_path / "collide/narrowphase/barba_langerman" / file
+    text = source.read_text(encoding="utf-8")
+    assert old in text, f"{file} no longer has {old!r}"
+    source.write_text(text.replace(old, new, 1) if old else text, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", CHILD, str(tmp_path)], capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    wrong, broken = map(int, done.stdout.split())
+    assert (wrong + broken == 0) == (name == "none"), f"{wrong} wrong answers, {broken} walks with a broken invariant"
