@@ -1,4 +1,4 @@
-"""Makes the references `naive.py`, `hull_families.py` and `reference_walk.py` importable by name: tests are no package and not on the path."""
+"""Makes the references and families of bodies beside it importable by name: tests are no package and not on the path."""
 
 from __future__ import annotations
 
@@ -18,3 +18,4 @@ def _register(name: str) -> None:
 _register("naive")
 _register("hull_families")
 _register("reference_walk")
+_register("hierarchy_families")
