@@ -129,7 +129,16 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 
 
 def distance(
-    A, B, X_WA, X_WB, *, max_distance: float = math.inf, signed: bool = True, check_poses: bool = True, threads: int = 1
+    A,
+    B,
+    X_WA,
+    X_WB,
+    *,
+    max_distance: float = math.inf,
+    signed: bool = True,
+    check_poses: bool = True,
+    threads: int = 1,
+    algorithm: str | None = None,
 ) -> PairResult:
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
@@ -140,6 +149,9 @@ def distance(
     signed : False where gaps are all that is wanted: bodies that meet are then at distance 0, with a zero normal
         and a bracket that is 0, too, unless the sign is open. How deep they overlap is not worked out, which saves
         most of the time of overlapping pairs.
+    algorithm : "gjk" (or None), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no
+        max_distance: gaps are found down bounded hierarchies, and settled in integers. The same numbers to their
+        last digit, and slower (docs/barba-langerman.md).
 
     Returns
     -------
@@ -149,6 +161,8 @@ def distance(
     half-space).
     """
     limit = check_distance("max_distance", max_distance)
+    if algorithm is not None and algorithm != "gjk":
+        return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
     if limit == math.inf and threads == 1 and signed:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB)
@@ -172,6 +186,29 @@ def distance(
             "end, so no translation of finite length separates them; collide() still answers"
         )
     return PairResult(rows, single, (_held(A), _held(B), X_WA, X_WB))
+
+
+def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
+    if algorithm != "dobkin-kirkpatrick":
+        raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
+    if limit != math.inf or threads != 1:
+        raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')
+    from collide import walks
+
+    for shape in (A, B):
+        walks.walk_body(shape, algorithm)
+    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+
+    def answer_open(left: np.ndarray) -> np.ndarray:
+        X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
+        return np.broadcast_to(ask(A, B, X_WO, X_WT, False, math.inf, False, 1, depths=signed), (len(left),))
+
+    rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, answer_open)
+    rows["b"] = 1
+    if not signed:
+        _forget_depths(rows)
+    return PairResult(rows, single, (A, B, X_WA, X_WB))
 
 
 def _forget_depths(rows: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""The walk of Barba and Langerman from Python: which body plays which part, and what it leaves open.
+"""The walk of Barba and Langerman, and distances along hierarchies, from Python: who plays which part, what stays open.
 
 Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one. Where neither
 has, the default narrowphase answers. What the walk cannot prove clear of rounding it hands over to the default
@@ -11,9 +11,13 @@ import numpy as np
 
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.packing import POINTS
+from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.barba_langerman.bodies import WalkBody
 from collide.narrowphase.barba_langerman.run import TracedRound, no_walks, run_walks
 from collide.narrowphase.barba_langerman.walk import APART, MEETING, OPEN_MEETING
+from collide.narrowphase.hierarchy_distance import hierarchy_distance
+from collide.narrowphase.run import settle_proposals
+from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
 
 
@@ -63,21 +67,21 @@ class Walks:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
 
 
-def walk_body(shape: Shape) -> WalkBody:
+def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
     """What the walk keeps of a shape, made once. Raises UnsupportedQuery for all but polytopes."""
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f'algorithm="barba-langerman" takes two shapes, got {type(shape).__name__}')
+        raise InvalidArgument(f'algorithm="{algorithm}" takes two shapes, got {type(shape).__name__}')
     try:
         return shape._walk
     except AttributeError:
         pass
     name = type(shape).__name__
     if not is_plain(shape):
-        raise UnsupportedQuery(f'{name}: algorithm="barba-langerman" takes one convex polytope, not a union')
+        raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, not a union')
     packed = shape.parts()[0][0]
     if packed.kind != POINTS or packed.radius != 0.0:
         raise UnsupportedQuery(
-            f'{name}: algorithm="barba-langerman" takes convex polytopes (ConvexHull without a radius, Box, HPolytope); '
+            f'{name}: algorithm="{algorithm}" takes convex polytopes (ConvexHull without a radius, Box, HPolytope); '
             "leave the algorithm out"
         )
     body = WalkBody(packed.points, getattr(shape, "_hull", None))
@@ -111,3 +115,52 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
         left = np.flatnonzero(~found.walked)
         hit[left] = answer_open(left)
     return found
+
+
+def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open) -> np.ndarray:
+    """Rows of `PAIR_DTYPE`: gaps found down both hierarchies (Dobkin and Kirkpatrick 1990), settled in integers.
+
+    Arguments as in `walk_poses`; ``answer_open`` gives whole rows, for pairs that overlap and bodies without interior.
+    ``iterations`` counts small problems.
+    """
+    first, second = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
+    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    rows = np.zeros(n, dtype=PAIR_DTYPE)
+    found = np.zeros(n, dtype=bool)
+    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+    if first.solid and second.solid:
+        for k in range(n):
+            found[k] = _propose(first, second, X_WA[k], X_WB[k], rows[k : k + 1])
+    if found.any():
+        packed = [shape.parts()[0][0] for shape in (A, B)]
+        poses = pose_table(np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n))
+        chosen = np.flatnonzero(found)
+        proposed = rows[chosen]
+        settle_proposals(
+            ShapeTable(packed), poses, np.repeat(np.arange(2), n), np.stack([chosen, n + chosen], axis=1), proposed
+        )
+        rows[chosen] = proposed
+        found[chosen] = ~proposed["hit"]
+    left = np.flatnonzero(~found)
+    if len(left):
+        rows[left] = answer_open(left)
+    return rows
+
+
+def _propose(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
+    """Enter the nearest vertices of a pair into a row; False where the bodies overlap as far as doubles tell."""
+    into_a = np.linalg.inv(X_WA)
+    X_AB = into_a @ X_WB
+    nearest = hierarchy_distance(first.packed, second.packed, X_AB[:3, :3], X_AB[:3, 3])
+    used = nearest.vertices[:, 0] >= 0
+    ids = nearest.vertices[used]
+    known = (ids[:, 0] < len(first.points)).all() and (ids[:, 1] < len(second.points)).all()
+    if nearest.distance == 0.0 or not known:
+        return False
+    row["distance"] = nearest.distance
+    for name, point in (("point_a", nearest.point_a), ("point_b", nearest.point_b)):
+        row[name] = X_WA[:3, :3] @ point + X_WA[:3, 3]
+    row["count"] = len(ids)
+    row["vertices_a"][:, : len(ids)], row["vertices_b"][:, : len(ids)] = ids.T
+    row["iterations"] = nearest.counters[2]
+    return True

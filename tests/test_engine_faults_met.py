@@ -272,3 +272,18 @@ def test_composed_poses_that_stretch_keep_their_bracket(stretch):
         square = sum((Fraction(a) - e) ** 2 for a, e in zip(at.tolist(), exact))
         truth = float(square) ** 0.5 - 1e-12
         assert r.lower <= truth + 1e-15 * gap and truth - 1e-15 * gap <= r.upper, (offset.tolist(), X.tolist(), at.tolist())
+
+
+def test_a_sliver_does_not_leave_a_curved_overlap_without_proof():
+    """One facet of EPA's surface whose side doubles left open made a bracket of 22 % of the size, one run in a thousand."""
+    rng = np.random.default_rng(7)
+    wide = hits = 0
+    for _ in range(3000):
+        A = collide.Cylinder(*np.exp(rng.uniform(-3, 0, 2)))
+        B = (collide.Sphere(np.exp(rng.uniform(-3, 0))), collide.Cone(*np.exp(rng.uniform(-3, 0, 2))))[rng.integers(2)]
+        X_WA, X_WB = (collide.pose(rng.normal(size=3) * 0.3, rpy=rng.uniform(-3, 3, 3)) for _ in range(2))
+        r = collide.distance(A, B, X_WA, X_WB)
+        hits += r.hit
+        wide += r.hit and not r.certified
+    assert hits > 1000
+    assert wide == 0, f"{wide} of {hits} overlaps"

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from hierarchy_families import degree_doubling, families, sphere
 
+import collide
 from collide.geometry.hierarchies.hierarchy import DEGREE_BOUND, build_hierarchy
 from collide.geometry.hulls.hull import convex_hull
 from collide.narrowphase.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.scenes.families import generate
 
 SIZE = 200 if os.environ.get("NUMBA_DISABLE_JIT") != "1" else 40
 NAMES = list(families(40))
@@ -108,3 +110,41 @@ def test_a_vertex_of_large_degree_in_the_body_itself_is_scanned_with_and_without
         found = hierarchy_distance(a, b, np.eye(3), np.array([0.05, 0.02, 1.5]))
         assert 0.4 < found.distance < 0.6
         assert 0.9 * len(points) < found.counters[3] < 2 * len(points) + 1000
+
+
+@pytest.mark.parametrize("family", ["rand_sep", "near_sep", "rand_pen", "boxes_rest", "needles", "cyl1000", "identical"])
+def test_distances_of_the_public_call_are_proven(family):
+    """`algorithm="dobkin-kirkpatrick"`: the proposal of the hierarchies, settled in integers to the last digit."""
+    gaps = 0
+    for case in generate(family, n=8, seed=12):
+        question = case.shapes()
+        r, default = collide.distance(*question, algorithm="dobkin-kirkpatrick"), collide.distance(*question)
+        assert r.hit == default.hit and r.certified, case.snippet()
+        assert max(r.lower, default.lower) <= min(r.upper, default.upper), case.snippet()
+        assert abs(r.distance - default.distance) <= 4 * np.spacing(abs(default.distance)), case.snippet()
+        if not r.hit:
+            gaps += 1
+            assert r.iterations > 0 and abs(r.normal @ r.normal - 1.0) < 1e-14
+            assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() < 1e-12 * (1 + np.abs(r.point_a).max())
+            collide.verify(*question, r)
+    assert gaps >= {"identical": 0, "cyl1000": 1, "rand_pen": 1, "boxes_rest": 1}.get(family, 4)
+
+
+def test_batches_and_what_is_not_served():
+    rng = np.random.default_rng(12)
+    A, B = (collide.ConvexHull(rng.normal(size=(40, 3))) for _ in range(2))
+    X_WB = np.array([collide.pose(rng.normal(size=3) * 3, rpy=rng.uniform(-3, 3, 3)) for _ in range(30)])
+    together = collide.distance(A, B, np.eye(4), X_WB, algorithm="dobkin-kirkpatrick")
+    assert 3 <= together.hit.sum() <= 27
+    for k in range(30):
+        alone = collide.distance(A, B, np.eye(4), X_WB[k], algorithm="dobkin-kirkpatrick")
+        assert alone.rows.tobytes() == together.rows[k : k + 1].tobytes()
+    flat = collide.ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    assert collide.distance(flat, A, np.eye(4), X_WB[0], algorithm="dobkin-kirkpatrick").certified
+    for wrong in ("barba-langerman", "fast"):
+        with pytest.raises(collide.InvalidArgument, match="algorithm"):
+            collide.distance(A, B, np.eye(4), np.eye(4), algorithm=wrong)
+    with pytest.raises(collide.UnsupportedQuery, match="Sphere"):
+        collide.distance(collide.Sphere(1), B, np.eye(4), np.eye(4), algorithm="dobkin-kirkpatrick")
+    with pytest.raises(collide.InvalidArgument, match="max_distance"):
+        collide.distance(A, B, np.eye(4), np.eye(4), max_distance=1.0, algorithm="dobkin-kirkpatrick")

@@ -37,7 +37,7 @@ ROOMS = {
     "certificates": {"errors", "transforms", "geometry", "results"},
     "unions": {"geometry", "narrowphase", "results"},
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
-    "walks": {"errors", "geometry", "shapes", "narrowphase"},
+    "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},

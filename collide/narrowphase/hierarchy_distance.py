@@ -13,8 +13,8 @@ through the nearest point of P_i, the distance is the smaller one of the old one
 its neighbours to T, found by a descent of its own. The nearest point of T may be anywhere then: one cannot go on from
 the one before, and this is where the second logarithm comes from.
 
-In doubles, without proof: distances come out to rounding, for bodies clear of touching; `collide.collide` decides
-what touches. Nearest points of small hulls are found by GJK over their vertices.
+In doubles, without proof: what comes out is a proposal, which the exact stage settles (`collide/walks.py`). Nearest points
+of small hulls are found by GJK over their vertices.
 """
 
 from __future__ import annotations
@@ -38,12 +38,16 @@ COUNTERS = 4
 
 
 class Nearest(NamedTuple):
-    """distance (0 where they overlap), the nearest points in A's frame, and the counters."""
+    """distance (0 where they overlap), the nearest points in A's frame, the counters, and what the points lie on:
+
+    vertices : (3, 2) int64, pairs of a vertex of A and one of B whose differences span the nearest one; −1 beyond.
+    """
 
     distance: float
     point_a: np.ndarray
     point_b: np.ndarray
     counters: np.ndarray
+    vertices: np.ndarray
 
 
 class PackedHierarchy:
@@ -76,7 +80,8 @@ def hierarchy_distance(a: PackedHierarchy, b: PackedHierarchy, rotation: np.ndar
         address_of(a.handles), address_of(b.handles), a.most, b.most, address_of(pose), address_of(doubles),
         address_of(integers), address_of(result), address_of(counters),
     )  # fmt: skip
-    return Nearest(math.sqrt(result[0]), result[1:4], result[4:7], counters)
+    vertices = integers[room + 10 : room + 10 + _IDS].reshape(2, 3).T
+    return Nearest(math.sqrt(result[0]), result[1:4], result[4:7], counters, vertices)
 
 
 @kernel

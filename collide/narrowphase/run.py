@@ -69,6 +69,17 @@ def run_pairs(
     return rows[:done]
 
 
+def settle_proposals(table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray) -> None:
+    """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
+
+    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet are told
+    to, without a depth.
+    """
+    rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
+    _of_thread.space.integers[REQUESTS_AT] = 0
+    _finish(rows, np.ascontiguousarray(pairs, dtype=np.int64), table, poses, shape_of, boolean=False, limit=np.inf)
+
+
 def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float) -> None:
     """Settle in place what doubles left open."""
     if (rows["how"] == REFUSED).any():

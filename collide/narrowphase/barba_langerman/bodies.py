@@ -18,6 +18,7 @@ from collide.geometry.hierarchies.polar import polar_of_hull
 from collide.geometry.hulls.hull import Hull, convex_hull
 from collide.narrowphase.barba_langerman.flat import flat_hierarchy
 from collide.narrowphase.barba_langerman.ladder import Ladder
+from collide.narrowphase.hierarchy_distance import PackedHierarchy
 
 
 class WalkBody:
@@ -28,6 +29,7 @@ class WalkBody:
         self._hull = hull
         self._ladder: Ladder | None = None
         self._polar: PolarSide | None = None
+        self._packed: PackedHierarchy | None = None
         self._hopeless = False
 
     @property
@@ -50,6 +52,15 @@ class WalkBody:
                     make = build_hierarchy if self.solid else flat_hierarchy
                     self._ladder = Ladder(make(self.points, self.hull))
         return self._ladder
+
+    @property
+    def packed(self) -> PackedHierarchy:
+        """The hierarchy as distances go down it; for solids."""
+        if self._packed is None:
+            with _building():
+                if self._packed is None:
+                    self._packed = PackedHierarchy(build_hierarchy(self.points, self.hull))
+        return self._packed
 
     @property
     def polar(self) -> PolarSide | None:

@@ -7,6 +7,7 @@ import math
 from collide._jit import kernel
 from collide.geometry.scan import least
 from collide.narrowphase.bounds import EPA_VERTICES
+from collide.narrowphase.epa.prove import prove_facets
 from collide.narrowphase.epa.seed import extremal_tetrahedron
 from collide.narrowphase.epa.surface import (
     FACET,
@@ -123,6 +124,9 @@ def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, e
         count = expand(surface, f, vertices, count, found, edges, depth, error)
         vertices += 1
     clearance = _surface_clearance(clearances, count, error)
+    if clearance < 0.0:
+        prove_facets(surface, count)
+        clearance = _surface_clearance(clearances, count, error)
     if has_trees(pair):
         depth = _extent(pair, points, ids, nx, ny, nz)
     return EXPANDED, depth, clearance, nx, ny, nz, facet, vertices, count

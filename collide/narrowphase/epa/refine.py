@@ -16,6 +16,8 @@ from collide.geometry.scan import least
 from collide.narrowphase.epa.surface import (
     FACET,
     POINTS,
+    SEEN,
+    SURE,
     WIDEST_BORDER,
     edge_from,
     expand,
@@ -136,7 +138,7 @@ def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, sca
     """`surface.find_patch` by the fine planes."""
     _, _, _, _, ids, facets, _, border, patch = surface
     _load(pair, low, fine, known, ids, apex, scale)
-    facets[FACET * f + 6] = 1
+    facets[FACET * f + SEEN] = 1
     patch[0] = f
     found = 1
     visited = 0
@@ -146,10 +148,10 @@ def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, sca
         visited += 1
         for e in range(3):
             h = facets[FACET * g + 3 + e]
-            if facets[FACET * h + 6] == 1:
+            if facets[FACET * h + SEEN] == 1:
                 continue
             if found < WIDEST_BORDER - 2 and _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale):
-                facets[FACET * h + 6] = 1
+                facets[FACET * h + SEEN] = 1
                 patch[found] = h
                 found += 1
             else:
@@ -174,12 +176,16 @@ def _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale)
     return height > 4.0 * unsure * length
 
 
-@kernel
-def _forget(distances, clearances, f, error, scale):
-    """Facet f has a new plane, known in doubles only: what they prove, less their error, or nothing."""
+@kernel(inline=True)
+def _forget(surface, distances, f, error, scale):
+    """Facet f has a new plane, known in doubles only: what they prove, less their error, or nothing.
+
+    What counts here are the true corners, so the origin has to lie behind it wherever they are.
+    """
+    _, _, _, clearances, _, facets, _, _, _ = surface
     distances[2 * f] = -math.inf
     if clearances[f] < math.inf:
-        clearances[f] = (clearances[f] - error) * scale if clearances[f] >= 0.0 else -math.inf
+        clearances[f] = (clearances[f] - error) * scale if facets[FACET * f + SURE] == 1 else -math.inf
 
 
 @kernel
@@ -231,7 +237,7 @@ def refine(
     for v in range(vertices):
         known[v] = 0
     for f in range(count):
-        _forget(distances, clearances, f, error, scale)
+        _forget(surface, distances, f, error, scale)
     for _ in range(_STEPS):
         f = least(clearances, max(count, 8))
         taken = distances[2 * f] > -math.inf
@@ -245,13 +251,16 @@ def refine(
             corners[2 * k] = ids[2 * facets[FACET * f + k]]
             corners[2 * k + 1] = ids[2 * facets[FACET * f + k] + 1]
         beyond = 0.0
+        final = are_alone(pair, corners, 3, direction, error)
         i = j = -1
-        if not are_alone(pair, corners, 3, direction, error):
+        if not final:
             excess, _, i, j = settle_level(
                 pair, low, fine, facets[FACET * f], POINTS - 1, corners, 3, direction, error, ties_at, scale
             )
             beyond = -excess / length
-        if beyond + spread <= max(_LEVEL * distance, 3.0 * unsure):  # three heights make a level pair's
+            # Three heights make a level pair's; what is as good as a corner cannot be added, and widens the bracket.
+            final = beyond <= max(_LEVEL * distance, 3.0 * unsure) or beyond <= spread
+        if final:
             inner = clearances[f] if clearances[f] > 0.0 else -math.inf
             outer = distance + spread + beyond + 3.0 * unsure
             outer += _ROUNDED * abs(outer)
@@ -266,8 +275,8 @@ def refine(
             h = _flip_to(surface, f, v, error)
             if h < 0:
                 break
-            _forget(distances, clearances, f, error, scale)
-            _forget(distances, clearances, h, error, scale)
+            _forget(surface, distances, f, error, scale)
+            _forget(surface, distances, h, error, scale)
             continue
         if not has_room(vertices, count):
             break
@@ -278,6 +287,6 @@ def refine(
         count = expand(surface, f, vertices, count, found, edges, math.inf, error)
         for g in range(count):
             if vertices == facets[FACET * g + 2]:  # the apex stands last in what was made for it
-                _forget(distances, clearances, g, error, scale)
+                _forget(surface, distances, g, error, scale)
         vertices += 1
     return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count

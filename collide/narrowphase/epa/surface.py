@@ -15,10 +15,15 @@ from collide.narrowphase.minkowski import POINT, copy_point
 
 #: Doubles a facet's plane: unit normal, and the least of its corners along it.
 PLANE = 4
-#: Integers a facet: vertices 0 … 2, slots across the edges 0→1, 1→2, 2→0, and whether it is seen from the apex.
-FACET = 7
+#: Integers a facet: vertices 0 … 2, slots across the edges 0→1, 1→2, 2→0, whether it is seen from the apex, and whether
+#: the origin lies behind it wherever its corners truly are.
+FACET = 8
+SEEN, SURE = 6, 7
 #: Vertices stand in this many points; the last ones are for trying.
 POINTS = EPA_VERTICES + 8
+#: Rounding of the determinant of three corners, in units of |a|·|b − a|·|c − a| as sums of coordinates: eight roundings
+#: in a row, doubled.
+DETERMINANT_ERROR = 16 * 2.0**-53
 #: Most edges of a border.
 WIDEST_BORDER = 512
 
@@ -68,12 +73,12 @@ def fine_workspace(doubles_at, integers_at):
 
 @kernel(inline=True)
 def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
-    """(nx, ny, nz, distance, clearance) of a triangle, counter-clockwise from outside; n = 0 where it has no area.
+    """(nx, ny, nz, distance, clearance, sure) of a triangle, counter-clockwise from outside; n = 0 where it has no area.
 
     distance : the least of the corners' along the unit normal: for any unit normal, however badly a thin triangle
         defines it, no point of the triangle lies nearer the origin.
-    clearance : the same where the origin provably lies behind the triangle, by the bound of
-        `simplex._height_behind`, else −1.   error : how far each corner may be from its true place.
+    clearance : the same where the origin provably lies behind the triangle of the corners as they stand, else −1.
+    sure : whether it would with corners anywhere within ``error`` of these (see `simplex._height_behind`).
     """
     ex = bx - ax
     ey = by - ay
@@ -86,11 +91,13 @@ def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
     nz = ex * fy - ey * fx
     square = nx * nx + ny * ny + nz * nz
     if square == 0.0:
-        return 0.0, 0.0, 0.0, math.inf, -1.0
+        return 0.0, 0.0, 0.0, math.inf, -1.0, False
     e = abs(ex) + abs(ey) + abs(ez)
     f = abs(fx) + abs(fy) + abs(fz)
     a = abs(ax) + abs(ay) + abs(az)
-    behind = nx * ax + ny * ay + nz * az > 2.0 * error * (e * f + 2.0 * a * (e + f))
+    determinant = nx * ax + ny * ay + nz * az
+    behind = determinant > DETERMINANT_ERROR * a * e * f
+    sure = determinant > 2.0 * error * (e * f + 2.0 * a * (e + f))
     shorten = 1.0 / math.sqrt(square)
     nx *= shorten
     ny *= shorten
@@ -98,7 +105,7 @@ def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
     distance = nx * ax + ny * ay + nz * az
     distance = min(distance, nx * bx + ny * by + nz * bz)
     distance = min(distance, nx * cx + ny * cy + nz * cz)
-    return nx, ny, nz, distance, distance if behind else -1.0
+    return nx, ny, nz, distance, distance if behind else -1.0, sure
 
 
 @kernel(inline=True)
@@ -112,14 +119,15 @@ def set_facet(surface, f, i, j, k, error, depth):
     a = POINT * i
     b = POINT * j
     c = POINT * k
-    nx, ny, nz, distance, clearance = plane_of(
+    nx, ny, nz, distance, clearance, sure = plane_of(
         points[a], points[a + 1], points[a + 2], points[b], points[b + 1], points[b + 2],
         points[c], points[c + 1], points[c + 2], error,
     )  # fmt: skip
     facets[FACET * f] = i
     facets[FACET * f + 1] = j
     facets[FACET * f + 2] = k
-    facets[FACET * f + 6] = 0
+    facets[FACET * f + SEEN] = 0
+    facets[FACET * f + SURE] = 1 if sure else 0
     at = PLANE * f
     planes[at] = nx
     planes[at + 1] = ny
@@ -194,7 +202,7 @@ def find_patch(surface, f, apex, slack):
     x = points[POINT * apex]
     y = points[POINT * apex + 1]
     z = points[POINT * apex + 2]
-    facets[FACET * f + 6] = 1
+    facets[FACET * f + SEEN] = 1
     patch[0] = f
     found = 1
     visited = 0
@@ -204,10 +212,10 @@ def find_patch(surface, f, apex, slack):
         visited += 1
         for e in range(3):
             h = facets[FACET * g + 3 + e]
-            if facets[FACET * h + 6] == 1:
+            if facets[FACET * h + SEEN] == 1:
                 continue
             if is_seen(planes, h, x, y, z, slack) and found < WIDEST_BORDER - 2:
-                facets[FACET * h + 6] = 1
+                facets[FACET * h + SEEN] = 1
                 patch[found] = h
                 found += 1
             else:
@@ -233,7 +241,7 @@ def expand(surface, f, apex, count, found, edges, depth, error):
         starts[2 * start + 1] = apex
     if edges == 0:
         for k in range(1, found):
-            facets[FACET * patch[k] + 6] = 0
+            facets[FACET * patch[k] + SEEN] = 0
         for e in range(3):
             h = facets[FACET * f + 3 + e]
             border[2 * e] = h
