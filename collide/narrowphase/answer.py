@@ -32,7 +32,7 @@ from collide.narrowphase.epa.surface import FACET, workspace
 from collide.narrowphase.epa.surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.gap import GAP_DOUBLES, GAP_INTEGERS, polish_gap
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
-from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height
+from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height, reach_of_plane
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
@@ -325,7 +325,7 @@ def _combine(points, weights, n, j):
 
 
 @kernel
-def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, known, flip):
+def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip):
     """A half-space A and a convex B: the point of B deepest behind the plane."""
     (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b, _, _) = pair
     ids = view_i64(integers_at, 10)
@@ -354,7 +354,7 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, li
     width = 0.0 if exactly else math.inf
     if exactly and lower <= limit and not boolean:
         proven, height, height_low, unsure = polish_height(
-            pair, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, k, size, error
+            pair, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, k, size, error, skew
         )
         if proven:
             height, height_low = add(height, height_low, -radius, 0.0)
@@ -455,12 +455,11 @@ def _answer(
     if how == HALFSPACES:
         _halves(pair, row, marks, flip)
     elif how == HALFSPACE_CONVEX:
-        m0 = numbers[pair[4]]
-        m1 = numbers[pair[4] + 1]
-        m2 = numbers[pair[4] + 2]
-        size += abs(numbers[pair[4] + 3]) / math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+        offset, skew = reach_of_plane(numbers, pair[4], poses, pair[5])
+        size += offset
+        error = ERROR * size * skew + slop
         _half(
-            pair, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, ERROR * size + slop, known, flip
+            pair, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip
         )
     else:
         _swept(

@@ -18,6 +18,7 @@ from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_e
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.exact_plane import reach_plane_exactly
+from collide.narrowphase.halfspace_convex import reach_of_plane
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
 from collide.narrowphase.requests import REQUESTS, find_request
 from collide.narrowphase.rows import (
@@ -112,9 +113,10 @@ def decide_pairs(
         if plane:
             rounds = 1
             shown = 1
+            _, skew = reach_of_plane(numbers, pair[4], poses, pair[5])
             apart = False
             vx = vy = vz = 0.0
-            verdict, vertex, excess, excess_low = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error)
+            verdict, vertex, excess, excess_low = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error * skew)
             ids[0] = -1
             ids[1] = vertex
         else:

@@ -29,8 +29,7 @@ from collide.narrowphase.level import MOST_TIES, are_alone, settle_level
 #: Doubles of workspace: four points, a direction, low parts of two poses. Integers: ties.
 GAP_DOUBLES, GAP_INTEGERS = 4 * FINE + FINE + 24, 2 * (MOST_TIES + 1)
 
-#: Rounding of a weight in doubles, from exact differences rounded once: in units of |w|·|edge| over the height of the
-#: feature, with a dozen roundings to spare.
+#: Rounding of a weight's numerator in doubles, with a dozen roundings to spare: points are good to u·|w|, and so are edges.
 _WEIGHT_ERROR = 64 * 2.0**-53
 
 
@@ -45,7 +44,8 @@ def _foot_is_inside_edge(fine):
     ez = fine[FINE + 4] - z
     square = ex * ex + ey * ey + ez * ez
     along = -(x * ex + y * ey + z * ez)
-    margin = _WEIGHT_ERROR * (abs(x) + abs(y) + abs(z)) * (abs(ex) + abs(ey) + abs(ez))
+    w = abs(x) + abs(y) + abs(z)
+    margin = _WEIGHT_ERROR * w * (w + abs(ex) + abs(ey) + abs(ez))
     return margin < along < square - margin
 
 
@@ -67,11 +67,10 @@ def _foot_is_inside(fine, parallelogram):
     square = nx * nx + ny * ny + nz * nz
     beta = -(nx * (y * fz - z * fy) + ny * (z * fx - x * fz) + nz * (x * fy - y * fx))
     gamma = -(nx * (ey * z - ez * y) + ny * (ez * x - ex * z) + nz * (ex * y - ey * x))
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    # A product of four lengths twice over, the normal being off by as much of |e||f|. The differences here are off
-    # by u·|w|, which moves a weight by as much of |w| over the feature's height: the same product.
-    margin = _WEIGHT_ERROR * (abs(x) + abs(y) + abs(z)) * max(e, f) * e * f
+    # (e × f)·(f × w): edges off by u·|w| move it by that times |w| and two edges; rounding by u times all four lengths.
+    w = abs(x) + abs(y) + abs(z)
+    longest = max(abs(ex) + abs(ey) + abs(ez), abs(fx) + abs(fy) + abs(fz))
+    margin = _WEIGHT_ERROR * w * longest * longest * (w + longest)
     farther = max(beta, gamma) if parallelogram else beta + gamma
     return beta > margin and gamma > margin and farther < square - margin
 

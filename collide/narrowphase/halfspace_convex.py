@@ -47,6 +47,25 @@ def plane_in_world(numbers, at, poses, p):
 
 
 @kernel
+def reach_of_plane(numbers, at, poses, p):
+    """(distance of the plane from the frame's origin, skew): what a half-space adds to S, and by what errors grow.
+
+    n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; a matrix that is no rotation may make that much of |n|.
+    """
+    _, _, _, offset, length = plane_in_world(numbers, at, poses, p)
+    row = 0.0
+    for k in range(3):
+        r = p + 3 * k
+        row = max(row, poses[r] * poses[r] + poses[r + 1] * poses[r + 1] + poses[r + 2] * poses[r + 2])
+    m0 = numbers[at]
+    m1 = numbers[at + 1]
+    m2 = numbers[at + 2]
+    m = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+    skew = max(row * m / length, 1.0)
+    return max(abs(offset), abs(numbers[at + 3]) * row * math.sqrt(row)) / length, skew
+
+
+@kernel
 def opposite_halfspaces(numbers, at_a, p, at_b, q, poses):
     """(whether the outward normals are opposite within rounding, also of composed poses; nhat_A)."""
     ax, ay, az, _, length_a = plane_in_world(numbers, at_a, poses, p)
@@ -107,16 +126,14 @@ def _fine_coordinate(coordinates, m, k, poses, p, q, axis):
 
 
 @kernel
-def polish_height(pair, doubles_at, ties_at, vertex, size, error):
+def polish_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     """(proven, height, low part, error): the signed distance of B's core from a half-space A, to its last digit.
 
-    vertex : the deepest, as doubles say.   doubles_at, ties_at : workspace of eight doubles, MOST_TIES + 1 integers.
+    vertex : the deepest, as doubles say.   size, error, skew : as `reach_of_plane` makes them.
+    doubles_at, ties_at : workspace of eight doubles, MOST_TIES + 1 integers.
     Composed poses are left to the exact stage.
     """
     (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, _, _, _, _, tree_b, _, _) = pair
-    m0 = numbers[at_a]
-    m1 = numbers[at_a + 1]
-    m2 = numbers[at_a + 2]
     if is_composed(poses, p) or is_composed(poses, q) or not (SMALLEST_FINE < size < LARGEST_FINE):
         return False, 0.0, 0.0, 0.0
     plane = view_f64(doubles_at, 8)
@@ -155,11 +172,5 @@ def polish_height(pair, doubles_at, ties_at, vertex, size, error):
             least_low = height_low
     least, least_low = subtract(least, least_low, plane[6], plane[7])
     least, least_low = divide(least, least_low, length, length_low)
-    # The normal, too, is rounded here, to 2⁻¹⁰⁰·3 of |row|²|m|, and the offset to as much of |row|³ times it; a matrix
-    # that is no rotation may make that much of |n|.
-    row = 0.0
-    for k in range(3):
-        r = p + 3 * k
-        row = max(row, poses[r] * poses[r] + poses[r + 1] * poses[r + 1] + poses[r + 2] * poses[r + 2])
-    skew = max(row * math.sqrt(row), row) * math.sqrt(m0 * m0 + m1 * m1 + m2 * m2) / length
-    return True, least, least_low, 8.0 * max(skew, 1.0) * HEIGHT_ERROR / scale_of(size)
+    # The normal, too, is rounded here, to 2⁻¹⁰⁰·3 of |row|²|m|, and the offset to as much of |row|³ times it.
+    return True, least, least_low, 8.0 * skew * HEIGHT_ERROR / scale_of(size)
