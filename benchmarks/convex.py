@@ -240,10 +240,7 @@ def show(table: str, rows: list[dict]) -> None:
                 if r and r["bar"]:
                     verdict = [r["bar"], r["stretch"], r["verdict"]]
             lines.append(line + verdict)
-    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    print(f"\n{table}: µs a pair; ours by class of pose and mixed, others mixed")
-    for first, *rest in lines:
-        print("  ".join([first.ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(rest, widths[1:]))]).rstrip())
+    aligned(f"{table}: µs a pair; ours by class of pose and mixed, others mixed", lines)
     verdicts = [r for r in rows if r["verdict"]]
     missed = [f"{r['question']} at {r['n']:,}" for r in verdicts if r["verdict"] == "missed"]
     if verdicts:
@@ -251,11 +248,19 @@ def show(table: str, rows: list[dict]) -> None:
     sys.stdout.flush()
 
 
-def write(table: str, rows: list[dict], about: dict[str, str]) -> Path:
-    """The CSV of this table on this kind of machine; a later run on it takes its place."""
+def aligned(title: str, lines: list[list[str]]) -> None:
+    """A table: the first column to the left, the others to the right."""
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    tell(f"\n{title}")
+    for first, *rest in lines:
+        tell("  ".join([first.ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(rest, widths[1:]))]).rstrip())
+
+
+def write(name: str, rows: list[dict], about: dict[str, str]) -> Path:
+    """The CSV of this name on this kind of machine; a later run on it takes its place."""
     slug = re.sub(r"[^a-z0-9]+", "-", about["cpu"].lower()).strip("-")
     RESULTS.mkdir(exist_ok=True)
-    place = RESULTS / f"convex-{table}_{slug}_{about['cores']}-cores.csv"
+    place = RESULTS / f"{name}_{slug}_{about['cores']}-cores.csv"
     with place.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [*rows[0], *about], lineterminator="\n")
         writer.writeheader()
@@ -334,7 +339,7 @@ def main() -> None:
             rows += measure(table, n, args.poses, args.repeats, args.engines)
         show(table, judged(rows))
         if not args.no_csv:
-            print("written to", write(table, rows, about).relative_to(RESULTS.parent.parent))
+            print("written to", write(f"convex-{table}", rows, about).relative_to(RESULTS.parent.parent))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """coal and python-fcl as `benchmarks/convex.py` asks them: Python loops over poses that are ready to be used.
 
 Geometries, transforms and requests are made beforehand; a loop makes or clears the result and asks. Both are
-asked the same three questions: the boolean without contacts, the signed distance, the unsigned one.
+asked the same three questions: the boolean without contacts, the signed distance, the unsigned one. coal can be
+asked with tolerances of one's own.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from collections.abc import Callable
 import numpy as np
 
 QUESTIONS = ("boolean", "signed", "unsigned")
+#: Most iterations of coal where a tolerance is asked for; its default is too few for tight ones.
+MOST_ITERATIONS = 1000
 #: How long python-fcl may take over one loop before it counts as hung [s].
 PATIENCE = 300.0
 
 
 class Coal:
-    """coal with its default settings, contacts off for the boolean."""
+    """coal with its default settings unless a tolerance is given, contacts off for the boolean."""
 
     name = "coal"
 
@@ -34,9 +37,9 @@ class Coal:
             for (a, b), X in zip(which.tolist(), X_WBs)
         ]
 
-    def loop(self, question: str) -> Callable[[], None]:
+    def loop(self, question: str, tolerance: float | None = None) -> Callable[[], None]:
         """The loop to be timed; it keeps no answers."""
-        ask, request, result, origin = *self._asked(question), self._origin
+        ask, request, result, origin = *self._asked(question, tolerance), self._origin
 
         def run():
             for a, b, T in self._pairs:
@@ -45,8 +48,8 @@ class Coal:
 
         return run
 
-    def answers(self, question: str) -> np.ndarray:
-        ask, request, result, origin = *self._asked(question), self._origin
+    def answers(self, question: str, tolerance: float | None = None) -> np.ndarray:
+        ask, request, result, origin = *self._asked(question, tolerance), self._origin
         found = []
         for a, b, T in self._pairs:
             result.clear()  # a distance result that is not cleared keeps its answer
@@ -54,7 +57,7 @@ class Coal:
         return np.array(found, dtype=float)
 
     @staticmethod
-    def _asked(question: str) -> tuple:
+    def _asked(question: str, tolerance: float | None) -> tuple:
         import coal
 
         if question == "boolean":
@@ -63,7 +66,15 @@ class Coal:
             return coal.collide, request, coal.CollisionResult()
         request = coal.DistanceRequest()
         request.enable_signed_distance = question == "signed"
+        set_tolerance(request, tolerance)
         return coal.distance, request, coal.DistanceResult()
+
+
+def set_tolerance(request, tolerance: float | None) -> None:
+    """coal's GJK and EPA told to stop there; None leaves a request as it is."""
+    if tolerance is not None:
+        request.gjk_tolerance = request.epa_tolerance = tolerance
+        request.gjk_max_iterations = request.epa_max_iterations = MOST_ITERATIONS
 
 
 def _coal_hull(points: np.ndarray, faces: np.ndarray):
@@ -102,8 +113,16 @@ class Fcl:
 
     def seconds(self, question: str) -> float:
         """Of one loop; NaN where python-fcl has crashed or hung on it."""
+        return self._asked(question)[0]
+
+    def answers(self, question: str) -> np.ndarray:
+        """What one loop finds; NaN where python-fcl has crashed or hung on it."""
+        return self._asked(question)[1]
+
+    def _asked(self, question: str) -> tuple[float, np.ndarray]:
+        nothing = math.nan, np.full(len(self._job[1]), math.nan)
         if question in self._dead:
-            return math.nan
+            return nothing
         try:
             self._pipe.send(question)
             if self._pipe.poll(PATIENCE):
@@ -113,7 +132,7 @@ class Fcl:
         self._dead.add(question)
         self.close()
         self._start()
-        return math.nan
+        return nothing
 
     def close(self) -> None:
         self._process.kill()
@@ -122,7 +141,7 @@ class Fcl:
 
 
 def _fcl_child(pipe) -> None:
-    """Times one loop for every question that comes down the pipe."""
+    """Times one loop for every question that comes down the pipe, and tells what it found."""
     import fcl
 
     hulls, which, X_WBs = pipe.recv()
@@ -147,6 +166,5 @@ def _fcl_child(pipe) -> None:
             request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=signed)
             ask, result = fcl.distance, fcl.DistanceResult
         started = time.perf_counter()
-        for a, b in pairs:
-            ask(a, b, request, result())  # results accumulate, so each pair gets its own
-        pipe.send(time.perf_counter() - started)
+        found = [ask(a, b, request, result()) for a, b in pairs]  # results accumulate, so each pair gets its own
+        pipe.send((time.perf_counter() - started, np.array(found, dtype=float)))
