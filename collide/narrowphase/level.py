@@ -70,12 +70,14 @@ def _no_other_is_level(coordinates, n, m, tree, i, j, k, own, gx, gy, gz, slack)
         # What fills up the last block are copies of vertex 0.
         copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
         return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
-    starts, ring = rings_of(tree)
-    for turn in range(3):
-        v = i if turn == 0 else (j if turn == 1 else k)
+    starts, ring, corners = rings_of(tree)
+    for turn in range(own):
+        # The last is a new one if the one in the middle is not.
+        v = i if turn == 0 else (k if turn == 2 or j == i else j)
         for at in range(starts[v], starts[v + 1]):
             w = ring[at]
-            if _product(coordinates, m, w, gx, gy, gz) <= limit and w != i and w != j and w != k:
+            height = corners[3 * w] * gx + corners[3 * w + 1] * gy + corners[3 * w + 2] * gz
+            if height <= limit and w != i and w != j and w != k:
                 return False
     return True
 
@@ -95,12 +97,12 @@ def tied_vertices(coordinates, n, m, tree, ties, own, gx, gy, gz, slack):
     limit += slack
     count = own
     if tree != 0:
-        starts, ring = rings_of(tree)
+        starts, ring, corners = rings_of(tree)
         k = 0
         while k < count:
             for at in range(starts[ties[k]], starts[ties[k] + 1]):
                 i = ring[at]
-                if coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz <= limit:
+                if corners[3 * i] * gx + corners[3 * i + 1] * gy + corners[3 * i + 2] * gz <= limit:
                     count = _with_tie(ties, count, i)
                     if count > MOST_TIES:
                         return count, limit

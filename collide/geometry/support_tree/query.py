@@ -18,6 +18,7 @@ from collide.geometry.support_tree.layout import (
     AT_ENTRIES,
     AT_LIST_COORDINATES,
     AT_NODES,
+    AT_POINTS,
     AT_RING,
     AT_RING_STARTS,
     DEPTH,
@@ -72,9 +73,15 @@ def extreme_vertex(tree_at, gx, gy, gz):
 
 @kernel
 def rings_of(tree_at):
-    """(starts, ring): the hull neighbours of row i are ring[starts[i]] … ring[starts[i + 1] − 1]."""
+    """(starts, ring, corners): the hull neighbours of row i are ring[starts[i]] … ring[starts[i + 1] − 1].
+
+    The coordinates of row i stand at corners[3·i], next to each other, which saves two of three cache misses.
+    """
     header = view_i64(tree_at, HEADER)
-    return view_i32(header[AT_RING_STARTS], header[POINTS] + 1), view_i32(header[AT_RING], header[LINKS])
+    return (
+        view_i32(header[AT_RING_STARTS], header[POINTS] + 1), view_i32(header[AT_RING], header[LINKS]),
+        view_f64(header[AT_POINTS], 3 * header[POINTS]),
+    )  # fmt: skip
 
 
 @entry("void(int64, int64, int64, boolean, int64, int64)")

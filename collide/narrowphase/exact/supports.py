@@ -73,7 +73,7 @@ def _climb(digits, d, n, coordinates, m, tree, core, digits_core, gx, gy, gz, sl
     −1 where all neighbours are level: a vertex within a face, which may be a face on the far side.
     """
     best, _, _, _ = extreme_vertex(tree, -gx, -gy, -gz)
-    starts, ring = rings_of(tree)
+    starts, ring, _ = rings_of(tree)
     while True:
         better = best
         level = True
