@@ -59,7 +59,7 @@ from collide.transforms import SMALLEST
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits need.
 _WEIGHTS = 5 * POINT
-_FINE = 64
+_FOOT, _FINE = 60, 64
 _NEAREST, _TIES = 10, 16
 _TIED = _TIES + GAP_INTEGERS
 _OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIED + ENTRY
@@ -233,9 +233,10 @@ def _swept(
             used, parallelogram = _nearest_of_four(ids, weights, n, integers_at)
             proven, value, value_low, unsure, ux, uy, uz = polish_gap(
                 pair, terms_at, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, view_i64(integers_at + 8 * _NEAREST, 6),
-                used, parallelogram, size, slop, error,
+                used, parallelogram, view_f64(doubles_at + 8 * _FOOT, 3), size, slop, error,
             )  # fmt: skip
             if proven:
+                _take_foot(weights, n, view_f64(doubles_at + 8 * _FOOT, 3))
                 swept, swept_low = two_sum(radius_a, radius_b)
                 value, value_low = add(value, value_low, -swept, -swept_low)
                 low, distance, high = bracket(value, value_low, unsure)
@@ -271,9 +272,8 @@ def _swept(
     bx = _combine(points, weights, n, 6)
     by = _combine(points, weights, n, 7)
     bz = _combine(points, weights, n, 8)
-    # On curved cores the last facet still has a width: what the two points miss of depth·n is shared
-    # between them. For polytopes this is rounding.
-    missing = 0.0 if boolean else 0.5
+    # On curved cores the last facet still has a width: what the two points miss of depth·n is shared between them.
+    missing = 0.5 if curved and not boolean else 0.0
     ox = missing * (ax - bx - pair[14] - depth * nx)
     oy = missing * (ay - by - pair[15] - depth * ny)
     oz = missing * (az - bz - pair[16] - depth * nz)
@@ -297,6 +297,27 @@ def _name_plane(ids, tied):
     tied[1] = 1
     for k in range(6):
         tied[2 + k] = ids[k]
+
+
+@kernel(inline=True)
+def _take_foot(weights, n, foot):
+    """Replace the weights of the points that have one by those of `polish_gap`.
+
+    Of four points of two segments, three corners have told the plane: the weights of the parallelogram are products.
+    """
+    if n == 4 and weights[0] > 0.0 and weights[1] > 0.0 and weights[2] > 0.0 and weights[3] > 0.0:
+        s = foot[1]
+        t = foot[2]
+        weights[0] = (1.0 - s) * (1.0 - t)
+        weights[1] = s * (1.0 - t)
+        weights[2] = (1.0 - s) * t
+        weights[3] = s * t
+        return
+    used = 0
+    for k in range(n):
+        if weights[k] > 0.0 and used < 3:
+            weights[k] = foot[used]
+            used += 1
 
 
 @kernel(inline=True)

@@ -18,6 +18,8 @@ from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_e
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.exact_plane import reach_plane_exactly
+from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, fine_points, scale_of, write_low_parts
+from collide.narrowphase.gap import weigh_foot
 from collide.narrowphase.halfspace_convex import reach_of_plane
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
 from collide.narrowphase.requests import REQUESTS, find_request
@@ -45,19 +47,45 @@ DIGITS = max(HULL_DIGITS, PLANE_DIGITS)
 
 
 @kernel
-def _set_normal(row, vx, vy, vz, distance, flip):
-    """The normal from the exact direction, and the witness points along it about their middle.
+def _set_normal(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, vx, vy, vz, distance, flip):
+    """The normal from the exact direction, and the witness points on the feature that decided.
 
-    Those found in doubles carry the direction of a difference of nearly equal points, which says
-    nothing where the gap is below rounding.
+    Those found in doubles carry the direction of a difference of nearly equal points, which says nothing where the gap
+    is below rounding, and need not lie on that feature.
     """
     sign = 1.0 if flip else -1.0
+    fine = view_f64(room_at, 4 * FINE)
+    weights = view_f64(room_at + 8 * 4 * FINE, 3)
+    low_at = room_at + 8 * (4 * FINE + 3)
+    known = n <= 3 and SMALLEST_FINE < size < LARGEST_FINE
+    if known:
+        low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
+        fine_points(pair, low, fine, ids, n, scale_of(size))
+        weigh_foot(fine, n, False, weights)
+    poses = pair[13]
     for axis in range(3):
         v = sign * (vx if axis == 0 else (vy if axis == 1 else vz))
-        middle = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis])
+        first = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis]) - 0.5 * distance * v
+        second = first + distance * v
+        if known:
+            a = 0.0
+            b = 0.0
+            p = pair[5] + 3 * axis
+            q = pair[11] + 3 * axis
+            for k in range(n):
+                i = ids[2 * k]
+                j = ids[2 * k + 1]
+                a += weights[k] * (poses[p] * pair[0][i] + poses[p + 1] * pair[0][pair[2] + i] + poses[p + 2] * pair[0][2 * pair[2] + i])
+                b += weights[k] * (poses[q] * pair[6][j] + poses[q + 1] * pair[6][pair[8] + j] + poses[q + 2] * pair[6][2 * pair[8] + j])
+            # v is the normal of the pair as asked; the bodies here may be exchanged.
+            own = -v if flip else v
+            a += poses[pair[5] + 9 + axis] + radius_a * own
+            b += poses[pair[11] + 9 + axis] - radius_b * own
+            first = b if flip else a
+            second = a if flip else b
         row[NORMAL + axis] = v + 0.0
-        row[POINT_A + axis] = middle - 0.5 * distance * v
-        row[POINT_B + axis] = middle + 0.5 * distance * v
+        row[POINT_A + axis] = first
+        row[POINT_B + axis] = second
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)")
@@ -158,7 +186,11 @@ def decide_pairs(
                     lower = max(lower, low)
                     upper = min(upper, high)
         if not plane and apart:
-            _set_normal(row, vx, vy, vz, distance, flip)
+            # The digits have done their work; their place is as good as any for doubles.
+            _set_normal(
+                row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, vx, vy, vz,
+                distance, flip,
+            )  # fmt: skip
         width = math.inf if boolean else 0.0
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double

@@ -16,6 +16,7 @@ from collide.narrowphase.fine import (
     LARGEST_FINE,
     SLOP_ERROR,
     SMALLEST_FINE,
+    fine_edge,
     fine_height,
     fine_length,
     fine_points,
@@ -29,57 +30,65 @@ from collide.narrowphase.level import MOST_TIES, are_alone, settle_level
 #: Doubles of workspace: four points, a direction, low parts of two poses. Integers: ties.
 GAP_DOUBLES, GAP_INTEGERS = 4 * FINE + FINE + 24, 2 * (MOST_TIES + 1)
 
-#: Rounding of a weight's numerator in doubles, with a dozen roundings to spare: points are good to u·|w|, and so are edges.
+#: Rounding of a weight's numerator in doubles, of points and edges rounded once, with a dozen roundings to spare.
 _WEIGHT_ERROR = 64 * 2.0**-53
 
 
-@kernel(inline=True)
-def _foot_is_inside_edge(fine):
-    """Whether the foot of the origin certainly lies between points 0 and 1."""
+@kernel
+def weigh_foot(fine, n, parallelogram, weights):
+    """Weights of n ≤ 3 points at the foot of the origin, brought among the points; whether it certainly lies there.
+
+    Edges are taken finely and rounded once, so that weights are good to u·|w| over the feature's length, and the
+    foot to a few ulps of the pair's size.
+    """
+    weights[0] = 1.0
+    weights[1] = 0.0
+    weights[2] = 0.0
+    if n == 1:
+        return True
     x = fine[0]
     y = fine[2]
     z = fine[4]
-    ex = fine[FINE] - x
-    ey = fine[FINE + 2] - y
-    ez = fine[FINE + 4] - z
-    square = ex * ex + ey * ey + ez * ez
-    along = -(x * ex + y * ey + z * ez)
+    ex, _, ey, _, ez, _ = fine_edge(fine, 1, 0)
     w = abs(x) + abs(y) + abs(z)
-    margin = _WEIGHT_ERROR * w * (w + abs(ex) + abs(ey) + abs(ez))
-    return margin < along < square - margin
-
-
-@kernel(inline=True)
-def _foot_is_inside(fine, parallelogram):
-    """Whether the foot of the origin certainly lies inside the triangle of points 0, 1 and 2, or their parallelogram."""
-    x = fine[0]
-    y = fine[2]
-    z = fine[4]
-    ex = fine[FINE] - x
-    ey = fine[FINE + 2] - y
-    ez = fine[FINE + 4] - z
-    fx = fine[2 * FINE] - x
-    fy = fine[2 * FINE + 2] - y
-    fz = fine[2 * FINE + 4] - z
+    e = abs(ex) + abs(ey) + abs(ez)
+    if n == 2:
+        square = ex * ex + ey * ey + ez * ez
+        along = -(x * ex + y * ey + z * ez)
+        margin = _WEIGHT_ERROR * w * e
+        if not (margin < along < square - margin):
+            return False
+        weights[1] = along / square
+        weights[0] = 1.0 - weights[1]
+        return True
+    fx, _, fy, _, fz, _ = fine_edge(fine, 2, 0)
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
     square = nx * nx + ny * ny + nz * nz
     beta = -(nx * (y * fz - z * fy) + ny * (z * fx - x * fz) + nz * (x * fy - y * fx))
     gamma = -(nx * (ey * z - ez * y) + ny * (ez * x - ex * z) + nz * (ex * y - ey * x))
-    # (e × f)·(f × w): edges off by u·|w| move it by that times |w| and two edges; rounding by u times all four lengths.
-    w = abs(x) + abs(y) + abs(z)
-    longest = max(abs(ex) + abs(ey) + abs(ez), abs(fx) + abs(fy) + abs(fz))
-    margin = _WEIGHT_ERROR * w * longest * longest * (w + longest)
+    f = abs(fx) + abs(fy) + abs(fz)
+    # A product of four lengths, each as good as doubles are, and the normal off by as much of |e||f|.
+    margin = _WEIGHT_ERROR * w * max(e, f) * e * f
     farther = max(beta, gamma) if parallelogram else beta + gamma
+    if square > 0.0:
+        weights[1] = max(beta / square, 0.0)
+        weights[2] = max(gamma / square, 0.0)
+        weights[0] = 1.0 - weights[1] - weights[2]
+        if weights[0] < 0.0 and not parallelogram:
+            weights[1] /= 1.0 - weights[0]
+            weights[2] /= 1.0 - weights[0]
+            weights[0] = 0.0
     return beta > margin and gamma > margin and farther < square - margin
 
 
 @kernel
-def polish_gap(pair, terms_at, doubles_at, ties_at, ids, n, parallelogram, size, slop, error):
+def polish_gap(pair, terms_at, doubles_at, ties_at, ids, n, parallelogram, weights, size, slop, error):
     """The distance of two cores of points that are apart, from the vertex pairs of the n ≤ 3 points nearest the origin.
 
     parallelogram : the nearest point lies in that of three points, point 0 the corner between the others.
+    weights : of the points at the foot, out where proven.
     terms_at, doubles_at, ties_at : terms of the `PoseTable`, workspace.   size, slop, error : as for the pair.
 
     Returns (proven, distance, low part, error of it, nx, ny, nz): the last three the unit vector from B to A.
@@ -92,18 +101,17 @@ def polish_gap(pair, terms_at, doubles_at, ties_at, ids, n, parallelogram, size,
     low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
     scale = scale_of(size)
     fine_points(pair, low, fine, ids, n, scale)
-    inside = True
+    if not weigh_foot(fine, n, parallelogram, weights):
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n == 1:
         for k in range(FINE):
             direction[k] = fine[k]
     elif n == 2:
-        inside = _foot_is_inside_edge(fine)
         set_away_from_edge(fine, direction)
     else:
-        inside = _foot_is_inside(fine, parallelogram)
         set_plane(fine, 0, 1, 2, direction)
     length, length_low = fine_length(direction)
-    if not inside or length == 0.0:
+    if length == 0.0:
         return False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     height, height_low = fine_height(fine, 0, direction)
     if height < 0.0:

@@ -32,15 +32,24 @@ from collide.narrowphase.simplex import face_weights
 EXPANDED, FLAT = range(2)
 
 
+#: With so many vertices a repeated one is looked for among all of them: where faces are nearly parallel, runs went on
+#: adding the same ones up to the cap.
+_MANY = 64
+
+
 @kernel(inline=True)
 def _is_corner(ids, facets, f, k):
-    """Whether point k is a vertex of facet f or of a neighbour, by its support vertices."""
+    """Whether point k is a vertex of facet f or of a neighbour, or one of many vertices, by its support vertices."""
     if ids[2 * k] < 0 or ids[2 * k + 1] < 0:
         return False
     for side in range(4):
         g = f if side == 3 else facets[FACET * f + 3 + side]
         for corner in range(3):
             v = facets[FACET * g + corner]
+            if ids[2 * v] == ids[2 * k] and ids[2 * v + 1] == ids[2 * k + 1]:
+                return True
+    if k >= _MANY:
+        for v in range(k):
             if ids[2 * v] == ids[2 * k] and ids[2 * v + 1] == ids[2 * k + 1]:
                 return True
     return False

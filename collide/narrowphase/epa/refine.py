@@ -265,7 +265,7 @@ def refine(
             outer = distance + spread + beyond + 3.0 * unsure
             outer += _ROUNDED * abs(outer)
             if distance * over < 4.0 * error:
-                _name_tied(surface, distance + 8.0 * unsure, f, count, tied)
+                _name_tied(surface, distance + spread + 8.0 * unsure, f, count, tied)
             return (
                 True, inner * over, distance * over, outer * over,
                 -direction[0] / length, -direction[2] / length, -direction[4] / length, f, count,
