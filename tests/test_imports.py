@@ -52,7 +52,7 @@ LATE = {
     "walks": {"certificates"},
     "results": {"certificates"},
     "robot": {"scenes"},
-    "reports": {"rich"},
+    "reports": {"rich", "matplotlib"},
     "cli": {"scenes", "adapters"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
