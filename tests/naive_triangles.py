@@ -149,3 +149,27 @@ def surface_distance(vertices_a, faces_a, X_WA, vertices_b, faces_b, X_WB) -> tu
                 pairs.append((i, j))
     assert best is not None
     return best / scale**2, pairs
+
+
+def winding(corners, p) -> int | None:
+    """How often a closed surface of integer triangles winds around an integer point; None on the surface."""
+    for a, b, c in corners:
+        n = cross(minus(b, a), minus(c, a))
+        if inner(n, minus(p, a)) == 0:
+            sides = [inner(n, cross(minus(y, x), minus(p, x))) for x, y in ((a, b), (b, c), (c, a))]
+            if min(sides) >= 0:
+                return None
+    for direction in ([7919, 104729, 1299709], [-15485863, 32452843, 49979687], [86028121, -3, 17]):
+        passed = 0
+        for a, b, c in corners:
+            w = [minus(x, p) for x in (a, b, c)]
+            sides = [inner(cross(w[k], w[(k + 1) % 3]), direction) for k in range(3)]
+            n = cross(minus(b, a), minus(c, a))
+            slope = inner(n, direction)
+            if (min(sides) > 0 or max(sides) < 0) and inner(n, w[0]) * slope > 0:
+                passed += 1 if slope > 0 else -1
+            elif (min(sides) >= 0 or max(sides) <= 0) and 0 in sides:
+                break
+        else:
+            return passed
+    raise AssertionError("choose other directions")

@@ -39,6 +39,7 @@ ROOMS = {
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
     "walks": {"errors", "geometry", "shapes", "narrowphase"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
+    "meshes": {"errors", "geometry", "shapes", "narrowphase", "results", "batches"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
@@ -49,6 +50,8 @@ ROOMS = {
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
     "query": {"walks"},
+    "batches": {"meshes"},
+    "packed_world": {"meshes"},
     "walks": {"certificates"},
     "results": {"certificates"},
     "robot": {"scenes"},

@@ -29,15 +29,16 @@ SIGNATURE = "int64(int64, int64, int64, int64, int64, int64)"
 #: What is asked of it: whether triangles meet; how a segment (corners 3 and 4) passes the triangle of A; whether two
 #: triangles with one edge (corners 0 and 1, also 3 and 4) share more than that edge.
 MEET, PASS, OVERLAP = range(3)
-#: How a segment passes: by, through the inside, along an edge or corner or in the plane, or from a point of the triangle.
-BY, THROUGH, UNCLEAR, FROM = range(4)
+#: How a segment passes: by, through the inside, along an edge or corner or in the plane, from a point of the
+#: triangle, or through it the other way (THROUGH begins where the corners are seen counter-clockwise).
+BY, THROUGH, UNCLEAR, FROM, BACK = range(5)
 #: Integers of its workspace.
 INTEGERS = STATE + DIGITS
 
 
 @entry(SIGNATURE)
 def decide_exactly(what, corners_at, placing_at, integers_at, XA_at, XB_at):
-    """MEET: 1 where the two triangles of the corners meet, as posed by the matrices given, else 0. PASS: BY … FROM."""
+    """MEET: 1 where the two triangles of the corners meet, as posed by the matrices given, else 0. PASS: BY … BACK."""
     corners = view_f64(corners_at, CORNERS)
     placing = view_f64(placing_at, PLACING)
     state = view_i64(integers_at, STATE)
@@ -95,7 +96,7 @@ def meeting_exactly(context):
 
 @kernel
 def passing_exactly(context):
-    """How the segment from corner 3 to corner 4 passes the triangle of A: BY, THROUGH, UNCLEAR or FROM."""
+    """How the segment from corner 3 to corner 4 passes the triangle of A: BY … BACK."""
     forget_points(context[3])
     start = sign3(context, 0, 1, 2, 3)
     end = sign3(context, 0, 1, 2, 4)
@@ -114,7 +115,9 @@ def passing_exactly(context):
         return BY
     if start == 0:
         return FROM
-    return UNCLEAR if end == 0 or (least <= 0 and most >= 0) else THROUGH
+    if end == 0 or (least <= 0 and most >= 0):
+        return UNCLEAR
+    return THROUGH if start > 0 else BACK
 
 
 @kernel

@@ -1,4 +1,7 @@
-"""Whether points are inside a closed surface: the parity of the facets that a segment to the outside passes.
+"""Whether points are inside a closed surface: how often it winds around them, by the facets that a segment passes.
+
+A segment that leaves counts one for every facet passed from behind, and one less for every facet passed from its
+front. Around points inside the surface winds once or more: parts that overlap are one body, cavities are none of it.
 
 The segment goes from the point to one beyond the surface's box, in the frame the point is given in, along an axis of
 it; ends are doubles there, so both are posed without rounding. Where it passes an edge or a corner, or runs in a
@@ -27,7 +30,7 @@ from collide.geometry.mesh_tree.layout import (
     TRIANGLES_AT,
     WIDTH,
 )
-from collide.narrowphase.triangles.exact import BY, FROM, PASS, THROUGH, UNCLEAR, call_exactly
+from collide.narrowphase.triangles.exact import BACK, BY, FROM, PASS, THROUGH, UNCLEAR, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
 from collide.narrowphase.triangles.filtered import orientation, sign_error
 from collide.narrowphase.triangles.placing import (
@@ -40,6 +43,8 @@ from collide.narrowphase.triangles.placing import (
 from collide.narrowphase.triangles.surfaces import link_of, no_slab, set_probe
 
 OUTSIDE, ON_SURFACE, INSIDE, UNDECIDED, SINGULAR = range(5)
+#: From a facet's back to its front, and the other way.
+LEAVING, ENTERING = BACK, THROUGH
 #: Segments tried for a point: along the axes of its frame, then off them.
 TRIES = 6 + 32
 #: Doubles, floats and integers of workspace besides the exact stage's: the fake tree of a segment with them.
@@ -106,7 +111,7 @@ def _set_tree_of_segment(ends, header_b, numbers_b, node):
 
 @kernel
 def _pass(P, a, corners, error):
-    """How the segment passes the triangle, in doubles: BY, THROUGH, or UNCLEAR, which here is for the exact stage."""
+    """How the segment passes the triangle, in doubles: BY, THROUGH, BACK, or UNCLEAR, which here is for the exact stage."""
     far = 0.0
     for axis in range(3):
         x = P[a + axis]
@@ -127,7 +132,9 @@ def _pass(P, a, corners, error):
     if (two > limit and three < -limit) or (two < -limit and three > limit):
         return BY
     sure = abs(start) > limit and abs(end) > limit and abs(one) > limit and abs(two) > limit and abs(three) > limit
-    return THROUGH if sure else UNCLEAR
+    if not sure:
+        return UNCLEAR
+    return THROUGH if start > 0.0 else BACK
 
 
 @entry(
@@ -183,7 +190,7 @@ def points_inside(
             transform(placing, ends, 0, corners, 9)
             set_probe(placing, 1, node, 0, probe)
             no_slab(probe)
-            answers[k] = _parity(
+            answers[k] = _winding(
                 P, boxes_a, links_a, stack, placing, corners, frame_b, probe, decide, arguments, counters
             )
             if answers[k] != UNDECIDED:
@@ -191,7 +198,7 @@ def points_inside(
 
 
 @kernel
-def _parity(P, boxes, links, stack, placing, corners, frame, probe, decide, arguments, counters):
+def _winding(P, boxes, links, stack, placing, corners, frame, probe, decide, arguments, counters):
     """OUTSIDE or INSIDE by the facets that the segment passes; ON_SURFACE; UNDECIDED where one is passed at its edge."""
     passed = 0
     unclear = False
@@ -220,7 +227,7 @@ def _parity(P, boxes, links, stack, placing, corners, frame, probe, decide, argu
             if how == FROM:
                 return ON_SURFACE
             unclear = unclear or how == UNCLEAR
-            passed += how == THROUGH
+            passed += (how == LEAVING) - (how == ENTERING)
     if unclear:
         return UNDECIDED
-    return INSIDE if passed % 2 == 1 else OUTSIDE
+    return INSIDE if passed > 0 else OUTSIDE

@@ -89,7 +89,7 @@ def _inverse(X, out, at):
             m = (i + 2) % 3
             out[at + 3 * i + j] = X[a + k] * X[b + m] - X[a + m] * X[b + k]
     det = X[0] * out[at] + X[1] * out[at + 3] + X[2] * out[at + 6]
-    if not abs(det) > 0.0:
+    if not det > 0.0:  # signs of doubles are A's, exact ones the world's: a mirror would mix them
         return math.inf
     worst = 0.0
     for k in range(9):

@@ -109,7 +109,7 @@ def _walked(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.
             first_only, keys.ctypes.data, len(keys), starts_at, counters_at, where_at, *work.addresses,
         )  # fmt: skip
         if said == SINGULAR:
-            raise InvalidPose(f"pose {int(told[0])}: a matrix that is singular, or nearly so, cannot place a mesh")
+            raise InvalidPose(f"pose {int(told[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
         if said != FULL:
             break
         keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
@@ -138,7 +138,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
         integers_at, decide,
     )  # fmt: skip
     if done < n:
-        raise InvalidPose(f"pose {done}: a matrix that is singular, or nearly so, cannot place a mesh")
+        raise InvalidPose(f"pose {done}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
     return SurfaceDistances(
         results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
         marks[:, 2] != 0, marks[:, 3:],
@@ -149,8 +149,8 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
     """(N,) int64: whether points are OUTSIDE (0) of a closed surface, ON it (1) or INSIDE (2), without rounding.
 
     points : (3,) or (N, 3), in a frame of pose X_WB: points of the world with ``np.eye(4)``, vertices of another mesh
-        with its pose. X_WA, X_WB : (4, 4) or (N, 4, 4). The parity of the facets passed counts, so the surface must be
-        closed, but need not be oriented. Points on facets without area may be said to be off the surface.
+        with its pose. X_WA, X_WB : (4, 4) or (N, 4, 4). Inside is where the surface winds once or more: it must be
+        closed, facets counter-clockwise from outside. Points on facets without area may be said to be off the surface.
         UNDECIDED (3) where every segment tried passes an edge: not met so far.
     """
     X_WA, X_WB, n = matched(X_WA, X_WB)
@@ -170,7 +170,7 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
     )  # fmt: skip
     if (answers == inside.SINGULAR).any():
         k = int(np.flatnonzero(answers == inside.SINGULAR)[0])
-        raise InvalidPose(f"pose {k}: a matrix that is singular, or nearly so, cannot place a mesh")
+        raise InvalidPose(f"pose {k}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
     return answers
 
 
