@@ -49,7 +49,7 @@ ROOMS = {
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
-    "query": {"walks"},
+    "query": {"meshes", "walks"},
     "batches": {"meshes"},
     "packed_world": {"meshes"},
     "walks": {"certificates"},

@@ -12,12 +12,16 @@ import math
 import numpy as np
 
 from collide.batches import ask
+from collide.geometry.mesh_tree.layout import REACH
 from collide.meshes.bodies import Body, body_of, hull_of, is_halfspace
 from collide.meshes.hits import core_hits, hits, swept_apart
 from collide.meshes.way_out import way_out
 from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
+
+#: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
+PROMISE = 2.0**-43
 
 
 def mesh_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
@@ -102,7 +106,8 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     rows["point_a"], rows["point_b"] = found.point_a + A.radius * normal, found.point_b - B.radius * normal
     rows["part_a"], rows["part_b"] = np.maximum(found.facets[:, 0], 0), np.maximum(found.facets[:, 1], 0)
     beyond = unseen | (rows["lower"] > limit)
-    rows["beyond"], rows["certified"] = beyond, (rows["lower"] > 0.0) | (radius == 0.0)
+    narrow = rows["upper"] - rows["lower"] <= PROMISE * _size(A, B, X_WA, X_WB)
+    rows["beyond"], rows["certified"] = beyond, (narrow | beyond) & ((rows["lower"] > 0.0) | (radius == 0.0))
     if beyond.any():
         rows["lower"][unseen] = math.nextafter(limit, math.inf)
         rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
@@ -141,6 +146,12 @@ def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bo
     row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
     row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
     row["certified"] = bool(decided and bound == 0.0)
+
+
+def _size(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
+    """(n,) reaches of both from their frames' origins, the distance between these, and the radii."""
+    reaches = sum(float(body.tree.numbers[REACH:].sum()) + body.radius for body in (A, B))
+    return reaches + np.abs(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1)
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

@@ -12,7 +12,13 @@ import numpy as np
 
 from collide.meshes.bodies import Body
 from collide.narrowphase.triangles.inside import OUTSIDE
-from collide.narrowphase.triangles.queries import SurfaceDistances, points_in_solid, surface_distances, surfaces_meet
+from collide.narrowphase.triangles.queries import (
+    FARTHER,
+    SurfaceDistances,
+    points_in_solid,
+    surface_distances,
+    surfaces_meet,
+)
 
 #: As many points and poses are looked at in one go.
 _CHUNK = 1 << 16
@@ -88,7 +94,6 @@ def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     radius = A.radius + B.radius
     left = np.flatnonzero(~answer)
     if radius > 0.0 and len(left):
-        limit = radius * (1 + 1e-9)
-        found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], limit)
+        found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], radius * FARTHER)
         answer[left] = ~swept_apart(A, B, found)[0]
     return answer

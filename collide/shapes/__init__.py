@@ -1,8 +1,8 @@
 """What a user hands in: immutable shapes, validated when made.
 
 One file per family: primitives (a few numbers), hull (points), hpolytope (half-spaces),
-mesh (triangles), compound (a union), shape_set (many, picked from by number). Queries on meshes are still to
-come; until then `collide.scenes` turns meshes into hulls or unions of hulls and says so for every body.
+mesh (triangles), compound (a union), shape_set (many, picked from by number). `collide.scenes` still turns the
+meshes of scene files into hulls or unions of hulls, and says so for every body.
 """
 
 from collide.shapes.base import Shape

@@ -384,10 +384,14 @@ def _pop_heap(items, keys, size):
     return size
 
 
-@entry(
+#: Of `near_surfaces`.
+SIGNATURE = (
     "int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64, int64,"
     " int64, int64, int64)"
 )
+
+
+@entry(SIGNATURE)
 def near_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, alike, limit, results_at, marks_at, stack_at, n_stack,
     heap_at, n_heap, doubles_at, integers_at, decide,

@@ -137,9 +137,13 @@ def _pass(P, a, corners, error):
     return THROUGH if start > 0.0 else BACK
 
 
-@entry(
+#: Of `points_inside`.
+SIGNATURE = (
     "void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
 )
+
+
+@entry(SIGNATURE)
 def points_inside(
     header_a_at, XA_at, step_a, XB_at, step_b, points_at, step_points, n, answers_at, counters_at, stack_at, n_stack,
     doubles_at, integers_at, decide,

@@ -21,7 +21,9 @@ from collide.narrowphase.triangles.exact import INTEGERS, decide_exactly
 from collide.narrowphase.triangles.surfaces import COUNTERS, FULL, SINGULAR, walk_surfaces
 
 #: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.
-_HEAP = 1 << 14
+HEAP = 1 << 14
+#: Bodies with radii: cores are looked for as far as these, and this much farther, so that a bracket tells.
+FARTHER = 1 + 1e-9
 
 
 class SurfacePairs(NamedTuple):
@@ -134,7 +136,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     stack_at, n_stack, doubles_at, integers_at, decide = work.addresses
     done = distances.near_surfaces(
         A.address, B.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), n, A.content == B.content,
-        float(limit), results.ctypes.data, marks.ctypes.data, stack_at, n_stack, work.heap_address, _HEAP, doubles_at,
+        float(limit), results.ctypes.data, marks.ctypes.data, stack_at, n_stack, work.heap_address, HEAP, doubles_at,
         integers_at, decide,
     )  # fmt: skip
     if done < n:
@@ -217,7 +219,7 @@ def step(X: np.ndarray) -> int:
     return 16 if X.ndim == 3 else 0
 
 
-class _Workspace:
+class Workspace:
     """What kernels write on besides answers."""
 
     def __init__(self, n_stack: int):
@@ -236,7 +238,7 @@ class _Workspace:
     @property
     def heap_address(self) -> int:
         if self._heap is None:
-            self._heap = np.empty(2 * _HEAP, dtype=np.int64)
+            self._heap = np.empty(2 * HEAP, dtype=np.int64)
             self._heap_address = address_of(self._heap)
         return self._heap_address
 
@@ -244,9 +246,9 @@ class _Workspace:
 _kept = threading.local()
 
 
-def _workspace(n_stack: int) -> _Workspace:
+def _workspace(n_stack: int) -> Workspace:
     """This thread's workspace, with room for a stack of this many entries."""
     work = getattr(_kept, "work", None)
     if work is None or work.n_stack < n_stack:
-        work = _kept.work = _Workspace(max(n_stack, 512))
+        work = _kept.work = Workspace(max(n_stack, 512))
     return work

@@ -192,10 +192,14 @@ def _leaves(
     return found
 
 
-@entry(
+#: Of `walk_surfaces`.
+SIGNATURE = (
     "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, int64, int64, int64, int64, int64, int64,"
     " int64, int64, int64, int64)"
 )
+
+
+@entry(SIGNATURE)
 def walk_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, alike, first_only, pairs_at, capacity, starts_at, counters_at,
     where_at, stack_at, n_stack, doubles_at, integers_at, decide,
