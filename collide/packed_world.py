@@ -27,6 +27,7 @@ class PackedWorld:
         self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
         self._keys = np.sort(np.array([i * len(bodies) + j for i, j in allowed], dtype=np.int64))
         self._shapes = [body.shape for body in bodies]
+        self._ready: dict = {}  # pairs with a mesh, made ready for booleans
         self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
         parts = [shape.bounding_parts() for shape in self._shapes]
         self._parts = [[packed for packed, _ in own] for own in parts]
@@ -82,21 +83,23 @@ class PackedWorld:
         rows, convex_pairs, answered = self._convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
         found = []
         for a, b in candidates[meshed].tolist() if not (stop_at_hit and rows["hit"].any()) else ():
-            found.append(self._mesh_row(self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b], limit, boolean))
-            found[-1]["a"], found[-1]["b"] = a, b
+            found.append(self._mesh_row(a, b, limit, boolean))
             if stop_at_hit and found[-1]["hit"]:
                 break
         rows = np.concatenate([rows, *found])
         return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found)
 
-    @staticmethod
-    def _mesh_row(A, B, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, boolean: bool) -> np.ndarray:
-        from collide.meshes.answers import mesh_hits, mesh_rows
+    def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
+        from collide.meshes.answers import mesh_rows
+        from collide.meshes.single import one_hit
 
-        if not boolean:
-            return mesh_rows(A, B, X_WA[None], X_WB[None], limit=limit)
-        row = np.zeros(1, dtype=PAIR_DTYPE)
-        row["hit"], row["how"] = mesh_hits(A, B, X_WA[None], X_WB[None]), EXACT
+        A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
+        if boolean:
+            row = np.zeros(1, dtype=PAIR_DTYPE)
+            row["hit"], row["how"] = one_hit(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b), EXACT
+        else:
+            row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=limit)
+        row["a"], row["b"] = a, b
         return row
 
     def _convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
@@ -159,9 +162,11 @@ class PackedWorld:
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
+        from collide.meshes.answers import mesh_rows
+
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
         for b in bodies[meshed].tolist():
-            rows.append(self._mesh_row(shape, self._shapes[b], X_WS, self._X_WBs[b], limit, False))
+            rows.append(mesh_rows(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit=limit))
             rows[-1]["b"] = b
         found = np.concatenate(rows)
         return found[np.argsort(found["b"], kind="stable")]

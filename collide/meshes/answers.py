@@ -78,7 +78,7 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
     rows["hit"], rows["hit"][left] = True, ~apart
     rows["how"][core], rows["how"][left] = EXACT, np.where(sure, FORMULA, UNDECIDED)
-    for k in np.flatnonzero(rows["hit"]):
+    for k in np.flatnonzero(rows["hit"]).tolist():
         at = int(np.searchsorted(left, k)) if not core[k] else -1
         point, step = _common(A, B, X_WA[k], X_WB[k], inside[k], rows[k], found, at)
         _overlap(A, B, X_WA[k], X_WB[k], rows, k, point, step, depths)
