@@ -117,7 +117,7 @@ def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool,
 
 def _any_meshed(side) -> bool:
     if isinstance(side, Picked):
-        return False  # a `ShapeSet` takes convex parts only
+        return any(shape.meshed for shape in side.shape_set.shapes)
     return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
 
 

@@ -168,6 +168,23 @@ def test_limits_and_unsigned_distances():
     assert deep.hit and deep.distance == 0.0 and deep.certified and not deep.normal.any()
 
 
+def test_gaps_beyond_the_range_of_floats():
+    """Boxes are floats in units of the bodies: at 1e40 times these they cannot tell how far; hulls do."""
+    A = collide.Mesh(*box())
+    X = np.stack([collide.pose((x, 0, 0)) for x in (3.0, 1e40, 1e49)])
+    point = collide.Mesh(np.zeros((3, 3)), [[0, 1, 2]])
+    for B, near in ((collide.Box((1, 1, 1)), 1.5), (collide.Sphere(0.5), 1.5), (point, 2.0)):
+        rows = collide.distance(A, B, np.eye(4), X)
+        assert rows.certified.all() and not rows.beyond.any() and not rows.hit.any()
+        assert (rows.lower <= rows.distance).all() and (rows.distance <= rows.upper).all()
+        assert np.abs(rows.distance / [near, 1e40, 1e49] - 1).max() < 1e-12
+        assert not collide.collide(A, B, np.eye(4), X).any()
+        limited = collide.distance(A, B, np.eye(4), X, max_distance=1e42)
+        assert limited.beyond.tolist() == [False, False, True] and limited.lower[2] > 1e42
+        for k in range(3):
+            assert collide.distance(A, B, np.eye(4), X[k]).rows.tobytes() == rows[k].rows.tobytes()
+
+
 def test_depth_of_a_small_body_in_a_hollow_one():
     """The hulls overlap by far more: the way out of the wall is found, and proven."""
     ring, small = collide.Mesh(*block_ring()), collide.Mesh(*box((-0.1,) * 3, (0.1,) * 3))

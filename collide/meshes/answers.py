@@ -20,6 +20,8 @@ from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
 
+#: Gaps above so many times the smaller body may be more than its boxes, in floats, can tell.
+_FAR = 1e20
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
 
@@ -76,6 +78,9 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
     found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], out_of_sight)
     apart, sure = swept_apart(A, B, found)
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
+    if limit > _FAR * min(A.reach, B.reach):
+        for k in left[found.facets[:, 0] < 0].tolist():
+            rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
     rows["hit"], rows["hit"][left] = True, ~apart
     rows["how"][core], rows["how"][left] = EXACT, np.where(sure, FORMULA, UNDECIDED)
     for k in np.flatnonzero(rows["hit"]).tolist():
@@ -106,16 +111,32 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     rows["point_a"], rows["point_b"] = found.point_a + A.radius * normal, found.point_b - B.radius * normal
     rows["part_a"], rows["part_b"] = np.maximum(found.facets[:, 0], 0), np.maximum(found.facets[:, 1], 0)
     beyond = unseen | (rows["lower"] > limit)
-    narrow = rows["upper"] - rows["lower"] <= PROMISE * _size(A, B, X_WA, X_WB)
-    rows["beyond"], rows["certified"] = beyond, (narrow | beyond) & ((rows["lower"] > 0.0) | (radius == 0.0))
+    rows["beyond"] = beyond
+    narrow = rows["upper"] <= rows["lower"] + PROMISE * _size(A, B, X_WA, X_WB)
+    rows["certified"] = (narrow | beyond) & ((rows["lower"] > 0.0) | (radius == 0.0))
     if beyond.any():
-        rows["lower"][unseen] = math.nextafter(limit, math.inf)
+        # Without a limit, what is unseen is for `_far_gap` to write.
+        rows["lower"][unseen] = math.nextafter(limit, math.inf) if limit < math.inf else 0.0
         rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
         middle = 0.5 * (start + across)[unseen]
         half = 0.5 * rows["distance"][unseen, None] * normal[unseen]
         rows["point_a"][unseen], rows["point_b"][unseen] = middle - half, middle + half
     rows["exact"] = np.minimum(found.counters[:, 2], 255)
     return rows
+
+
+def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
+    """The row of bodies so far apart that boxes in floats could not tell how far: their hulls and one point of each do."""
+    row = ask(hull_of(A), hull_of(B), X_WA[None], X_WB[None], False, limit, False, 1)
+    row["count"], row["part_a"], row["part_b"] = 0, 0, 0
+    row["vertices_a"] = row["vertices_b"] = -1
+    if not row["beyond"][0]:
+        one, other = (X[:3, 3] + (X[:3, :3] * body.points[0]).sum(axis=1) for body, X in ((A, X_WA), (B, X_WB)))
+        across = float(np.sqrt(np.square(other - one).sum())) * (1 + 2.0**-45) - A.radius - B.radius
+        row["upper"] = max(across, float(row["upper"][0]))
+        size = _size(A, B, X_WA[None], X_WB[None])[0]
+        row["certified"] = bool(row["lower"][0] > 0.0 and row["upper"][0] <= row["lower"][0] + PROMISE * size)
+    return row[0]
 
 
 def _common(A: Body, B: Body, X_WA, X_WB, inside, row, found, at: int) -> tuple[np.ndarray, list[np.ndarray]]:
