@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         Ellipsoid,
         Halfspace,
         HPolytope,
+        Mesh,
         Shape,
         ShapeSet,
         Sphere,
@@ -58,7 +59,7 @@ _HOMES = {
     "collide.robot": ("Robot",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-        "Halfspace", "Shape", "ShapeSet", "Sphere",
+        "Halfspace", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
@@ -67,7 +68,7 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-    "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "PairResult", "Robot",
+    "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "PairResult", "Robot",
     "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
     "distance", "pose", "verify", "walk",
 ]

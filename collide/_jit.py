@@ -385,6 +385,7 @@ else:
 view_f64 = _view(ctypes.c_double, np.float64)
 view_i64 = _view(ctypes.c_int64, np.int64)
 view_i32 = _view(ctypes.c_int32, np.int32)
+view_f32 = _view(ctypes.c_float, np.float32)
 view_u8 = _view(ctypes.c_uint8, np.uint8)
 
 

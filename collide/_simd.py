@@ -221,3 +221,170 @@ def _splat(builder, scalar, kind):
     one = builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
     return builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), mask)
+
+
+# --- eight boxes at once ------------------------------------------------------------------------
+
+_F32, _I8 = ir.FloatType(), ir.IntType(8)
+_FLOATS = ir.VectorType(_F32, LANES)
+
+
+@intrinsic
+def boxes_meeting(_context, boxes, at, frame, probe):
+    """Bits of the boxes that nothing parts from a box; described in `geometry/mesh_tree/eight_boxes.py`."""
+    _check_floats(boxes, frame, probe)
+    signature = types.int64(boxes, types.int64, frame, probe)
+
+    def codegen(_context, builder, signature, args):
+        data, frame, probe = _float_data(_context, builder, signature, args)
+        apart = None
+        for over in _apart(builder, data, frame, probe):
+            apart = over if apart is None else builder.or_(apart, over)
+        mask = builder.bitcast(builder.not_(apart), _I8)
+        return builder.zext(mask, _I64)
+
+    return signature, codegen
+
+
+def _apart(builder, data, frame, probe):
+    """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
+    centres = [_eight(builder, data, axis) for axis in range(3)]
+    halves = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    yield _unused(builder, halves)
+    for axis in range(3):
+        gap = builder.fsub(centres[axis], _one(builder, probe, axis))
+        reach = builder.fadd(halves[axis], _one(builder, probe, 3 + axis))
+        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+    for axis in range(3):
+        gap, reach = _one(builder, probe, 6 + axis), _one(builder, probe, 9 + axis)
+        for j in range(3):
+            entry = _one(builder, frame, 3 * axis + j)
+            gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), halves[j]))
+        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+    gap, reach = _one(builder, probe, 15), _one(builder, probe, 16)
+    for j in range(3):  # the probe's slab
+        entry = _one(builder, probe, 12 + j)
+        gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
+        reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), halves[j]))
+    yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+
+
+def _check_floats(*views):
+    for view in views:
+        if not (isinstance(view, types.Array) and view.ndim == 1 and view.layout == "C" and view.dtype == types.float32):
+            raise TypingError("boxes, frame and probe must be contiguous views of floats")
+
+
+def _float_data(context, builder, signature, args):
+    """Pointers to the node's first float, to the frame and to the probe."""
+    data, frame, probe = (
+        make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 2, 3)
+    )  # fmt: skip
+    return builder.gep(data, [args[1]]), frame, probe
+
+
+def _eight(builder, data, row):
+    place = builder.gep(data, [ir.Constant(_I64, LANES * row)])
+    return builder.load(builder.bitcast(place, _FLOATS.as_pointer()), align=4)
+
+
+def _one(builder, data, k):
+    """Float k in all lanes."""
+    return _splat(builder, builder.load(builder.gep(data, [ir.Constant(_I64, k)])), _FLOATS)
+
+
+def _abs(builder, vector):
+    """Without the sign: the bits of −0 and of all others are those of the number, but the first."""
+    words = ir.VectorType(ir.IntType(32), LANES)
+    bits = builder.bitcast(vector, words)
+    return builder.bitcast(builder.and_(bits, ir.Constant(words, [0x7FFFFFFF] * LANES)), _FLOATS)
+
+
+@intrinsic
+def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
+    """Lower bounds of the distances of eight boxes, and how far their centres are; see `geometry/mesh_tree/eight_boxes.py`."""
+    _check_floats(boxes, slabs, frame, probe, out)
+    signature = types.void(boxes, types.int64, slabs, types.int64, frame, probe, out)
+
+    def codegen(context, builder, signature, args):
+        data, slab, frame, probe, result = (
+            make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 2, 4, 5, 6)
+        )
+        best, centres = _gaps(builder, builder.gep(data, [args[1]]), builder.gep(slab, [args[3]]), frame, probe)
+        for row, vector in enumerate((best, centres)):
+            place = builder.gep(result, [ir.Constant(_I64, LANES * row)])
+            builder.store(vector, builder.bitcast(place, _FLOATS.as_pointer()), align=4)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+def _gaps(builder, data, slab, frame, probe):
+    """Vectors: the largest gap along eight axes; the squared length of the line between centres."""
+    centres = [_eight(builder, data, axis) for axis in range(3)]
+    halves = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    entries = [[_one(builder, frame, 3 * i + j) for j in range(3)] for i in range(3)]
+    best = ir.Constant(_FLOATS, [float("-inf")] * LANES)
+
+    def larger(gap):
+        return builder.select(builder.fcmp_ordered(">", gap, best), gap, best)
+
+    for axis in range(3):
+        gap = _abs(builder, builder.fsub(centres[axis], _one(builder, probe, axis)))
+        gap = builder.fsub(gap, builder.fadd(halves[axis], _one(builder, probe, 3 + axis)))
+        best = larger(builder.fmul(gap, _one(builder, probe, 12 + axis)))
+    line, across, square = [], None, None
+    for axis in range(3):
+        gap, reach = _one(builder, probe, 6 + axis), _one(builder, probe, 9 + axis)
+        for j in range(3):
+            gap = builder.fadd(gap, builder.fmul(entries[axis][j], centres[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entries[axis][j]), halves[j]))
+        line.append(gap)
+        size = _abs(builder, gap)
+        best = larger(builder.fmul(builder.fsub(size, reach), _one(builder, probe, 15 + axis)))
+        own = builder.fmul(size, _one(builder, probe, 9 + axis))
+        across = own if across is None else builder.fadd(across, own)
+        own = builder.fmul(gap, gap)
+        square = own if square is None else builder.fadd(square, own)
+    for j in range(3):  # the line between the centres as an axis
+        along = builder.fmul(line[0], entries[0][j])
+        for i in (1, 2):
+            along = builder.fadd(along, builder.fmul(line[i], entries[i][j]))
+        across = builder.fadd(across, builder.fmul(_abs(builder, along), halves[j]))
+    root = builder.call(_square_root(builder.module), [square])
+    gap = builder.fdiv(builder.fsub(square, across), root)
+    best = larger(builder.fmul(gap, _one(builder, probe, 18)))
+    best = larger(_along_direction(builder, centres, halves, slab, probe))
+    nothing = ir.Constant(_FLOATS, [float("inf")] * LANES)
+    return builder.select(_unused(builder, halves), nothing, best), square
+
+
+def _unused(builder, halves):
+    return builder.fcmp_ordered("<", halves[0], ir.Constant(_FLOATS, [0.0] * LANES))
+
+
+def _along_direction(builder, centres, halves, slab, probe):
+    """Gaps along the direction given: what the boxes say, or their slabs and boxes together, whichever is more."""
+    direction = [_one(builder, probe, 19 + j) for j in range(3)]
+    plain = thin = _one(builder, probe, 22)
+    for j in range(3):
+        plain = builder.fadd(plain, builder.fmul(direction[j], centres[j]))
+        plain = builder.fsub(plain, builder.fmul(_abs(builder, direction[j]), halves[j]))
+    normals = [_eight(builder, slab, j) for j in range(3)]
+    share = builder.fmul(direction[0], normals[0])
+    for j in (1, 2):
+        share = builder.fadd(share, builder.fmul(direction[j], normals[j]))
+    thin = builder.fadd(thin, builder.fmul(share, _eight(builder, slab, 3)))
+    thin = builder.fsub(thin, builder.fmul(_abs(builder, share), _eight(builder, slab, 4)))
+    for j in range(3):
+        rest = builder.fsub(direction[j], builder.fmul(share, normals[j]))
+        thin = builder.fadd(thin, builder.fmul(rest, centres[j]))
+        thin = builder.fsub(thin, builder.fmul(_abs(builder, rest), halves[j]))
+    return builder.select(builder.fcmp_ordered(">", thin, plain), thin, plain)
+
+
+def _square_root(module):
+    """LLVM's square root of eight floats, correctly rounded."""
+    name = f"llvm.sqrt.v{LANES}f32"
+    return module.globals.get(name) or ir.Function(module, ir.FunctionType(_FLOATS, [_FLOATS]), name=name)

@@ -35,7 +35,7 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
     """
     n = length_of(A, B, X_WA, X_WB)
-    workers = min(_workers(threads), n // _FEWEST_A_THREAD)
+    workers = min(_workers(threads), n // (_FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD))
     if workers < 2:
         return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes, depths)
     bounds = np.linspace(0, n, workers + 1).astype(int)
@@ -59,6 +59,7 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
 
 #: A thread is handed at least so many poses: below, handing over takes longer than answering.
 _FEWEST_A_THREAD = 2000
+_FEWEST_OF_MESHES = 16
 
 
 @lru_cache(maxsize=4)
@@ -98,14 +99,26 @@ def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool,
     _refuse_poses(X_WA, X_WB, check)
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
     if isinstance(A, Shape) and isinstance(B, Shape):
-        rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit)
+        rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
+        if rows.dtype == bool:
+            return rows
     else:
         sides = ([S] * n if isinstance(S, Shape) else S for S in (A, B))
         asked = zip(*sides, X_WA[:, None], X_WB[:, None])
         rows = np.zeros(n, dtype=PAIR_DTYPE)
         for k, pair in enumerate(asked):
-            rows[k : k + 1] = _parts(*pair, boolean=boolean, limit=limit)
+            answer = _parts(*pair, boolean=boolean, limit=limit, depths=depths)
+            if answer.dtype == bool:
+                rows["hit"][k] = answer[0]
+            else:
+                rows[k : k + 1] = answer
     return rows["hit"] if boolean else rows
+
+
+def _any_meshed(side) -> bool:
+    if isinstance(side, Picked):
+        return any(shape.meshed for shape in side.shape_set.shapes)
+    return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
 
 
 def _all_plain(side) -> bool:
@@ -137,8 +150,14 @@ def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     return ShapeTable(packed), which
 
 
-def _parts(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float) -> np.ndarray:
-    """One row a pose: every part of A against every part of B, combined."""
+def _parts(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float, depths: bool
+) -> np.ndarray:
+    """One row a pose: every part of A against every part of B, combined. Of meshes, booleans come as bool[n]."""
+    if A.meshed or B.meshed:
+        from collide.meshes.answers import mesh_hits, mesh_rows
+
+        return mesh_hits(A, B, X_WA, X_WB) if boolean else mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
     parts_a, parts_b = A.parts(), B.parts()
     parts = [*parts_a, *parts_b]
     n, many = len(X_WA), len(parts_a) * len(parts_b)

@@ -227,6 +227,36 @@ def _stress(args) -> int:
     return YES if args.engine == "collide" and (table.wrong or table.failed) else FREE
 
 
+def _locality(args) -> int:
+    from collide.reports import locality, terminal
+    from collide.scenes.loaders.triangles import read_meshes
+
+    if args.plot:
+        locality.check_plot(args.plot)
+    progress = _progress(args.quiet)
+    measured = []
+    for place in args.meshes:
+        with progress(f"reading {place}"):
+            meshes = read_meshes(place)
+        _watch_compiler(progress)
+        for name, mesh in meshes:
+
+            def about(label: str, name=name):
+                return progress(f"{name}: {label}")
+
+            measured.append(locality.Measured(name, place, mesh.locality(repeated=args.repeated, progress=about)))
+    if args.plot:
+        with progress("drawing"):
+            locality.plot(measured, args.plot)
+    if args.json:
+        _write_json(locality.to_dict(measured, args.repeated), args.json)
+    if args.json != "-" and not args.quiet:
+        for k, table in enumerate(locality.tables(measured)):
+            terminal.write_text("\n" if k else "")
+            terminal.show_table(table)
+    return FREE
+
+
 def _scenes(args) -> int:
     if args.copy:
         print(_copy_scene(args.copy, args.force))
@@ -404,6 +434,26 @@ code with the engine.
 
 exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
 
+_LOCALITY = """examples:
+  collide locality bunny.ply
+  collide locality teapot.ply dragon.ply.gz --plot stretches.png
+  collide locality part.stl --json - | jq '.meshes[].local_stretch'
+
+How fast meshes can be tested for collision is bounded by how local they are
+(Erickson, "Local polyhedra and geometric graphs", 2003):
+  global stretch   longest edge over shortest
+  local stretch    longest edge at a vertex, over the distance to its nearest
+                   other vertex; of order k: to its k-th nearest
+Each is given for its worst vertex, and as a distribution: one bad vertex does
+not slow a mesh down, long edges packed closely together do. --plot draws how
+many vertices have which stretch: pip install 'collide-robotics[plots]' first.
+docs/locality.md explains the numbers and what to do about large ones.
+
+Vertices with equal coordinates are one vertex. Vertices that no facet uses
+count as neighbours.
+
+exit status: 0 measured, 2 error"""
+
 _SCENES = """examples:
   collide scenes
   collide scenes --copy workcell             to ./workcell.json, for editing
@@ -427,6 +477,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_check(commands)
     _add_compare(commands)
     _add_stress(commands)
+    _add_locality(commands)
     _add_scenes(commands)
     _add(commands, "doctor", _doctor, "is this installation sound?", _DOCTOR)
     return parser
@@ -445,6 +496,15 @@ def _add_stress(commands) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
     parser.add_argument("--engine", default="collide", metavar="E", help="collide, fcl, coal or pybullet (collide)")
     parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
+    _output_arguments(parser)
+
+
+def _add_locality(commands) -> None:
+    parser = _add(commands, "locality", _locality, "how local are these meshes?", _LOCALITY)
+    parser.add_argument("meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too")
+    parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
+    parser.add_argument("--repeated", action="store_true",
+                        help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
     _output_arguments(parser)
 
 

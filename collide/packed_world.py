@@ -10,7 +10,7 @@ from collide.geometry.boxes import bounding_boxes
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
-from collide.results import PAIR_DTYPE
+from collide.results import EXACT, PAIR_DTYPE
 from collide.unions import Union, combine
 
 
@@ -26,7 +26,10 @@ class PackedWorld:
         self.group = np.array([body.group for body in bodies], dtype=np.int64)
         self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
         self._keys = np.sort(np.array([i * len(bodies) + j for i, j in allowed], dtype=np.int64))
-        parts = [body.shape.parts() for body in bodies]
+        self._shapes = [body.shape for body in bodies]
+        self._ready: dict = {}  # pairs with a mesh, made ready for booleans
+        self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
+        parts = [shape.bounding_parts() for shape in self._shapes]
         self._parts = [[packed for packed, _ in own] for own in parts]
         counts = np.array([len(own) for own in parts], dtype=np.int64)
         self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -40,6 +43,7 @@ class PackedWorld:
 
     def move(self, X_WBs: np.ndarray) -> None:
         """Take new poses (n, 4, 4) of all bodies, and refit the tree."""
+        self._X_WBs = X_WBs
         self._poses = pose_table(X_WBs[self._body_of], self._X_BP, self._reach)
         self._part_boxes = self._boxes_of(self._table, self._poses.rows, self._shape_of)
         if len(X_WBs):
@@ -73,6 +77,33 @@ class PackedWorld:
 
     def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
         """(rows, convex pairs answered, body pairs answered); fields a and b are positions."""
+        if not self._meshed.any():
+            return self._convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        meshed = self._meshed[candidates].any(axis=1)
+        rows, convex_pairs, answered = self._convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        found = []
+        for a, b in candidates[meshed].tolist() if not (stop_at_hit and rows["hit"].any()) else ():
+            found.append(self._mesh_row(a, b, limit, boolean))
+            if stop_at_hit and found[-1]["hit"]:
+                break
+        rows = np.concatenate([rows, *found])
+        return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found)
+
+    def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
+        from collide.meshes.answers import mesh_rows
+        from collide.meshes.single import one_hit
+
+        A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
+        if boolean:
+            row = np.zeros(1, dtype=PAIR_DTYPE)
+            row["hit"], row["how"] = one_hit(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b), EXACT
+        else:
+            row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=limit)
+        row["a"], row["b"] = a, b
+        return row
+
+    def _convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
+        """What `answer` gives, of bodies made of convex parts."""
         pairs, owner = self._part_pairs(candidates, limit)
         rows = run_pairs(
             self._table, self._poses, self._shape_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
@@ -121,15 +152,30 @@ class PackedWorld:
 
     def against(self, shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
         """Rows of one outside shape against all bodies near it; b is a position, a is 0."""
-        own = shape.parts()
+        own = shape.bounding_parts()
         packed = [part for part, _ in own]
         reach = np.array([part.reach for part in packed])
         poses = pose_table(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
         boxes = self._boxes_of(ShapeTable(packed), poses.rows, np.arange(len(own)))
         box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
         bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
+        meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
+        if not meshed.any():
+            return self._convex_against(packed, poses, bodies, limit)
+        from collide.meshes.answers import mesh_rows
+
+        rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
+        for b in bodies[meshed].tolist():
+            rows.append(mesh_rows(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit=limit))
+            rows[-1]["b"] = b
+        found = np.concatenate(rows)
+        return found[np.argsort(found["b"], kind="stable")]
+
+    def _convex_against(self, packed: list[PackedConvex], poses, bodies: np.ndarray, limit: float) -> np.ndarray:
+        """What `against` gives, of parts and bodies that are convex or made of convex parts."""
         if not len(bodies):
             return np.zeros(0, dtype=PAIR_DTYPE)
+        own = packed
         others = np.concatenate([np.arange(self._first[b], self._first[b + 1]) for b in bodies])
         table = ShapeTable([*packed, *self._table.packed])
         shape_of = np.concatenate([np.arange(len(own)), self._shape_of + len(own)])

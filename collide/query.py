@@ -290,8 +290,11 @@ _PARTNERS = 512
 
 
 def _prepare(A, B) -> None:
-    """Make a pair of convex shapes ready for single calls, and keep it with A, by the number B has then."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape) and is_plain(A) and is_plain(B)):
+    """Make a pair of shapes ready for single calls, and keep it with A, by the number B has then."""
+    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+        return
+    meshed = A.meshed or B.meshed
+    if not meshed and not (is_plain(A) and is_plain(B)):
         return
     if not run.single_calls_are_safe():
         return
@@ -302,7 +305,16 @@ def _prepare(A, B) -> None:
     prepared, serial = A._prepared, B._serial
     if serial in prepared:
         return
+    pair = _meshed_pair(A, B) if meshed else run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    if pair is None:
+        return
     while len(prepared) >= _PARTNERS:
         prepared.pop(next(iter(prepared)), None)
-    prepared[serial] = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    prepared[serial] = pair
     weakref.finalize(B, prepared.pop, serial, None)  # what is gone is not held by its partners
+
+
+def _meshed_pair(A: Shape, B: Shape):
+    from collide.meshes.single import single_pair
+
+    return single_pair(A, B)

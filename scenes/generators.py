@@ -3,6 +3,9 @@
     generate("workcell", seed=0, parts=16)       an arm of our own making over a bench of parts
     generate("clutter", seed=0, n=100, density=0.2)   convex shapes of every kind, anywhere
     generate("stack", seed=0, layers=6, wide=4)   boxes resting on each other
+    generate("harpsicordia", n=1000, stretch=10.0, spread=None, gap=0.0)   two local meshes, n log n meetings
+    generate("accordions", strings=40, gap=0.0)   two meshes whose n strings all meet
+    generate("chazelle", strings=40, gap=0.0)     the same with Chazelle's polyhedra
 
 Random numbers come from ``numpy.random.default_rng(seed)`` alone.
 """
@@ -27,6 +30,7 @@ from collide.shapes import (
     Cylinder,
     Ellipsoid,
     HPolytope,
+    Mesh,
     Shape,
     Sphere,
 )
@@ -314,4 +318,57 @@ def _arm() -> dict[str, Any]:
     }
 
 
-_GENERATORS: dict[str, Callable[..., Scene]] = {"clutter": _clutter, "stack": _stack, "workcell": _workcell}
+# --- worst cases of meshes ------------------------------------------------------------------------
+
+
+def _harpsicordia(
+    rng: np.random.Generator, n: int = 1000, stretch: float = 10.0, spread: float | None = None, gap: float = 0.0
+) -> Scene:
+    """Two local meshes of about n vertices that meet in Θ(n log n) points (`collide.scenes.worst_cases`).
+
+    stretch : local stretch σ ≥ 6.   spread : global stretch Σ at most; n where None.   gap : the upper one is
+    lifted by it [m]; 0 touches, less than 0 crosses.
+    """
+    from collide.scenes.worst_cases import harpsicordia
+
+    upper, lower, meetings = harpsicordia(n, stretch, spread)
+    return _across_the_saddle(rng, "harpsicordia", upper, lower, meetings, gap)
+
+
+def _accordions(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
+    """Two accordions each of whose strings meets every one of the other. gap : as above [m]."""
+    from collide.scenes.worst_cases import accordion, below
+
+    mesh = accordion(strings)
+    return _across_the_saddle(rng, "accordions", mesh, below(mesh), strings**2, gap)
+
+
+def _chazelle(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
+    """Two of Chazelle's polyhedra each of whose ridges meets every one of the other. gap : as above [m]."""
+    from collide.scenes.worst_cases import below, chazelle
+
+    mesh = chazelle(strings)
+    return _across_the_saddle(rng, "chazelle", mesh, below(mesh), strings**2, gap)
+
+
+def _across_the_saddle(rng, name: str, upper: Mesh, lower: Mesh, meetings: int, gap) -> Scene:
+    """Two bodies, vertices and facets in random order: nothing should depend on how a file lists them."""
+    if isinstance(gap, bool) or not isinstance(gap, (int, float)) or not abs(gap) <= 1:
+        raise SceneError(f"gap must lie within [-1, 1], got {gap!r}")
+    scene = Scene(name)
+    for label, mesh, lift in (("upper", upper, float(gap)), ("lower", lower, 0.0)):
+        scene.add(SceneBody(label, _shuffled(rng, mesh), pose((0.0, 0.0, lift)), source=f"{name}: {label}"))
+    scene.notes.append(f"{name}: the surfaces are {gap:g} m apart at {meetings} places")
+    return scene
+
+
+def _shuffled(rng: np.random.Generator, mesh: Mesh) -> Mesh:
+    order = rng.permutation(len(mesh.vertices))
+    place = np.argsort(order)
+    return Mesh(mesh.vertices[order], place[mesh.faces[rng.permutation(len(mesh.faces))]], solid=True)
+
+
+_GENERATORS: dict[str, Callable[..., Scene]] = {
+    "clutter": _clutter, "stack": _stack, "workcell": _workcell,
+    "harpsicordia": _harpsicordia, "accordions": _accordions, "chazelle": _chazelle,
+}

@@ -39,6 +39,7 @@ ROOMS = {
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
+    "meshes": {"errors", "geometry", "shapes", "narrowphase", "results", "batches"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
@@ -48,11 +49,13 @@ ROOMS = {
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
-    "query": {"walks"},
+    "query": {"meshes", "walks"},
+    "batches": {"meshes"},
+    "packed_world": {"meshes"},
     "walks": {"certificates"},
     "results": {"certificates"},
     "robot": {"scenes"},
-    "reports": {"rich"},
+    "reports": {"rich", "matplotlib"},
     "cli": {"scenes", "adapters"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.

@@ -72,7 +72,7 @@ def _set_pose(R, at, X, check):
     shift = abs(X[3]) + abs(X[7]) + abs(X[11])
     if off <= ROTATION_TOLERANCE * ROTATION_TOLERANCE and shift <= LARGEST:
         return _determinant(X) > 0.0 or not check
-    return _is_pose(X, check)
+    return is_pose(X, check)
 
 
 @kernel(inline=True)
@@ -83,7 +83,7 @@ def _determinant(X):
 
 
 @kernel
-def _is_pose(X, check):
+def is_pose(X, check):
     """The same entry by entry, for poses on the brink and for any matrix where ``check`` is off."""
     for i in range(12):
         if not abs(X[i]) <= LARGEST:
@@ -177,7 +177,7 @@ def answer_poses(
 
 
 @kernel(inline=True)
-def _matrix_at(object_at, header):
+def matrix_at(object_at, header):
     """Address of the 16 doubles of a C-contiguous (4, 4) numpy array of float64, given where the object is; else 0.
 
     Read from the array object itself, whose layout is part of numpy's binary interface (and is looked at once
@@ -200,8 +200,8 @@ def _matrix_at(object_at, header):
 def _single(header_at, A_object, B_object, boolean, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for."""
     header = view_i64(header_at, HEADER)
-    XA_at = _matrix_at(A_object, header)
-    XB_at = _matrix_at(B_object, header)
+    XA_at = matrix_at(A_object, header)
+    XB_at = matrix_at(B_object, header)
     if XA_at == 0 or XB_at == 0:
         return -1
     poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
@@ -242,7 +242,7 @@ def distance_single(header_at, A_object, B_object, row):
 
 
 def array_layout_is_known() -> bool:
-    """Whether array objects lie in memory as `_matrix_at` reads them: CPython with its lock, 64 bits."""
+    """Whether array objects lie in memory as `matrix_at` reads them: CPython with its lock, 64 bits."""
     if sys.implementation.name != "cpython" or sys.maxsize < 2**60 or not getattr(sys, "_is_gil_enabled", lambda: True)():
         return False
     probe = np.zeros((4, 4))

@@ -26,6 +26,7 @@ OPTIONAL = (
     ("rich", "robots", "colours in the terminal"),
     ("example-robot-data", "demo", "the panda of the shipped scene"),
     ("coacd", "decompose", "meshes as unions of convex pieces"),
+    ("matplotlib", "plots", "collide locality --plot"),
     ("coal", "peers", "collide compare"),
     ("python-fcl", "peers", "collide compare"),
     ("pybullet", "peers", "collide compare (wheels up to Python 3.11)"),

@@ -1,18 +1,19 @@
 """What a user hands in: immutable shapes, validated when made.
 
 One file per family: primitives (a few numbers), hull (points), hpolytope (half-spaces),
-compound (a union), shape_set (many, picked from by number). A triangle mesh as itself arrives with the box-trees over facets; until then
-`collide.scenes` turns meshes into hulls or unions of hulls and says so for every body.
+mesh (triangles), compound (a union), shape_set (many, picked from by number). `collide.scenes` still turns the
+meshes of scene files into hulls or unions of hulls, and says so for every body.
 """
 
 from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.hull import ConvexHull
+from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape_set import ShapeSet
 
 __all__ = [
     "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
-    "HPolytope", "Halfspace", "Shape", "ShapeSet", "Sphere",
+    "HPolytope", "Halfspace", "Mesh", "Shape", "ShapeSet", "Sphere",
 ]

@@ -18,7 +18,7 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_walk")
+    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_surface", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -26,9 +26,13 @@ class Shape:
     _serial: int
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`walks.py`).
     _walk: Any
+    #: The shape as meshes meet it: facets under a tree, and a radius (`meshes/bodies.py`).
+    _surface: Any
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
+    #: True where the set is given by triangles: `meshes` answers, and there are no convex parts.
+    meshed = False
 
     def _store(self, **values: Any) -> None:
         for name, value in values.items():
@@ -67,6 +71,10 @@ class Shape:
             object.__setattr__(self, "_parts", self._pack())
             return self._parts
 
+    def bounding_parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        """Convex sets that hold this: its parts, or something larger and simpler. Boxes are made of them."""
+        return self.parts()
+
     def _pack(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
         raise TypeError(f"{type(self).__name__} cannot be asked about: derive it from Shape and define _pack")
 
@@ -82,6 +90,8 @@ IDENTITY.flags.writeable = False
 
 def is_plain(shape: Shape) -> bool:
     """Whether a shape is one convex set in its own frame."""
+    if shape.meshed:
+        return False
     parts = shape.parts()
     return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
 

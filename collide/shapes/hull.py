@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import zipfile
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +9,7 @@ import numpy as np
 from collide.errors import InvalidShape
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, positive, rows
+from collide.shapes.saved import read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
@@ -124,27 +122,12 @@ class ConvexHull(Shape):
             arrays["faces"] = self.faces
         tree = self._tree_arrays()
         arrays.update({f"tree_{name}": array for name, array in tree.items()} if tree is not None else {})
-        try:
-            with Path(path).open("wb") as file:
-                np.savez(file, format=np.array(_FILE_FORMAT), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
-        except (OSError, TypeError) as error:
-            raise InvalidShape(f"ConvexHull.save: {path!r}: {getattr(error, 'strerror', None) or error}") from None
+        write_arrays("ConvexHull", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> ConvexHull:
         """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
-        try:
-            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as found:
-                arrays = {name: found[name] for name in found.files}
-        except OSError as error:
-            raise InvalidShape(f"ConvexHull.load: {path}: {error.strerror or error}") from None
-        except (TypeError, AttributeError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-            raise InvalidShape(f"ConvexHull.load: {path} is no file that ConvexHull.save wrote ({error})") from None
-        stamp, digest = arrays.pop("format", None), arrays.pop("digest", None)
-        if stamp is None or digest is None or int(stamp) != _FILE_FORMAT or not {"points", "radius"} <= set(arrays):
-            raise InvalidShape(f"ConvexHull.load: {path} is of another format; save the shape again")
-        if not np.array_equal(digest, _digest(arrays)):
-            raise InvalidShape(f"ConvexHull.load: {path} is damaged: its contents do not fit their digest")
+        arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, {"points", "radius"})
         tree = {name[5:]: array for name, array in arrays.items() if name.startswith("tree_")}
         try:
             return cls._from_fields(arrays["points"], arrays.get("faces"), float(arrays["radius"]), tree or None)
@@ -165,16 +148,6 @@ class ConvexHull(Shape):
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
-
-
-def _digest(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """Of all arrays by name: a file that was damaged must not lend its neighbours to a proof."""
-    digest = hashlib.blake2b(digest_size=16)
-    for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        digest.update(array.tobytes())
-    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def _check_faces(faces, n: int) -> np.ndarray:

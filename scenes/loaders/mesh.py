@@ -18,11 +18,11 @@ import numpy as np
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import cache
 from collide.scenes.loaders.documents import read_bytes
+from collide.scenes.loaders.triangles import SUFFIXES, read_triangles
 from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
 from collide.shapes.hull import ConvexHull
 
-SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf", ".off")
 #: A mesh whose volume is this much of its hull's is its hull.
 CONVEX_RATIO = 1.0 - 1e-6
 
@@ -162,45 +162,19 @@ def _about_pieces(part: MeshPart) -> str | None:
 
 
 def _read_with_trimesh(path: Path) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
-    try:
-        import trimesh
-    except ImportError:
-        raise MissingExtra("trimesh", extra="robots", purpose=f"read the mesh {path.name}") from None
-    options: dict[str, Any] = {"process": False}
-    if path.suffix.lower() == ".obj":
-        # Objects of the file are bodies; materials are not.
-        options.update(split_objects=True, group_material=False, skip_materials=True)
-    try:
-        loaded = trimesh.load_scene(str(path), **options)
-        named = [(name, *loaded.graph.get(name)) for name in sorted(loaded.graph.nodes_geometry)]
-    except ImportError as error:
-        raise MissingExtra(error.name or "a mesh library", extra="robots", purpose=f"read the mesh {path.name}") from None
-    except Exception as error:  # noqa: BLE001 - the readers of seven formats raise what they like
-        raise SceneError(f"is not a mesh that can be read: {_one_line(error)}", path=path) from None
-    parts, raw, notes = [], [], []
-    metre = _metres(loaded.units)
-    if metre != 1.0:
-        notes.append(f"the file says its unit is {metre:g} m; it was scaled to metres")
-    for node, X_WG, geometry in named:  # by name: the graph keeps no order
-        mesh = loaded.geometry[geometry]
-        vertices, faces = _arrays(mesh, np.asarray(X_WG, dtype=np.float64), metre)
+    found, notes = read_triangles(path)
+    import trimesh  # what is missing has been told by now
+
+    parts, raw = [], []
+    for name, vertices, faces in found:
         if len(vertices):
-            part, about = _describe(trimesh, str(node), vertices, faces, path)
+            part, about = _describe(trimesh, name, vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
     if not parts:
         raise SceneError("has no vertices; a mesh needs at least one", path=path)
     return MeshFile(parts, notes), raw
-
-
-def _arrays(mesh, X_WG: np.ndarray, metre: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) in the file's world frame and faces (m, 3) of a mesh or a point cloud."""
-    vertices = np.array(getattr(mesh, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
-    faces = np.array(getattr(mesh, "faces", np.zeros((0, 3))), dtype=np.int64).reshape(-1, 3)
-    if not np.array_equal(X_WG, np.eye(4)):
-        vertices = vertices @ X_WG[:3, :3].T + X_WG[:3, 3]
-    return vertices * metre if metre != 1.0 else vertices, faces
 
 
 def _describe(trimesh, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
@@ -256,14 +230,6 @@ def _decompose(vertices: np.ndarray, faces: np.ndarray, path: Path) -> list[np.n
     return pieces
 
 
-def _metres(units) -> float:
-    """Metres in a unit as trimesh names it: "meters", "0.0254 * meters", "millimeters", None."""
-    words = str(units or "meters").replace("*", " ").split()
-    factor = float(words[0]) if len(words) == 2 else 1.0
-    named = {"meters": 1.0, "m": 1.0, "millimeters": 1e-3, "mm": 1e-3, "centimeters": 1e-2, "cm": 1e-2, "inches": 0.0254}
-    return factor * named.get(words[-1], 1.0)
-
-
 def _gltf_buffers(blob: bytes, path: Path) -> list[bytes]:
     """The files a glTF text refers to: they are part of it, for the cache."""
     try:
@@ -272,10 +238,6 @@ def _gltf_buffers(blob: bytes, path: Path) -> list[bytes]:
     except (ValueError, AttributeError, TypeError, KeyError):
         raise SceneError("is not glTF: its text is not JSON with a list of buffers", path=path) from None
     return [read_bytes(path.parent / name) for name in names if not name.startswith("data:")]
-
-
-def _one_line(error: Exception) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:200]
 
 
 # --- arrays for the cache -------------------------------------------------------------------------

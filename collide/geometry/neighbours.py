@@ -1,0 +1,184 @@
+"""Distances from each point of a cloud to its nearest others: a k-d tree with a tight box a node.
+
+J. L. Bentley, "Multidimensional binary search trees used for associative searching" (1975); halved at the
+median of the longest side of the box (Friedman, Bentley, Finkel 1977). The tree is implicit: on level l
+node i holds the points n·i / 2^l … n·(i + 1) / 2^l of the order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from collide._jit import address_of, entry, kernel, view_f64, view_i64
+
+#: Points a leaf holds at most.
+_LEAF = 8
+#: Points asked in one call, so that a long run can be watched and stopped.
+CHUNK = 1 << 15
+#: The most neighbours that may be asked for.
+MOST = 32
+
+
+class PointTree:
+    """A k-d tree over points (n, 3), finite; O(n log n) to build, 24 bytes a point and 12 for its box."""
+
+    def __init__(self, points: np.ndarray):
+        n = len(points)
+        self.levels = 0
+        while n >> self.levels > _LEAF:
+            self.levels += 1
+        self.order = np.arange(n, dtype=np.int64)
+        self.points = np.array(points, dtype=np.float64, order="C")
+        self.boxes = np.empty((2 << self.levels, 6))
+        build_tree(address_of(self.points), address_of(self.order), n, self.levels, address_of(self.boxes))
+
+    def nearest(self, k: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """For all points, in chunks: their numbers (m,), and the squared distances (m, k) to their k nearest
+        others, ascending; infinite where there are not as many. Each point counts once for every row it has."""
+        if not 1 <= k <= MOST:
+            raise ValueError(f"k must lie within 1 … {MOST}, got {k}")
+        n = len(self.points)
+        for first in range(0, n, CHUNK):
+            last = min(first + CHUNK, n)
+            squares = np.empty((last - first, k))
+            nearest_squares(
+                address_of(self.points), n, self.levels, address_of(self.boxes), first, last, k, address_of(squares)
+            )
+            yield self.order[first:last], squares
+
+
+@kernel
+def _swap(points, order, i, j):
+    order[i], order[j] = order[j], order[i]
+    for k in range(3):
+        points[3 * i + k], points[3 * j + k] = points[3 * j + k], points[3 * i + k]
+
+
+@kernel
+def _split_at(points, order, low, high, middle, axis):
+    """Order low … high − 1 so that those before ``middle`` lie no farther along the axis than those from it on.
+
+    Hoare's selection; equal coordinates go to both sides, so that lattices do no harm.
+    """
+    high -= 1
+    while low < high:
+        a = points[3 * low + axis]
+        b = points[3 * ((low + high) >> 1) + axis]
+        c = points[3 * high + axis]
+        pivot = max(min(a, b), min(max(a, b), c))
+        i = low
+        j = high
+        while i <= j:
+            while points[3 * i + axis] < pivot:
+                i += 1
+            while points[3 * j + axis] > pivot:
+                j -= 1
+            if i <= j:
+                _swap(points, order, i, j)
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            return
+
+
+@kernel
+def _fit_box(points, low, high, boxes, node):
+    for k in range(3):
+        least = points[3 * low + k]
+        most = least
+        for i in range(low + 1, high):
+            least = min(least, points[3 * i + k])
+            most = max(most, points[3 * i + k])
+        boxes[6 * node + k] = least
+        boxes[6 * node + 3 + k] = most
+
+
+@entry("void(int64, int64, int64, int64, int64)")
+def build_tree(points_at, order_at, n, levels, boxes_at):
+    """Order the points along the tree and box its nodes: node i of level l is row 2^l + i."""
+    points = view_f64(points_at, 3 * n)
+    order = view_i64(order_at, n)
+    boxes = view_f64(boxes_at, 12 << levels)
+    for level in range(levels + 1):
+        for i in range(1 << level):
+            low = (n * i) >> level
+            high = (n * (i + 1)) >> level
+            node = (1 << level) + i
+            _fit_box(points, low, high, boxes, node)
+            if level < levels:
+                axis = 0
+                for k in range(1, 3):
+                    if boxes[6 * node + 3 + k] - boxes[6 * node + k] > boxes[6 * node + 3 + axis] - boxes[6 * node + axis]:
+                        axis = k
+                _split_at(points, order, low, high, (n * (2 * i + 1)) >> (level + 1), axis)
+
+
+@kernel
+def _square_to_box(boxes, node, x, y, z):
+    at = 6 * node
+    dx = max(max(boxes[at] - x, x - boxes[at + 3]), 0.0)
+    dy = max(max(boxes[at + 1] - y, y - boxes[at + 4]), 0.0)
+    dz = max(max(boxes[at + 2] - z, z - boxes[at + 5]), 0.0)
+    return dx * dx + dy * dy + dz * dz
+
+
+@kernel
+def _look_at_leaf(points, low, high, own, x, y, z, squares, at, k):
+    """Put the leaf's points into the k nearest, ascending."""
+    for i in range(low, high):
+        if i != own:
+            dx = points[3 * i] - x
+            dy = points[3 * i + 1] - y
+            dz = points[3 * i + 2] - z
+            square = dx * dx + dy * dy + dz * dz
+            if square < squares[at + k - 1]:
+                j = at + k - 1
+                while j > at and squares[j - 1] > square:
+                    squares[j] = squares[j - 1]
+                    j -= 1
+                squares[j] = square
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
+def nearest_squares(points_at, n, levels, boxes_at, first, last, k, squares_at):
+    """Squared distances of points first … last − 1, in the tree's order, to their k nearest others."""
+    points = view_f64(points_at, 3 * n)
+    boxes = view_f64(boxes_at, 12 << levels)
+    squares = view_f64(squares_at, k * (last - first))
+    for own in range(first, last):
+        at = k * (own - first)
+        for j in range(k):
+            squares[at + j] = np.inf
+        x = points[3 * own]
+        y = points[3 * own + 1]
+        z = points[3 * own + 2]
+        # Depth first, the nearer child first: level by level the path is the bits of `node`, and a bit of
+        # `done` says whether the sibling of the node there has been seen to.
+        node = 1
+        level = 0
+        done = 1
+        while node > 0:
+            if _square_to_box(boxes, node, x, y, z) < squares[at + k - 1]:
+                if level == levels:
+                    i = node - (1 << level)
+                    _look_at_leaf(points, (n * i) >> level, (n * (i + 1)) >> level, own, x, y, z, squares, at, k)
+                else:
+                    left = _square_to_box(boxes, 2 * node, x, y, z)
+                    right = _square_to_box(boxes, 2 * node + 1, x, y, z)
+                    node = 2 * node + (1 if right < left else 0)
+                    done = 2 * done
+                    level += 1
+                    continue
+            while done & 1:
+                node >>= 1
+                done >>= 1
+                level -= 1
+            if node > 0:
+                node ^= 1
+                done |= 1

@@ -1,0 +1,63 @@
+"""Vertices with equal coordinates, found: files such as STL name each vertex once for every facet.
+
+Coordinates are compared as numbers, exactly: no tolerance, so that nothing is joined that the file keeps apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
+
+#: Hashes are of 31 bits, so that no product leaves 63: plain Python and machine code agree.
+_MASK = (1 << 31) - 1
+_MULTIPLIER = 0x2C1B3C6D
+
+
+def weld(vertices: np.ndarray) -> np.ndarray:
+    """(n,) int32: for every vertex the first row with the same coordinates, itself where there is none before.
+
+    vertices : (n, 3) finite; −0.0 and 0.0 are one number. O(n).
+    """
+    points = np.ascontiguousarray(vertices + 0.0)
+    n = len(points)
+    size = 1 << max(4, (2 * n - 1).bit_length())
+    table = np.full(size, -1, dtype=np.int32)
+    first = np.empty(n, dtype=np.int32)
+    first_rows(address_of(points), n, address_of(table), size, address_of(first))
+    return first
+
+
+@kernel
+def _stir(h, bits):
+    """A hash with 62 bits of a double stirred in; the two highest come in with the lower half."""
+    h = ((h ^ (bits & _MASK) ^ ((bits >> 62) & 3)) * _MULTIPLIER) & _MASK
+    h ^= h >> 15
+    h = ((h ^ ((bits >> 31) & _MASK)) * _MULTIPLIER) & _MASK
+    return h ^ (h >> 13)
+
+
+@entry("void(int64, int64, int64, int64, int64)")
+def first_rows(points_at, n, table_at, size, first_at):
+    """For each of n points the first with the same coordinates. table : ``size`` int32, a power of two > n, all −1."""
+    points = view_f64(points_at, 3 * n)
+    bits = view_i64(points_at, 3 * n)
+    table = view_i32(table_at, size)
+    first = view_i32(first_at, n)
+    for k in range(n):
+        h = 0
+        for axis in range(3):
+            h = _stir(h, bits[3 * k + axis])
+        slot = (h ^ (h << 7)) & (size - 1)
+        found = table[slot]
+        while found >= 0 and not (
+            points[3 * found] == points[3 * k]
+            and points[3 * found + 1] == points[3 * k + 1]
+            and points[3 * found + 2] == points[3 * k + 2]
+        ):
+            slot = (slot + 1) & (size - 1)
+            found = table[slot]
+        if found < 0:
+            table[slot] = k
+            found = k
+        first[k] = found

@@ -1,0 +1,1 @@
+"""Triangle meshes in pair queries and worlds: solids and surfaces, against each other and against convex shapes."""

@@ -1,0 +1,188 @@
+"""Rows of results for pairs of shapes of which one at least is a mesh.
+
+Gaps are the surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a
+translation that is proven to part the bodies (`way_out.py`); how much shorter another one might be is not known, so
+the bracket reaches up to 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.batches import ask
+from collide.geometry.mesh_tree.layout import REACH
+from collide.meshes.bodies import Body, body_of, hull_of, is_halfspace
+from collide.meshes.hits import core_hits, hits, swept_apart
+from collide.meshes.way_out import way_out
+from collide.narrowphase.triangles.queries import surface_distances
+from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
+from collide.shapes.base import Shape
+
+#: Gaps above so many times the smaller body may be more than its boxes, in floats, can tell.
+_FAR = 1e20
+#: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
+PROMISE = 2.0**-43
+
+
+def mesh_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool for poses (n, 4, 4): whether two shapes, a mesh among them, share a point. Raises UnsupportedQuery."""
+    if is_halfspace(A) or is_halfspace(B):
+        return ask(_hull(A), _hull(B), X_WA, X_WB, True, 0.0, False, 1)
+    one, other = body_of(A), body_of(B)
+    return hits(one, other, X_WA, X_WB) if one.key <= other.key else hits(other, one, X_WB, X_WA)
+
+
+def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
+    """Rows (PAIR_DTYPE) for poses (n, 4, 4); part_a and part_b are facets, 0 where none decided.
+
+    limit, depths : as in `distance`.
+    """
+    if is_halfspace(A) or is_halfspace(B):
+        rows = ask(_hull(A), _hull(B), X_WA, X_WB, False, limit, False, 1, depths=depths)
+        rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hull, not of the mesh
+        return rows
+    rows = _ordered(body_of(A), body_of(B), X_WA, X_WB, limit, depths)
+    out = np.zeros(len(rows), dtype=PAIR_DTYPE)
+    for name in FIELDS:  # padding stays 0: equal answers are equal bytes
+        out[name] = rows[name]
+    return out
+
+
+def _ordered(one: Body, other: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+    """Rows worked out on the same numbers for swapped questions."""
+    if other.key < one.key:
+        return flipped(_rows(other, one, X_WB, X_WA, limit, depths))
+    if one.key == other.key:
+        turned = np.array([X.tolist() > Y.tolist() for X, Y in zip(X_WA[:, :3], X_WB[:, :3])], dtype=bool)
+        if turned.any():
+            rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+            rows[~turned] = _rows(one, other, X_WA[~turned], X_WB[~turned], limit, depths)
+            rows[turned] = flipped(_rows(other, one, X_WB[turned], X_WA[turned], limit, depths))
+            return rows
+    return _rows(one, other, X_WA, X_WB, limit, depths)
+
+
+def _hull(shape: Shape) -> Shape:
+    return hull_of(body_of(shape)) if shape.meshed else shape
+
+
+def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+    rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    rows["vertices_a"] = rows["vertices_b"] = -1
+    core, inside = core_hits(A, B, X_WA, X_WB)
+    radius = A.radius + B.radius
+    left = np.flatnonzero(~core)
+    out_of_sight = math.nextafter(math.nextafter(limit, math.inf) + radius, math.inf)
+    found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], out_of_sight)
+    apart, sure = swept_apart(A, B, found)
+    rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
+    if limit > _FAR * min(A.reach, B.reach):
+        for k in left[found.facets[:, 0] < 0].tolist():
+            rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
+    rows["hit"], rows["hit"][left] = True, ~apart
+    rows["how"][core], rows["how"][left] = EXACT, np.where(sure, FORMULA, UNDECIDED)
+    for k in np.flatnonzero(rows["hit"]).tolist():
+        at = int(np.searchsorted(left, k)) if not core[k] else -1
+        point, step = _common(A, B, X_WA[k], X_WB[k], inside[k], rows[k], found, at)
+        _overlap(A, B, X_WA[k], X_WB[k], rows, k, point, step, depths)
+    return rows
+
+
+def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
+    """Rows of bodies whose cores are apart."""
+    rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    rows["vertices_a"] = rows["vertices_b"] = -1
+    radius = A.radius + B.radius
+    unseen = found.facets[:, 0] < 0
+    across = X_WB[:, :3, 3] + (X_WB[:, :3, :3] * B.centre).sum(axis=2)
+    start = X_WA[:, :3, 3] + (X_WA[:, :3, :3] * A.centre).sum(axis=2)
+    normal = np.where(unseen[:, None], _unit(across - start), found.normal)
+    lost = (normal == 0.0).all(axis=1)
+    normal[lost] = _unit((across - start)[lost])
+    rows["normal"] = normal + 0.0
+    rows["lower"] = np.maximum(_down(found.lower - radius) if radius else found.lower, 0.0)
+    rows["upper"] = np.maximum(_up(found.upper - radius) if radius else found.upper, 0.0)
+    rows["distance"] = np.clip(found.distance - radius, rows["lower"], rows["upper"])
+    # Apart, and nearer than the bracket is wide: 0 would say that they touch.
+    none = rows["distance"] == 0.0
+    rows["distance"][none] = rows["upper"][none]
+    rows["point_a"], rows["point_b"] = found.point_a + A.radius * normal, found.point_b - B.radius * normal
+    rows["part_a"], rows["part_b"] = np.maximum(found.facets[:, 0], 0), np.maximum(found.facets[:, 1], 0)
+    beyond = unseen | (rows["lower"] > limit)
+    rows["beyond"] = beyond
+    narrow = rows["upper"] <= rows["lower"] + PROMISE * _size(A, B, X_WA, X_WB)
+    rows["certified"] = (narrow | beyond) & ((rows["lower"] > 0.0) | (radius == 0.0))
+    if beyond.any():
+        # Without a limit, what is unseen is for `_far_gap` to write.
+        rows["lower"][unseen] = math.nextafter(limit, math.inf) if limit < math.inf else 0.0
+        rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
+        middle = 0.5 * (start + across)[unseen]
+        half = 0.5 * rows["distance"][unseen, None] * normal[unseen]
+        rows["point_a"][unseen], rows["point_b"][unseen] = middle - half, middle + half
+    rows["exact"] = np.minimum(found.counters[:, 2], 255)
+    return rows
+
+
+def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
+    """The row of bodies so far apart that boxes in floats could not tell how far: their hulls and one point of each do."""
+    row = ask(hull_of(A), hull_of(B), X_WA[None], X_WB[None], False, limit, False, 1)
+    row["count"], row["part_a"], row["part_b"] = 0, 0, 0
+    row["vertices_a"] = row["vertices_b"] = -1
+    if not row["beyond"][0]:
+        one, other = (X[:3, 3] + (X[:3, :3] * body.points[0]).sum(axis=1) for body, X in ((A, X_WA), (B, X_WB)))
+        across = float(np.sqrt(np.square(other - one).sum())) * (1 + 2.0**-45) - A.radius - B.radius
+        row["upper"] = max(across, float(row["upper"][0]))
+        size = _size(A, B, X_WA[None], X_WB[None])[0]
+        row["certified"] = bool(row["lower"][0] > 0.0 and row["upper"][0] <= row["lower"][0] + PROMISE * size)
+    return row[0]
+
+
+def _common(A: Body, B: Body, X_WA, X_WB, inside, row, found, at: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(a point of both bodies, translations that may part them); ``at`` is the row of ``found``, −1 of cores that meet."""
+    if at >= 0:  # only the radii overlap
+        overlap = (A.radius + B.radius - float(found.lower[at])) * (1 + 1e-12) + 1e-300
+        middle = 0.5 * (row["point_a"] + row["point_b"])
+        return middle, [overlap * row["normal"]] if overlap > 0.0 else []
+    if not np.isnan(inside[0]):
+        return inside, []
+    meeting = surface_distances(A.tree, B.tree, X_WA, X_WB)
+    row["part_a"], row["part_b"] = np.maximum(meeting.facets[0], 0)
+    return meeting.point_a[0], []
+
+
+def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bool) -> None:
+    """Fill in row k of bodies that meet."""
+    row = rows[k]
+    decided = row["how"] != UNDECIDED
+    row["upper"] = 0.0 if decided else max(float(row["upper"]), 0.0)
+    row["beyond"] = False
+    if not depths:
+        row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
+        row["point_a"], row["point_b"], row["certified"] = point, point, decided
+        return
+    hulls = ask(hull_of(A), hull_of(B), X_WA[None], X_WB[None], False, math.inf, False, 1)[0]
+    length, bound, normal = way_out(A, B, X_WA, X_WB, hulls, more)
+    row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
+    row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
+    row["certified"] = bool(decided and bound == 0.0)
+
+
+def _size(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
+    """(n,) reaches of both from their frames' origins, the distance between these, and the radii."""
+    reaches = sum(float(body.tree.numbers[REACH:].sum()) + body.radius for body in (A, B))
+    return reaches + np.abs(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1)
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    lengths = np.sqrt(np.square(v).sum(axis=1))[:, None]
+    return np.where(lengths > 0.0, v / np.where(lengths > 0.0, lengths, 1.0), (0.0, 0.0, 1.0))
+
+
+def _down(values: np.ndarray) -> np.ndarray:
+    return np.nextafter(values, -math.inf)
+
+
+def _up(values: np.ndarray) -> np.ndarray:
+    return np.nextafter(values, math.inf)

@@ -1,0 +1,118 @@
+"""Shapes as meshes meet them: facets under a box-tree, a ball swept over them, and whether there is an inside.
+
+A convex polytope is the surface of its hull and what is inside; a sphere is one facet without area and a radius, a
+capsule a segment and one. A cylinder, cone or ellipsoid has no facets and is refused by name.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.geometry.hulls.hull import convex_hull
+from collide.geometry.mesh_tree.build import build_mesh_tree
+from collide.geometry.mesh_tree.layout import MeshTree
+from collide.geometry.packing import HALFSPACE, POINTS
+from collide.shapes.base import Shape, is_plain
+from collide.shapes.hull import ConvexHull
+from collide.shapes.mesh import Mesh
+
+
+class Body(NamedTuple):
+    """A set in its own frame: facets, the points they enclose where it is solid, and a ball swept over all.
+
+    tree : the facets.   points : (k, 3), one of every part that hangs together.
+    centre, reach : of a ball that holds the facets, the reach rounded upwards [m].
+    hull : a convex shape that holds the set, the least one; None until asked for (`hull_of`).
+    """
+
+    shape: Shape
+    tree: MeshTree
+    solid: bool
+    radius: float
+    points: np.ndarray
+    centre: np.ndarray
+    reach: float
+    hull: list[Shape]
+
+    @property
+    def key(self) -> tuple:
+        """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
+        return self.tree.content, self.radius, self.solid
+
+
+def is_halfspace(shape: Shape) -> bool:
+    """Half-spaces have no facets: the hull of a mesh answers for it."""
+    return not shape.meshed and is_plain(shape) and shape.parts()[0][0].kind == HALFSPACE
+
+
+def body_of(shape: Shape) -> Body:
+    """The body of a shape, made when first asked for and kept with it. Raises UnsupportedQuery, naming the shape."""
+    try:
+        return shape._surface
+    except AttributeError:
+        body = _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
+        shape._store(_surface=body)
+        return body
+
+
+def hull_of(body: Body) -> Shape:
+    """The hull of a mesh, without points inside; a convex shape itself."""
+    if not body.hull:
+        used = body.shape.vertices[np.unique(body.shape.faces)]  # type: ignore[attr-defined]
+        body.hull.append(ConvexHull(used[convex_hull(used).vertices]))
+    return body.hull[0]
+
+
+def _of_mesh(mesh: Mesh) -> Body:
+    return _made(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)], [])
+
+
+def _one_of_each_part(mesh: Mesh) -> np.ndarray:
+    """Vertex ids: one of every shell, and those of collapsed facets that no other facet uses."""
+    survey = mesh.survey
+    shells, corners = survey.shells, survey.corners
+    first = np.unique(shells, return_index=True)
+    ids = corners[first[1][first[0] >= 0], 0]
+    collapsed = shells < 0
+    if collapsed.any():
+        lonely = np.setdiff1d(corners[collapsed], corners[~collapsed])
+        ids = np.concatenate([ids, lonely])
+    return ids
+
+
+def _of_convex(shape: Shape) -> Body:
+    name = type(shape).__name__
+    parts = shape.parts()
+    if len(parts) != 1 or not is_plain(shape):
+        raise UnsupportedQuery(f"{name} against Mesh: unions are not answered yet; ask for each of their parts")
+    packed = parts[0][0]
+    if packed.kind != POINTS:
+        raise UnsupportedQuery(
+            f"{name} against Mesh is not answered yet: its surface is curved. A ConvexHull around it, or a Mesh, can stand in"
+        )
+    if packed.slop > 0.0:
+        raise UnsupportedQuery(
+            f"{name} against Mesh: its corners are not doubles, and what is rounded proves nothing; "
+            "ConvexHull(shape.vertices) is answered"
+        )
+    hull = convex_hull(packed.points)
+    tree = build_mesh_tree(packed.points, _facets(packed.points, hull))
+    return _made(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])
+
+
+def _facets(points: np.ndarray, hull) -> np.ndarray:
+    if hull.dimension == 3:
+        return hull.facets
+    if hull.dimension == 2:
+        return hull.facets[: len(hull.facets) // 2]
+    order = hull.vertices[np.lexsort(points[hull.vertices].T)]  # along a line its ends come first and last
+    return np.array([[order[0], order[-1], order[-1]]])
+
+
+def _made(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray, hull: list[Shape]) -> Body:
+    corners = tree.triangles.reshape(-1, 3)
+    reach = float(np.sqrt(np.square(corners - tree.centre).sum(axis=1).max())) * (1 + 1e-12)
+    return Body(shape, tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach, hull)

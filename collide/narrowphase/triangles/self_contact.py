@@ -1,0 +1,276 @@
+"""A surface against itself: pairs of facets that share more than the corners and edges they have in common.
+
+Corners are the same where their coordinates are. Facets with no common corner must not meet at all. With one, v, they
+share more exactly if the edge opposite v of one meets the other: whatever point besides v both have, the ray from v
+through it leaves one of them over that edge. With two, they overlap exactly if they lie in one plane on one side of the
+common edge. With three they are one facet twice. Facets without area hide nothing: their corners and edges are
+their neighbours' too, and what else they meet is found, by the rule for the corners they have.
+"""
+
+from __future__ import annotations
+
+from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
+from collide.geometry.mesh_tree.layout import (
+    IDS_AT,
+    INTS,
+    N_FACETS,
+    N_NODES,
+    NODE,
+    NODES_AT,
+    NUMBERS,
+    NUMBERS_AT,
+    TRIANGLES_AT,
+    WIDTH,
+)
+from collide.narrowphase.triangles.exact import MEET, OVERLAP, call_exactly
+from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
+from collide.narrowphase.triangles.filtered import APART, MEETING, UNSURE, meeting_in_doubles, orientation, sign_error
+from collide.narrowphase.triangles.placing import ERROR, PLACING, place
+from collide.narrowphase.triangles.surfaces import box_size, link_of, no_slab, set_probe
+
+#: Doubles and floats of workspace: a placing, corners, and a pose that moves nothing.
+DOUBLES, FLOATS = PLACING + CORNERS + 16, 2 * FRAME + PROBE
+BOXES, TRIANGLES, EXACT = range(3)
+#: Where a walk stands.
+TOP, FOUND = range(2)
+DONE, FULL = range(2)
+_MOST_AT_ONCE = 64
+
+
+@kernel(inline=True)
+def _same(P, a, b):
+    return P[a] == P[b] and P[a + 1] == P[b + 1] and P[a + 2] == P[b + 2]
+
+
+@kernel(inline=True)
+def _shared(P, a, b):
+    """(how many corners of b are corners of a, which of a the last one is, and which of b)."""
+    count = 0
+    of_a = -1
+    of_b = -1
+    for j in range(3):
+        for i in range(3):
+            if _same(P, a + 3 * i, b + 3 * j):
+                count += 1
+                of_a = i
+                of_b = j
+                break
+    return count, of_a, of_b
+
+
+@kernel
+def _load(P, a, i, j, k, corners, at):
+    """Corners i, j, k of a facet as corners at, at + 1, at + 2 of the exact stage."""
+    for axis in range(3):
+        corners[3 * at + axis] = P[a + 3 * i + axis]
+        corners[3 * at + 3 + axis] = P[a + 3 * j + axis]
+        corners[3 * at + 6 + axis] = P[a + 3 * k + axis]
+    if at == 3:
+        for word in range(9):
+            corners[OWN_AT + word] = corners[9 + word]
+
+
+@kernel
+def _edge_meets(P, a, i, b, corners, error, arguments, decide, counters):
+    """Whether the edge of facet a opposite its corner i meets facet b."""
+    p = a + 3 * ((i + 1) % 3)
+    q = a + 3 * ((i + 2) % 3)
+    far = 0.0
+    for axis in range(3):
+        x = P[b + axis]
+        far = max(far, abs(P[b + 3 + axis] - x), abs(P[b + 6 + axis] - x), abs(P[p + axis] - x), abs(P[q + axis] - x))
+    limit = sign_error(far, error)
+    start = orientation(P, b, P, b + 3, P, b + 6, P, p)
+    end = orientation(P, b, P, b + 3, P, b + 6, P, q)
+    if (start > limit and end > limit) or (start < -limit and end < -limit):
+        return False
+    one = orientation(P, b, P, b + 3, P, p, P, q)
+    two = orientation(P, b + 3, P, b + 6, P, p, P, q)
+    if (one > limit and two < -limit) or (one < -limit and two > limit):
+        return False
+    three = orientation(P, b + 6, P, b, P, p, P, q)
+    if (one > limit and three < -limit) or (one < -limit and three > limit):
+        return False
+    if (two > limit and three < -limit) or (two < -limit and three > limit):
+        return False
+    counters[EXACT] += 1
+    _load(P, b, 0, 1, 2, corners, 0)
+    _load(P, a, (i + 1) % 3, (i + 2) % 3, (i + 2) % 3, corners, 3)
+    return call_exactly(decide, (MEET, *arguments)) != 0
+
+
+@kernel(inline=True)
+def _one_side(P, v, face, of_face, other, of_other, error):
+    """Whether the two corners of ``other`` besides the common one, v, are certainly on one side of the face's plane."""
+    c = face + 3 * ((of_face + 1) % 3)
+    d = face + 3 * ((of_face + 2) % 3)
+    p = other + 3 * ((of_other + 1) % 3)
+    q = other + 3 * ((of_other + 2) % 3)
+    x = P[v]
+    y = P[v + 1]
+    z = P[v + 2]
+    ux = P[c] - x
+    uy = P[c + 1] - y
+    uz = P[c + 2] - z
+    vx = P[d] - x
+    vy = P[d + 1] - y
+    vz = P[d + 2] - z
+    px = P[p] - x
+    py = P[p + 1] - y
+    pz = P[p + 2] - z
+    qx = P[q] - x
+    qy = P[q + 1] - y
+    qz = P[q + 2] - z
+    nx = uy * vz - uz * vy
+    ny = uz * vx - ux * vz
+    nz = ux * vy - uy * vx
+    one = nx * px + ny * py + nz * pz
+    two = nx * qx + ny * qy + nz * qz
+    far = max(
+        abs(ux), abs(uy), abs(uz), abs(vx), abs(vy), abs(vz), abs(px), abs(py), abs(pz), abs(qx), abs(qy), abs(qz)
+    )
+    limit = sign_error(far, error)
+    return (one > limit and two > limit) or (one < -limit and two < -limit)
+
+
+@kernel
+def _conflict(P, a, b, corners, error, arguments, decide, counters):
+    """Whether two facets share more than corners and edges."""
+    count, i, j = _shared(P, a, b)
+    if count == 0:
+        verdict = meeting_in_doubles(P, P, b, a, error)
+        if verdict != UNSURE:
+            return verdict != APART
+        counters[EXACT] += 1
+        _load(P, a, 0, 1, 2, corners, 0)
+        _load(P, b, 0, 1, 2, corners, 3)
+        return call_exactly(decide, (MEET, *arguments)) == MEETING
+    if count == 1:
+        if _one_side(P, a + 3 * i, b, j, a, i, error) or _one_side(P, a + 3 * i, a, i, b, j, error):
+            return False
+        return _edge_meets(P, a, i, b, corners, error, arguments, decide, counters) or _edge_meets(
+            P, b, j, a, corners, error, arguments, decide, counters
+        )
+    if count > 2:
+        return True
+    # Two: turn both so that the corner that is not common comes last.
+    free_a = _free(P, a, b)
+    free_b = _free(P, b, a)
+    if free_a < 0 or free_b < 0:
+        return False  # a facet without area on an edge of the other
+    far = 0.0
+    for axis in range(3):
+        x = P[a + 3 * free_a + axis]
+        for k in range(3):
+            far = max(far, abs(P[a + 3 * k + axis] - x), abs(P[b + 3 * k + axis] - x))
+    v = a + 3 * ((free_a + 1) % 3)
+    w = a + 3 * ((free_a + 2) % 3)
+    if abs(orientation(P, v, P, w, P, a + 3 * free_a, P, b + 3 * free_b)) > sign_error(far, error):
+        return False
+    counters[EXACT] += 1
+    _load(P, a, (free_a + 1) % 3, (free_a + 2) % 3, free_a, corners, 0)
+    _load(P, b, (free_b + 1) % 3, (free_b + 2) % 3, free_b, corners, 3)
+    return call_exactly(decide, (OVERLAP, *arguments)) != 0
+
+
+@kernel
+def _free(P, a, b):
+    """The corner of a that is none of b's; −1 where all are."""
+    for i in range(3):
+        shared = False
+        for j in range(3):
+            shared = shared or _same(P, a + 3 * i, b + 3 * j)
+        if not shared:
+            return i
+    return -1
+
+
+@entry(
+    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
+)
+def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, n_stack, doubles_at, integers_at, decide):
+    """Pairs of facets of one surface that share more than corners and edges; DONE or FULL, then to be called again.
+
+    pairs : out, the smaller facet number times the number of facets plus the larger.
+    """
+    header = view_i64(header_at, INTS)
+    numbers = view_f64(header[NUMBERS_AT], NUMBERS)
+    boxes = view_f32(header[NODES_AT], NODE * header[N_NODES])
+    links = view_i32(header[NODES_AT], NODE * header[N_NODES])
+    P = view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS])
+    ids = view_i32(header[IDS_AT], header[N_FACETS])
+    pairs = view_i64(pairs_at, capacity)
+    counters = view_i64(counters_at, 3)
+    where = view_i64(where_at, 2)
+    stack = view_i64(stack_at, n_stack)
+    placing = view_f64(doubles_at, PLACING)
+    corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
+    still_at = doubles_at + 8 * (PLACING + CORNERS)
+    still = view_f64(still_at, 16)
+    frames = view_f32(doubles_at + 8 * DOUBLES, 2 * FRAME)
+    frame = view_f32(doubles_at + 8 * DOUBLES, FRAME)
+    probe = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, PROBE)
+    for k in range(16):
+        still[k] = 1.0 if k % 5 == 0 else 0.0
+    place(header, numbers, still, header, numbers, still, placing, frames)
+    forget_poses(view_i64(integers_at, STATE))
+    no_slab(probe)
+    arguments = (doubles_at + 8 * PLACING, doubles_at, integers_at, still_at, still_at)
+    top = where[TOP]
+    found = where[FOUND]
+    if top == 0:
+        stack[0] = 0
+        top = 1
+    while top > 0:
+        if found + _MOST_AT_ONCE > capacity:
+            where[TOP] = top
+            where[FOUND] = found
+            return FULL
+        top -= 1
+        one = stack[top] >> 32
+        two = stack[top] & 0xFFFFFFFF
+        link = int(link_of(links, one))
+        other = int(link_of(links, two))
+        if link < 0 and other < 0:
+            for i in range(~link & 7):
+                a = (~link >> 3) + i
+                for j in range(i + 1 if one == two else 0, ~other & 7):
+                    b = (~other >> 3) + j
+                    counters[TRIANGLES] += 1
+                    if _conflict(P, 9 * a, 9 * b, corners, placing[ERROR], arguments, decide, counters):
+                        x = min(ids[a], ids[b])
+                        y = max(ids[a], ids[b])
+                        pairs[found] = int(x) * header[N_FACETS] + int(y)
+                        found += 1
+            continue
+        if one == two:
+            # Every child with itself and with those after it.
+            for first in range(WIDTH):
+                child = link * WIDTH + first
+                if boxes[NODE * link + 3 * WIDTH + first] < 0.0:
+                    continue
+                counters[BOXES] += 1
+                set_probe(placing, 0, boxes, child, probe)
+                mask = boxes_meeting(boxes, NODE * link, frame, probe)
+                for slot in range(first, WIDTH):
+                    if (mask >> slot) & 1:
+                        stack[top] = (child << 32) | (link * WIDTH + slot)
+                        top += 1
+            continue
+        counters[BOXES] += 1
+        if link < 0 or (other >= 0 and box_size(boxes, two) > box_size(boxes, one)):
+            fixed = one
+            node = other
+        else:
+            fixed = two
+            node = link
+        set_probe(placing, 0, boxes, fixed, probe)
+        mask = boxes_meeting(boxes, NODE * node, frame, probe)
+        for slot in range(WIDTH):
+            if (mask >> slot) & 1:
+                stack[top] = (fixed << 32) | (node * WIDTH + slot)
+                top += 1
+    where[TOP] = 0
+    where[FOUND] = found
+    return DONE

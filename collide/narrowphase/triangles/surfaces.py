@@ -1,0 +1,309 @@
+"""Two posed surfaces: whether they meet, and every pair of facets that does.
+
+A walk over pairs of boxes, depth first on a stack, the larger box opened into its eight; leaves end in triangles
+that doubles part or not, and in integers where doubles cannot tell. The order is fixed, so the first pair found is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
+from collide.geometry.mesh_tree.layout import (
+    CENTRE,
+    EXPONENT,
+    IDS_AT,
+    INTS,
+    N_FACETS,
+    N_NODES,
+    NODE,
+    NODES_AT,
+    NUMBERS,
+    NUMBERS_AT,
+    TRIANGLES_AT,
+    WIDTH,
+)
+from collide.narrowphase.triangles.exact import MEET, call_exactly
+from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
+from collide.narrowphase.triangles.filtered import MEETING, TINY, UNSURE, meeting_in_doubles
+from collide.narrowphase.triangles.placing import (
+    ERROR,
+    FRAME_SIZE,
+    FRAMES,
+    PLACING,
+    UNITS,
+    later,
+    place,
+    transform,
+)
+
+# What rides along, a row of integers a pose: pairs of boxes looked at, triangles tested, decided exactly.
+BOXES, TRIANGLES, EXACT = range(3)
+COUNTERS = 3
+
+#: Doubles and floats of workspace; integers are `exact.INTEGERS`.
+DOUBLES = PLACING + CORNERS
+FLOATS = 2 * FRAME + PROBE
+
+#: Where a walk stands: pose, height of the stack, pairs found.
+POSE, TOP, FOUND = range(3)
+#: What it says: all poses done, room for pairs gone, or a matrix that cannot be inverted.
+DONE, FULL, SINGULAR = range(3)
+#: Pairs that a pair of leaves may add.
+_MOST_AT_ONCE = 64
+
+
+@kernel(inline=True)
+def set_probe(placing, which, nodes, ref, probe):
+    """Make the box behind a reference (node times 8 plus slot) the probe; which: 0 for A's box, 1 for B's."""
+    own = FRAMES + FRAME_SIZE * which
+    other = FRAMES + FRAME_SIZE * (1 - which)
+    at = NODE * (ref >> 3) + (ref & 7)
+    x = float(nodes[at])
+    y = float(nodes[at + WIDTH])
+    z = float(nodes[at + 2 * WIDTH])
+    hx = float(nodes[at + 3 * WIDTH])
+    hy = float(nodes[at + 4 * WIDTH])
+    hz = float(nodes[at + 5 * WIDTH])
+    for i in range(3):
+        a = placing[other + 3 * i]
+        b = placing[other + 3 * i + 1]
+        c = placing[other + 3 * i + 2]
+        probe[i] = np.float32(a * x + b * y + c * z + placing[other + 9 + i])
+        probe[3 + i] = np.float32(abs(a) * hx + abs(b) * hy + abs(c) * hz + placing[other + 12 + i])
+    probe[6] = np.float32(placing[own + 9] - x)
+    probe[7] = np.float32(placing[own + 10] - y)
+    probe[8] = np.float32(placing[own + 11] - z)
+    probe[9] = np.float32(hx + placing[own + 12])
+    probe[10] = np.float32(hy + placing[own + 13])
+    probe[11] = np.float32(hz + placing[own + 14])
+
+
+@kernel
+def set_slab(placing, which, triangles, numbers, exponent, run, probe):
+    """Add the slab around a leaf's triangles to the probe of its box.
+
+    A box around a large triangle that lies across its axes holds whole regions of a finer mesh. Where leaves are
+    opened against nodes this is what parts them.
+    """
+    first = 9 * (run >> 3)
+    last = first + 9 * (run & 7)
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    for a in range(first, last, 9):
+        ux = triangles[a + 3] - triangles[a]
+        uy = triangles[a + 4] - triangles[a + 1]
+        uz = triangles[a + 5] - triangles[a + 2]
+        vx = triangles[a + 6] - triangles[a]
+        vy = triangles[a + 7] - triangles[a + 1]
+        vz = triangles[a + 8] - triangles[a + 2]
+        x += uy * vz - uz * vy
+        y += uz * vx - ux * vz
+        z += ux * vy - uy * vx
+    size = max(abs(x), abs(y), abs(z))
+    if not size > TINY:
+        no_slab(probe)
+        return
+    x /= size
+    y /= size
+    z /= size
+    low = math.inf
+    high = -math.inf
+    for k in range(first, last, 3):
+        height = (
+            x * (triangles[k] - numbers[CENTRE])
+            + y * (triangles[k + 1] - numbers[CENTRE + 1])
+            + z * (triangles[k + 2] - numbers[CENTRE + 2])
+        )
+        low = min(low, height)
+        high = max(high, height)
+    scale = math.ldexp(1.0, int(-exponent))
+    at = FRAMES + FRAME_SIZE * which
+    offset = x * placing[at + 9] + y * placing[at + 10] + z * placing[at + 11] - 0.5 * (low + high) * scale
+    # What rounding can do to the frame, to heights and to the sums of floats.
+    reach = 0.5 * (high - low) * scale + 2.0**-19 * (3.0 + abs(offset)) + 2.0**-110
+    reach += abs(x) * placing[at + 12] + abs(y) * placing[at + 13] + abs(z) * placing[at + 14]
+    for j in range(3):
+        entry = x * placing[at + j] + y * placing[at + 3 + j] + z * placing[at + 6 + j]
+        probe[12 + j] = np.float32(entry)
+        reach += 2.0**-19 * abs(entry)
+    probe[15] = np.float32(offset)
+    probe[16] = np.float32(reach)
+
+
+@kernel(inline=True)
+def no_slab(probe):
+    for k in range(12, 17):
+        probe[k] = np.float32(0.0)
+
+
+@kernel(inline=True)
+def box_size(nodes, ref):
+    """Sum of the half lengths of the box behind a reference."""
+    at = NODE * (ref >> 3) + (ref & 7) + 3 * WIDTH
+    return float(nodes[at]) + float(nodes[at + WIDTH]) + float(nodes[at + 2 * WIDTH])
+
+
+@kernel(inline=True)
+def link_of(links, ref):
+    return links[NODE * (ref >> 3) + 6 * WIDTH + (ref & 7)]
+
+
+@kernel
+def certainly_meeting(P, W, a, b, corners, context, counters, exact):
+    """Whether triangle P[a:] of A meets W[b:] of B, of which A sees corners 9 … 17: in doubles, else exactly.
+
+    counters[exact] counts what doubles could not tell.   context : addresses of the exact stage and of what it takes.
+    """
+    decide, corners_at, placing_at, integers_at, XA_at, XB_at, error = context
+    verdict = meeting_in_doubles(P, corners, 9, a, error)
+    if verdict == UNSURE:
+        counters[exact] += 1
+        for k in range(9):
+            corners[k] = P[a + k]
+            corners[OWN_AT + k] = W[b + k]
+        return call_exactly(decide, (MEET, corners_at, placing_at, integers_at, XA_at, XB_at)) != 0
+    return verdict == MEETING
+
+
+@kernel
+def _leaves(
+    P, W, ids_a, ids_b, run_a, run_b, placing, corners, context, flip, first_only, pairs, found, counters
+):
+    """All triangles of two leaves; returns how many pairs there are now."""
+    n_b = len(ids_b)
+    for i in range(run_b & 7):
+        b = (run_b >> 3) + i
+        transform(placing, W, 9 * b, corners, 9)
+        for j in range(run_a & 7):
+            a = (run_a >> 3) + j
+            counters[TRIANGLES] += 1
+            if certainly_meeting(P, W, 9 * a, 9 * b, corners, context, counters, EXACT):
+                one = int(ids_a[a])
+                two = int(ids_b[b])
+                pairs[found] = two * n_b + one if flip else one * n_b + two
+                found += 1
+                if first_only:
+                    return found
+    return found
+
+
+#: Of `walk_surfaces`.
+SIGNATURE = (
+    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, int64, int64, int64, int64, int64, int64,"
+    " int64, int64, int64, int64)"
+)
+
+
+@entry(SIGNATURE)
+def walk_surfaces(
+    header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, alike, first_only, pairs_at, capacity, starts_at, counters_at,
+    where_at, stack_at, n_stack, doubles_at, integers_at, decide,
+):  # fmt: skip
+    """Facet pairs of two surfaces at n pairs of poses, from where an earlier call stopped; DONE, FULL or SINGULAR.
+
+    XA, XB : matrices of 16 doubles; step 16 or, for a single pose, 0.
+    alike : the trees are equal; poses are then exchanged by their numbers, and answers turned back.
+    pairs : out, facet of A times the number of B's facets plus facet of B; of pose k those from starts[k] to
+        starts[k + 1]. With ``first_only`` at most one a pose.
+    counters : COUNTERS integers a pose.   where : POSE, TOP, FOUND; zeros at first.
+    """
+    header_a = view_i64(header_a_at, INTS)
+    header_b = view_i64(header_b_at, INTS)
+    numbers_a = view_f64(header_a[NUMBERS_AT], NUMBERS)
+    numbers_b = view_f64(header_b[NUMBERS_AT], NUMBERS)
+    boxes_a = view_f32(header_a[NODES_AT], NODE * header_a[N_NODES])
+    boxes_b = view_f32(header_b[NODES_AT], NODE * header_b[N_NODES])
+    links_a = view_i32(header_a[NODES_AT], NODE * header_a[N_NODES])
+    links_b = view_i32(header_b[NODES_AT], NODE * header_b[N_NODES])
+    P = view_f64(header_a[TRIANGLES_AT], 9 * header_a[N_FACETS])
+    W = view_f64(header_b[TRIANGLES_AT], 9 * header_b[N_FACETS])
+    ids_a = view_i32(header_a[IDS_AT], header_a[N_FACETS])
+    ids_b = view_i32(header_b[IDS_AT], header_b[N_FACETS])
+    pairs = view_i64(pairs_at, capacity)
+    starts = view_i64(starts_at, n + 1)
+    where = view_i64(where_at, 3)
+    stack = view_i64(stack_at, n_stack)
+    placing = view_f64(doubles_at, PLACING)
+    corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
+    frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
+    frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
+    frames = view_f32(doubles_at + 8 * DOUBLES, 2 * FRAME)
+    probe = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, PROBE)
+    state = view_i64(integers_at, STATE)
+    found = where[FOUND]
+    k = where[POSE]
+    top = where[TOP]
+    while k < n:
+        pose_a = XA_at + 8 * step_a * k
+        pose_b = XB_at + 8 * step_b * k
+        flip = alike and later(view_f64(pose_a, 12), view_f64(pose_b, 12))
+        if flip:
+            pose_a, pose_b = pose_b, pose_a
+        XA = view_f64(pose_a, 16)
+        XB = view_f64(pose_b, 16)
+        counters = view_i64(counters_at + 8 * COUNTERS * k, COUNTERS)
+        if not place(header_a, numbers_a, XA, header_b, numbers_b, XB, placing, frames):
+            where[POSE] = k
+            return SINGULAR
+        forget_poses(state)
+        context = (
+            decide, doubles_at + 8 * PLACING, doubles_at, integers_at, pose_a, pose_b, placing[ERROR],
+        )  # fmt: skip
+        units = placing[UNITS]
+        if top == 0:
+            starts[k] = found
+            stack[0] = 0
+            top = 1
+        while top > 0:
+            if found + _MOST_AT_ONCE > capacity:
+                where[POSE] = k
+                where[TOP] = top
+                where[FOUND] = found
+                return FULL
+            top -= 1
+            a = stack[top] >> 32
+            b = stack[top] & 0xFFFFFFFF
+            link_a = int(link_of(links_a, a))
+            link_b = int(link_of(links_b, b))
+            if link_a < 0 and link_b < 0:
+                found = _leaves(
+                    P, W, ids_a, ids_b, ~link_a, ~link_b, placing, corners, context, flip, first_only,
+                    pairs, found, counters,
+                )
+                if first_only and found > starts[k]:
+                    top = 0
+                continue
+            counters[BOXES] += 1
+            if link_a < 0 or (link_b >= 0 and box_size(boxes_b, b) > units * box_size(boxes_a, a)):
+                set_probe(placing, 0, boxes_a, a, probe)
+                if link_a < 0:
+                    set_slab(placing, 0, P, numbers_a, header_a[EXPONENT], ~link_a, probe)
+                else:
+                    no_slab(probe)
+                mask = boxes_meeting(boxes_b, NODE * link_b, frame_a, probe)
+                for slot in range(WIDTH):
+                    if (mask >> slot) & 1:
+                        stack[top] = (a << 32) | (link_b * WIDTH + slot)
+                        top += 1
+            else:
+                set_probe(placing, 1, boxes_b, b, probe)
+                if link_b < 0:
+                    set_slab(placing, 1, W, numbers_b, header_b[EXPONENT], ~link_b, probe)
+                else:
+                    no_slab(probe)
+                mask = boxes_meeting(boxes_a, NODE * link_a, frame_b, probe)
+                for slot in range(WIDTH):
+                    if (mask >> slot) & 1:
+                        stack[top] = ((link_a * WIDTH + slot) << 32) | b
+                        top += 1
+        k += 1
+        starts[k] = found
+    where[POSE] = k
+    where[TOP] = 0
+    where[FOUND] = found
+    return DONE

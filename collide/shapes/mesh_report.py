@@ -1,0 +1,112 @@
+"""What a mesh is and what is wrong with it, in words and facet numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collide.geometry.surfaces.survey import Survey
+
+#: Facet numbers shown of each defect; `Defect.facets` has them all.
+_SHOWN = 6
+
+
+class Defect(NamedTuple):
+    """One kind of defect of a mesh.
+
+    name : what it is, the same words for every mesh.
+    facets : (k,) rows of ``mesh.faces`` that show it, sorted.
+    spoils : whether an inside cannot be told because of it; such a mesh is no solid.
+    meaning : what these facets are.
+    """
+
+    name: str
+    facets: np.ndarray
+    spoils: bool
+    meaning: str
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.meaning}): {_numbers(self.facets)}"
+
+
+class MeshReport(NamedTuple):
+    """What `Mesh.report` says; printed, it is text for a person.
+
+    solid : whether the mesh is taken as a solid.   why : the reason, in words.
+    vertices, facets : as given.   used : distinct vertices that facets use.   welded : vertices that
+    equal an earlier one.   edges : of the welded mesh.   shells : parts that close, or hang together, by themselves.
+    euler : distinct vertices − edges + facets.   volume : enclosed [m³], cavities taken off; 0 where not closed.
+    defects : everything found wrong, what spoils a solid first.
+    """
+
+    solid: bool
+    why: str
+    vertices: int
+    facets: int
+    used: int
+    welded: int
+    edges: int
+    shells: int
+    euler: int
+    volume: float
+    defects: tuple[Defect, ...]
+
+    def __str__(self) -> str:
+        lines = [
+            f"{'solid' if self.solid else 'surface'}: {self.why}",
+            f"{self.facets} facets, {self.edges} edges, {self.used} distinct vertices in use of {self.vertices}",
+            f"{self.shells} shell{'s' * (self.shells != 1)}, Euler characteristic {self.euler}, volume {self.volume:.6g} m³",
+        ]
+        return "\n".join([*lines, *(f"- {defect}" for defect in self.defects)])
+
+
+def _numbers(facets: np.ndarray) -> str:
+    shown = ", ".join(str(f) for f in facets[:_SHOWN].tolist())
+    if len(facets) > _SHOWN:
+        return f"facets {shown}, … ({len(facets)} in all)"
+    return f"facet{'s' * (len(facets) != 1)} {shown}"
+
+
+def find_defects(survey: Survey) -> tuple[Defect, ...]:
+    """The defects that a survey flags, what spoils a solid first."""
+    from collide.geometry.surfaces import survey as says
+    from collide.geometry.surfaces import topology as meet
+
+    nothing = bool(len(survey.signs)) and not (survey.signs > 0).any()
+    kinds = [
+        (meet.DOUBLED, not survey.closed, "duplicate facets", "the same corners as an earlier facet, the same way round"),
+        (meet.OPEN, True, "open edges", "an edge has no other facet"),
+        (meet.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
+        (meet.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),
+        (meet.ONE_SIDED, True, "one-sided", "where the surface closes to a band with one side"),
+        (says.INSIDE_OUT, True, "inside out", "parts that run clockwise seen from outside, and are no cavities"),
+        (says.EMPTY, nothing, "encloses nothing", "parts without volume"),
+        (meet.BACK_TO_BACK, False, "back-to-back facets", "the same corners as another facet, the other way round"),
+        (meet.SEVERAL, False, "non-manifold edges", "four or more meet at an edge"),
+        (meet.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
+        (says.NO_AREA, False, "no area", "corners on one line"),
+    ]
+    found = [
+        Defect(name, np.flatnonzero(survey.flags & bit), spoils, meaning)
+        for bit, spoils, name, meaning in kinds
+        if (survey.flags & bit).any()
+    ]
+    return tuple(sorted(found, key=lambda defect: not defect.spoils))
+
+
+def make_report(vertices: int, solid: bool, survey: Survey) -> MeshReport:
+    """The report on a mesh of so many vertices, taken as a solid or not."""
+    defects = find_defects(survey)
+    spoilt = [defect for defect in defects if defect.spoils]
+    if solid:
+        why = "every edge is run along as often one way as the other"
+    elif spoilt or not survey.edges:
+        why = "; ".join(defect.name for defect in spoilt) or "no facet has three distinct corners"
+    else:
+        why = "asked for; it could be a solid"
+    return MeshReport(
+        solid, why, vertices, len(survey.flags), survey.used, survey.welded, survey.edges, survey.many_shells,
+        survey.euler, float(survey.volumes.sum()), defects,
+    )  # fmt: skip

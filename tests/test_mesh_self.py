@@ -1,0 +1,88 @@
+"""A surface against itself: clean meshes have no pairs, and crossings, folds and doubled facets are all found."""
+
+from __future__ import annotations
+
+import numpy as np
+from mesh_families import grid, soup
+from mesh_shapes import block_ring, box, bumpy_sphere
+from naive_triangles import as_integers, cross, inner, minus, triangles_meet, world_points
+
+from collide.geometry.mesh_tree.build import build_mesh_tree
+from collide.narrowphase.triangles.queries import self_hits
+
+
+def shares_more(P, Q) -> bool:
+    """Whether two integer triangles share more than common corners and edges."""
+    of_q = [q for q in Q if q in P]
+    if not of_q:
+        return triangles_meet(P, Q)
+    if len(of_q) == 1:
+        v = of_q[0]
+        rest_p, rest_q = _without(P, v), _without(Q, v)
+        return triangles_meet([*rest_p, rest_p[1]], Q) or triangles_meet([*rest_q, rest_q[1]], P)
+    if len(of_q) > 2:
+        return True
+    free_p, free_q = [p for p in P if p not in Q], [q for q in Q if q not in P]
+    if not free_p or not free_q:
+        return False
+    v, w = of_q
+    n, k = (cross(minus(w, v), minus(x, v)) for x in (free_p[0], free_q[0]))
+    return cross(n, k) == [0, 0, 0] and inner(n, k) > 0
+
+
+def _without(P, v):
+    i = max(k for k in range(3) if P[k] == v)
+    return [P[(i + 1) % 3], P[(i + 2) % 3]]
+
+
+def proper(vertices, faces):
+    """Facets with an area."""
+    corners = vertices[faces]
+    return faces[np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).max(axis=1) > 1e-9]
+
+
+def test_pairs_are_those_of_brute_force():
+    rng = np.random.default_rng(41)
+    found_pairs = tested = 0
+    for case in range(60):
+        vertices, faces = grid(rng, 24, 3) if case % 3 else soup(rng, 20)
+        if case % 3 == 1:
+            vertices = vertices + rng.normal(size=vertices.shape) * 0.2
+        faces = proper(vertices, faces)
+        points = as_integers(world_points(vertices, np.eye(4)))[0]
+        corners = [[points[v] for v in f] for f in faces.tolist()]
+        want = [(i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])]
+        pairs, _ = self_hits(build_mesh_tree(vertices, faces))
+        assert list(map(tuple, pairs.tolist())) == want, (case, vertices.tolist(), faces.tolist())
+        found_pairs += len(want)
+        tested += len(faces) ** 2 // 2
+    assert 0.1 < found_pairs / tested < 0.9
+
+
+def test_clean_meshes_have_none():
+    for vertices, faces in (box(), block_ring(), bumpy_sphere(5000)):
+        for scale in (1.0, 1e-9, 1e9):
+            pairs, _ = self_hits(build_mesh_tree(vertices * scale, faces))
+            assert len(pairs) == 0
+
+
+def test_crossings_folds_and_doubles_are_found():
+    (va, fa), (vb, fb) = box(), box((-0.5, -0.5, 0.5), (0.5, 0.5, 1.5))
+    pairs, _ = self_hits(build_mesh_tree(np.concatenate([va, vb]), np.concatenate([fa, fb + len(va)])))
+    assert len(pairs) > 4 and (pairs[:, 0] < 12).all() and (pairs[:, 1] >= 12).all()
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0.25, 0.5, 0]])
+    for faces, want in (
+        ([[0, 1, 2], [0, 2, 3]], []),  # a square that is nearly one
+        ([[0, 1, 2], [0, 1, 3]], [(0, 1)]),  # folded flat
+        ([[0, 1, 2], [2, 0, 1]], [(0, 1)]),  # one facet twice
+    ):
+        assert list(map(tuple, self_hits(build_mesh_tree(square, np.array(faces)))[0].tolist())) == want
+
+
+def test_many_pairs_are_not_lost():
+    n = 120
+    faces = np.arange(3 * n).reshape(n, 3)
+    vertices = (np.array([[1.0, 0, 0], [-1, 1, 0], [-1, -1, 0]])[None] + 0.01 * np.random.default_rng(1).normal(size=(n, 3, 3)))
+    vertices[::2] = vertices[::2, :, [2, 0, 1]]
+    pairs, _ = self_hits(build_mesh_tree(vertices.reshape(-1, 3), faces))
+    assert len(pairs) >= (n // 2) ** 2 and len(np.unique(pairs, axis=0)) == len(pairs)
