@@ -77,7 +77,7 @@ def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
         pass
     name = type(shape).__name__
     if not is_plain(shape):
-        raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, not a union')
+        raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, no union and no mesh')
     packed = shape.parts()[0][0]
     if packed.kind != POINTS or packed.radius != 0.0:
         raise UnsupportedQuery(
