@@ -25,7 +25,7 @@ class Body(NamedTuple):
 
     tree : the facets.   points : (k, 3), one of every part that hangs together.
     centre, reach : of a ball that holds the facets, the reach rounded upwards [m].
-    hull : a convex shape that holds the set, the least one; None until asked for (`hull_of`).
+    hull : the least convex shape that holds the set, once it has been asked for (`hull_of`); empty before.
     """
 
     shape: Shape
