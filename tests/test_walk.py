@@ -162,6 +162,13 @@ def test_large_stars_and_facets():
 # --- proofs, counts, sameness -----------------------------------------------------------------------
 
 
+def test_answers_keep_poses_of_their_own():
+    box, X_WB = collide.Box((1, 1, 1)), shifted(0.5)
+    found, before = collide.walk(box, box, EYE, X_WB), X_WB.copy()
+    X_WB[0, 3] = 9.0
+    collide.verify(box, box, EYE, before, found)
+
+
 def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
     """In rational numbers: the plane against all vertices, or the point against all facets."""
     rng = np.random.default_rng(12)
@@ -328,8 +335,9 @@ def test_what_it_refuses():
         for A, B in ((shape, box), (box, shape)):
             with pytest.raises(collide.UnsupportedQuery, match=type(shape).__name__):
                 collide.collide(A, B, EYE, EYE, algorithm=WALK)
-    with pytest.raises(collide.InvalidArgument, match="gjk"):
-        collide.collide(box, box, EYE, EYE, algorithm="quick")
+    for wrong in ("quick", np.array(["gjk", "gjk"]), 3):
+        with pytest.raises(collide.InvalidArgument, match="gjk"):
+            collide.collide(box, box, EYE, EYE, algorithm=wrong)
     with pytest.raises(collide.InvalidArgument, match="axes"):
         collide.collide(box, box, EYE[None], EYE, algorithm=WALK, axes=np.zeros((1, 3)))
     with pytest.raises(collide.InvalidArgument, match="two shapes"):
