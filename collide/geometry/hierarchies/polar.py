@@ -53,7 +53,7 @@ def polar_of_hull(
 ) -> PolarBody:
     """The polar of the hull of points (n, 3) about ``origin``, or about a point well inside, with its hierarchy.
 
-    O(n log n). Raises ValueError for a hull without interior, for a needle or a pancake with no double
+    Near-linear but for what `build_hierarchy` says. Raises ValueError for a hull without interior, for a needle or a pancake with no double
     inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60 to 1e60.
     """
     if hull.dimension != 3:
