@@ -80,7 +80,7 @@ def _clusters(polar: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Facets that rounding split from one flat side have polar points an ulp or so apart. Which of them is highest along
     a direction is then a matter of rounding, and Lemma 4.2, which looks around one of them only, loses the maximum. Fewer
-    points make Q' smaller and R' larger: by 2⁻³⁰ of its size at most, and by 2⁻⁴⁰ for bodies that are round.
+    points make Q' smaller and R' larger: by some 3·2⁻³⁰ of its size at most, and 3·2⁻⁴⁰ for bodies that are round.
     """
     scaled = polar * extent
     cell = min(2.0**-40 * float(np.abs(scaled).max()), 2.0**-30)
