@@ -28,7 +28,7 @@ from collide.narrowphase.barba_langerman.walk import APART
 
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
 KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")
-#: Beyond this the vertices of "doubling" are nearer to one another than doubles tell apart.
+#: Larger ones of this generator crowd their vertices; benchmarks/hierarchies.py has one of 786,433.
 MOST_DOUBLING = 200_000
 POSES = 1000
 #: Poses timed together: few enough that a turn is seldom interrupted.

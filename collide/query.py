@@ -53,7 +53,7 @@ def collide(
 
     Raises InvalidPose, InvalidArgument; UnsupportedQuery for shapes that the algorithm does not serve.
     """
-    if algorithm is not None and algorithm != "gjk":
+    if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
@@ -79,12 +79,17 @@ def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
 
 
 def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algorithm):
-    if algorithm != "barba-langerman":
+    if not _is_named(algorithm, "barba-langerman"):
         raise InvalidArgument(f'algorithm must be "gjk" or "barba-langerman", got {algorithm!r}')
     if axes is not None or threads != 1:
         raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
     found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
     return bool(found.hit[0]) if _is_single(X_WA) and _is_single(X_WB) else found.hit
+
+
+def _is_named(algorithm, name: str) -> bool:
+    """Whether an algorithm is given by this name; anything but a string, an array among them, is not."""
+    return isinstance(algorithm, str) and algorithm == name
 
 
 def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
@@ -100,7 +105,8 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
     for shape in (A, B):
         walks.walk_body(shape)
     X_WA, X_WB, _ = _poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = as_poses(X_WA, "X_WA", check=check_poses), as_poses(X_WB, "X_WB", check=check_poses)
+    # Copies: a certificate worked out later is one for these poses.
+    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
 
     def answer_open(left: np.ndarray) -> np.ndarray:
         X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
@@ -161,7 +167,7 @@ def distance(
     half-space).
     """
     limit = check_distance("max_distance", max_distance)
-    if algorithm is not None and algorithm != "gjk":
+    if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
     if limit == math.inf and threads == 1 and signed:
         try:
@@ -189,7 +195,7 @@ def distance(
 
 
 def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
-    if algorithm != "dobkin-kirkpatrick":
+    if not _is_named(algorithm, "dobkin-kirkpatrick"):
         raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
     if limit != math.inf or threads != 1:
         raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')

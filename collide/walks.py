@@ -147,15 +147,30 @@ def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     return rows
 
 
+#: Sizes of bodies, and longest ways between them, whose sixth powers doubles hold: the small problems form such products.
+_SMALLEST, _LARGEST = 1e-40, 1e40
+
+
+def _is_ordinary(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray) -> bool:
+    """Whether the descent can work with these sizes; it has no room for overflow, which the default has."""
+    sizes = [np.abs(body.points).max() for body in (first, second)]
+    reach = max(np.abs(X).max() for X in (X_WA, X_WB))
+    return all(_SMALLEST < size < _LARGEST for size in sizes) and bool(reach < _LARGEST)
+
+
 def _propose(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
     """Enter the nearest vertices of a pair into a row; False where the bodies overlap as far as doubles tell."""
-    into_a = np.linalg.inv(X_WA)
-    X_AB = into_a @ X_WB
+    if not _is_ordinary(first, second, X_WA, X_WB):
+        return False
+    try:
+        X_AB = np.linalg.inv(X_WA) @ X_WB
+    except np.linalg.LinAlgError:  # unchecked poses may be singular
+        return False
     nearest = hierarchy_distance(first.packed, second.packed, X_AB[:3, :3], X_AB[:3, 3])
     used = nearest.vertices[:, 0] >= 0
     ids = nearest.vertices[used]
     known = (ids[:, 0] < len(first.points)).all() and (ids[:, 1] < len(second.points)).all()
-    if nearest.distance == 0.0 or not known:
+    if not 0.0 < nearest.distance < np.inf or not known:
         return False
     row["distance"] = nearest.distance
     for name, point in (("point_a", nearest.point_a), ("point_b", nearest.point_b)):

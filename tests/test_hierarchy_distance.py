@@ -141,10 +141,46 @@ def test_batches_and_what_is_not_served():
         assert alone.rows.tobytes() == together.rows[k : k + 1].tobytes()
     flat = collide.ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
     assert collide.distance(flat, A, np.eye(4), X_WB[0], algorithm="dobkin-kirkpatrick").certified
-    for wrong in ("barba-langerman", "fast"):
+    for wrong in ("barba-langerman", "fast", np.array(["gjk", "gjk"])):
         with pytest.raises(collide.InvalidArgument, match="algorithm"):
             collide.distance(A, B, np.eye(4), np.eye(4), algorithm=wrong)
     with pytest.raises(collide.UnsupportedQuery, match="Sphere"):
         collide.distance(collide.Sphere(1), B, np.eye(4), np.eye(4), algorithm="dobkin-kirkpatrick")
     with pytest.raises(collide.InvalidArgument, match="max_distance"):
         collide.distance(A, B, np.eye(4), np.eye(4), max_distance=1.0, algorithm="dobkin-kirkpatrick")
+
+
+@pytest.mark.parametrize("far", [1e160, 1e200, np.inf, np.nan])
+def test_numbers_beyond_doubles_give_no_vertices(far):
+    """Squares overflow: nothing is found, and nothing is read by a vertex number that was never written."""
+    *_, body = packed("cube, turned", DEGREE_BOUND)
+    found = hierarchy_distance(body, body, np.eye(3), np.array([far, far, 0.0]))
+    assert not found.distance < np.inf and (found.vertices == -1).all()
+
+
+@pytest.mark.parametrize("size", [1e-45, 1e-30, 1.0, 1e30, 1e45])
+def test_extreme_sizes_are_left_to_the_default(size):
+    points = sphere(50) * size
+    A, B = collide.ConvexHull(points), collide.ConvexHull(points[::-1])
+    X_WB = np.eye(4)
+    X_WB[:3, 3] = 4 * size, size, 0.0
+    for shift in (1.0, 2.0**60):
+        X_WB[:3, 3] *= shift
+        try:
+            default = collide.distance(A, B, np.eye(4), X_WB)
+        except (collide.InvalidPose, collide.InvalidArgument, collide.UnsupportedQuery) as error:
+            with pytest.raises(type(error)):
+                collide.distance(A, B, np.eye(4), X_WB, algorithm="dobkin-kirkpatrick")
+            continue
+        r = collide.distance(A, B, np.eye(4), X_WB, algorithm="dobkin-kirkpatrick")
+        assert r.certified and r.hit == default.hit, (size, shift)
+        assert abs(r.distance - default.distance) <= 4 * np.spacing(default.distance), (size, shift)
+
+
+def test_singular_poses_unchecked_are_left_to_the_default():
+    A, X = collide.ConvexHull(sphere(50)), np.diag([0.0, 1.0, 1.0, 1.0])
+    answers = [
+        collide.distance(A, A, X, collide.pose((0, 3, 1)), check_poses=False, algorithm=name).distance
+        for name in ("gjk", "dobkin-kirkpatrick")
+    ]
+    assert answers[0] == answers[1] > 0

@@ -162,6 +162,13 @@ def test_large_stars_and_facets():
 # --- proofs, counts, sameness -----------------------------------------------------------------------
 
 
+def test_answers_keep_poses_of_their_own():
+    box, X_WB = collide.Box((1, 1, 1)), shifted(0.5)
+    found, before = collide.walk(box, box, EYE, X_WB), X_WB.copy()
+    X_WB[0, 3] = 9.0
+    collide.verify(box, box, EYE, before, found)
+
+
 def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
     """In rational numbers: the plane against all vertices, or the point against all facets."""
     rng = np.random.default_rng(12)
@@ -240,6 +247,51 @@ def test_what_proofs_rest_on():
                 n = exact.cross(exact.minus(b, a), exact.minus(c, a))
                 assert exact.dot(n, a) > 0
                 assert exact.dot(n, a) ** 2 >= Fraction(side.radius) ** 2 * exact.dot(n, n)
+
+
+def sides_split_by_rounding() -> dict:
+    """Polytopes whose flat sides are many facets in doubles, since they are turned."""
+    rng, angle, up = np.random.default_rng(31), np.arange(40) * np.pi / 20, np.array([0.0, 0.0, 1.0])
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    cube = np.argwhere(np.ones((2, 2, 2))) * 2.0 - 1.0
+    points = {
+        "cube": cube, "flat box": cube * (1.0, 0.3, 0.1), "grid cube": np.argwhere(np.ones((5, 5, 5))) * 0.5 - 1.0,
+        "prism of 40": np.concatenate([ring + up, ring - up]),
+        "cone of 40": np.concatenate([ring, [(0, 0, 1)]]),
+    }  # fmt: skip
+    return {name: collide.ConvexHull(own @ turned(rng, 0.0)[:3, :3].T) for name, own in points.items()}
+
+
+def test_invariants_hold_where_rounding_split_flat_sides():
+    """Polar points an ulp apart: of each cluster one is kept, or the walk looks around the wrong one."""
+    rng, shapes = np.random.default_rng(32), sides_split_by_rounding()
+    prism = walk_body(shapes["prism of 40"]).polar
+    assert len(prism.body.points) == 42 < len(prism.body.groups)
+    shapes["ball"] = ball(rng, 60)
+    for name, R in shapes.items():
+        for other in ("ball", "prism of 40", "cube"):
+            P = shapes[other]
+            for _ in range(40):
+                X_WP = turned(rng, rng.uniform(0, 2))
+                found = collide.walk(P, R, X_WP, EYE, trace=True)
+                assert found.hit[0] == collide.collide(P, R, X_WP, EYE)
+                try:
+                    validate_rounds(P._walk, R._walk, X_WP, EYE, found.trace)
+                except AssertionError as error:
+                    raise AssertionError(f"{error}\n{other} against {name}, X_WP = {X_WP.tolist()}") from None
+
+
+def test_deep_hits_are_proven_where_rounding_split_flat_sides():
+    """The ray from the centre leaves by another sliver than the tangent one, and slivers' planes are known loosely."""
+    rng = np.random.default_rng(33)
+    small = ball(rng, 40, (0.05, 0.05, 0.05))
+    for name, R in sides_split_by_rounding().items():
+        assert walk_body(R).polar.radius > 0
+        X_WA = np.array([turned(rng, rng.uniform(0, 1.2)) for _ in range(200)])
+        found, truth = collide.walk(small, R, X_WA, EYE), collide.distance(small, R, X_WA, EYE)
+        assert (found.hit == truth.hit).all()
+        deep = truth.distance < -1e-6
+        assert deep.sum() >= 8 and found.walked[deep].all(), (name, X_WA[deep & ~found.walked][:1].tolist())
 
 
 def test_a_body_whose_walk_is_lost_is_handed_over(monkeypatch):
@@ -328,8 +380,9 @@ def test_what_it_refuses():
         for A, B in ((shape, box), (box, shape)):
             with pytest.raises(collide.UnsupportedQuery, match=type(shape).__name__):
                 collide.collide(A, B, EYE, EYE, algorithm=WALK)
-    with pytest.raises(collide.InvalidArgument, match="gjk"):
-        collide.collide(box, box, EYE, EYE, algorithm="quick")
+    for wrong in ("quick", np.array(["gjk", "gjk"]), 3):
+        with pytest.raises(collide.InvalidArgument, match="gjk"):
+            collide.collide(box, box, EYE, EYE, algorithm=wrong)
     with pytest.raises(collide.InvalidArgument, match="axes"):
         collide.collide(box, box, EYE[None], EYE, algorithm=WALK, axes=np.zeros((1, 3)))
     with pytest.raises(collide.InvalidArgument, match="two shapes"):

@@ -69,13 +69,15 @@ class PackedHierarchy:
 def hierarchy_distance(a: PackedHierarchy, b: PackedHierarchy, rotation: np.ndarray, shift: np.ndarray) -> Nearest:
     """Distance of hull A from hull B at x ↦ rotation x + shift in A's frame.
 
-    rotation (3, 3), shift (3,). The distance is that of what the doubles of rotation and shift place.
+    rotation (3, 3), shift (3,). The distance is that of what the doubles of rotation and shift place; infinite, without
+    vertices, where squares overflow or numbers are not finite. Squares that underflow count as 0.
     """
     pose = np.ascontiguousarray(np.concatenate([np.asarray(rotation, float).ravel(), np.asarray(shift, float)]))
     result = np.empty(_PAIR)
     counters = np.zeros(COUNTERS, dtype=np.int64)
     room = a.most + b.most
-    doubles, integers = np.empty(3 * room + 5 * POINT + 16 + 2 * _PAIR), np.empty(room + 16 + 2 * _IDS, dtype=np.int64)
+    doubles = np.zeros(3 * room + 5 * POINT + 16 + 2 * _PAIR)
+    integers = np.full(room + 16 + 2 * _IDS, -1, dtype=np.int64)
     nearest(
         address_of(a.handles), address_of(b.handles), a.most, b.most, address_of(pose), address_of(doubles),
         address_of(integers), address_of(result), address_of(counters),
@@ -280,6 +282,8 @@ def beyond(levels, pose, posed, level, pair, pair_ids, side, sign, spot):
 def descend(a, ids_a, count_a, b, ids_b, levels, pose, space, simplex_ids, spot, pair, pair_ids, counters):
     """The pair of the set A and the whole of hierarchy B nearest to each other."""
     pair[0] = math.inf
+    for k in range(_IDS):
+        pair_ids[k] = -1  # stays so where squares overflow and nothing is found
     count = put_top(levels, pose, 1, b, ids_b)
     nearest_of_sets(a, ids_a, count_a, b, ids_b, count, space, simplex_ids, pair, pair_ids, counters)
     level = levels[9] - 2

@@ -6,8 +6,10 @@ so that a motion of R changes nothing.
 
 from __future__ import annotations
 
+import math
 import os
 import threading
+from fractions import Fraction
 
 import numpy as np
 
@@ -84,8 +86,8 @@ class PolarSide:
     """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
 
     ladder : of Q = ρ0(R − origin).   origin : (3,), inside R.   radius : of a ball about it that R holds, proven;
-    0 where rounding leaves none, and then nothing is proven by it.   starts, triangles : facet k of R, whose polar
-    is vertex k of Q, is triangles[starts[k]:starts[k + 1]].
+    0 where rounding leaves none, and then nothing is proven by it.   starts, triangles : the facets of R for which
+    vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
     """
 
     def __init__(self, points: np.ndarray, hull: Hull):
@@ -95,7 +97,7 @@ class PolarSide:
         self.origin = np.asarray(polar.origin, dtype=np.float64)
         facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
         self.radius = _inner_radius(points, facets, self.origin)
-        patch = _facet_of(points, facets)
+        patch = polar.groups[_facet_of(points, facets)]
         order = np.argsort(patch, kind="stable")
         self.triangles = np.ascontiguousarray(facets[order])
         self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
@@ -128,6 +130,8 @@ def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 #: Rounding of a distance to a facet's plane, in units of the largest coordinate: some twenty operations, and
 #: a thin triangle's normal is as good as its shortest height is long.
 _ROUNDING = 64 * 2.0**-53
+#: So many facets, those that doubles tell least of, are measured in fractions, some 20 µs each.
+_MOST_EXACT = 20_000
 
 
 def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) -> float:
@@ -143,8 +147,27 @@ def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) ->
     areas = spans[3] * spans[4] + (spans[0] + spans[1] + spans[2]) * (spans[3] + spans[4])
     with np.errstate(divide="ignore", invalid="ignore"):
         bound = (volume - 4 * _ROUNDING * largest * areas) / (length + _ROUNDING * largest * (spans[3] + spans[4]))
-    least = float(bound.min()) * (1 - 1e-12)
-    return max(0.0, least)
+        loose = ~(bound > 0.99 * volume / length)
+    bound[np.isnan(bound)] = -np.inf
+    least = float(bound[~loose].min(initial=np.inf))
+    order = np.flatnonzero(loose)[np.argsort(bound[loose], kind="stable")]
+    for count, k in enumerate(order.tolist()):
+        if bound[k] >= least or count == _MOST_EXACT:  # the others are farther away, or too many
+            least = min(least, float(bound[k]))
+            break
+        least = min(least, _exact_distance(points[facets[k]], origin))
+    return max(0.0, least * (1 - 1e-12))
+
+
+def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
+    """Distance from the origin to the plane of a facet, from rational numbers, rounded downwards."""
+    a, b, c = ([Fraction(v) - Fraction(o) for v, o in zip(p, origin.tolist())] for p in corners.tolist())
+    e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
+    normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
+    height = sum(x * y for x, y in zip(a, normal))
+    if height <= 0:
+        return 0.0
+    return math.sqrt(float(height * height / sum(x * x for x in normal))) * (1 - 1e-12)
 
 
 _lock = threading.RLock()

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from collide._jit import kernel, view_f64, view_i32, view_i64
 from collide.narrowphase.minkowski import difference_point, has_trees, settle_point
 
@@ -20,6 +22,8 @@ BALL = 5
 
 #: A facet of more triangles than this is not searched: the walk's answer is then not proven here.
 _MOST_TRIANGLES = 256
+#: Facets stepped over in search of the one that a ray leaves by.
+_MOST_STEPS = 64
 
 
 @kernel
@@ -77,7 +81,10 @@ def _apart_by(poses, p, x, y, z, q, rx, ry, rz, tx, ty, tz):
 
 @kernel
 def _best_triangle(ball, coords, m, facet, fx, fy, fz):
-    """(vertices and weights of the triangle of a facet that holds f best, whether there is one); all from the centre."""
+    """(how well, vertices and weights of the triangle of a facet that holds f best); f from the centre.
+
+    How well: the least weight, negative where the triangle does not hold f.
+    """
     centre = view_f64(ball[CENTRE_AT], 4)
     starts = view_i64(ball[STARTS_AT], ball[FACETS] + 1)
     triangles = view_i32(ball[TRIANGLES_AT], 3 * ball[TRIANGLES])
@@ -114,13 +121,37 @@ def _best_triangle(ball, coords, m, facet, fx, fy, fz):
                 found = (a, b, c, wa / total, wb / total, wc / total)
                 if least >= 0.0:
                     break
+    return best, found
+
+
+@kernel
+def _triangle_near(Q, ball, coords, m, facet, fx, fy, fz):
+    """As `_best_triangle`, from facet to neighbouring facet while that gets better.
+
+    Rounding may have split a flat side into facets whose planes it cannot tell apart: the ray then leaves by another.
+    """
+    rows, starts, neighbours = Q[3], Q[4], Q[5]
+    best, found = _best_triangle(ball, coords, m, facet, fx, fy, fz)
+    for _ in range(_MOST_STEPS):
+        if best >= 0.0:
+            break
+        at = facet
+        for k in range(starts[rows[at]], starts[rows[at] + 1]):
+            other, there = _best_triangle(ball, coords, m, np.int64(neighbours[k]), fx, fy, fz)
+            if other > best:
+                best = other
+                found = there
+                facet = np.int64(neighbours[k])
+        if facet == at:
+            break
     return found
 
 
 @kernel
-def shares_point(pair, ball_at, ids, facet, qx, qy, qz, x, y, z, yx, yy, yz, error):
+def shares_point(Q, pair, ball_at, ids, facet, qx, qy, qz, x, y, z, yx, yy, yz, error):
     """Whether the point (x, y, z) of P, in P's frame, lies in R, clear of rounding.
 
+    Q : the ladder of R's polar, whose edges join neighbouring facets of R.
     facet, q : the facet of R that the ray from the centre through the point leaves by, and its polar point.
     yx, yy, yz : the point in R's frame, from the centre, as the walk had it.
     ids : room for three pairs; the vertices of R named by the proof.
@@ -130,7 +161,7 @@ def shares_point(pair, ball_at, ids, facet, qx, qy, qz, x, y, z, yx, yy, yz, err
     ball = view_i64(ball_at, BALL)
     centre = view_f64(ball[CENTRE_AT], 4)
     s = yx * qx + yy * qy + yz * qz
-    a, b, c, wa, wb, wc = _best_triangle(ball, coords, m, facet, yx, yy, yz)
+    a, b, c, wa, wb, wc = _triangle_near(Q, ball, coords, m, facet, yx, yy, yz)
     ids[0] = a
     ids[1] = b
     ids[2] = c

@@ -7,7 +7,7 @@ inverse separation  x ∈ P_i and ⟨x, q⟩ ≤ 1 for all q ∈ Q_j: ρ(x) part
 star, primal        z_φ ∈ Q_j, and ⟨p, z_φ⟩ > 1 for all p ∈ P_i but p*
 star, polar         x_γ ∈ P_i, and ⟨x_γ, q⟩ ≤ 1 for all q ∈ Q_j but q*
 
-Three things differ from the text, each proven in docs/barba-langerman.md: > and ≤ instead of "separates", so that
+Three things differ from the text, each explained in docs/barba-langerman.md: > and ≤ instead of "separates", so that
 touching is a hit; Case 1 already where the next level is beyond φ, not only where it is beyond π; and P_i* and Q_j*
 without ρ(γ) and ρ(φ), which the steps do not need once the invariants ask for z ∈ Q_j and x ∈ P_i.
 

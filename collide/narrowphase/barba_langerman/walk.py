@@ -176,11 +176,11 @@ def _walk_down(P, Q, doubles_at, integers_at, trace_at, early, pair, inverse, ba
     return said, False
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, int64, int64, int64, int64)")
+@entry("void(int64, int64, int64, int64, int64, int64, int64, boolean, int64, int64, int64, int64)")
 def walk_poses(
     ladder_p, ladder_q, ball_at, ints_at, numbers_at, poses_at, n, early, rows_at, trace_at, doubles_at, integers_at
 ):  # fmt: skip
-    """Walk at n pairs of poses; returns how many were decided and proven.
+    """Walk at n pairs of poses.
 
     ladder_p, ladder_q : of P's hierarchy and of that of Q = ρ0(R).   ball : see `proof.py`.
     ints, numbers : a `ShapeTable` of P and R, in this order.   poses : for each pair P's row and R's, POSE doubles each.
@@ -199,7 +199,6 @@ def walk_poses(
     marks = view_i64(integers_at, MARKS)
     points = view_f64(doubles_at + 8 * STEP_DOUBLES, POINT)
     ids = view_i64(integers_at + 8 * STEP_INTEGERS, 4)
-    decided = 0
     for k in range(n):
         pair = posed_pair(ints, numbers, poses, view_f64(at_p, length_p), view_f64(at_r, length_r), 0, 2 * k, 1, 2 * k + 1)
         size, slop, _ = size_and_slop(numbers, poses, 0, 2 * k, 1, 2 * k + 1)
@@ -233,7 +232,7 @@ def walk_poses(
             # x is a convex combination, rounded once more in every round.
             error += ERROR * size * (1.0 + marks[ROUNDS])
             proven = proven or shares_point(
-                pair, ball_at, ids, facet, Q[0][3 * facet], Q[0][3 * facet + 1], Q[0][3 * facet + 2], x, y, z,
+                Q, pair, ball_at, ids, facet, Q[0][3 * facet], Q[0][3 * facet + 1], Q[0][3 * facet + 2], x, y, z,
                 height_of(state, 0, x, y, z) + state[T], height_of(state, 1, x, y, z) + state[T + 1],
                 height_of(state, 2, x, y, z) + state[T + 2], error,
             )  # fmt: skip
@@ -249,5 +248,3 @@ def walk_poses(
         counts[_LEVEL_Q] = marks[LEVEL_Q]
         counts[_VERTEX_P] = marks[AT_P]
         counts[_VERTEX_Q] = marks[AT_Q]
-        decided += 1 if answer >= APART else 0
-    return decided
