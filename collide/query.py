@@ -104,16 +104,23 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
 
     for shape in (A, B):
         walks.walk_body(shape)
-    X_WA, X_WB, _ = _poses(A, B, X_WA, X_WB)
-    # Copies: a certificate worked out later is one for these poses.
+    X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
+    return walks.walk_poses(A, B, X_WA, X_WB, lambda left: ask_default(left, True, 0.0), trace=trace)
+
+
+def _with_default(A, B, X_WA, X_WB, check_poses: bool):
+    """(poses, poses, whether single, a function that asks the default algorithm at the poses of given numbers).
+
+    Poses are checked and copied: a certificate worked out later is one for these.
+    """
+    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
 
-    def answer_open(left: np.ndarray) -> np.ndarray:
+    def ask_default(left: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
         X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        hits = ask(A, B, X_WO, X_WT, True, 0.0, False, 1)
-        return np.broadcast_to(hits, (len(left),))
+        return np.broadcast_to(ask(A, B, X_WO, X_WT, boolean, limit, False, 1, depths=depths), (len(left),))
 
-    return walks.walk_poses(A, B, X_WA, X_WB, answer_open, trace=trace)
+    return X_WA, X_WB, single, ask_default
 
 
 #: Longest warm-start axis: its square is far from overflow.
@@ -203,14 +210,8 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
 
     for shape in (A, B):
         walks.walk_body(shape, algorithm)
-    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-
-    def answer_open(left: np.ndarray) -> np.ndarray:
-        X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        return np.broadcast_to(ask(A, B, X_WO, X_WT, False, math.inf, False, 1, depths=signed), (len(left),))
-
-    rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, answer_open)
+    X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
+    rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
     rows["b"] = 1
     if not signed:
         _forget_depths(rows)
