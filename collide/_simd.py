@@ -232,18 +232,45 @@ _FLOATS = ir.VectorType(_F32, LANES)
 @intrinsic
 def boxes_meeting(_context, boxes, at, frame, probe):
     """Bits of the boxes that nothing parts from a box; described in `geometry/mesh_tree/eight_boxes.py`."""
+    return _meeting(boxes, frame, probe, _apart)
+
+
+@intrinsic
+def boxes_meeting_prism(_context, boxes, at, frame, probe):
+    """The same of a triangle, with half-spaces along its edges."""
+
+    def parted(builder, data, frame, probe):
+        yield from _apart(builder, data, frame, probe)
+        yield from _outside(builder, data, probe)
+
+    return _meeting(boxes, frame, probe, parted)
+
+
+def _meeting(boxes, frame, probe, parted):
+    """Signature and code of the bits that none of the vectors ``parted`` yields has set."""
     _check_floats(boxes, frame, probe)
     signature = types.int64(boxes, types.int64, frame, probe)
 
     def codegen(_context, builder, signature, args):
         data, frame, probe = _float_data(_context, builder, signature, args)
         apart = None
-        for over in _apart(builder, data, frame, probe):
+        for over in parted(builder, data, frame, probe):
             apart = over if apart is None else builder.or_(apart, over)
         mask = builder.bitcast(builder.not_(apart), _I8)
         return builder.zext(mask, _I64)
 
     return signature, codegen
+
+
+def _outside(builder, data, probe):
+    """Three vectors of bits: which boxes lie outside the half-space of each edge of the probe."""
+    for edge in (17, 21, 25):
+        out = _one(builder, probe, edge + 3)
+        for j in range(3):
+            entry = _one(builder, probe, edge + j)
+            out = builder.fadd(out, builder.fmul(entry, _eight(builder, data, j)))
+            out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
+        yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
 
 
 def _apart(builder, data, frame, probe):

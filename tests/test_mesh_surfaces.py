@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import pytest
 from mesh_families import FAMILIES, random_pose
 from mesh_shapes import block_ring, bumpy_sphere
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
@@ -77,6 +78,69 @@ def test_near_to_touching():
             hits += bool(want)
             cases += 1
     assert 0.3 < hits / cases < 0.8
+
+
+def test_large_facets_against_fine_ones():
+    """Leaves opened against boxes become triangles with half-spaces along their edges: no pair is lost to these."""
+    rng = np.random.default_rng(23)
+    va, fa = bumpy_sphere(1500, 3)
+    A = build_mesh_tree(va, fa)
+    hits = cases = 0
+    for case in range(60):
+        # A few triangles through, along and beside the fine surface, slivers and such without area among them.
+        corners = rng.normal(size=(4, 3, 3)) * (1.2, 1.2, 1.2 * 10.0 ** rng.integers(-12, 1))
+        corners[1, 2] = corners[1, 1] if case % 5 == 0 else corners[1, 1] + rng.normal(size=3) * 1e-6
+        corners[2, 0] = va[fa[case]].mean(axis=0)
+        corners[3] = va[fa[7 * case]][0] + (corners[3] - corners[3].mean(axis=0)) * 0.02
+        vb, fb = corners.reshape(-1, 3), np.arange(12).reshape(4, 3)
+        X, Y = random_pose(rng), random_pose(rng)
+        Y[:3, 3] = X[:3, 3] + rng.normal(size=3) * (0.3 + case % 3)
+        B = build_mesh_tree(vb, fb)
+        told = f"case {case}: X, Y, B = {X.tolist(), Y.tolist(), vb.tolist()}"
+        want = pairs_by_boxes(va, fa, X, vb, fb, Y)
+        found = all_hits(A, B, X, Y)
+        assert list(map(tuple, found.pairs.tolist())) == want, told
+        assert sorted(map(tuple, all_hits(B, A, Y, X).pairs[:, ::-1].tolist())) == want, told
+        assert surfaces_meet(A, B, X, Y)[0] == bool(want), told
+        # Far fewer than the boxes of the triangles hold.
+        assert found.counters[0, 1] < 30 * (len(want) + 8), told
+        hits += len(want)
+        cases += bool(want)
+    assert hits > 500 and 15 < cases < 55
+
+
+def test_far_apart_or_not_a_matrix_that_mirrors_is_refused():
+    va, fa = bumpy_sphere(300)
+    A = build_mesh_tree(va, fa)
+    far, touching = np.eye(4), np.eye(4)
+    far[:3, 3] = 50.0, 0.0, 0.0
+    assert not surfaces_meet(A, A, np.eye(4), far)[0]
+    assert all_hits(A, A, np.eye(4), far).counters.sum() == 0  # their balls are apart
+    touching[0, 3] = 2.0 * va[:, 0].max()
+    assert all_hits(A, A, np.eye(4), touching).counters[0, 0] > 0
+    for X in (np.diag([-1.0, 1.0, 1.0, 1.0]), np.diag([1.0, 1.0, 0.0, 1.0])):
+        for shift in (0.0, 50.0):
+            X[0, 3] = shift
+            with pytest.raises(collide.InvalidPose):
+                surfaces_meet(A, A, X, np.eye(4))
+
+
+def test_balls_part_only_what_is_apart():
+    """Near to where two balls touch, at any distance from the origin, for matrices near and not so near to rotations."""
+    rng = np.random.default_rng(31)
+    vb, fb = np.array([[-1.0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1, 1]])  # a segment along x fills its ball
+    A = build_mesh_tree(vb, fb)
+    hits = 0
+    for case in range(400):
+        X, Y = np.eye(4), np.eye(4)
+        stretch = rng.choice([1.0, 1.0 + 1e-5, 1.0 - 1e-5, 1.01, 0.5])
+        Y[:3, :3] *= stretch
+        X[0, 3] = rng.choice([0.0, 1.0, 1e6, -3e9]) * rng.random()
+        Y[0, 3] = X[0, 3] + (1.0 + stretch) + rng.choice([0.0, 1e-15, -1e-15, 1e-9, -1e-9, 1e-4, -1e-4])
+        gap = Fraction(float(Y[0, 3])) - Fraction(float(Y[0, 0])) - Fraction(float(X[0, 3])) - 1
+        assert surfaces_meet(A, A, X, Y)[0] == (gap <= 0), (case, X.tolist(), Y.tolist())
+        hits += gap <= 0
+    assert 100 < hits < 300
 
 
 def test_one_inside_the_other_meets_nothing():

@@ -13,8 +13,11 @@ from collide._jit import address_of, entry, view_f32
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.eight_boxes import (
     NEAR_PROBE,
+    PRISM,
     boxes_meeting,
     boxes_meeting_one_by_one,
+    boxes_meeting_prism,
+    boxes_meeting_prism_one_by_one,
     boxes_nearest,
     boxes_nearest_one_by_one,
 )
@@ -135,6 +138,11 @@ def _meeting(node_at, frame_at, probe_at):
     return boxes_meeting(view_f32(node_at, NODE), 0, view_f32(frame_at, 9), view_f32(probe_at, NEAR_PROBE))
 
 
+@entry("int64(int64, int64, int64)")
+def _meeting_prism(node_at, frame_at, probe_at):
+    return boxes_meeting_prism(view_f32(node_at, NODE), 0, view_f32(frame_at, 9), view_f32(probe_at, PRISM))
+
+
 @entry("void(int64, int64, int64, int64, int64)")
 def _nearest(node_at, slab_at, frame_at, probe_at, out_at):
     boxes_nearest(
@@ -146,7 +154,7 @@ def _nearest(node_at, slab_at, frame_at, probe_at, out_at):
 def test_eight_boxes_are_eight_boxes():
     """Compiled vectors say what plain numbers say, bit by bit, with infinities and slots that are not used."""
     rng = np.random.default_rng(2)
-    masks = []
+    masks, by_edges = [], []
     for case in range(3000):
         node = rng.normal(size=NODE).astype(np.float32)
         node[24:48] = np.abs(node[24:48]) * np.float32(0.5)
@@ -159,8 +167,13 @@ def test_eight_boxes_are_eight_boxes():
         mask = _meeting(address_of(node), address_of(frame), address_of(probe))
         assert mask == boxes_meeting_one_by_one(node, 0, frame, probe)
         masks.append(mask)
+        prism = np.concatenate([probe[:17], rng.normal(size=PRISM - 17).astype(np.float32)])
+        prism[3:6] += 2.0  # parted by its edges, if at all
+        mask = _meeting_prism(address_of(node), address_of(frame), address_of(prism))
+        assert mask == boxes_meeting_prism_one_by_one(node, 0, frame, prism)
+        by_edges.append(mask != boxes_meeting_one_by_one(node, 0, frame, prism))
         outs = np.zeros((2, 16), dtype=np.float32)
         _nearest(*(address_of(x) for x in (node, slab, frame, probe, outs[0])))
         boxes_nearest_one_by_one(node, 0, slab, 0, frame, probe, outs[1])
         assert np.array_equal(outs[0], outs[1], equal_nan=True), (case, outs)
-    assert len(set(masks)) > 50
+    assert len(set(masks)) > 50 and 0.2 < np.mean(by_edges) < 0.9

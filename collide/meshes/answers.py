@@ -171,7 +171,7 @@ def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bo
 
 def _size(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
     """(n,) reaches of both from their frames' origins, the distance between these, and the radii."""
-    reaches = sum(float(body.tree.numbers[REACH:].sum()) + body.radius for body in (A, B))
+    reaches = sum(float(body.tree.numbers[REACH : REACH + 3].sum()) + body.radius for body in (A, B))
     return reaches + np.abs(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1)
 
 

@@ -20,6 +20,9 @@ FRAME = 9
 #: meeting is asked: a slab around the box's contents, its normal in the node's frame (3), its middle (1) and its half
 #: width (1), enlarged; zeros for none.
 PROBE = 17
+#: A triangle as probe has three half-spaces more that hold it, one an edge: the outward direction in the node's frame
+#: (3) and how far its origin is out (1), less rounding.
+PRISM = PROBE + 12
 #: For distances, from 12 on: what gaps along the axes of the node's frame (3), of the probe's (3) and of any line in it (1)
 #: are worth, at least; a direction in the node's frame (3) and its gap from the probe to the node's middle (1).
 NEAR_PROBE = 23
@@ -41,6 +44,20 @@ def boxes_meeting_one_by_one(boxes, at, frame, probe):
             reach = reach + np.abs(probe[12 + j]) * rows[3 + j]
         apart |= np.abs(gap) > reach
     return int(np.packbits(~apart, bitorder="little")[0])
+
+
+def boxes_meeting_prism_one_by_one(boxes, at, frame, probe):
+    """`boxes_meeting_prism` in numpy's floats."""
+    mask = boxes_meeting_one_by_one(boxes, at, frame, probe)
+    with np.errstate(all="ignore"):
+        rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+        for edge in range(PROBE, PRISM, 4):
+            out = np.full(WIDTH, probe[edge + 3])
+            for j in range(3):
+                out = out + probe[edge + j] * rows[j]
+                out = out - np.abs(probe[edge + j]) * rows[3 + j]
+            mask &= ~int(np.packbits(out > 0.0, bitorder="little")[0])
+    return mask
 
 
 def boxes_nearest_one_by_one(boxes, at, slabs, slab_at, frame, probe, out):
@@ -92,14 +109,15 @@ def _along(rows, frame, probe, axis):
 
 if PLAIN_PYTHON:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
+    boxes_meeting_prism = boxes_meeting_prism_one_by_one
 else:
-    from collide._simd import boxes_meeting, boxes_nearest
+    from collide._simd import boxes_meeting, boxes_meeting_prism, boxes_nearest
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis parts box k of the node whose
-#: first float is ``boxes[at]`` from the probe's box. Views of float32.
+#: first float is ``boxes[at]`` from the probe's box. Views of float32. `boxes_meeting_prism` looks at PRISM floats.
 #: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0 where no axis
 #: parts), then eight squared lengths of lines between centres, in units of the probe's tree.
 __all__ = [
-    "FRAME", "NEAR_PROBE", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_nearest",
-    "boxes_nearest_one_by_one",
+    "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
+    "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",
 ]  # fmt: skip

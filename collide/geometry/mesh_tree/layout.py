@@ -11,6 +11,7 @@ a mesh of microns far from its origin as for one of kilometres. Triangles are th
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import threading
 
@@ -35,9 +36,9 @@ MOST_FACETS = 1 << 28
 # Header that kernels read: integers, and the address of the numbers.
 NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT = range(9)
 INTS = 9
-# Numbers: centre (3), largest |coordinate| of the triangles by axis (3).
-CENTRE, REACH = 0, 3
-NUMBERS = 6
+# Numbers: centre (3), largest |coordinate| of the triangles by axis (3), radius of a ball around the centre.
+CENTRE, REACH, RADIUS = 0, 3, 6
+NUMBERS = 7
 
 
 class MeshTree:
@@ -60,7 +61,7 @@ class MeshTree:
         self.exponent, self.depth = int(exponent), int(depth)
         self._check_structure()
         corners = np.abs(self.triangles).reshape(-1, 3)
-        self.numbers = np.concatenate([self.centre, corners.max(axis=0)])
+        self.numbers = np.concatenate([self.centre, corners.max(axis=0), [self._radius()]])
         self.header = np.array(
             [
                 address_of(self.nodes), address_of(self.triangles), address_of(self.ids), address_of(self.numbers),
@@ -134,6 +135,11 @@ class MeshTree:
         _require(np.array_equal(np.sort(order), np.arange(len(faces))), "an order that is none of the faces")
         triangles = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)[order]].reshape(-1, 9)
         return cls(arrays["mesh_nodes"], triangles, order, arrays["mesh_centre"], stamp[1], stamp[2])
+
+    def _radius(self) -> float:
+        """Of a ball around the centre that holds the box of the whole mesh."""
+        box = self.nodes[0, : 6 * WIDTH].view(np.float32)[::WIDTH].astype(np.float64)
+        return math.ldexp(math.hypot(*(abs(box[:3]) + box[3:])), self.exponent) * (1 + 2.0**-50)
 
     def _check_structure(self) -> None:
         """Everything that a kernel relies on to stay inside the arrays and to come to an end."""

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from collide._jit import kernel
-from collide.geometry.mesh_tree.layout import CENTRE, EXPONENT, REACH
+from collide.geometry.mesh_tree.layout import CENTRE, EXPONENT, RADIUS, REACH
 
 # A placing, doubles: M (9) and m (3) take B's frame to A's; N (9) and n (3) take A's to B's.
 M, SHIFT, N, N_SHIFT = 0, 9, 12, 21
@@ -40,6 +40,8 @@ _EXTENT = 1.001
 _TINY = 2.0**-110
 #: Trees whose units differ by more powers of two than this are compared in the larger one's only.
 MOST_UNLIKE = 90
+#: How far from a rotation a matrix may be for balls to stand for bodies, and lengths whose squares might vanish.
+_LITTLE, _VANISHING = 2.0**-10, 1e-140
 #: A matrix whose computed inverse is worse than this is refused.
 _WORST_INVERSE = 2.0**-10
 
@@ -67,6 +69,47 @@ def place(header_a, numbers_a, XA, header_b, numbers_b, XB, out, frames):
     _frame(out, frames, 0, M, SHIFT, out[ERROR], numbers_a, numbers_b, ea, eb)
     _frame(out, frames, 1, N, N_SHIFT, out[N_ERROR], numbers_b, numbers_a, eb, ea)
     return True
+
+
+@kernel
+def balls_apart(XA, numbers_a, XB, numbers_b):
+    """Whether the balls around two bodies are certainly apart; False of matrices that are not close to rotations.
+
+    For a rotation but for d, the largest row sum of |RᵀR − I|, lengths grow by no more than 1 + d.
+    """
+    stretch_a = _off_rotation(XA)
+    stretch_b = _off_rotation(XB)
+    if not (stretch_a <= _LITTLE and stretch_b <= _LITTLE):
+        return False
+    square = 0.0
+    size = 0.0
+    for i in range(3):
+        gap = XB[4 * i + 3] - XA[4 * i + 3]
+        size += abs(XB[4 * i + 3]) + abs(XA[4 * i + 3])
+        for j in range(3):
+            gap += XB[4 * i + j] * numbers_b[CENTRE + j] - XA[4 * i + j] * numbers_a[CENTRE + j]
+        size += 2.0 * (abs(numbers_a[CENTRE + i]) + abs(numbers_b[CENTRE + i]))
+        square += gap * gap
+    reach = numbers_a[RADIUS] * (1.0 + stretch_a) + numbers_b[RADIUS] * (1.0 + stretch_b)
+    reach += 2.0**-40 * (reach + size)
+    return square > reach * reach and reach > _VANISHING
+
+
+@kernel(inline=True)
+def _off_rotation(X):
+    """Largest row sum of |RᵀR − I|, rounded upwards; infinite where R mirrors."""
+    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8]
+    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9]
+    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10]
+    xy = abs(X[0] * X[1] + X[4] * X[5] + X[8] * X[9])
+    xz = abs(X[0] * X[2] + X[4] * X[6] + X[8] * X[10])
+    yz = abs(X[1] * X[2] + X[5] * X[6] + X[9] * X[10])
+    det = (
+        X[0] * (X[5] * X[10] - X[6] * X[9]) - X[1] * (X[4] * X[10] - X[6] * X[8]) + X[2] * (X[4] * X[9] - X[5] * X[8])
+    )
+    if not det > 0.0:
+        return math.inf
+    return max(abs(xx - 1.0) + xy + xz, abs(yy - 1.0) + xy + yz, abs(zz - 1.0) + xz + yz) + 2.0**-48
 
 
 @kernel

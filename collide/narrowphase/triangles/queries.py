@@ -99,7 +99,7 @@ def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> Su
 def _walked(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(keys, starts, counters) of bodies in order; a key is a facet of A times B's number of facets, and one of B."""
     X_WA, X_WB, n = matched(X_WA, X_WB)
-    work = _workspace(WIDTH * (A.depth + B.depth + 2))
+    work = _workspace(WIDTH * (A.depth + B.depth + 4))
     keys = np.empty(64 + n if first_only else 4096, dtype=np.int64)
     told = np.zeros(3 + n + 1 + COUNTERS * n, dtype=np.int64)
     where_at = told.ctypes.data
@@ -132,7 +132,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     X_WA, X_WB, n = matched(X_WA, X_WB)
     results = np.empty((n, distances.RESULT))
     marks = np.zeros((n, distances.MARKS), dtype=np.int64)
-    work = _workspace(WIDTH * (A.depth + B.depth + 2))
+    work = _workspace(WIDTH * (A.depth + B.depth + 4))
     stack_at, n_stack, doubles_at, integers_at, decide = work.addresses
     done = distances.near_surfaces(
         A.address, B.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), n, A.content == B.content,

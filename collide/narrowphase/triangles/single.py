@@ -167,7 +167,7 @@ class SingleMeshPair:
     _work: Workspace | None = None
 
     def __init__(self, A: Side, B: Side, exchanged: bool, radius: float):
-        n_stack = WIDTH * (A.tree.depth + B.tree.depth + 2)
+        n_stack = WIDTH * (A.tree.depth + B.tree.depth + 4)
         work = SingleMeshPair._work
         if work is None or work.n_stack < n_stack:
             work = SingleMeshPair._work = Workspace(max(512, n_stack))

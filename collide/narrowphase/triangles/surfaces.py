@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
-from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
+from collide.geometry.mesh_tree.eight_boxes import FRAME, PRISM, PROBE, boxes_meeting, boxes_meeting_prism
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
@@ -35,6 +35,7 @@ from collide.narrowphase.triangles.placing import (
     FRAMES,
     PLACING,
     UNITS,
+    balls_apart,
     later,
     place,
     transform,
@@ -46,12 +47,16 @@ COUNTERS = 3
 
 #: Doubles and floats of workspace; integers are `exact.INTEGERS`.
 DOUBLES = PLACING + CORNERS
-FLOATS = 2 * FRAME + PROBE
+FLOATS = 2 * FRAME + PRISM
 
 #: Where a walk stands: pose, height of the stack, pairs found.
 POSE, TOP, FOUND = range(3)
 #: What it says: all poses done, room for pairs gone, or a matrix that cannot be inverted.
 DONE, FULL, SINGULAR = range(3)
+#: A reference with this bit is to a triangle, not to a box: a leaf opened against boxes becomes its triangles.
+TRIANGLE = 1 << 30
+#: So many times as large as the box that is opened.
+LARGE = 2.0
 #: Pairs that a pair of leaves may add.
 _MOST_AT_ONCE = 64
 
@@ -59,15 +64,18 @@ _MOST_AT_ONCE = 64
 @kernel(inline=True)
 def set_probe(placing, which, nodes, ref, probe):
     """Make the box behind a reference (node times 8 plus slot) the probe; which: 0 for A's box, 1 for B's."""
+    at = NODE * (ref >> 3) + (ref & 7)
+    _set_box(
+        placing, which, float(nodes[at]), float(nodes[at + WIDTH]), float(nodes[at + 2 * WIDTH]),
+        float(nodes[at + 3 * WIDTH]), float(nodes[at + 4 * WIDTH]), float(nodes[at + 5 * WIDTH]), probe,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _set_box(placing, which, x, y, z, hx, hy, hz, probe):
+    """Make a box of A or B, in its tree's units, the probe."""
     own = FRAMES + FRAME_SIZE * which
     other = FRAMES + FRAME_SIZE * (1 - which)
-    at = NODE * (ref >> 3) + (ref & 7)
-    x = float(nodes[at])
-    y = float(nodes[at + WIDTH])
-    z = float(nodes[at + 2 * WIDTH])
-    hx = float(nodes[at + 3 * WIDTH])
-    hy = float(nodes[at + 4 * WIDTH])
-    hz = float(nodes[at + 5 * WIDTH])
     for i in range(3):
         a = placing[other + 3 * i]
         b = placing[other + 3 * i + 1]
@@ -80,6 +88,92 @@ def set_probe(placing, which, nodes, ref, probe):
     probe[9] = np.float32(hx + placing[own + 12])
     probe[10] = np.float32(hy + placing[own + 13])
     probe[11] = np.float32(hz + placing[own + 14])
+
+
+@kernel
+def set_prism(placing, which, triangles, numbers, exponent, t, probe):
+    """Make a triangle the probe: its box, the slab along its plane, and a half-space along each edge.
+
+    Against the finer boxes of the other body a large triangle that lies across its axes is little of its box: this is
+    what parts it from them.
+    """
+    scale = math.ldexp(1.0, int(-exponent))
+    p = (
+        (triangles[9 * t] - numbers[CENTRE]) * scale,
+        (triangles[9 * t + 1] - numbers[CENTRE + 1]) * scale,
+        (triangles[9 * t + 2] - numbers[CENTRE + 2]) * scale,
+    )
+    q = (
+        (triangles[9 * t + 3] - numbers[CENTRE]) * scale,
+        (triangles[9 * t + 4] - numbers[CENTRE + 1]) * scale,
+        (triangles[9 * t + 5] - numbers[CENTRE + 2]) * scale,
+    )
+    r = (
+        (triangles[9 * t + 6] - numbers[CENTRE]) * scale,
+        (triangles[9 * t + 7] - numbers[CENTRE + 1]) * scale,
+        (triangles[9 * t + 8] - numbers[CENTRE + 2]) * scale,
+    )
+    low = (min(p[0], q[0], r[0]), min(p[1], q[1], r[1]), min(p[2], q[2], r[2]))
+    high = (max(p[0], q[0], r[0]), max(p[1], q[1], r[1]), max(p[2], q[2], r[2]))
+    _set_box(
+        placing, which, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]),
+        0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1]), 0.5 * (high[2] - low[2]), probe,
+    )  # fmt: skip
+    u = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+    v = (r[0] - p[0], r[1] - p[1], r[2] - p[2])
+    w = (r[0] - q[0], r[1] - q[1], r[2] - q[2])
+    n = _unit(_cross(u, v))
+    middle, reach = _set_line(placing, which, n, probe, 12)
+    heights = (_dot(n, p), _dot(n, q), _dot(n, r))
+    low_n = min(heights[0], heights[1], heights[2])
+    high_n = max(heights[0], heights[1], heights[2])
+    probe[15] = np.float32(middle - 0.5 * (low_n + high_n))
+    probe[16] = np.float32(reach + 0.5 * (high_n - low_n) + 2.0**-19 * abs(middle))
+    _set_edge(placing, which, _unit(_cross(u, n)), p, q, r, probe, PROBE)
+    _set_edge(placing, which, _unit(_cross(w, n)), p, q, r, probe, PROBE + 4)
+    _set_edge(placing, which, _unit(_cross(n, v)), p, q, r, probe, PROBE + 8)
+
+
+@kernel(inline=True)
+def _set_edge(placing, which, out, p, q, r, probe, at):
+    """The half-space of direction ``out`` that just holds three points."""
+    middle, reach = _set_line(placing, which, out, probe, at)
+    top = max(_dot(out, p), _dot(out, q), _dot(out, r))
+    probe[at + 3] = np.float32(middle - top - reach - 2.0**-19 * abs(middle))
+
+
+@kernel(inline=True)
+def _set_line(placing, which, n, probe, at):
+    """Write a direction of the probe's frame, in the node's; (its product with the shift, what rounding can do to it)."""
+    own = FRAMES + FRAME_SIZE * which
+    middle = n[0] * placing[own + 9] + n[1] * placing[own + 10] + n[2] * placing[own + 11]
+    # Of the frame, of heights and of the sums of floats; a triangle is within its units.
+    reach = 2.0**-19 * 6.0 + 2.0**-110
+    reach += abs(n[0]) * placing[own + 12] + abs(n[1]) * placing[own + 13] + abs(n[2]) * placing[own + 14]
+    for j in range(3):
+        entry = n[0] * placing[own + j] + n[1] * placing[own + 3 + j] + n[2] * placing[own + 6 + j]
+        probe[at + j] = np.float32(entry)
+        reach += 2.0**-19 * abs(entry)
+    return middle, reach
+
+
+@kernel(inline=True)
+def _unit(n):
+    """Scaled so that its largest component is 1; 0 where it is next to nothing."""
+    size = max(abs(n[0]), abs(n[1]), abs(n[2]))
+    if not size > TINY:
+        return 0.0, 0.0, 0.0
+    return n[0] / size, n[1] / size, n[2] / size
+
+
+@kernel(inline=True)
+def _cross(u, v):
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@kernel(inline=True)
+def _dot(u, v):
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 @kernel
@@ -151,6 +245,12 @@ def box_size(nodes, ref):
 @kernel(inline=True)
 def link_of(links, ref):
     return links[NODE * (ref >> 3) + 6 * WIDTH + (ref & 7)]
+
+
+@kernel(inline=True)
+def _behind(links, ref):
+    """The link behind a reference to a box; for one to a triangle, the link of a leaf of its own."""
+    return ~(((ref ^ TRIANGLE) << 3) | 1) if ref & TRIANGLE else int(link_of(links, ref))
 
 
 @kernel
@@ -233,7 +333,7 @@ def walk_surfaces(
     frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
     frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
     frames = view_f32(doubles_at + 8 * DOUBLES, 2 * FRAME)
-    probe = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, PROBE)
+    probe = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, PRISM)
     state = view_i64(integers_at, STATE)
     found = where[FOUND]
     k = where[POSE]
@@ -247,6 +347,11 @@ def walk_surfaces(
         XA = view_f64(pose_a, 16)
         XB = view_f64(pose_b, 16)
         counters = view_i64(counters_at + 8 * COUNTERS * k, COUNTERS)
+        if top == 0 and balls_apart(XA, numbers_a, XB, numbers_b):
+            starts[k] = found
+            k += 1
+            starts[k] = found
+            continue
         if not place(header_a, numbers_a, XA, header_b, numbers_b, XB, placing, frames):
             where[POSE] = k
             return SINGULAR
@@ -268,8 +373,8 @@ def walk_surfaces(
             top -= 1
             a = stack[top] >> 32
             b = stack[top] & 0xFFFFFFFF
-            link_a = int(link_of(links_a, a))
-            link_b = int(link_of(links_b, b))
+            link_a = _behind(links_a, a)
+            link_b = _behind(links_b, b)
             if link_a < 0 and link_b < 0:
                 found = _leaves(
                     P, W, ids_a, ids_b, ~link_a, ~link_b, placing, corners, context, flip, first_only,
@@ -278,8 +383,26 @@ def walk_surfaces(
                 if first_only and found > starts[k]:
                     top = 0
                 continue
-            counters[BOXES] += 1
-            if link_a < 0 or (link_b >= 0 and box_size(boxes_b, b) > units * box_size(boxes_a, a)):
+            if link_a < 0 and (a & TRIANGLE or box_size(boxes_a, a) * units > LARGE * box_size(boxes_b, b)):
+                for t in range(~link_a >> 3, (~link_a >> 3) + (~link_a & 7)):
+                    counters[BOXES] += 1
+                    set_prism(placing, 0, P, numbers_a, header_a[EXPONENT], t, probe)
+                    mask = boxes_meeting_prism(boxes_b, NODE * link_b, frame_a, probe)
+                    for slot in range(WIDTH):
+                        if (mask >> slot) & 1:
+                            stack[top] = ((TRIANGLE | t) << 32) | (link_b * WIDTH + slot)
+                            top += 1
+            elif link_b < 0 and (b & TRIANGLE or box_size(boxes_b, b) > LARGE * units * box_size(boxes_a, a)):
+                for t in range(~link_b >> 3, (~link_b >> 3) + (~link_b & 7)):
+                    counters[BOXES] += 1
+                    set_prism(placing, 1, W, numbers_b, header_b[EXPONENT], t, probe)
+                    mask = boxes_meeting_prism(boxes_a, NODE * link_a, frame_b, probe)
+                    for slot in range(WIDTH):
+                        if (mask >> slot) & 1:
+                            stack[top] = ((link_a * WIDTH + slot) << 32) | TRIANGLE | t
+                            top += 1
+            elif link_a < 0 or (link_b >= 0 and box_size(boxes_b, b) > units * box_size(boxes_a, a)):
+                counters[BOXES] += 1
                 set_probe(placing, 0, boxes_a, a, probe)
                 if link_a < 0:
                     set_slab(placing, 0, P, numbers_a, header_a[EXPONENT], ~link_a, probe)
@@ -291,6 +414,7 @@ def walk_surfaces(
                         stack[top] = (a << 32) | (link_b * WIDTH + slot)
                         top += 1
             else:
+                counters[BOXES] += 1
                 set_probe(placing, 1, boxes_b, b, probe)
                 if link_b < 0:
                     set_slab(placing, 1, W, numbers_b, header_b[EXPONENT], ~link_b, probe)
