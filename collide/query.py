@@ -176,9 +176,10 @@ def distance(
     limit = check_distance("max_distance", max_distance)
     if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
-    if limit == math.inf and threads == 1 and signed:
+    if limit == math.inf and threads == 1:
         try:
-            rows = A._prepared[B._serial].distance(X_WA, X_WB)
+            pair = A._prepared[B._serial]
+            rows = pair.distance(X_WA, X_WB) if signed or pair.only_gaps else None
             if rows is not None:
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
         except (AttributeError, KeyError, TypeError):

@@ -145,16 +145,24 @@ def test_distances_are_bracketed_and_overlaps_come_apart():
 
 def test_batches_give_the_bits_of_single_calls():
     rng = np.random.default_rng(73)
-    for A, B in PAIRS[::7]:
+    gaps = 0
+    for A, B in [*PAIRS[::7], (PAIRS[0][0], PAIRS[0][0])]:
         X, Y = (np.stack(side) for side in zip(*poses(rng, 6)))
         hits, rows = collide.collide(A[0], B[0], X, Y), collide.distance(A[0], B[0], X, Y)
+        unsigned, swapped = collide.distance(A[0], B[0], X, Y, signed=False), collide.distance(B[0], A[0], Y, X)
+        gaps += int((~hits).sum())
         threaded = collide.collide(A[0], B[0], np.repeat(X, 8, axis=0), np.repeat(Y, 8, axis=0), threads=2)
         assert (threaded == np.repeat(hits, 8)).all()
         for k in range(6):
             assert collide.collide(A[0], B[0], X[k], Y[k]) == hits[k]
             assert collide.distance(A[0], B[0], X[k], Y[k]).rows.tobytes() == rows[k].rows.tobytes()
+            assert collide.distance(A[0], B[0], X[k], Y[k], signed=False).rows.tobytes() == unsigned[k].rows.tobytes()
+            one = collide.distance(B[0], A[0], Y[k], X[k])
+            assert one.rows.tobytes() == swapped[k].rows.tobytes()
+            assert not (one.normal + rows[k].normal).any() and one.distance == rows[k].distance
         many = collide.collide([A[0]] * 6, [B[0]] * 6, X, Y)
         assert (many == hits).all()
+    assert gaps > 15
 
 
 def test_limits_and_unsigned_distances():

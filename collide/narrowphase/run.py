@@ -186,6 +186,8 @@ class SinglePair:
 
     #: One for all single calls: their kernels keep Python's lock.
     _space: _Workspace | None = None
+    #: `distance` works depths out as well.
+    only_gaps = False
 
     def __init__(self, table: ShapeTable):
         if SinglePair._space is None:

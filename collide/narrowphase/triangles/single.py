@@ -92,19 +92,21 @@ def _part_inside(header, tree_at, solid, ball, X_at, points_at, many, Y_at):
     return 0
 
 
-@entry("int64(int64, int64, int64)", nogil=False)
-def meet_single(header_at, A_object, B_object):
-    """0 apart, 1 hit, −1 where the long way answers, or says what is wrong; poses by `id`, held by the caller.
-
-    All threads share the workspace: this keeps Python's lock.
-    """
-    header = view_i64(header_at, HEADER)
+@kernel
+def _posed(header, A_object, B_object):
+    """Addresses of both matrices, the bodies in the order of their contents; 0 where one is none for single calls."""
     XA_at = matrix_at(A_object, header)
     XB_at = matrix_at(B_object, header)
     if XA_at == 0 or XB_at == 0 or not _checked(view_f64(XA_at, 16)) or not _checked(view_f64(XB_at, 16)):
-        return -1
+        return 0, 0
     if header[EXCHANGED] != 0:
-        XA_at, XB_at = XB_at, XA_at
+        return XB_at, XA_at
+    return XA_at, XB_at
+
+
+@kernel
+def _cores_meet(header, XA_at, XB_at):
+    """1 where bodies meet without their radii, 0 where they do not, −1 where that is left open."""
     marks_at = header[MARKS_AT]
     marks = view_i64(marks_at, 8)
     for i in range(8):
@@ -124,9 +126,34 @@ def meet_single(header_at, A_object, B_object):
     within = _part_inside(header, TREE_A, SOLID_A, 0, XA_at, POINTS_B, MANY_B, XB_at)
     if within == 0:
         within = _part_inside(header, TREE_B, SOLID_B, 1, XB_at, POINTS_A, MANY_A, XA_at)
-    if within != 0 or header[SWEPT] == 0:
-        return within
-    return _swept(header, XA_at, XB_at)
+    return within
+
+
+@entry("int64(int64, int64, int64)", nogil=False)
+def meet_single(header_at, A_object, B_object):
+    """0 apart, 1 hit, −1 where the long way answers, or says what is wrong; poses by `id`, held by the caller.
+
+    All threads share the workspace: this keeps Python's lock.
+    """
+    header = view_i64(header_at, HEADER)
+    XA_at, XB_at = _posed(header, A_object, B_object)
+    if XA_at == 0:
+        return -1
+    said = _cores_meet(header, XA_at, XB_at)
+    return _swept(header, XA_at, XB_at) if said == 0 and header[SWEPT] != 0 else said
+
+
+@entry("int64(int64, int64, int64, int64, int64)", nogil=False)
+def near_single(header_at, A_object, B_object, result_at, marks_at):
+    """1 where the cores are apart, with the row and the marks of `distances.near_surfaces`; else −1, as `meet_single`."""
+    header = view_i64(header_at, HEADER)
+    XA_at, XB_at = _posed(header, A_object, B_object)
+    if XA_at == 0 or _cores_meet(header, XA_at, XB_at) != 0:
+        return -1
+    marks = view_i64(marks_at, distances.MARKS)
+    for i in range(distances.MARKS):
+        marks[i] = 0
+    return _measured(header, XA_at, XB_at, math.inf, result_at, marks_at)
 
 
 @kernel
@@ -138,19 +165,23 @@ def _swept(header, XA_at, XB_at):
     marks = view_i64(marks_at, 8)
     for i in range(8):
         marks[i] = 0
-    done = _measure(
-        header[DISTANCES_AT],
-        (
-            header[TREE_A], header[TREE_B], XA_at, 0, XB_at, 0, 1, header[ALIKE] != 0, room[_LIMIT], room_at + 8 * _RESULT,
-            marks_at, header[STACK_AT], header[N_STACK], header[HEAP_AT], header[N_HEAP], header[DOUBLES_AT],
-            header[INTEGERS_AT], header[DECIDE],
-        ),
-    )  # fmt: skip
-    if done < 1:
+    if _measured(header, XA_at, XB_at, room[_LIMIT], room_at + 8 * _RESULT, marks_at) < 1:
         return -1
     if room[_RESULT + distances.LOWER] > room[_RADIUS]:
         return 0
     return 1 if room[_RESULT + distances.UPPER] <= room[_RADIUS] else -1
+
+
+@kernel
+def _measured(header, XA_at, XB_at, limit, result_at, marks_at):
+    return _measure(
+        header[DISTANCES_AT],
+        (
+            header[TREE_A], header[TREE_B], XA_at, 0, XB_at, 0, 1, header[ALIKE] != 0, limit, result_at, marks_at,
+            header[STACK_AT], header[N_STACK], header[HEAP_AT], header[N_HEAP], header[DOUBLES_AT], header[INTEGERS_AT],
+            header[DECIDE],
+        ),
+    )  # fmt: skip
 
 
 class Side:
@@ -172,9 +203,9 @@ class SingleMeshPair:
         if work is None or work.n_stack < n_stack:
             work = SingleMeshPair._work = Workspace(max(512, n_stack))
         self._held = A, B, work
+        self.exchanged = exchanged
         if radius > 0.0:
-            for side in (A, B):
-                side.tree.ask_slabs(make_slabs)
+            self._prepare_distances()
         self._room = np.zeros(_RESULT + distances.RESULT)
         self._room[_RADIUS], self._room[_LIMIT] = radius, radius * FARTHER
         self._balls = np.concatenate([A.ball, B.ball])
@@ -186,7 +217,7 @@ class SingleMeshPair:
             inside.points_inside.address, A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
             len(B.points), address_of(self._balls), address_of(self._keys), address_of(self._marks), *work.addresses[:4],
             decide_exactly.address, radius > 0.0, distances.near_surfaces.address, address_of(self._room),
-            work.heap_address if radius > 0.0 else 0, HEAP,
+            self._heap_address if radius > 0.0 else 0, HEAP,
         )  # fmt: skip
         self.address = address_of(header)
         self.collide = meet_single.unchecked
@@ -195,5 +226,20 @@ class SingleMeshPair:
     def serves(A: Side, B: Side) -> bool:
         return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MOST_POINTS
 
-    def distance(self, X_WA, X_WB) -> None:
-        """Left to the long way."""
+    def _prepare_distances(self) -> None:
+        A, B, work = self._held
+        for side in (A, B):
+            side.tree.ask_slabs(make_slabs)
+        self._heap_address = work.heap_address
+
+    def near(self, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray] | None:
+        """(row, marks) of `distances.near_surfaces` for poses (4, 4), the bodies in the order given here.
+
+        None where the cores meet, or poses are none for single calls.
+        """
+        if self._header[HEAP_AT] == 0:
+            self._prepare_distances()
+            self._header[HEAP_AT] = self._heap_address
+        row, marks = np.empty(distances.RESULT), np.empty(distances.MARKS, dtype=np.int64)
+        said = near_single.unchecked(self.address, id(X_WA), id(X_WB), row.ctypes.data, marks.ctypes.data)
+        return None if said < 1 else (row, marks)
