@@ -26,6 +26,32 @@ def test_booleans_without_doubles_are_the_same(family, monkeypatch):
         assert HOW[collide.distance(*case.shapes(), max_distance=0.0).how] == "exact arithmetic", case.snippet()
 
 
+def test_depths_without_doubles_are_the_same(monkeypatch):
+    """No surface has been grown then: all planes of both hulls are looked at, and the nearest is the one that EPA found."""
+    rng = np.random.default_rng(29)
+    asked = []
+    for k in range(60):
+        A = collide.ConvexHull(rng.normal(size=(rng.integers(4, 13), 3))) if k % 3 else collide.Box(rng.uniform(0.3, 2.0, 3))
+        B = collide.ConvexHull(rng.normal(size=(rng.integers(4, 13), 3)), radius=0.1 * (k % 4 == 0))
+        X, Y = (collide.pose(rng.normal(size=3) * 0.25, rpy=rng.uniform(-3, 3, 3) * (k % 5 > 0)) for _ in range(2))
+        asked.append((A, B, X, Y, collide.distance(A, B, X, Y)))
+    deep = [case for case in asked if case[4].hit]
+    assert 40 < len(deep) < 60
+    monkeypatch.setattr(run, "distrust_doubles", True)
+    for A, B, X, Y, grown in deep:
+        told = f"A, B, X, Y = {A!r}, {B!r}, {X.tolist()}, {Y.tolist()}"
+        r = collide.distance(A, B, X[None], Y[None])[0]  # a batch: what is prepared for single calls trusts doubles
+        assert r.certified and r.how == HOW.index("exact arithmetic"), told
+        assert abs(r.distance - grown.distance) <= 1e-12 * abs(r.distance), told
+        assert r.lower <= grown.upper and grown.lower <= r.upper, told
+        assert np.abs(r.normal - grown.normal).max() < 1e-13, told
+        assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() < 1e-14, told
+        for shape, X_WS, point in ((A, X, r.point_a), (B, Y, r.point_b)):
+            assert collide.distance(shape, collide.Sphere(1e-14), X_WS, collide.pose(point)).distance <= 0.0, told
+        open_ended = collide.distance(A, B, X[None], Y[None], signed=False)[0]
+        assert open_ended.hit and open_ended.distance == 0.0, told
+
+
 def test_each_exact_stage_is_reached():
     """Counted, so that a filter that grows too sharp or too blunt shows."""
     hulls = [collide.distance(*case.shapes()) for case in generate("touch_ff", 40, 2)]

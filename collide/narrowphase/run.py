@@ -11,7 +11,7 @@ from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
-from collide.narrowphase.decide import DIGITS, decide_pairs
+from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
     ANSWERED,
@@ -61,7 +61,7 @@ def run_pairs(
             *tables, address_of(todo), len(todo), boolean, not boolean, stop_at_hit, limit, address_of(out),
             *_of_thread.space.addresses,
         )  # fmt: skip
-        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit)
+        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=not boolean)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
         if stop_at_hit and out["hit"][answered - 1]:
@@ -77,10 +77,12 @@ def settle_proposals(table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, 
     """
     rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
     _of_thread.space.integers[REQUESTS_AT] = 0
-    _finish(rows, np.ascontiguousarray(pairs, dtype=np.int64), table, poses, shape_of, boolean=False, limit=np.inf)
+    _finish(rows, np.ascontiguousarray(pairs, dtype=np.int64), table, poses, shape_of, boolean=False, limit=np.inf, depths=False)
 
 
-def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float) -> None:
+def _finish(
+    rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
+) -> None:
     """Settle in place what doubles left open."""
     if (rows["how"] == REFUSED).any():
         raise UnsupportedQuery(
@@ -90,7 +92,7 @@ def _finish(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boole
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
         decide_pairs(
-            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
+            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, depths, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
             _of_thread.space.addresses[1] + 8 * REQUESTS_AT, address_of(_of_thread.space.digits),
         )  # fmt: skip
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
@@ -134,7 +136,7 @@ def run_poses(
         if said:
             start = done - 1 - (done - 1) % BLOCK
             rows = space.rows[: done - start] if boolean else out[start:done]
-            _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit)
+            _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)
             if boolean:
                 out[start:done] = rows["hit"]
     return out
@@ -146,7 +148,7 @@ class _Workspace:
     def __init__(self) -> None:
         self.doubles = np.zeros(DOUBLES)
         self.integers = np.zeros(INTEGERS, dtype=np.int64)
-        self.digits = np.zeros(DIGITS + 16, dtype=np.int64)
+        self.digits = np.zeros(WORKSPACE, dtype=np.int64)
         self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), np.zeros((0, 12, TERMS)))
         self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
         self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
