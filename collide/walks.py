@@ -16,7 +16,7 @@ from collide.narrowphase.barba_langerman.bodies import WalkBody
 from collide.narrowphase.barba_langerman.run import TracedRound, no_walks, run_walks
 from collide.narrowphase.barba_langerman.walk import APART, MEETING, OPEN_MEETING
 from collide.narrowphase.hierarchy_distance import hierarchy_distance
-from collide.narrowphase.run import settle_proposals
+from collide.narrowphase.run import number_of_poses, settle_proposals
 from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
 
@@ -95,7 +95,7 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
     answer_open : called with the numbers of the poses that the walk leaves open; gives their booleans.
     """
     first, second = walk_body(A), walk_body(B)
-    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    n = number_of_poses(X_WA, X_WB)
     exchanged = second.polar is None
     if exchanged and first.polar is None:
         rows, depths = no_walks(n), (0, 0)
@@ -124,7 +124,7 @@ def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     ``iterations`` counts small problems.
     """
     first, second = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
-    n = max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    n = number_of_poses(X_WA, X_WB)
     rows = np.zeros(n, dtype=PAIR_DTYPE)
     found = np.zeros(n, dtype=bool)
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))

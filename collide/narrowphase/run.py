@@ -98,6 +98,11 @@ def _finish(
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
 
 
+def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
+    """How many pairs two batches of poses make, of which either may be of one."""
+    return max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+
+
 def run_poses(
     table: ShapeTable,
     which: np.ndarray | None,
@@ -118,7 +123,7 @@ def run_poses(
     axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
     depths : of rows: whether it is wanted how deep overlaps are.
     """
-    n = len(which) if which is not None else max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+    n = len(which) if which is not None else number_of_poses(X_WA, X_WB)
     table.plant(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)

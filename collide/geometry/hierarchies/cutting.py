@@ -37,6 +37,7 @@ from collide.geometry.hierarchies.placing import (
     unit_normal,
 )  # fmt: skip
 from collide.geometry.hierarchies.surface import (
+    degree_of,
     drop_star,
     drop_triangle,
     fill_hole,
@@ -96,10 +97,10 @@ def cut(
         return -1
     for j in range(k):
         blocked[ring[j]] = 1
-        degree[ring[j]] = count_around(mesh, ring[j])
+        degree[ring[j]] = degree_of(mesh, ring[j])
         if mesh[2][fresh[j]] >= 0:
             blocked[fresh[j]] = 1
-            degree[fresh[j]] = count_around(mesh, fresh[j])
+            degree[fresh[j]] = degree_of(mesh, fresh[j])
     degree[w] = 0
     mesh[2][w] = -1
     return k
@@ -269,20 +270,6 @@ def surely_extreme(cloud, mesh, v):
         h = np.int64(twins[preceding(h)])
         if h == first:
             return True
-
-
-@kernel
-def count_around(mesh, v):
-    """Degree of a vertex."""
-    _, twins, leaving = mesh
-    first = np.int64(leaving[v])
-    h = first
-    many = 0
-    while True:
-        many += 1
-        h = np.int64(twins[preceding(h)])
-        if h == first:
-            return many
 
 
 @kernel

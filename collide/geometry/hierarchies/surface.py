@@ -7,6 +7,8 @@ from outside. ``corners[h]`` is where it starts, ``twins[h]`` the half-edge that
 
 from __future__ import annotations
 
+import numpy as np
+
 from collide._jit import kernel
 from collide.geometry.hierarchies.perturbed import side
 
@@ -167,3 +169,17 @@ def fill_hole(mesh, state, ring, start, count, outer, plan, waiting):
             join(mesh, h + 1, outer[start + k])
         else:
             waiting[k] = h + 1
+
+
+@kernel
+def degree_of(mesh, v):
+    """Degree of a vertex."""
+    _, twins, leaving = mesh
+    first = np.int64(leaving[v])
+    h = first
+    many = 0
+    while True:
+        many += 1
+        h = np.int64(twins[preceding(h)])
+        if h == first:
+            return many

@@ -16,6 +16,7 @@ from collide.geometry.hierarchies.facets import cloud_at
 from collide.geometry.hierarchies.surface import (
     FREE,
     USED,
+    degree_of,
     drop_star,
     fill_hole,
     following,
@@ -63,23 +64,11 @@ def build_mesh(given_at, twins_given_at, count, corners_at, twins_at, triangles,
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
 def measure_degrees(corners_at, twins_at, triangles, leaving_at, rows, vertices_at, count, degree_at):
     """Degrees of the vertices listed, by row."""
-    corners, twins, leaving = mesh_at(corners_at, twins_at, triangles, leaving_at, rows)
+    mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows)
     vertices = view_i32(vertices_at, count)
     degree = view_i32(degree_at, rows)
     for k in range(count):
-        degree[vertices[k]] = degree_of(corners, twins, leaving, vertices[k])
-
-
-@kernel
-def degree_of(corners, twins, leaving, v):
-    first = leaving[v]
-    h = first
-    many = 0
-    while True:
-        many += 1
-        h = twins[preceding(h)]
-        if h == first:
-            return many
+        degree[vertices[k]] = degree_of(mesh, vertices[k])
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")

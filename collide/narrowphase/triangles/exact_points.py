@@ -32,7 +32,7 @@ _ENTRY = 48
 
 # Corners, doubles: three of A and three of B in A's frame, B's in its own, and all six in the frame of the exact
 # points, each coordinate good to the last number.
-B_AT, OWN_AT, SEEN_AT, SEEN_ERROR = 9, 18, 27, 45
+OWN_AT, SEEN_AT, SEEN_ERROR = 18, 27, 45
 CORNERS = 46
 
 # State, integers.
