@@ -25,6 +25,10 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.meshes.inside import contains
+    from collide.meshes.overlays import Overlay, overlay
+    from collide.meshes.pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
+    from collide.meshes.rays import RayHits, raycast
     from collide.query import collide, distance, walk
     from collide.results import PairResult, WorldResult
     from collide.robot import Robot
@@ -54,6 +58,10 @@ _HOMES = {
         "UnknownBody", "UnsupportedQuery",
     ),
     "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.meshes.inside": ("contains",),
+    "collide.meshes.overlays": ("Overlay", "overlay"),
+    "collide.meshes.pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
+    "collide.meshes.rays": ("RayHits", "raycast"),
     "collide.query": ("collide", "distance", "walk"),
     "collide.results": ("PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
@@ -67,10 +75,11 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-    "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "PairResult", "Robot",
-    "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
-    "distance", "pose", "verify", "walk",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
+    "FacetPairs", "HPolytope", "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay",
+    "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery",
+    "World", "WorldResult", "collide", "contains", "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions",
+    "verify", "walk",
 ]
 
 

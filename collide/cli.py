@@ -244,7 +244,9 @@ def _locality(args) -> int:
             def about(label: str, name=name):
                 return progress(f"{name}: {label}")
 
-            measured.append(locality.Measured(name, place, mesh.locality(repeated=args.repeated, progress=about)))
+            found = mesh.locality(repeated=args.repeated, progress=about)
+            with progress(f"{name}: building trees"):
+                measured.append(locality.Measured(name, place, found, mesh.tree_figures()))
     if args.plot:
         with progress("drawing"):
             locality.plot(measured, args.plot)
@@ -447,6 +449,8 @@ How fast meshes can be tested for collision is bounded by how local they are
 Each is given for its worst vertex, and as a distribution: one bad vertex does
 not slow a mesh down, long edges packed closely together do. --plot draws how
 many vertices have which stretch: pip install 'collide-robotics[plots]' first.
+The last table is about the trees: the one that queries walk, and the graded
+box-tree that the paper's bounds are proven for, its outliers and its bounds.
 docs/locality.md explains the numbers and what to do about large ones.
 
 Vertices with equal coordinates are one vertex. Vertices that no facet uses

@@ -27,6 +27,7 @@ SHOWS = {
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
     "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
     "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True"],
+    "09_rays_and_overlays": ["shared area 1.000000000000000", "beside it: [True, True, False]", "inside: [True, True, False]", "itself: False True"],
 }
 
 

@@ -39,7 +39,7 @@ ROOMS = {
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
-    "meshes": {"errors", "geometry", "shapes", "narrowphase", "results", "batches"},
+    "meshes": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},

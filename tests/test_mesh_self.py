@@ -59,6 +59,30 @@ def test_pairs_are_those_of_brute_force():
     assert 0.1 < found_pairs / tested < 0.9
 
 
+def test_tiny_meshes_far_away_and_facets_that_nearly_touch():
+    """Coordinates of few digits: boxes are then much wider than facets, and most signs next to nothing."""
+    rng = np.random.default_rng(43)
+    found_pairs = tested = 0
+    for case in range(40):
+        vertices, faces = soup(rng, 16, 0.5) if case % 2 else grid(rng, 20, 3)
+        offset, scale = rng.choice([0.0, 1.0, 1e6, 1e12]), 10.0 ** rng.integers(-14, 3)
+        vertices = offset + vertices * scale
+        faces = faces[np.abs(np.cross(*(vertices[faces][:, 1:] - vertices[faces][:, :1]).transpose(1, 0, 2))).max(axis=1) > 0.0]
+        if not len(faces):
+            continue
+        points = as_integers(world_points(vertices, np.eye(4)))[0]
+        corners = [[points[v] for v in f] for f in faces.tolist()]
+        proper_ones = [k for k, (a, b, c) in enumerate(corners) if cross(minus(b, a), minus(c, a)) != [0, 0, 0]]
+        faces, corners = faces[proper_ones], [corners[k] for k in proper_ones]
+        if not len(faces):
+            continue
+        want = [(i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])]
+        pairs, _ = self_hits(build_mesh_tree(vertices, faces))
+        assert list(map(tuple, pairs.tolist())) == want, (case, vertices.tolist(), faces.tolist())
+        found_pairs, tested = found_pairs + len(want), tested + len(faces) ** 2 // 2
+    assert 0.05 < found_pairs / tested < 0.95
+
+
 def test_clean_meshes_have_none():
     for vertices, faces in (box(), block_ring(), bumpy_sphere(5000)):
         for scale in (1.0, 1e-9, 1e9):

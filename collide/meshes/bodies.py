@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import UnsupportedQuery
+from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.layout import MeshTree
@@ -56,6 +56,26 @@ def body_of(shape: Shape) -> Body:
         body = _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
         shape._store(_surface=body)
         return body
+
+
+def facet_body(shape, caller: str) -> Body:
+    """The body of a shape that is facets and no more, for a question about facets.
+
+    Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
+    """
+    if not isinstance(shape, Shape):
+        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+    name = type(shape).__name__
+    if is_halfspace(shape):
+        raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
+    try:
+        body = body_of(shape)
+    except UnsupportedQuery as refused:
+        told = str(refused).replace(f"{name} against Mesh", name)
+        raise UnsupportedQuery(f"{caller}: {told}") from None
+    if body.radius > 0.0:
+        raise UnsupportedQuery(f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in")
+    return body
 
 
 def hull_of(body: Body) -> Shape:

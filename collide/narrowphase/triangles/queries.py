@@ -16,7 +16,7 @@ from collide._jit import address_of
 from collide.errors import InvalidPose
 from collide.geometry.mesh_tree.layout import WIDTH, MeshTree
 from collide.geometry.mesh_tree.slabs import make_slabs
-from collide.narrowphase.triangles import distances, inside, self_contact, surfaces
+from collide.narrowphase.triangles import distances, inside, rays, self_contact, surfaces
 from collide.narrowphase.triangles.exact import INTEGERS, decide_exactly
 from collide.narrowphase.triangles.surfaces import COUNTERS, FULL, SINGULAR, walk_surfaces
 
@@ -184,16 +184,41 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
     """
     keys = np.empty(4096, dtype=np.int64)
     counters, where = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    planes = np.empty(self_contact.PLANE * len(tree.ids))
     work = _workspace(WIDTH * WIDTH * (tree.depth + 2))
     while True:
         said = self_contact.walk_itself(
-            tree.address, keys.ctypes.data, len(keys), counters.ctypes.data, where.ctypes.data, *work.addresses
+            tree.address, keys.ctypes.data, len(keys), counters.ctypes.data, where.ctypes.data, planes.ctypes.data,
+            *work.addresses,
         )
         if said != self_contact.FULL:
             break
         keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
     found = np.sort(keys[: where[1]])
     return np.stack(np.divmod(found, len(tree.ids)), axis=1), counters
+
+
+def facets_on_rays(A: MeshTree, X_WA, given: np.ndarray, first_only: bool) -> tuple[np.ndarray, np.ndarray]:
+    """(hits (k, rays.HIT), counters (N, 3): boxes, triangles and exact decisions) of N rays, each ray's together.
+
+    X_WA : (4, 4) or (N, 4, 4).   given : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
+    first_only : only facets that may be the first of their ray, by brackets; all that are met otherwise.
+    """
+    X_WA = np.ascontiguousarray(X_WA, dtype=np.float64)
+    n = len(given)
+    hits = np.empty((n + 64, rays.HIT))
+    counters, where = np.zeros((n, 3), dtype=np.int64), np.zeros(2, dtype=np.int64)
+    work = _workspace(WIDTH * (A.depth + 2))
+    while True:
+        said = rays.cast_rays(
+            A.address, X_WA.ctypes.data, step(X_WA), given.ctypes.data, n, first_only, hits.ctypes.data, len(hits),
+            counters.ctypes.data, where.ctypes.data, *work.addresses,
+        )  # fmt: skip
+        if said == rays.SINGULAR:
+            raise InvalidPose(f"pose {int(where[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+        if said != rays.FULL:
+            return hits[: where[1]], counters
+        hits = np.concatenate([hits, np.empty((3 * len(hits), rays.HIT))])
 
 
 # --- poses and workspaces -----------------------------------------------------------------------
@@ -224,7 +249,7 @@ class Workspace:
 
     def __init__(self, n_stack: int):
         self._stack = np.empty(2 * n_stack + 32, dtype=np.int64)
-        doubles = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside, self_contact))
+        doubles = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside, self_contact, rays))
         self._doubles = np.empty(doubles)
         self._integers = np.empty(INTEGERS, dtype=np.int64)
         self._heap: np.ndarray | None = None

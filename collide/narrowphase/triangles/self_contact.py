@@ -9,9 +9,14 @@ their neighbours' too, and what else they meet is found, by the rule for the cor
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
+    EXPONENT,
     IDS_AT,
     INTS,
     N_FACETS,
@@ -25,13 +30,23 @@ from collide.geometry.mesh_tree.layout import (
 )
 from collide.narrowphase.triangles.exact import MEET, OVERLAP, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
-from collide.narrowphase.triangles.filtered import APART, MEETING, UNSURE, meeting_in_doubles, orientation, sign_error
-from collide.narrowphase.triangles.placing import ERROR, PLACING, place
-from collide.narrowphase.triangles.surfaces import box_size, link_of, no_slab, set_probe
+from collide.narrowphase.triangles.filtered import (
+    APART,
+    MEETING,
+    TINY,
+    UNSURE,
+    meeting_in_doubles,
+    orientation,
+    sign_error,
+)
+from collide.narrowphase.triangles.placing import FRAMES, PLACING, place
+from collide.narrowphase.triangles.surfaces import box_size, link_of
 
 #: Doubles and floats of workspace: a placing, corners, and a pose that moves nothing.
 DOUBLES, FLOATS = PLACING + CORNERS + 16, 2 * FRAME + PROBE
 BOXES, TRIANGLES, EXACT = range(3)
+#: Doubles that are known of a facet's plane.
+PLANE = 4
 #: Where a walk stands.
 TOP, FOUND = range(2)
 DONE, FULL = range(2)
@@ -135,6 +150,120 @@ def _one_side(P, v, face, of_face, other, of_other, error):
 
 
 @kernel
+def _set_planes(P, n, planes):
+    """PLANE doubles a facet: the edges' cross product, and the longest edge along an axis, squared."""
+    for facet in range(n):
+        a = 9 * facet
+        x = P[a]
+        y = P[a + 1]
+        z = P[a + 2]
+        ux = P[a + 3] - x
+        uy = P[a + 4] - y
+        uz = P[a + 5] - z
+        vx = P[a + 6] - x
+        vy = P[a + 7] - y
+        vz = P[a + 8] - z
+        edge = max(max(abs(ux), abs(uy), abs(uz)), max(abs(vx), abs(vy), abs(vz)))
+        at = PLANE * facet
+        planes[at] = uy * vz - uz * vy
+        planes[at + 1] = uz * vx - ux * vz
+        planes[at + 2] = ux * vy - uy * vx
+        planes[at + 3] = edge * edge
+
+
+@kernel(inline=True)
+def _is_corner(P, a, x, y, z):
+    """Whether a point is a corner of a facet. No branches: they cannot be foreseen, and cost more than all of this."""
+    return (
+        ((x == P[a]) & (y == P[a + 1]) & (z == P[a + 2]))
+        | ((x == P[a + 3]) & (y == P[a + 4]) & (z == P[a + 5]))
+        | ((x == P[a + 6]) & (y == P[a + 7]) & (z == P[a + 8]))
+    )
+
+
+@kernel(inline=True)
+def _off_plane(P, planes, one, other, reach):
+    """Whether all corners of the other facet that are none of the one's are certainly on one side of its plane, and there is one.
+
+    Then the other has the common corners in that plane, and what is between them: no more. Coordinates are exact, so with
+    edges up to L a side at distance w is off by 64 u L² w, as in `filtered.py`. reach : no w is more, along any axis.
+    """
+    a = 9 * one
+    b = 9 * other
+    nx = planes[PLANE * one]
+    ny = planes[PLANE * one + 1]
+    nz = planes[PLANE * one + 2]
+    x = P[a]
+    y = P[a + 1]
+    z = P[a + 2]
+    px = P[b] - x
+    py = P[b + 1] - y
+    pz = P[b + 2] - z
+    qx = P[b + 3] - x
+    qy = P[b + 4] - y
+    qz = P[b + 5] - z
+    rx = P[b + 6] - x
+    ry = P[b + 7] - y
+    rz = P[b + 8] - z
+    first = nx * px + ny * py + nz * pz
+    second = nx * qx + ny * qy + nz * qz
+    third = nx * rx + ny * ry + nz * rz
+    limit = planes[PLANE * one + 3] * reach * 2.0**-47 + TINY
+    above = (first > limit) | (second > limit) | (third > limit)
+    below = (first < -limit) | (second < -limit) | (third < -limit)
+    return (
+        (above != below)
+        & ((abs(first) > limit) | _is_corner(P, a, P[b], P[b + 1], P[b + 2]))
+        & ((abs(second) > limit) | _is_corner(P, a, P[b + 3], P[b + 4], P[b + 5]))
+        & ((abs(third) > limit) | _is_corner(P, a, P[b + 6], P[b + 7], P[b + 8]))
+    )
+
+
+@kernel
+def _across_a_side(P, planes, one, other, reach):
+    """Whether all corners of b that are no ends of some side of a are certainly beyond that side, seen along a's normal.
+
+    Facets around a vertex of a smooth surface are so. The wall on a side holds nothing of a but the side, and of b its
+    common corners with it. Sides of points at distance w: 256 u L³ w.
+    """
+    a = 9 * one
+    b = 9 * other
+    nx = planes[PLANE * one]
+    ny = planes[PLANE * one + 1]
+    nz = planes[PLANE * one + 2]
+    square = planes[PLANE * one + 3]
+    limit = square * math.sqrt(square) * reach * 2.0**-44 + TINY
+    for k in range(3):
+        i = a + 3 * k
+        j = a + 3 * ((k + 1) % 3)
+        x = P[i]
+        y = P[i + 1]
+        z = P[i + 2]
+        ex = P[j] - x
+        ey = P[j + 1] - y
+        ez = P[j + 2] - z
+        mx = ey * nz - ez * ny
+        my = ez * nx - ex * nz
+        mz = ex * ny - ey * nx
+        beyond = True
+        proper = False
+        for c in range(b, b + 9, 3):
+            wx = P[c] - x
+            wy = P[c + 1] - y
+            wz = P[c + 2] - z
+            outside = mx * wx + my * wy + mz * wz > limit
+            proper = proper | outside
+            beyond = beyond & (
+                outside
+                | ((wx == 0.0) & (wy == 0.0) & (wz == 0.0))
+                | ((P[c] == P[j]) & (P[c + 1] == P[j + 1]) & (P[c + 2] == P[j + 2]))
+            )
+        if beyond & proper:
+            return True
+    return False
+
+
+@kernel
 def _conflict(P, a, b, corners, error, arguments, decide, counters):
     """Whether two facets share more than corners and edges."""
     count, i, j = _shared(P, a, b)
@@ -186,12 +315,34 @@ def _free(P, a, b):
     return -1
 
 
+@kernel(inline=True)
+def _set_own_probe(placing, nodes, ref, probe):
+    """Make the box behind a reference the probe among boxes of its own tree, where only their own axes tell."""
+    at = NODE * (ref >> 3) + (ref & 7)
+    for i in range(3):
+        probe[i] = nodes[at + WIDTH * i]
+        probe[3 + i] = np.float32(float(nodes[at + WIDTH * (3 + i)]) + placing[FRAMES + 12 + i])
+
+
+@kernel
+def _forget_other_axes(frame, probe):
+    for k in range(FRAME):
+        frame[k] = np.float32(0.0)
+    for k in range(6, PROBE):
+        probe[k] = np.float32(0.0)
+    for k in range(9, 12):
+        probe[k] = np.float32(1.0)
+
+
 @entry(
-    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
+    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
 )
-def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, n_stack, doubles_at, integers_at, decide):
+def walk_itself(
+    header_at, pairs_at, capacity, counters_at, where_at, planes_at, stack_at, n_stack, doubles_at, integers_at, decide
+):
     """Pairs of facets of one surface that share more than corners and edges; DONE or FULL, then to be called again.
 
+    planes : room for PLANE doubles a facet, kept between calls.
     pairs : out, the smaller facet number times the number of facets plus the larger.
     """
     header = view_i64(header_at, INTS)
@@ -203,6 +354,7 @@ def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, 
     pairs = view_i64(pairs_at, capacity)
     counters = view_i64(counters_at, 3)
     where = view_i64(where_at, 2)
+    planes = view_f64(planes_at, PLANE * header[N_FACETS])
     stack = view_i64(stack_at, n_stack)
     placing = view_f64(doubles_at, PLACING)
     corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
@@ -215,11 +367,14 @@ def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, 
         still[k] = 1.0 if k % 5 == 0 else 0.0
     place(header, numbers, still, header, numbers, still, placing, frames)
     forget_poses(view_i64(integers_at, STATE))
-    no_slab(probe)
+    _forget_other_axes(frame, probe)
     arguments = (doubles_at + 8 * PLACING, doubles_at, integers_at, still_at, still_at)
+    unit = math.ldexp(1.0, int(header[EXPONENT]))
+    wider = 2.0**-16 + 2.0 * max(placing[FRAMES + 12], placing[FRAMES + 13], placing[FRAMES + 14])
     top = where[TOP]
     found = where[FOUND]
     if top == 0:
+        _set_planes(P, header[N_FACETS], planes)
         stack[0] = 0
         top = 1
     while top > 0:
@@ -233,12 +388,18 @@ def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, 
         link = int(link_of(links, one))
         other = int(link_of(links, two))
         if link < 0 and other < 0:
+            # Boxes that meet hold both facets: no coordinate differs by more than their widths, and what probes are enlarged by.
+            reach = unit * (2.01 * (box_size(boxes, one) + box_size(boxes, two)) + wider)
             for i in range(~link & 7):
                 a = (~link >> 3) + i
                 for j in range(i + 1 if one == two else 0, ~other & 7):
                     b = (~other >> 3) + j
                     counters[TRIANGLES] += 1
-                    if _conflict(P, 9 * a, 9 * b, corners, placing[ERROR], arguments, decide, counters):
+                    if _off_plane(P, planes, a, b, reach):
+                        continue
+                    if _off_plane(P, planes, b, a, reach) or _across_a_side(P, planes, a, b, reach):
+                        continue
+                    if _conflict(P, 9 * a, 9 * b, corners, 0.0, arguments, decide, counters):
                         x = min(ids[a], ids[b])
                         y = max(ids[a], ids[b])
                         pairs[found] = int(x) * header[N_FACETS] + int(y)
@@ -251,7 +412,7 @@ def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, 
                 if boxes[NODE * link + 3 * WIDTH + first] < 0.0:
                     continue
                 counters[BOXES] += 1
-                set_probe(placing, 0, boxes, child, probe)
+                _set_own_probe(placing, boxes, child, probe)
                 mask = boxes_meeting(boxes, NODE * link, frame, probe)
                 for slot in range(first, WIDTH):
                     if (mask >> slot) & 1:
@@ -265,7 +426,7 @@ def walk_itself(header_at, pairs_at, capacity, counters_at, where_at, stack_at, 
         else:
             fixed = two
             node = link
-        set_probe(placing, 0, boxes, fixed, probe)
+        _set_own_probe(placing, boxes, fixed, probe)
         mask = boxes_meeting(boxes, NODE * node, frame, probe)
         for slot in range(WIDTH):
             if (mask >> slot) & 1:

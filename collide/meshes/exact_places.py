@@ -1,0 +1,109 @@
+"""Points under poses as Python integers on one grid, for the few questions that doubles leave open.
+
+A double is a whole number times a power of two. So are the coordinates R v + t of a placed point, and all of a question
+can be written as integers times one power of two: nothing is rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+#: Integer coordinates.
+Point = tuple[int, int, int]
+
+
+def integers(values) -> tuple[list[int], int]:
+    """(whole numbers, exponent e) with values = numbers · 2^e; e is 0 where all are 0."""
+    flat = np.asarray(values, dtype=np.float64).ravel()
+    mantissas, exponents = np.frexp(flat)
+    whole = np.ldexp(mantissas, 53).astype(np.int64).tolist()
+    known = [e - 53 for m, e in zip(whole, exponents.tolist()) if m]
+    if not known:
+        return [0] * len(whole), 0
+    low = min(known)
+    return [m << (e - 53 - low) if m else 0 for m, e in zip(whole, exponents.tolist())], low
+
+
+def placed(X: np.ndarray, points: np.ndarray) -> tuple[list[Point], int]:
+    """(points (k, 3) placed by the pose X as integers, exponent of their grid), entries taken as exact numbers."""
+    turn, turn_at = integers(X[:3, :3])
+    shift, shift_at = integers(X[:3, 3])
+    own, own_at = integers(points)
+    low = min(turn_at + own_at, shift_at)
+    up, over = turn_at + own_at - low, shift_at - low
+    t = [s << over for s in shift]
+    result = []
+    for k in range(0, len(own), 3):
+        x, y, z = own[k : k + 3]
+        result.append(tuple(((turn[i] * x + turn[i + 1] * y + turn[i + 2] * z) << up) + t[i // 3] for i in (0, 3, 6)))
+    return result, low  # type: ignore[return-value]
+
+
+def on_one_grid(*groups: tuple[list[Point], int]) -> tuple[list[list[Point]], int]:
+    """The groups of `placed` on the finest of their grids, and its exponent."""
+    low = min(grid for _, grid in groups)
+    return [[(x << g, y << g, z << g) for x, y, z in points] for points, grid in groups for g in (grid - low,)], low
+
+
+def minus(a: Point, b: Point) -> Point:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def cross(a: Point, b: Point) -> Point:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def inner(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def leading_digits(vector: Point) -> tuple[float, float, float]:
+    """A vector along this one, components below 1 and rounded, the largest of them at least ½; zeros of a zero vector."""
+    digits = max(abs(x).bit_length() for x in vector)
+    scale = 1 << digits
+    return vector[0] / scale, vector[1] / scale, vector[2] / scale
+
+
+def rounded(value: Fraction, exponent: int = 0) -> tuple[float, float, float]:
+    """(value · 2^exponent rounded to the nearest double, from below, from above); overflows to infinity."""
+    exact = value * Fraction(2) ** exponent
+    try:
+        nearest = float(exact)
+    except OverflowError:
+        largest = math.nextafter(math.inf, 0.0)
+        return (math.inf, largest, math.inf) if exact > 0 else (-math.inf, -math.inf, -largest)
+    back = Fraction(nearest)
+    return (
+        nearest,
+        nearest if back <= exact else math.nextafter(nearest, -math.inf),
+        nearest if back >= exact else math.nextafter(nearest, math.inf),
+    )
+
+
+def enters(triangle: list[Point], origin: Point, direction: Point) -> Fraction:
+    """The least t ≥ 0 with origin + t · direction in a closed triangle that the ray is known to meet."""
+    v = [minus(p, origin) for p in triangle]
+    across = cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0]))
+    slope = inner(across, direction)
+    if slope:
+        return Fraction(inner(across, v[0]), slope)
+    # The ray runs in the triangle's plane, or the triangle has no area: seen from `across` its corners lie left or right
+    # of the ray, or on it, and it is entered at one of those or on a side from left to right.
+    if across == (0, 0, 0):
+        sides = (cross(direction, minus(triangle[j], triangle[i])) for i, j in ((0, 1), (1, 2), (2, 0)))
+        across = next((side for side in sides if side != (0, 0, 0)), (0, 0, 0))
+    square = inner(direction, direction)
+    left = [inner(across, cross(direction, p)) for p in v]
+    along = [inner(direction, p) for p in v]
+    if across == (0, 0, 0):  # a point, or a segment along the ray
+        left = [0 if cross(direction, p) == (0, 0, 0) else 1 for p in v]
+    met = [Fraction(along[k], square) for k in range(3) if left[k] == 0]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        if left[i] * left[j] < 0:
+            met.append(Fraction(left[j] * along[i] - left[i] * along[j], (left[j] - left[i]) * square))
+    if not met or max(met) < 0:
+        raise AssertionError("a ray that meets a facet, and does not")
+    return max(min(met), Fraction(0))
