@@ -25,6 +25,8 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.manifolds.ask import contacts
+    from collide.manifolds.rows import Contacts
     from collide.query import collide, distance, walk
     from collide.results import PairResult, WorldResult
     from collide.robot import Robot
@@ -54,6 +56,8 @@ _HOMES = {
         "UnknownBody", "UnsupportedQuery",
     ),
     "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.manifolds.ask": ("contacts",),
+    "collide.manifolds.rows": ("Contacts",),
     "collide.query": ("collide", "distance", "walk"),
     "collide.results": ("PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
@@ -67,9 +71,9 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
     "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "PairResult", "Robot",
-    "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide",
+    "SceneError", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts",
     "distance", "pose", "verify", "walk",
 ]
 

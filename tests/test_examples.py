@@ -27,6 +27,7 @@ SHOWS = {
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
     "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
     "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True"],
+    "09_contacts": ["proven free", "a ball 1.00 mm above", "jaw 1 pushes along [-1.  0.  0.], 4 points", "box and ball"],
 }
 
 
