@@ -25,6 +25,8 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.manifolds.ask import contacts
+    from collide.manifolds.rows import Contacts
     from collide.meshes.inside import contains
     from collide.meshes.overlays import Overlay, overlay
     from collide.meshes.pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
@@ -58,6 +60,8 @@ _HOMES = {
         "UnknownBody", "UnsupportedQuery",
     ),
     "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.manifolds.ask": ("contacts",),
+    "collide.manifolds.rows": ("Contacts",),
     "collide.meshes.inside": ("contains",),
     "collide.meshes.overlays": ("Overlay", "overlay"),
     "collide.meshes.pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
@@ -75,11 +79,11 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
-    "FacetPairs", "HPolytope", "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay",
-    "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery",
-    "World", "WorldResult", "collide", "contains", "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions",
-    "verify", "walk",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
+    "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape",
+    "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
+    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
+    "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions", "verify", "walk",
 ]
 
 

@@ -11,7 +11,7 @@ For unions of convex parts: together, one certificate names the parts that meet;
 for each pair of parts. Cylinders, cones and ellipsoids have none (`certificate` is None), nor have
 rows whose sign is open. Vertices are rows of `PackedConvex.points`: the points of a `ConvexHull` as
 given, the corners of a `Box` by sign (−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices``
-of an `HPolytope`.
+of an `HPolytope`. Pairs with a mesh: `mesh_certificates.py`.
 """
 
 from __future__ import annotations
@@ -57,6 +57,10 @@ def certificate_of(A, B, X_WA, X_WB, row) -> tuple[Certificate, ...] | None:
     """
     if row["how"] == UNDECIDED or row["beyond"]:
         return None
+    if A.meshed or B.meshed:
+        from collide.mesh_certificates import mesh_certificate
+
+        return mesh_certificate(A, B, X_WA, X_WB, row)
     parts_a, parts_b = _posed(A, X_WA), _posed(B, X_WB)
     if all(any(part.packed.kind == HALFSPACE for part in parts) for parts in (parts_a, parts_b)):
         return None
@@ -96,9 +100,19 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
         raise InvalidArgument("verify: one pair at one pose each; index a batch first")
     given = r.certificate if certificate is None else certificate
     if given is None:
-        raise InvalidArgument("verify: this result carries no certificate (curved shapes, open sign, or beyond)")
-    parts_a, parts_b = _posed(A, X_WA[0]), _posed(B, X_WB[0])
+        raise InvalidArgument(
+            "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which one is "
+            "a mesh whose hull meets the other)"
+        )
     wanted = "together" if bool(np.all(r.hit)) else "apart"
+    if A.meshed or B.meshed:
+        from collide.mesh_certificates import refused_mesh
+
+        reason = refused_mesh(A, B, X_WA[0], X_WB[0], given, wanted)
+        if reason:
+            raise CertificateRefused(reason)
+        return
+    parts_a, parts_b = _posed(A, X_WA[0]), _posed(B, X_WB[0])
     seen = set()
     for one in given:
         kind, i, j, pairs = one

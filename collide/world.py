@@ -7,17 +7,21 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide import _jit
 from collide.broadphase.filters import CULLED, count_skipped
-from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
 from collide.packed_world import PackedWorld
 from collide.query import check_distance
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.shapes.base import Shape
 from collide.transforms import as_poses
+
+if TYPE_CHECKING:
+    from collide.manifolds.rows import WorldContacts
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
@@ -190,6 +194,28 @@ class World:
         limit = check_distance("World.distances: max_distance", max_distance)
         rows, _ = self._ask(limit)
         return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
+
+    def contacts(self, margin: float = 0.0, *, max_contacts: int = 8) -> WorldContacts:
+        """Contacts of every tested pair within ``margin`` [m], sorted by (a, b): one row a contact.
+
+        margin, max_contacts, and what a row says and promises: as in `collide.contacts`. `stats` stays as it is.
+        Raises UnsupportedQuery, naming the bodies, where that does.
+        """
+        from collide.manifolds.ask import check_margin, check_most, contact_rows
+        from collide.manifolds.rows import WorldContacts, no_rows
+
+        margin, most = check_margin("World.contacts", margin), check_most("World.contacts", max_contacts)
+        bodies = list(self._bodies.values())
+        found = []
+        for i, j in self._pack().candidates(margin).tolist():
+            A, B = bodies[i], bodies[j]
+            try:
+                rows = contact_rows(A.shape, B.shape, A.X_WB, B.X_WB, margin, most)
+            except UnsupportedQuery as error:
+                raise UnsupportedQuery(f'"{A.name}" and "{B.name}": {error}') from None
+            rows["a"], rows["b"] = A.id, B.id
+            found.append(rows)
+        return WorldContacts(np.concatenate([no_rows(), *found]), dict(self._bodies))
 
     def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
         """One outside shape S against every body: pairs at most ``max_distance`` apart.

@@ -35,11 +35,13 @@ ROOMS = {
     "broadphase": {"_jit", "errors", "geometry"},
     "narrowphase": {"_jit", "errors", "transforms", "geometry", "results"},
     "certificates": {"errors", "transforms", "geometry", "results"},
+    "mesh_certificates": {"certificates", "geometry"},
     "unions": {"geometry", "narrowphase", "results"},
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "meshes": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
+    "manifolds": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "meshes"},
     "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
@@ -49,9 +51,11 @@ ROOMS = {
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
+    "world": {"manifolds"},
+    "certificates": {"mesh_certificates"},
     "query": {"meshes", "walks"},
     "batches": {"meshes"},
-    "packed_world": {"meshes"},
+    "packed_world": {"meshes", "manifolds"},
     "walks": {"certificates"},
     "results": {"certificates"},
     "robot": {"scenes"},

@@ -277,8 +277,6 @@ def test_what_is_not_answered_is_refused_by_name():
                 ask(mesh, other, np.eye(4), np.eye(4))
     with pytest.raises(collide.UnsupportedQuery, match="convex parts"):
         collide.Compound([(mesh, np.eye(4))]).parts()
-    with pytest.raises(collide.UnsupportedQuery):
-        _ = collide.distance(mesh, mesh, np.eye(4), np.eye(4)).certificate
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
     with pytest.raises(collide.InvalidPose):
         collide.collide(mesh, mesh, np.eye(4), mirror, check_poses=False)

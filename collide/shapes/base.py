@@ -18,7 +18,7 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_surface", "_walk")
+    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_surface", "_topology", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -28,6 +28,8 @@ class Shape:
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`meshes/bodies.py`).
     _surface: Any
+    #: Which facets of that share corners, for contacts (`manifolds/facets.py`).
+    _topology: Any
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True

@@ -1,0 +1,129 @@
+"""`contacts`: the public call, pose after pose and part after part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import InvalidArgument, InvalidPose
+from collide.manifolds.convex import convex_contacts
+from collide.manifolds.rows import Contacts, no_rows
+from collide.manifolds.surfaces import surface_contacts
+from collide.shapes.base import Shape, is_plain
+from collide.shapes.compound import Compound
+from collide.transforms import as_poses
+
+_U = 2.0**-53
+#: Margins beyond this are no margins, and would overflow squared.
+_LARGEST_MARGIN = 1e50
+
+
+def contacts(A, B, X_WA, X_WB, *, margin: float = 0.0, max_contacts: int = 8, check_poses: bool = True) -> Contacts:
+    """Where A and B touch, overlap, or come within a margin: a few points a patch, with one normal each.
+
+    Parameters
+    ----------
+    A, B : shapes.
+    X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every pose of the other's batch.
+    margin : [m], ≥ 0, finite: bodies, and parts of them, up to so far apart are in contact, too.
+    max_contacts : of each patch, ≥ 1: the deepest is kept, then those that span the greatest area. Patches are all told.
+    check_poses : refuse matrices that are no rotation.
+
+    Returns
+    -------
+    Contacts : columns ``normal``, ``point_a``, ``point_b``, ``distance``, ``lower``, ``upper``, ``patch``, ``kind`` …, one
+        row a contact (`manifolds/rows.py` describes them); no rows where the bodies are farther apart than the margin.
+
+    What is promised. ``point_b − point_a = distance · normal``, both points within rounding of the surfaces. ``lower`` and
+    ``upper`` hold the true distance, along the normal, between the two facets named at that place. *Apart*: there is a
+    patch for every place at which facets of both come locally nearest within the margin, its normal the line between the
+    nearest points; its first row is that gap. *Overlapping*: the normal is one of those of facets, of crossed edges or their
+    mean, along which the facets that meet come apart after a short way; a shorter one may be. With B at
+    ``X_WB[:3, 3] + apart * normal`` no facet pair of the patch meets, proven (`inf`: no such length was found); of convex
+    bodies the bodies are apart but for touching. Bodies that grip each other have several patches, and none of them need part the bodies. Where a
+    body lies within a solid, or facets meet too deeply for a patch (deeper than half the smaller body's radius), a row of
+    kind "way out" is the answer of `distance`. A part of a mesh that lies within the other body, without facets that
+    meet, adds nothing while other facets meet.
+
+    Two convex shapes have one patch, with the normal of `distance`. Parts of a Compound are asked one by one.
+
+    Raises InvalidPose, InvalidArgument; UnsupportedQuery for shapes that `distance` refuses, and for two half-spaces that
+    overlap. A pair near the surface costs about a millisecond, which grows with the facets within the margin.
+    """
+    margin, most = check_margin("contacts", margin), check_most("contacts", max_contacts)
+    for name, shape in (("A", A), ("B", B)):
+        if not isinstance(shape, Shape):
+            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+    X_WA, X_WB = (as_poses(X, name, check=check_poses) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+    lengths = {len(X_WA), len(X_WB)}
+    if len(lengths) > 1 and 1 not in lengths:
+        raise InvalidPose(f"lengths do not match: X_WA {len(X_WA)}, X_WB {len(X_WB)}; batches must be equally long")
+    n = 0 if 0 in lengths else max(lengths)
+    found = [contact_rows(A, B, X_WA[k % len(X_WA)], X_WB[k % len(X_WB)], margin, most) for k in range(n)]
+    starts = np.concatenate([[0], np.cumsum([len(rows) for rows in found])]).astype(np.int64)
+    return Contacts(np.concatenate([no_rows(), *found]), starts)
+
+
+def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, most: int) -> np.ndarray:
+    """Rows of two shapes at checked poses (4, 4)."""
+    parts_a, parts_b = _parts(A, X_WA), _parts(B, X_WB)
+    if len(parts_a) == len(parts_b) == 1 and parts_a[0][2] == parts_b[0][2] == 0.0:
+        return _two(parts_a[0][0], parts_b[0][0], parts_a[0][1], parts_b[0][1], margin, most)
+    found, patches = [], 0
+    for i, (one, X_WO, off_a) in enumerate(parts_a):
+        for j, (other, X_WP, off_b) in enumerate(parts_b):
+            rows = _two(one, other, X_WO, X_WP, margin, most)
+            rows["part_a"], rows["part_b"] = i, j
+            rows["lower"] -= off_a + off_b
+            rows["upper"] += off_a + off_b
+            rows["patch"] += patches
+            patches = int(rows["patch"].max(initial=patches - 1)) + 1
+            found.append(rows)
+    return np.concatenate([no_rows(), *found])
+
+
+def _two(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    if A.meshed or B.meshed:
+        return surface_contacts(A, B, X_WA, X_WB, margin, most)
+    return convex_contacts(A, B, X_WA, X_WB, margin, most)
+
+
+def _parts(shape: Shape, X: np.ndarray) -> list[tuple[Shape, np.ndarray, float]]:
+    """(shape, its pose, how far the pose's rounding moves a point) of every part of a compound, nested ones too."""
+    if not isinstance(shape, Compound):
+        return [(shape, X, 0.0)]
+    found = []
+    for item, X_CS in shape.items:
+        X_WS = X.copy()
+        X_WS[:3] = (X[:3, :, None] * X_CS[None]).sum(axis=1)
+        size = _reach(item) + float(np.abs(X_CS[:3, 3]).sum() + np.abs(X[:3, 3]).sum())
+        off = 0.0 if np.array_equal(X_CS, np.eye(4)) else 32.0 * _U * size
+        found += [(part, X_WP, off + more) for part, X_WP, more in _parts(item, np.ascontiguousarray(X_WS))]
+    return found
+
+
+def _reach(shape: Shape) -> float:
+    parts = shape.bounding_parts()
+    return max(4.0 * (part.reach + part.radius) + float(np.abs(X[:3, 3]).sum()) for part, X in parts)
+
+
+def check_margin(name: str, value) -> float:
+    """A margin [m]."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name}: margin must be a number ≥ 0 [m], got {value!r}") from None
+    if not 0.0 <= number <= _LARGEST_MARGIN:
+        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {value!r}")
+    return number
+
+
+def check_most(name: str, value) -> int:
+    """How many contacts a patch may have."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InvalidArgument(f"{name}: max_contacts must be an integer ≥ 1, got {value!r}")
+    return int(value)
+
+
+def is_answered(shape: Shape) -> bool:
+    """Whether a shape is one that `contacts` takes apart or takes whole."""
+    return shape.meshed or isinstance(shape, Compound) or is_plain(shape)

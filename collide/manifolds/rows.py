@@ -1,0 +1,185 @@
+"""What `contacts` returns: one row a contact.
+
+=============== ===================================================================================
+a, b            ids of the bodies (0 and 1 for a pair query)
+part_a, part_b  which part of a Compound each is of, 0 otherwise
+patch           number of the patch among those of its pair, from 0
+kind            index into `KINDS`
+facet_a,facet_b facet each point lies on: of a Mesh rows of ``faces``, of a convex shape triangles of its
+                hull, −1 where a curved or a plane surface has none
+normal          (3,) unit vector nhat_AB_W, one for all contacts of a patch
+point_a,point_b (3,) a point of A's surface and one of B's [m]: point_b − point_a = distance · normal
+distance        signed, along the normal [m]: the gap there, or minus the overlap
+lower, upper    lower ≤ true value ≤ upper: how far these two facets are apart along the normal, there, with
+                normal, poses and shapes as given, against rounding [m]; of "way out" that of `distance`
+apart           of overlaps: moving B by this length along the normal is proven to clear the patch's facets of
+                each other, or the bodies where they are convex, but for touching [m]; inf where no such length
+                was found, 0 of gaps
+=============== ===================================================================================
+
+Rows of a patch stand together, the deepest first.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import InvalidArgument
+
+#: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch tells how the bodies overlap,
+#: and the row is the answer of `distance`: a translation that parts the bodies, and no place.
+KINDS = ("gap", "overlap", "way out")
+GAP, OVERLAP, WAY_OUT = range(3)
+
+CONTACT_DTYPE = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("apart", "f8"),
+        ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3),
+        ("a", "i4"), ("b", "i4"), ("part_a", "i4"), ("part_b", "i4"),
+        ("facet_a", "i4"), ("facet_b", "i4"), ("patch", "i4"), ("kind", "i4"),
+    ],
+    align=True,
+)
+#: Names of the fields of a row.
+FIELDS: tuple[str, ...] = CONTACT_DTYPE.names or ()
+
+
+def no_rows() -> np.ndarray:
+    return np.zeros(0, dtype=CONTACT_DTYPE)
+
+
+def turned_round(rows: np.ndarray) -> np.ndarray:
+    """The same contacts with the bodies' roles exchanged."""
+    swapped = rows.copy()
+    for one, other in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("facet_a", "facet_b")):
+        swapped[one], swapped[other] = rows[other], rows[one]
+    swapped["normal"] = 0.0 - rows["normal"]
+    return swapped
+
+
+def _middles(rows: np.ndarray) -> np.ndarray:
+    return 0.5 * rows["point_a"] + 0.5 * rows["point_b"]
+
+
+class Finished(NamedTuple):
+    """Contacts of one patch before they are rows: (k, 3) points of the world and what goes with them."""
+
+    normal: np.ndarray
+    point_a: np.ndarray
+    point_b: np.ndarray
+    distance: np.ndarray
+    error: np.ndarray
+    facets: np.ndarray
+    kind: int
+    apart: float
+
+
+def rows_of(patches: list[Finished]) -> np.ndarray:
+    """The rows of some patches, numbered in this order."""
+    out = np.zeros(sum(len(patch.distance) for patch in patches), dtype=CONTACT_DTYPE)
+    begin = 0
+    for number, patch in enumerate(patches):
+        rows = out[begin : begin + len(patch.distance)]
+        rows["normal"], rows["point_a"], rows["point_b"] = patch.normal + 0.0, patch.point_a, patch.point_b
+        rows["distance"] = patch.distance
+        rows["lower"], rows["upper"] = patch.distance - patch.error, patch.distance + patch.error
+        rows["facet_a"], rows["facet_b"] = patch.facets[:, 0], patch.facets[:, 1]
+        rows["patch"], rows["kind"], rows["apart"], rows["b"] = number, patch.kind, patch.apart, 1
+        begin += len(rows)
+    return out
+
+
+class WorldContacts:
+    """Contacts of a World: ``rows`` (CONTACT_DTYPE) sorted by (a, b), with ids of bodies; ``names`` resolves them.
+
+    Indexing by a field name gives that column.
+    """
+
+    __slots__ = ("_bodies", "rows")
+
+    def __init__(self, rows: np.ndarray, bodies: dict):
+        self.rows, self._bodies = rows, bodies
+
+    @property
+    def point(self) -> np.ndarray:
+        """(k, 3) the middles between ``point_a`` and ``point_b`` [m]."""
+        return _middles(self.rows)
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """(name of a, name of b), row by row."""
+        return [(self._bodies[int(a)].name, self._bodies[int(b)].name) for a, b in zip(self.rows["a"], self.rows["b"])]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __getitem__(self, key):
+        return self.rows[key]
+
+    def __repr__(self) -> str:
+        pairs = len(np.unique(np.stack([self.rows["a"], self.rows["b"]], axis=1), axis=0)) if len(self.rows) else 0
+        return f"WorldContacts({len(self.rows)} contacts of {pairs} pairs)"
+
+
+class Contacts:
+    """Contacts of one pair of bodies, at one pair of poses or many: the fields of `CONTACT_DTYPE` as columns.
+
+    ``rows`` is the structured array of all contacts, pose after pose; those of pose k are
+    ``rows[starts[k]:starts[k + 1]]``, and ``result[k]`` is a result of them alone. ``len(result)`` is the number of
+    contacts; that of poses is ``len(starts) − 1``. Iterating gives the rows.
+    """
+
+    __slots__ = ("rows", "starts")
+
+    def __init__(self, rows: np.ndarray, starts: np.ndarray):
+        self.rows, self.starts = rows, starts
+        for array in (rows, starts):
+            array.flags.writeable = False
+
+    def __getattr__(self, name: str):
+        if name not in FIELDS:
+            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
+        return self.rows[name]
+
+    def __dir__(self):
+        return [*super().__dir__(), *FIELDS]
+
+    @property
+    def point(self) -> np.ndarray:
+        """(k, 3) the middles between ``point_a`` and ``point_b``, where a simulator has one point a contact [m]."""
+        return _middles(self.rows)
+
+    @property
+    def patches(self) -> np.ndarray:
+        """(p,) the deepest row of every patch, pose after pose."""
+        if not len(self.rows):
+            return self.rows
+        pose = np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+        changes = (np.diff(pose, prepend=-1) != 0) | (np.diff(self.rows["patch"], prepend=-1) != 0)
+        changes |= np.diff(self.rows["part_a"], prepend=0) != 0
+        return self.rows[changes | (np.diff(self.rows["part_b"], prepend=0) != 0)]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __getitem__(self, k) -> Contacts:
+        """The contacts of pose k."""
+        poses = len(self.starts) - 1
+        if isinstance(k, bool) or not isinstance(k, (int, np.integer)):
+            raise InvalidArgument(f"contacts of a pose are named by its number, got {k!r}; rows[…] takes fields and slices")
+        if not -poses <= k < poses:
+            raise IndexError(f"there are poses 0 … {poses - 1}, not {k}" if poses else "there are no poses")
+        begin, end = self.starts[k % poses], self.starts[k % poses + 1]
+        return Contacts(self.rows[begin:end], np.array([0, end - begin]))
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{int((self.rows['kind'] == k).sum())} {name}" for k, name in enumerate(KINDS))
+        return f"Contacts({len(self.rows)} rows of {len(self.starts) - 1} poses: {kinds})"

@@ -1,0 +1,78 @@
+"""Contacts of pairs with a mesh, as rows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.manifolds.convex import against_plane
+from collide.manifolds.facets import Posed, posed
+from collide.manifolds.patches import Patch, patches_of
+from collide.manifolds.points import across
+from collide.manifolds.reduce import chosen
+from collide.manifolds.rows import GAP, OVERLAP, WAY_OUT, Finished, rows_of, turned_round
+from collide.meshes.answers import mesh_rows
+from collide.meshes.bodies import Body, body_of, is_halfspace
+from collide.shapes.base import Shape
+
+#: Points nearer than so many errors of a coordinate, or this share of the patch, are one point.
+_ERRORS, _SHARE = 64.0, 2.0**-30
+
+
+def surface_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    """Rows for single poses (4, 4). Raises UnsupportedQuery, naming the shape."""
+    if is_halfspace(A):
+        return against_plane(A, B, X_WA, X_WB, margin, most)
+    if is_halfspace(B):
+        return turned_round(against_plane(B, A, X_WB, X_WA, margin, most))
+    one, other = body_of(A), body_of(B)
+    later = other.key < one.key or (one.key == other.key and X_WA[:3].tolist() > X_WB[:3].tolist())
+    if later:
+        return turned_round(_ordered(other, one, B, A, X_WB, X_WA, margin, most))
+    return _ordered(one, other, A, B, X_WA, X_WB, margin, most)
+
+
+def _ordered(one: Body, other: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    here = posed(one, other, X_WA, X_WB)
+    patches, deep = patches_of(here, margin)
+    made = [finished(here, patch, margin, most) for patch in patches]
+    if deep:
+        made.append(_way_out(A, B, X_WA, X_WB))
+    rows = rows_of([patch for patch in made if len(patch.distance)])
+    last = rows["kind"] == WAY_OUT
+    rows["upper"][last] = 0.0  # how much shorter another way might be is not known
+    return rows
+
+
+def finished(here: Posed, patch: Patch, margin: float, most: int) -> Finished:
+    """A few of the patch's points, radii added, in the world."""
+    n, points = patch.normal, patch.points
+    radius = here.A.radius + here.B.radius
+    points = points.take((points.gap - radius <= margin + points.error) | (points.gap == points.gap.min(initial=np.inf)))
+    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
+    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
+    tolerance = max(_ERRORS * here.error, _SHARE * size)
+    kept = points.take(chosen(flat, points.gap, points.error, most, tolerance))
+    distance = kept.gap - radius
+    facets = patch.facets[np.searchsorted(patch.points.pair, kept.pair)] if len(patch.facets) == 1 else _facets(patch, kept)
+    kind = OVERLAP if patch.meets else GAP
+    error = kept.error + 8.0 * here.error * (radius > 0.0)
+    if patch.meets:  # what touches is no gap, though it may come out as one
+        distance = np.where((distance > 0.0) & (distance <= error), 0.0, distance)
+    middle = 0.5 * (kept.a + kept.b) + 0.5 * (here.A.radius - here.B.radius) * n + here.X_WA[:3, 3]
+    half = 0.5 * distance[:, None] * n
+    return Finished(n, middle - half, middle + half, distance, error, facets, kind, patch.apart)
+
+
+def _facets(patch: Patch, kept) -> np.ndarray:
+    by_pair = dict(zip(patch.points.pair.tolist(), patch.facets.tolist()))
+    return np.array([by_pair[k] for k in kept.pair.tolist()]).reshape(-1, 2)
+
+
+def _way_out(A: Shape, B: Shape, X_WA, X_WB) -> Finished:
+    row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0]
+    facets = np.array([[row["part_a"], row["part_b"]]])
+    distance = np.array([row["distance"]])
+    return Finished(
+        row["normal"], row["point_a"][None], row["point_b"][None], distance, distance - row["lower"], facets, WAY_OUT,
+        -float(row["lower"]),
+    )  # fmt: skip
