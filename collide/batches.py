@@ -98,21 +98,50 @@ def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool,
         raise AssertionError("a pose that is none")
     _refuse_poses(X_WA, X_WB, check)
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
-        if rows.dtype == bool:
-            return rows
-    else:
-        sides = ([S] * n if isinstance(S, Shape) else S for S in (A, B))
-        asked = zip(*sides, X_WA[:, None], X_WB[:, None])
-        rows = np.zeros(n, dtype=PAIR_DTYPE)
-        for k, pair in enumerate(asked):
-            answer = _parts(*pair, boolean=boolean, limit=limit, depths=depths)
-            if answer.dtype == bool:
-                rows["hit"][k] = answer[0]
-            else:
-                rows[k : k + 1] = answer
-    return rows["hit"] if boolean else rows
+    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+        return _pair_by_pair(A, B, X_WA, X_WB, boolean, limit, depths)
+    rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
+    return rows["hit"] if boolean and rows.dtype != bool else rows
+
+
+def _pair_by_pair(A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -> np.ndarray:
+    """The same for shapes that differ from pose to pose, poses (n, 4, 4): each distinct pair of them is one batch."""
+    n = len(X_WA)
+    (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
+    out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
+    plain_a, plain_b = (np.array([is_plain(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
+    keys = which_a * len(shapes_b) + which_b
+    if not run.distrust_doubles:
+        plain = plain_a[which_a] & plain_b[which_b]
+        some = np.flatnonzero(plain)
+        if len(some):
+            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
+            out[some] = _answers(*sides, X_WA[some], X_WB[some], len(some), boolean, limit, False, None, depths)
+        keys[plain] = -1
+    for key in np.unique(keys[keys >= 0]).tolist():
+        some = np.flatnonzero(keys == key)
+        one, other = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
+        rows = _parts(one, other, X_WA[some], X_WB[some], boolean=boolean, limit=limit, depths=depths)
+        out[some] = rows["hit"] if boolean and rows.dtype != bool else rows
+    return out
+
+
+def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
+    """(distinct shapes, (n,) which of them stands at each pose)."""
+    if isinstance(side, Shape):
+        return [side], np.zeros(n, dtype=np.int64)
+    if isinstance(side, Picked):
+        used, which = np.unique(side.rows, return_inverse=True)
+        return [side.shape_set.shapes[k] for k in used.tolist()], which.ravel()
+    numbers: dict[int, int] = {}
+    shapes: list[Shape] = []
+    which = np.empty(n, dtype=np.int64)
+    for k, shape in enumerate(side):
+        if id(shape) not in numbers:  # held by the caller as long as this dictionary lives
+            numbers[id(shape)] = len(shapes)
+            shapes.append(shape)
+        which[k] = numbers[id(shape)]
+    return shapes, which
 
 
 def _any_meshed(side) -> bool:
@@ -155,9 +184,9 @@ def _parts(
 ) -> np.ndarray:
     """One row a pose: every part of A against every part of B, combined. Of meshes, booleans come as bool[n]."""
     if A.meshed or B.meshed:
-        from collide.meshes.answers import mesh_hits, mesh_rows
+        from collide.meshes.pair_queries import pair_hits, pair_rows
 
-        return mesh_hits(A, B, X_WA, X_WB) if boolean else mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
+        return pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
     parts_a, parts_b = A.parts(), B.parts()
     parts = [*parts_a, *parts_b]
     n, many = len(X_WA), len(parts_a) * len(parts_b)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.broadphase.box_tree import BoxTree
-from collide.geometry.boxes import bounding_boxes
+from collide.geometry.boxes import boxes_of
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
-from collide.results import EXACT, PAIR_DTYPE
+from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.unions import Union, combine
 
 
@@ -45,7 +44,7 @@ class PackedWorld:
         """Take new poses (n, 4, 4) of all bodies, and refit the tree."""
         self._X_WBs = X_WBs
         self._poses = pose_table(X_WBs[self._body_of], self._X_BP, self._reach)
-        self._part_boxes = self._boxes_of(self._table, self._poses.rows, self._shape_of)
+        self._part_boxes = boxes_of(self._table, self._poses.rows, self._shape_of)
         if len(X_WBs):
             starts = self._first[:-1]
             low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
@@ -54,15 +53,6 @@ class PackedWorld:
                 self._tree = BoxTree(boxes)
             else:
                 self._tree.refit(boxes)
-
-    @staticmethod
-    def _boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
-        boxes = np.empty((len(poses), 6))
-        bounding_boxes(
-            address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of), len(poses),
-            address_of(boxes),
-        )  # fmt: skip
-        return boxes
 
     def candidates(self, margin: float) -> np.ndarray:
         """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin."""
@@ -76,9 +66,9 @@ class PackedWorld:
         return pairs[self._keys[at] != keys]
 
     def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
-        """(rows, convex pairs answered, body pairs answered); fields a and b are positions."""
+        """(rows, convex pairs answered, body pairs answered, of them with a mesh); fields a and b are positions."""
         if not self._meshed.any():
-            return self._convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
+            return *self._convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit), 0
         meshed = self._meshed[candidates].any(axis=1)
         rows, convex_pairs, answered = self._convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
         found = []
@@ -87,23 +77,25 @@ class PackedWorld:
             if stop_at_hit and found[-1]["hit"]:
                 break
         rows = np.concatenate([rows, *found])
-        return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found)
+        return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found), len(found)
 
     def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
-        from collide.meshes.answers import mesh_rows
-        from collide.meshes.single import one_hit
+        from collide.meshes.curved import APART, OPEN
+        from collide.meshes.pair_queries import pair_rows
+        from collide.meshes.single import one_state
 
         A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
         if boolean:
             row = np.zeros(1, dtype=PAIR_DTYPE)
-            row["hit"], row["how"] = one_hit(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b), EXACT
+            state = one_state(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b)
+            row["hit"], row["how"] = state != APART, UNDECIDED if state == OPEN else EXACT
         else:
-            row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=limit)
+            row = pair_rows(A, B, X_WA[None], X_WB[None], limit=limit)
         row["a"], row["b"] = a, b
         return row
 
     def _convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
-        """What `answer` gives, of bodies made of convex parts."""
+        """(rows, convex pairs answered, body pairs answered) of bodies made of convex parts."""
         pairs, owner = self._part_pairs(candidates, limit)
         rows = run_pairs(
             self._table, self._poses, self._shape_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
@@ -156,17 +148,17 @@ class PackedWorld:
         packed = [part for part, _ in own]
         reach = np.array([part.reach for part in packed])
         poses = pose_table(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
-        boxes = self._boxes_of(ShapeTable(packed), poses.rows, np.arange(len(own)))
+        boxes = boxes_of(ShapeTable(packed), poses.rows, np.arange(len(own)))
         box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
         bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
-        from collide.meshes.answers import mesh_rows
+        from collide.meshes.pair_queries import pair_rows
 
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
         for b in bodies[meshed].tolist():
-            rows.append(mesh_rows(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit=limit))
+            rows.append(pair_rows(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit=limit))
             rows[-1]["b"] = b
         found = np.concatenate(rows)
         return found[np.argsort(found["b"], kind="stable")]

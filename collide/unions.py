@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from collide.geometry.packing import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
+from collide.geometry.extents import extent_of_row
+from collide.geometry.packing import HALFSPACE, POINTS, PackedConvex
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.results import PAIR_DTYPE
 
@@ -30,28 +31,10 @@ class Union:
         """(support value of the whole body along unit n, its error), both in the world."""
         value, size = -math.inf, 0.0
         for packed, row in zip(self.packed, self.poses):
-            value = max(value, _extent(packed, row, n))
+            value = max(value, extent_of_row(packed, row, n))
             size = max(size, 2 * packed.reach + packed.radius + float(np.abs(row[9:12]).sum()))
         slop = max(p.slop for p in self.packed) + float(self.poses[:, 12].max())
         return value, ERROR * size + slop
-
-
-def _extent(packed: PackedConvex, row: np.ndarray, n: np.ndarray) -> float:
-    R, t = row[:9].reshape(3, 3), row[9:12]
-    g = R.T @ n
-    p = packed.params
-    if packed.kind == POINTS:
-        core = float((packed.points @ g).max())
-    elif packed.kind == ELLIPSOID:
-        core = float(np.linalg.norm(p[:3] * g))
-    elif packed.kind == CYLINDER:
-        core = p[0] * math.hypot(g[0], g[1]) + p[1] * abs(g[2])
-    elif packed.kind == CONE:
-        core = max(p[1] * g[2], p[0] * math.hypot(g[0], g[1]) - p[1] * g[2])
-    else:
-        assert packed.kind == HALFSPACE
-        return math.inf  # bounded in one direction only, which a rounded normal never is
-    return core + float(t @ n) + packed.radius
 
 
 def combine(rows: np.ndarray, starts: np.ndarray, plural: np.ndarray, sides) -> np.ndarray:

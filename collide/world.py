@@ -244,7 +244,7 @@ class World:
         """What the last collides, collisions or distances tested, culled, skipped, decided and took.
 
         bodies, static, pairs (of all bodies), skipped {reason: pairs}, narrowphase (pairs of bodies
-        answered), convex_pairs (of their parts), hits, undecided, how {argument: pairs},
+        answered), convex_pairs (of their parts), mesh_pairs (of bodies, one a mesh or with one), hits, undecided, how {argument: pairs},
         gjk_iterations, epa_iterations, seconds {compile, pack, broadphase, narrowphase}.
         """
         return self._stats
@@ -256,14 +256,14 @@ class World:
         ready = time.perf_counter()
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
-        rows, convex_pairs, answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        rows, *answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
         ended = time.perf_counter()
         compiled = sum(_jit.seconds.values()) - compiling
         seconds = {
             "compile": compiled, "pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled,
         }  # fmt: skip
         self._take_compilation_out(seconds, compiled)
-        self._stats = self._summary(packed, candidates, rows, convex_pairs, answered, seconds)
+        self._stats = self._summary(packed, candidates, rows, answered, seconds)
         ids = np.array(list(self._bodies), dtype=np.int32)
         rows["a"], rows["b"] = ids[rows["a"]], ids[rows["b"]]
         return rows, packed
@@ -276,7 +276,7 @@ class World:
             seconds[stage] -= own
             compiled -= own
 
-    def _summary(self, packed, candidates, rows, convex_pairs: int, answered: int, seconds: dict) -> dict:
+    def _summary(self, packed, candidates, rows, answered: list[int], seconds: dict) -> dict:
         n = len(self._bodies)
         skipped = count_skipped(packed.static, packed.group, packed.mask, packed.allowed)
         pairs = n * (n - 1) // 2
@@ -284,7 +284,7 @@ class World:
         iterations = rows["iterations"]
         return {
             "bodies": n, "static": int(packed.static.sum()), "pairs": pairs, "skipped": skipped,
-            "narrowphase": answered, "convex_pairs": convex_pairs, "hits": int(rows["hit"].sum()),
+            "narrowphase": answered[1], "convex_pairs": answered[0], "mesh_pairs": answered[2], "hits": int(rows["hit"].sum()),
             "undecided": int((rows["how"] == UNDECIDED).sum()),
             "how": dict(Counter(HOW[how] for how in rows["how"])),
             "gjk_iterations": int((iterations & 0xFFFF).sum()), "epa_iterations": int((iterations >> 16).sum()),

@@ -40,3 +40,10 @@ with tempfile.TemporaryDirectory() as folder:
     ring.save(Path(folder) / "ring.npz")
     again = collide.Mesh.load(Path(folder) / "ring.npz")
 print("tree kept:", again == ring and np.array_equal(again.tree.nodes, ring.tree.nodes))
+
+# Round pegs, and bodies made of several parts with meshes among them: here a ring on a stem, put over a peg.
+hook = collide.Compound([(ring, np.eye(4)), (collide.Box((0.02, 0.02, 0.3)), collide.pose((0.1, 0, 0.17)))])
+peg = collide.Cylinder(0.06, 0.4)
+free = collide.distance(hook, peg, np.eye(4), collide.pose((0.0, 0, -0.1)))
+print(f"the peg clears part {free.part_a} of the hook by {free.distance * 1e3:.3f} mm")
+print("turned by 30°, it hits:", collide.collide(hook, peg, np.eye(4), collide.pose((0, 0, 0), rpy=(np.pi / 6, 0, 0))))

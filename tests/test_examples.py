@@ -26,7 +26,7 @@ SHOWS = {
     "05_scene_file_to_report": ["COLLIDING", "HOW EACH ANSWER IS KNOWN", "as data: 1 collision"],
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
     "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
-    "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True"],
+    "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True", "clears part 0"],
     "09_rays_and_overlays": ["shared area 1.000000000000000", "beside it: [True, True, False]", "inside: [True, True, False]", "itself: False True"],
     "10_contacts": ["proven free", "a ball 1.00 mm above", "jaw 1 pushes along [-1.  0.  0.], 4 points", "box and ball"],
 }

@@ -4,10 +4,26 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i64
+import numpy as np
+
+from collide._jit import address_of, entry, kernel, view_f64, view_i64
 from collide.geometry.packing import HALFSPACE
 from collide.geometry.supports import settled_vertex, support
-from collide.geometry.tables import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, REACH, SLOP, TREE
+from collide.geometry.tables import (
+    ADDRESS,
+    COUNT,
+    INTS,
+    KIND,
+    NUMBERS,
+    PADDED,
+    PARAMS,
+    POSE,
+    RADIUS,
+    REACH,
+    SLOP,
+    TREE,
+    ShapeTable,
+)
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
 #: derivation in `narrowphase/bounds.py` needs fewer.
@@ -70,3 +86,13 @@ def bounding_boxes(ints_at, numbers_at, poses_at, shape_of_at, n, boxes_at):
                 low, high = _bound(ints, numbers, poses, coordinates, s, k, axis)
                 boxes[6 * k + axis] = low
                 boxes[6 * k + 3 + axis] = high
+
+
+def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
+    """(n, 6) world boxes of n parts: part k is row ``shape_of[k]`` of the table at row k of ``poses`` (n, POSE)."""
+    boxes = np.empty((len(poses), 6))
+    bounding_boxes(
+        address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of), len(poses),
+        address_of(boxes),
+    )  # fmt: skip
+    return boxes

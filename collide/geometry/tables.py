@@ -124,6 +124,38 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     return PoseTable(rows, np.ascontiguousarray(terms[exact]))
 
 
+def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(poses (n, 4, 4) of a part in the world, (n,) how far rounding may have moved its points [m]).
+
+    X_WB : (n, 4, 4) body poses.   X_BP : (4, 4) the part's pose in it.   reach : (n,) of its points from the part's
+    origin. The products are those of `pose_table`; 0 where they are exact, shifts and right angles among them.
+    """
+    out = np.zeros_like(X_WB)
+    out[:, 3, 3] = 1.0
+    if np.array_equal(X_BP, np.eye(4)):
+        return X_WB, np.zeros(len(X_WB))
+    exact = np.ones(len(X_WB), dtype=bool)
+    for j in range(4):
+        total = np.zeros((len(X_WB), 3))
+        for k in range(4 if j == 3 else 3):
+            if k == 3:
+                high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
+            else:
+                left, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
+                high, low = _two_products(left, factor)
+                exact &= ((np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
+            sum_, other = total + high, total
+            back = sum_ - other
+            lost = (other - (sum_ - back)) + (high - back)
+            exact &= ((low == 0.0) & (lost == 0.0)).all(axis=1)
+            total = sum_
+        out[:, :3, j] = total
+    stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
+    parts = reach + np.abs(X_BP[:3, 3]).sum()
+    slop = _PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
+    return out, np.where(exact, 0.0, slop)
+
+
 def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return A[:, :, 0:1] * B[:, 0:1, :] + A[:, :, 1:2] * B[:, 1:2, :] + A[:, :, 2:3] * B[:, 2:3, :]
 

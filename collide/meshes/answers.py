@@ -13,8 +13,11 @@ import numpy as np
 
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.bodies import Body, body_of, hull_of, is_halfspace
-from collide.meshes.hits import core_hits, hits, swept_apart
+from collide.meshes.bodies import Body, body_of, has_facets, hull_of, is_halfspace
+from collide.meshes.curved import APART, curved_rows, decide
+from collide.meshes.enclosures import enclosure_of
+from collide.meshes.facet_rows import Posed
+from collide.meshes.hits import apart_nearby, core_hits, hits, swept_apart
 from collide.meshes.way_out import way_out
 from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
@@ -29,7 +32,11 @@ PROMISE = 2.0**-43
 def mesh_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """(n,) bool for poses (n, 4, 4): whether two shapes, a mesh among them, share a point. Raises UnsupportedQuery."""
     if is_halfspace(A) or is_halfspace(B):
-        return ask(_hull(A), _hull(B), X_WA, X_WB, True, 0.0, False, 1)
+        return ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1)
+    if not has_facets(A):
+        return mesh_hits(B, A, X_WB, X_WA)
+    if not has_facets(B):
+        return decide(body_of(A), enclosure_of(B), given(X_WA), given(X_WB)).state != APART
     one, other = body_of(A), body_of(B)
     return hits(one, other, X_WA, X_WB) if one.key <= other.key else hits(other, one, X_WB, X_WA)
 
@@ -40,9 +47,13 @@ def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = Tr
     limit, depths : as in `distance`.
     """
     if is_halfspace(A) or is_halfspace(B):
-        rows = ask(_hull(A), _hull(B), X_WA, X_WB, False, limit, False, 1, depths=depths)
+        rows = ask(hull_shape(A), hull_shape(B), X_WA, X_WB, False, limit, False, 1, depths=depths)
         rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hull, not of the mesh
         return rows
+    if not has_facets(A):
+        return flipped(mesh_rows(B, A, X_WB, X_WA, limit=limit, depths=depths))
+    if not has_facets(B):
+        return curved_rows(body_of(A), enclosure_of(B), given(X_WA), given(X_WB), limit=limit, depths=depths)
     rows = _ordered(body_of(A), body_of(B), X_WA, X_WB, limit, depths)
     out = np.zeros(len(rows), dtype=PAIR_DTYPE)
     for name in FIELDS:  # padding stays 0: equal answers are equal bytes
@@ -64,7 +75,18 @@ def _ordered(one: Body, other: Body, X_WA, X_WB, limit: float, depths: bool) -> 
     return _rows(one, other, X_WA, X_WB, limit, depths)
 
 
-def _hull(shape: Shape) -> Shape:
+def facet_rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of two bodies of facets, without depths."""
+    return _ordered(body_of(A), body_of(B), X_WA, X_WB, math.inf, False)
+
+
+def given(X: np.ndarray) -> Posed:
+    """Poses as they were given."""
+    return Posed(X, np.zeros(len(X)))
+
+
+def hull_shape(shape: Shape) -> Shape:
+    """The hull of a mesh, any other shape itself."""
     return hull_of(body_of(shape)) if shape.meshed else shape
 
 
@@ -77,6 +99,9 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
     out_of_sight = math.nextafter(math.nextafter(limit, math.inf) + radius, math.inf)
     found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], out_of_sight)
     apart, sure = swept_apart(A, B, found)
+    if not sure.all():
+        apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
+        sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
     if limit > _FAR * min(A.reach, B.reach):
         for k in left[found.facets[:, 0] < 0].tolist():

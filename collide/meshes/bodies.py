@@ -1,7 +1,7 @@
 """Shapes as meshes meet them: facets under a box-tree, a ball swept over them, and whether there is an inside.
 
 A convex polytope is the surface of its hull and what is inside; a sphere is one facet without area and a radius, a
-capsule a segment and one. A cylinder, cone or ellipsoid has no facets and is refused by name.
+capsule a segment and one. A cylinder, cone or ellipsoid has no facets: see `enclosures.py`.
 """
 
 from __future__ import annotations
@@ -48,8 +48,16 @@ def is_halfspace(shape: Shape) -> bool:
     return not shape.meshed and is_plain(shape) and shape.parts()[0][0].kind == HALFSPACE
 
 
+def has_facets(shape: Shape) -> bool:
+    """Whether a mesh, or a convex set whose surface is that of a hull of doubles, and a radius: `body_of` serves it."""
+    if isinstance(shape, Mesh):
+        return True
+    packed = shape.parts()[0][0]
+    return packed.kind == POINTS and packed.slop == 0.0
+
+
 def body_of(shape: Shape) -> Body:
-    """The body of a shape, made when first asked for and kept with it. Raises UnsupportedQuery, naming the shape."""
+    """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with it."""
     try:
         return shape._surface
     except AttributeError:
@@ -87,7 +95,7 @@ def hull_of(body: Body) -> Shape:
 
 
 def _of_mesh(mesh: Mesh) -> Body:
-    return _made(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)], [])
+    return made_body(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)], [])
 
 
 def _one_of_each_part(mesh: Mesh) -> np.ndarray:
@@ -104,23 +112,10 @@ def _one_of_each_part(mesh: Mesh) -> np.ndarray:
 
 
 def _of_convex(shape: Shape) -> Body:
-    name = type(shape).__name__
-    parts = shape.parts()
-    if len(parts) != 1 or not is_plain(shape):
-        raise UnsupportedQuery(f"{name} against Mesh: unions are not answered yet; ask for each of their parts")
-    packed = parts[0][0]
-    if packed.kind != POINTS:
-        raise UnsupportedQuery(
-            f"{name} against Mesh is not answered yet: its surface is curved. A ConvexHull around it, or a Mesh, can stand in"
-        )
-    if packed.slop > 0.0:
-        raise UnsupportedQuery(
-            f"{name} against Mesh: its corners are not doubles, and what is rounded proves nothing; "
-            "ConvexHull(shape.vertices) is answered"
-        )
+    packed = shape.parts()[0][0]
     hull = convex_hull(packed.points)
     tree = build_mesh_tree(packed.points, _facets(packed.points, hull))
-    return _made(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])
+    return made_body(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])
 
 
 def _facets(points: np.ndarray, hull) -> np.ndarray:
@@ -132,7 +127,8 @@ def _facets(points: np.ndarray, hull) -> np.ndarray:
     return np.array([[order[0], order[-1], order[-1]]])
 
 
-def _made(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray, hull: list[Shape]) -> Body:
+def made_body(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray, hull: list[Shape]) -> Body:
+    """A body over the facets of a tree; parameters as of `Body`."""
     corners = tree.triangles.reshape(-1, 3)
     reach = float(np.sqrt(np.square(corners - tree.centre).sum(axis=1).max())) * (1 + 1e-12)
     return Body(shape, tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach, hull)

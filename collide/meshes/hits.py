@@ -95,5 +95,15 @@ def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     left = np.flatnonzero(~answer)
     if radius > 0.0 and len(left):
         found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], radius * FARTHER)
-        answer[left] = ~swept_apart(A, B, found)[0]
+        apart, sure = swept_apart(A, B, found)
+        if not sure.all():
+            more = surface_distances(A.tree, B.tree, X_WA[left[~sure]], X_WB[left[~sure]])
+            apart[~sure] = swept_apart(A, B, more)[0]
+        answer[left] = ~apart
     return answer
+
+
+def apart_nearby(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: which swept bodies a search no farther than their radii proves apart: a bracket may be too wide to."""
+    radius = A.radius + B.radius
+    return swept_apart(A, B, surface_distances(A.tree, B.tree, X_WA, X_WB, radius * FARTHER))[0]

@@ -7,8 +7,11 @@ import math
 import numpy as np
 
 from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.answers import PROMISE, mesh_hits
-from collide.meshes.bodies import Body, body_of, is_halfspace
+from collide.meshes.answers import PROMISE
+from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
+from collide.meshes.curved import APART, HIT
+from collide.meshes.pair_queries import pair_states
+from collide.meshes.union_parts import is_union
 from collide.narrowphase import run
 from collide.narrowphase.triangles.distances import (
     DISTANCE,
@@ -81,11 +84,12 @@ _NONE = (-1, -1, -1, -1)
 
 
 def single_pair(A: Shape, B: Shape) -> PreparedPair | None:
-    """The pair, or None where single calls are answered as batches of one: half-spaces, very many parts.
+    """The pair, or None where single calls are answered as batches of one: unions, half-spaces, curved shapes, very
+    many parts.
 
     It holds trees and points, not the shapes. Raises UnsupportedQuery.
     """
-    if is_halfspace(A) or is_halfspace(B):
+    if is_union(A) or is_union(B) or is_halfspace(A) or is_halfspace(B) or not (has_facets(A) and has_facets(B)):
         return None
     one, other = body_of(A), body_of(B)
     exchanged = other.key < one.key
@@ -95,13 +99,13 @@ def single_pair(A: Shape, B: Shape) -> PreparedPair | None:
     return PreparedPair(one, other, sides, exchanged) if SingleMeshPair.serves(*sides) else None
 
 
-def one_hit(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, kept: dict[int, PreparedPair | None], key: int) -> bool:
-    """Whether two shapes hit at one pair of checked poses (4, 4). kept : pairs made ready, by numbers of the caller's."""
+def one_state(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, kept: dict[int, PreparedPair | None], key: int) -> int:
+    """APART, HIT or OPEN at one pair of checked poses (4, 4). kept : pairs made ready, by numbers of the caller's."""
     if key not in kept:
         kept[key] = single_pair(A, B) if run.single_calls_are_safe() else None
     pair = kept[key]
     said = pair.collide(pair.address, id(X_WA), id(X_WB)) if pair is not None else -1
-    return bool(mesh_hits(A, B, X_WA[None], X_WB[None])[0] if said < 0 else said)
+    return int(pair_states(A, B, X_WA[None], X_WB[None])[0]) if said < 0 else HIT if said else APART
 
 
 def _side(body: Body) -> Side:

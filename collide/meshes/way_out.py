@@ -7,6 +7,9 @@ bodies, too: that is the longest answer given.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from collide.meshes.bodies import Body
@@ -22,23 +25,47 @@ _BETWEEN, _ROUNDS = 16, 3
 _FACETS = 3
 _UP = 1 + 2.0**-48
 
+#: (A, B, poses of A, poses of B) → (n,) bool, False only where they are proven apart.
+Meets = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
 
-def way_out(A: Body, B: Body, X_WA, X_WB, hull_row, more: list[np.ndarray]) -> tuple[float, float, np.ndarray]:
-    """(length, the same rounded upwards, unit direction) of a translation of B that parts it from A.
 
-    X_WA, X_WB : (4, 4).   hull_row : the hulls' answer.   more : translations (3,) to be tried first.
+class Parting(NamedTuple):
+    """A translation of B that parts it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
+
+    length: float
+    bound: float
+    normal: np.ndarray
+
+
+def way_out(A: Body, B: Body, X_WA, X_WB, hull_row, more: list[np.ndarray], meets: Meets | None = None) -> Parting:
+    """A translation that parts two bodies that meet, at poses (4, 4).
+
+    hull_row : the hulls' answer.   more : translations (3,) to be tried first.   meets : what tells whether bodies
+    meet, as `hits` does, where these are not the bodies themselves.
     """
     best, bound, normal = -float(hull_row["distance"]), -float(hull_row["lower"]), hull_row["normal"].copy()
-    best, bound = max(best, 0.0), max(bound, 0.0)
-    if bound == 0.0:
-        return best, bound, normal
-    tried = [(t, *_length(t)) for t in _parting(A, B, X_WA, X_WB, np.array(more).reshape(-1, 3))]
-    directions = _directions(A, B, X_WA, X_WB, [normal, *more])
+    known = Parting(max(best, 0.0), max(bound, 0.0), normal)
+    if known.bound == 0.0:
+        return known
+    told = hits if meets is None else meets
+    return shortened(
+        lambda X, Y: told(A, B, X, Y), X_WA, X_WB, known, _directions(A, B, X_WA, X_WB, [normal, *more]), more
+    )
+
+
+def shortened(meet: Callable, X_WA, X_WB, known: Parting, directions: np.ndarray, more: list[np.ndarray]) -> Parting:
+    """The shortest translation found that parts two bodies, at most as long as one that is known to.
+
+    meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit
+    vectors that are tried.   more : translations (3,) to be tried first.
+    """
+    best, bound, normal = known
+    tried = [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, np.array(more).reshape(-1, 3))]
     top = bound
     for _ in range(_AGAIN):
         ladder = top * 2.0 ** -np.arange(1, _HALVINGS + 1)
         steps = (directions[:, None] * ladder[None, :, None]).reshape(-1, 3)
-        tried += [(t, *_length(t)) for t in _parting(A, B, X_WA, X_WB, steps)]
+        tried += [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, steps)]
         shortest = min(tried, key=lambda one: one[1], default=None)
         if shortest is not None and shortest[1] < best:
             best, bound, normal = shortest[1], shortest[2], shortest[0] / shortest[1]
@@ -48,23 +75,23 @@ def way_out(A: Body, B: Body, X_WA, X_WB, hull_row, more: list[np.ndarray]) -> t
     low = 0.5 * best
     for _ in range(_ROUNDS):
         lengths = low + (best - low) * np.arange(1, _BETWEEN) / _BETWEEN
-        found = _parting(A, B, X_WA, X_WB, normal * lengths[:, None])
+        found = _parting(meet, X_WA, X_WB, normal * lengths[:, None])
         step = (best - low) / _BETWEEN
         if len(found):
             value, upwards = min(map(_length, found))
             if value < best:
                 best, bound = value, upwards
         low = max(low, best - step)
-    return best, bound, normal
+    return Parting(best, bound, normal)
 
 
-def _parting(A: Body, B: Body, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
+def _parting(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
     """(k, 3): those of the translations (n, 3) that part the bodies, as the poses they lead to really move them."""
     if not len(steps):
         return np.zeros((0, 3))
     moved = np.repeat(X_WB[None], len(steps), axis=0)
     moved[:, :3, 3] += steps
-    free = ~hits(A, B, np.repeat(X_WA[None], len(steps), axis=0), moved)
+    free = ~meet(np.repeat(X_WA[None], len(steps), axis=0), moved)
     return (moved[:, :3, 3] - X_WB[:3, 3])[free]
 
 

@@ -18,7 +18,7 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_parts", "_prepared", "_serial", "_surface", "_topology", "_walk")
+    __slots__ = ("__weakref__", "_bounds", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -26,10 +26,14 @@ class Shape:
     _serial: int
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`walks.py`).
     _walk: Any
-    #: The shape as meshes meet it: facets under a tree, and a radius (`meshes/bodies.py`).
+    #: The shape as meshes meet it: facets under a tree, and a radius (`meshes/bodies.py`), or two polytopes.
     _surface: Any
     #: Which facets of that share corners, for contacts (`manifolds/facets.py`).
     _topology: Any
+    #: Its parts, as unions with meshes ask about them (`meshes/union_parts.py`).
+    _union: Any
+    #: What `bounding_parts` gives, where that is not `parts`.
+    _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True

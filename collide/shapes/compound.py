@@ -19,7 +19,7 @@ class Compound(Shape):
     """The union of shapes, each at its own pose.
 
     items : sequence of ``(shape, X_CS)``: a shape S and its (4, 4) pose in the compound's frame C.
-        Compounds may be nested.
+        Compounds may be nested, and meshes among the shapes.
 
     Nested poses are multiplied out in float64; the rounding is accounted for in every bracket.
     """
@@ -40,7 +40,12 @@ class Compound(Shape):
     @property
     def convex(self) -> bool:  # type: ignore[override]
         """True for a compound of one convex shape."""
-        return len(self.parts()) == 1
+        return not self.meshed and len(self.parts()) == 1
+
+    @property
+    def meshed(self) -> bool:  # type: ignore[override]
+        """Whether a mesh is among the items, however deep."""
+        return any(shape.meshed for shape, _ in self.items)
 
     def __repr__(self) -> str:
         return f"Compound(<{len(self.items)} items>)"
@@ -52,6 +57,14 @@ class Compound(Shape):
         return tuple(
             _placed(packed, X_CS, X_SP) for shape, X_CS in self.items for packed, X_SP in shape.parts()
         )
+
+    def bounding_parts(self):
+        if not self.meshed:
+            return self.parts()
+        if not hasattr(self, "_bounds"):
+            placed = ((packed, X_CS, X_SP) for shape, X_CS in self.items for packed, X_SP in shape.bounding_parts())
+            self._store(_bounds=tuple(_placed(*part) for part in placed))
+        return self._bounds
 
 
 def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:

@@ -195,9 +195,32 @@ class Mesh(Shape):
         )
 
     def bounding_parts(self):
-        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
-        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
-        return alone(pack_points(np.where(corners, high, low)))
+        if not hasattr(self, "_bounds"):
+            used = np.zeros(len(self.vertices), dtype=bool)
+            used[self.faces] = True
+            self._store(_bounds=alone(pack_points(_around(self.vertices[used]))))
+        return self._bounds
+
+
+#: Points that are their own bounds; of more, boxes of so many cells along each axis hold them.
+_FEW, _CELLS = 512, 6
+
+
+def _around(points: np.ndarray) -> np.ndarray:
+    """Points (k, 3) whose hull holds the ones given, and is not much larger: few, or corners of boxes around groups."""
+    if len(points) <= _FEW:
+        return points
+    low, high = points.min(axis=0), points.max(axis=0)
+    with np.errstate(under="ignore"):
+        share = 0.5 * points - 0.5 * low, 0.5 * high - 0.5 * low
+    cell = np.minimum(share[0] / np.where(share[1] > 0.0, share[1], 1.0) * _CELLS, _CELLS - 1).astype(np.int64)
+    numbers = (cell[:, 0] * _CELLS + cell[:, 1]) * _CELLS + cell[:, 2]
+    order = np.argsort(numbers, kind="stable")
+    starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+    lows = np.minimum.reduceat(points[order], starts)[:, None]
+    highs = np.maximum.reduceat(points[order], starts)[:, None]
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
+    return np.unique(np.where(corners, highs, lows).reshape(-1, 3), axis=0)
 
 
 #: Changes whenever files written before would be read wrongly.

@@ -59,10 +59,10 @@ class ShapeSet:
 
     @cached_property
     def table(self) -> ShapeTable:
-        """What kernels read, a row a shape; of a union its first part, which nobody asks for."""
+        """What kernels read, a row a shape; of a union its first part and of a mesh its box, which nobody asks for."""
         from collide.geometry.tables import ShapeTable
 
-        return ShapeTable([shape.parts()[0][0] for shape in self.shapes])
+        return ShapeTable([shape.bounding_parts()[0][0] for shape in self.shapes])
 
 
 class Picked(Sequence):

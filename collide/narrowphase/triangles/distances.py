@@ -84,7 +84,7 @@ def _prepare(header_a, numbers_a, XA, header_b, numbers_b, XB, placing, near):
     near[_SCALE] = math.ldexp(1.0, int(header_a[EXPONENT]))
     size = 0.0
     for i in range(3):
-        terms = abs(XA[4 * i + 3]) + abs(XB[4 * i + 3])
+        terms = abs(XB[4 * i + 3] - XA[4 * i + 3])
         for j in range(3):
             terms += abs(XA[4 * i + j]) * numbers_a[REACH + j] + abs(XB[4 * i + j]) * numbers_b[REACH + j]
         size = max(size, terms)
@@ -157,7 +157,7 @@ def _set_direction(x, y, z, header_a, numbers_a, XA, header_b, numbers_b, XB, ne
         d = near[_DIRECTION + i]
         shift = XB[4 * i + 3] - XA[4 * i + 3]
         offset += d * shift
-        terms += abs(XB[4 * i + 3]) + abs(XA[4 * i + 3])
+        terms += abs(shift)
     for j in range(3):
         along_a = 0.0
         along_b = 0.0
