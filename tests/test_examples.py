@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 #: The package that an example cannot do without, beyond the engine.
-NEEDS = {"06_compare_with_fcl": "fcl"}
+NEEDS = {"06_compare_with_fcl": "fcl", "09_meshes_in_scenes": "trimesh"}
 #: What each example's output must hold.
 SHOWS = {
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
@@ -27,6 +27,9 @@ SHOWS = {
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
     "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
     "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True"],
+    "09_meshes_in_scenes": [
+        "as it is: [('bracket', 'chip')]", "open edges: facets", "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
+    ],
 }
 
 

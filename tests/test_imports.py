@@ -40,7 +40,7 @@ ROOMS = {
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "meshes": {"errors", "geometry", "shapes", "narrowphase", "results", "batches"},
-    "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
+    "packed_world": {"_jit", "errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "cache_folder", ""},
