@@ -18,7 +18,7 @@ from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from typing import NoReturn
 
-from collide.errors import CollideError, InvalidArgument
+from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.units import UNITS, count, parse_length
 
 _STARTED = time.perf_counter()
@@ -148,7 +148,12 @@ def _check(args) -> int:
         sys.stdout.flush()
     if not args.quiet:
         _say(report.verdict())
-    return YES if report.colliding or (args.touching_is_collision and report.touching) else FREE
+    if report.colliding or (args.touching_is_collision and report.touching):
+        return YES
+    if report.unanswered:
+        first = report.unanswered[0]
+        raise UnsupportedQuery(f"whether the scene is free is not known: {first['a']} and {first['b']}: {first['why']}")
+    return FREE
 
 
 def _make(args, **limits):
@@ -564,8 +569,8 @@ def _scene_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--state", metavar="FILE|NAME", help="joint values: a YAML or JSON file, or a state's name")
     group.add_argument("--robot", metavar="URDF", help="the robot of a planning scene")
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the URDF)")
-    group.add_argument("--meshes", choices=("hull", "pieces"),
-                       help="how meshes enter: their convex hull, or a union of convex pieces")
+    group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
+                       help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
     group.add_argument("--missing-meshes", choices=("error", "skip"),
                        help="what to do about mesh files that are missing")
     group.add_argument("--package-path", action="append", metavar="DIR",

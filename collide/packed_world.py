@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.broadphase.box_tree import BoxTree
+from collide.errors import UnsupportedQuery
 from collide.geometry.boxes import boxes_of
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
@@ -79,9 +80,19 @@ class PackedWorld:
         rows = np.concatenate([rows, *found])
         return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found), len(found)
 
+    def refused(self, candidates: np.ndarray, limit: float) -> list[tuple[int, int, str]]:
+        """(position, position, reason) of candidates for which `answer` raises UnsupportedQuery: pairs with a mesh."""
+        found = []
+        for a, b in candidates[self._meshed[candidates].any(axis=1)].tolist():
+            try:
+                self._mesh_row(a, b, limit, False)
+            except UnsupportedQuery as error:
+                found.append((a, b, str(error)))
+        return found
+
     def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
         from collide.meshes.curved import APART, OPEN
-        from collide.meshes.pair_queries import pair_rows
+        from collide.meshes.hulls_first import rows_within
         from collide.meshes.single import one_state
 
         A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
@@ -90,7 +101,7 @@ class PackedWorld:
             state = one_state(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b)
             row["hit"], row["how"] = state != APART, UNDECIDED if state == OPEN else EXACT
         else:
-            row = pair_rows(A, B, X_WA[None], X_WB[None], limit=limit)
+            row = rows_within(A, B, X_WA[None], X_WB[None], limit)
         row["a"], row["b"] = a, b
         return row
 
@@ -154,11 +165,11 @@ class PackedWorld:
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
-        from collide.meshes.pair_queries import pair_rows
+        from collide.meshes.hulls_first import rows_within
 
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
         for b in bodies[meshed].tolist():
-            rows.append(pair_rows(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit=limit))
+            rows.append(rows_within(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit))
             rows[-1]["b"] = b
         found = np.concatenate(rows)
         return found[np.argsort(found["b"], kind="stable")]

@@ -217,6 +217,15 @@ class World:
             found.append(rows)
         return WorldContacts(np.concatenate([no_rows(), *found]), dict(self._bodies))
 
+    def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
+        """Pairs for which `distances` up to ``max_distance`` [m] raises UnsupportedQuery: (id, id, reason), sorted.
+
+        Such are some shapes against a mesh. Allow these pairs, and the rest of the World is answered.
+        """
+        limit = check_distance("World.unanswerable: max_distance", max_distance)
+        packed, ids = self._pack(), list(self._bodies)
+        return [(ids[a], ids[b], why) for a, b, why in packed.refused(packed.candidates(limit), limit)]
+
     def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
         """One outside shape S against every body: pairs at most ``max_distance`` apart.
 

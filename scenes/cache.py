@@ -23,7 +23,7 @@ import numpy as np
 from collide.cache_folder import cache_folder
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
-VERSION = 1
+VERSION = 2
 
 _log = logging.getLogger(__name__)
 

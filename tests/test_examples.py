@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 #: The package that an example cannot do without, beyond the engine.
-NEEDS = {"06_compare_with_fcl": "fcl"}
+NEEDS = {"06_compare_with_fcl": "fcl", "11_meshes_in_scenes": "trimesh"}
 #: What each example's output must hold.
 SHOWS = {
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
@@ -29,6 +29,9 @@ SHOWS = {
     "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "tree kept: True", "clears part 0"],
     "09_rays_and_overlays": ["shared area 1.000000000000000", "beside it: [True, True, False]", "inside: [True, True, False]", "itself: False True"],
     "10_contacts": ["proven free", "a ball 1.00 mm above", "jaw 1 pushes along [-1.  0.  0.], 4 points", "box and ball"],
+    "11_meshes_in_scenes": [
+        "as it is: [('bracket', 'chip')]", "open edges: facets", "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
+    ],
 }
 
 

@@ -42,7 +42,7 @@ ROOMS = {
     "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "meshes": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "manifolds": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "meshes"},
-    "packed_world": {"_jit", "geometry", "broadphase", "narrowphase", "results", "unions"},
+    "packed_world": {"_jit", "errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "cache_folder", ""},

@@ -24,6 +24,7 @@ from collide.shapes import (
     Ellipsoid,
     Halfspace,
     HPolytope,
+    Mesh,
     Sphere,
 )
 from collide.transforms import pose
@@ -142,7 +143,12 @@ def test_meshes_and_urdf_beside_the_scene(scene_of, tmp_path):
         units="mm", bodies=[body({"mesh": {"file": "t.obj", "scale": [2, 1, 1]}})],
         robots=[{"urdf": "r.urdf", "name": "left", "prefix": "l_", "base": "mobile"}, {"urdf": "r.urdf", "name": "right", "prefix": "r_"}],
     )
-    assert scene.body("mug").shape.points.max() == 2 and scene.body("mug").approximation == "hull of 3 vertices of an open mesh"
+    mug = scene.body("mug")
+    assert isinstance(mug.shape, Mesh) and mug.shape.vertices.max() == 2 and not mug.shape.solid and mug.approximation is None
+    hull = scene_of(bodies=[body({"mesh": {"file": "t.obj", "as": "hull"}})]).body("mug")
+    assert hull.shape.points.max() == 1 and hull.approximation == "hull of 3 vertices of an open mesh"
+    left = scene_of(robots=[{"urdf": "r.urdf", "meshes": "hull"}, {"urdf": "r.urdf", "prefix": "r_"}]).bodies
+    assert [type(b.shape).__name__ for b in left] == ["ConvexHull", "Mesh"]
     assert [(b.name, b.owner, b.static) for b in scene.bodies[:2]] == [("l_l", "left", False), ("r_l", "right", True)]
 
 
@@ -384,7 +390,7 @@ def test_panda_workbench():
         raise
     assert scene.notes == [] and len([b for b in scene.bodies if b.owner is None and not b.static]) >= 12
     kinds = {type(b.shape).__name__ for b in scene.bodies}
-    assert kinds == {"Halfspace", "Compound", "Box", "HPolytope", "Cylinder", "Sphere", "Capsule", "Cone", "Ellipsoid", "ConvexHull"}
+    assert kinds == {"Halfspace", "Compound", "Box", "HPolytope", "Cylinder", "Sphere", "Capsule", "Cone", "Ellipsoid", "ConvexHull", "Mesh"}
     result = scene.world().distances(max_distance=0.05)
     near = {frozenset(names): row for row, names in zip(result.rows, result.names)}
     dips = near[frozenset(("panda_leftfinger", "parcel"))]["distance"]

@@ -69,20 +69,23 @@ def test_objects_of_one_file_are_bodies(tmp_path):
         "o first\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no second\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 4 5 6\n"
     )
     scene = load(tmp_path / "two.obj")
+    assert len(scene.bodies) == 2 and [len(body.shape.vertices) for body in scene.bodies] == [3, 3]
+    assert not any(body.shape.solid or body.approximation for body in scene.bodies)
+    scene = load(tmp_path / "two.obj", meshes="hull")
     assert len(scene.bodies) == 2 and sorted(len(body.shape.points) for body in scene.bodies) == [3, 3]
 
 
 def test_what_a_hull_leaves_out(tmp_path):
     pytest.importorskip("scipy")
     l_shape().export(tmp_path / "l.stl")
-    hull = load(tmp_path / "l.stl").bodies[0]
+    hull = load(tmp_path / "l.stl", meshes="hull").bodies[0]
     mesh = l_shape()
     extra = round((mesh.convex_hull.volume / mesh.volume - 1) * 100)
     assert hull.approximation == f"hull of 12 vertices, fills {extra} % more volume"
     open_mesh = l_shape()
     open_mesh.faces = open_mesh.faces[1:]
     open_mesh.export(tmp_path / "open.stl")
-    assert load(tmp_path / "open.stl").bodies[0].approximation == "hull of 12 vertices of an open mesh"
+    assert load(tmp_path / "open.stl", meshes="hull").bodies[0].approximation == "hull of 12 vertices of an open mesh"
 
 
 def test_pieces(tmp_path):
@@ -92,7 +95,7 @@ def test_pieces(tmp_path):
         (body,) = load(tmp_path / "l.stl", meshes="pieces").bodies
         assert isinstance(body.shape, Compound) and len(body.shape.items) >= 2
         assert body.approximation == f"{len(body.shape.items)} convex pieces of a mesh of 12 vertices (coacd)"
-    with pytest.raises(SceneError, match='meshes must be "hull" or "pieces", got \'tetra\''):
+    with pytest.raises(SceneError, match='meshes must be "mesh", "hull" or "pieces", got \'tetra\''):
         load(tmp_path / "l.stl", meshes="tetra")
 
 
@@ -156,6 +159,8 @@ def test_bad_meshes(tmp_path, name, content, message):
 def test_hull_out_of_range_names_the_part(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(InvalidShape, match=r"a\.obj: a: ConvexHull"):
+        load(tmp_path / "a.obj", scale=1e60, meshes="hull")
+    with pytest.raises(InvalidShape, match=r"a\.obj: a: Mesh.* must not exceed 1e\+50, got 1e\+60"):
         load(tmp_path / "a.obj", scale=1e60)
 
 
@@ -221,7 +226,7 @@ def test_warm_load_imports_no_mesh_library(tmp_path):
         "import collide.scenes\n"
         "light = sorted({name.split('.')[0] for name in sys.modules})\n"
         "scene = collide.scenes.load(sys.argv[1])\n"
-        "print(json.dumps([light, sorted({name.split('.')[0] for name in sys.modules}), len(scene.bodies[0].shape.points)]))\n"
+        "print(json.dumps([light, sorted({name.split('.')[0] for name in sys.modules}), len(scene.bodies[0].shape.vertices)]))\n"
     )
     for turn in ("cold", "warm"):
         done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "r.urdf")], capture_output=True, text=True, check=True)

@@ -122,7 +122,7 @@ def test_mesh_as_hull_mirrored_and_scaled(robot_of, tmp_path):
     shape = robot.geometry["a"][0].shape
     assert isinstance(shape, ConvexHull)
     assert sorted(shape.points.tolist()) == [[-1, 0, 0], [0, 0, 0], [0, 0, 1.5], [0, 2, 0]]
-    assert robot.notes == ['r.urdf: link "a": the mesh scale "-1 1 0.5" mirrors; its vertices were mirrored']
+    assert robot.notes == ['r.urdf: link "a": the mesh scale "-1 1 0.5" mirrors; the mesh was mirrored']
     assert robot_of(link("a", collision('<mesh filename="t.obj" scale="2"/>'))).geometry["a"][0].shape.points.max() == 6
 
 

@@ -16,7 +16,7 @@ from collide.adapters.peers.stress import Reply, run
 from collide.adapters.peers.stress_truth import DIGITS, gap_along, halfspace_distance, truth
 from collide.errors import InvalidArgument
 from collide.results import HOW, UNDECIDED
-from collide.scenes.families import Case, generate, names
+from collide.scenes.families import Case, generate, mesh_names, names
 
 #: Families of hundreds of vertices, where exact arithmetic takes its time.
 LARGE = ("spheres_big", "cyl1000", "bipyramids", "repeats")
@@ -52,7 +52,7 @@ def test_nothing_is_wrong_with_many_vertices(name):
 
 
 def test_every_family_by_default():
-    assert [f.family for f in run(n=0).families] == names()
+    assert [f.family for f in run(n=0).families] == [*names(), *mesh_names()]
 
 
 def test_totals(ours):

@@ -2,6 +2,8 @@
 
 Hulls are handed over with faces of our own: coal's own hull builder ends the interpreter on thin
 boxes. Its separate boolean (no contact wanted) is asked too, since its tolerances differ.
+Meshes are BVHModelOBBRSS: surfaces, without an inside, and no depth where they meet. For pairs with one
+`break_distance`, by default an absolute 1e-3, is 0: no pair of facets is left out for being nearly apart.
 """
 
 from __future__ import annotations
@@ -9,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from collide.adapters.peers.facets import triangulate
-from collide.adapters.peers.protocol import PairwisePeer, Reply
+from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery
-from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
+from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 
 class CoalPeer(PairwisePeer):
@@ -38,7 +40,19 @@ class CoalPeer(PairwisePeer):
         if isinstance(part, Halfspace):
             length = float(np.linalg.norm(part.normal))
             return coal.Halfspace(part.normal / length, part.offset / length)
+        if isinstance(part, Mesh):
+            return self._mesh(part)
         return self._hull(part)
+
+    def _mesh(self, part: Mesh):
+        import coal
+
+        model = coal.BVHModelOBBRSS()
+        model.beginModel(len(part.faces), len(part.vertices))
+        model.addVertices(part.vertices)
+        model.addTriangles(part.faces)
+        model.endModel()
+        return model
 
     def _hull(self, part: Shape):
         import coal
@@ -68,7 +82,12 @@ class CoalPeer(PairwisePeer):
         T_WA, T_WB = (coal.Transform3s(X[:3, :3], X[:3, 3]) for X in (X_WA, X_WB))
         request = coal.CollisionRequest()
         request.enable_contact = False
+        meshed = isinstance(A, coal.BVHModelBase) or isinstance(B, coal.BVHModelBase)
+        if meshed:
+            request.break_distance = 0.0
         hit = coal.collide(A, T_WA, B, T_WB, request, coal.CollisionResult()) > 0
+        if hit and meshed:
+            return Reply(hit, note=NO_DEPTH)
         result = coal.DistanceResult()  # a fresh one each time: an old one keeps its answer
         distance = float(coal.distance(A, T_WA, B, T_WB, coal.DistanceRequest(), result))
         point_a, point_b = tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2())

@@ -9,6 +9,10 @@ A boolean disagreement nearer to touching than `TOUCHING` of the pair's size is 
 both engines computed with rounded numbers, and one ulp decides. It counts against an engine only
 where that engine claims a proof. What exact arithmetic cannot judge (cylinders, cones, ellipsoids,
 half-spaces) is reported as not judged, and counts against nobody.
+
+The other engines see a mesh as a surface. Here a closed one is a solid, and a body wholly inside it hits: where exact
+arithmetic finds that no surfaces meet and one body lies inside the other, a peer's "apart" is the right answer to
+the question it understands. Such pairs are a class of their own, "inside", and no error of the peer.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from collide.adapters.peers.exact_peer import ExactPeer, is_rounded
+from collide.adapters.peers.exact_peer import INSIDE, ExactPeer, is_rounded
 from collide.adapters.peers.protocol import ENGINES, Question, Table, engine
 from collide.adapters.peers.question import ask, is_union
 from collide.errors import InvalidArgument
@@ -35,11 +39,12 @@ class Disagreement:
     """One pair on which an engine and the reference differ, or an engine contradicts itself.
 
     kind : "hit" (the booleans differ), "distance" (they do, by more than the tolerance, or the exact
-        one lies outside a proven bracket), "contradiction"
+        one lies outside a proven bracket), "inside" (the engine sees surfaces that do not meet, and one body is
+        inside the other), "contradiction"
         (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a World
         reports no row where its own pair query finds one).
     exact_hit, exact_distance : the verdict; None where the pair is not judged, and then
-        ``not_judged`` says why.
+        ``not_judged`` says why. Of meshes that meet the distance is None: nobody knows how deep they are.
     touching : the exact distance is within rounding of 0; None where not judged.
     wrong : the names of the engines that the verdict refutes.   proven, undecided : of those that claim
         a proof, and of those that say themselves that the boolean is open.
@@ -85,13 +90,15 @@ class Summary:
     """How one engine did. Counts are of pairs.
 
     skipped : why the engine was not asked at all; the rest is then 0.
+    inside : pairs that it calls apart because it sees surfaces, one body being inside the other: neither
+        an agreement nor a disagreement.
     agreeing : same boolean as the reference.   hit_disagreements : the other one.
     wrong : booleans that exact arithmetic refutes beyond rounding (or within it, where proven).
     wrong_within_rounding : refuted, but the pair touches within rounding, or the engine said itself
         that rounding leaves it open (undecided) and its bracket holds the truth.
     wrong_distances : farther than the tolerance from the exact distance.
     contradictions : boolean against own distance, beyond rounding.
-    gap, depth : largest differences to the reference, apart and overlapping; overlaps of unions
+    gap, depth : largest differences to the reference, apart and overlapping; overlaps of unions and meshes
         are left out, since engines mean different things by their depth.
     failed : each pair lost, with the reason.   unsupported : reasons and their counts.
     seconds : spent in this engine's interface; not a benchmark.
@@ -107,6 +114,7 @@ class Summary:
     without_distance: int = 0
     agreeing: int = 0
     hit_disagreements: int = 0
+    inside: int = 0
     distance_disagreements: int = 0
     wrong: int = 0
     wrong_within_rounding: int = 0
@@ -156,11 +164,11 @@ class Comparison:
     def table(self) -> tuple[list[str], list[list[str]]]:
         """Headers and rows of text for printing, one row per engine.
 
-        "differ" counts booleans, "distance off" distances farther than the tolerance from the
+        "differ" counts booleans, "inside" those that differ because the engine sees surfaces only, "distance off" distances farther than the tolerance from the
         reference's (for the reference: from the exact ones), "largest" differences both engines' own.
         """
         headers = [
-            "engine", "version", "answered", "agree", "differ", "wrong", "within rounding", "not judged",
+            "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
             "contradicts itself", "distance off", "largest gap difference", "largest depth difference",
             "failed", "unsupported",
         ]
@@ -248,8 +256,12 @@ class _Judge:
         if not row["answered"]:
             dispute.not_judged = table.reasons[0]
             return dispute
-        dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), float(row["distance"])
-        dispute.touching = abs(dispute.exact_distance) <= TOUCHING * dispute.size
+        dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), _number(row["distance"])
+        if dispute.kind == "hit" and table.reasons[0] == INSIDE and not dispute.hit:
+            dispute.kind = "inside"
+            parties = parties[:1]  # the reference alone knows insides
+        depth = dispute.reference_distance if dispute.exact_distance is None else dispute.exact_distance
+        dispute.touching = depth is not None and abs(depth) <= TOUCHING * dispute.size
         pair = self.question.pairs[k]
         if dispute.touching and any(is_rounded(self.question.bodies[i]) for i in pair):
             dispute.not_judged = "touching within the rounding of the body itself"
@@ -345,6 +357,7 @@ def _tally(summary: Summary, disagreements: list[Disagreement], reference: str) 
         pair = d.a, d.b
         if d.engine == summary.engine:
             summary.hit_disagreements += d.kind == "hit"
+            summary.inside += d.kind == "inside"
             summary.distance_disagreements += d.kind == "distance"
             summary.contradictions += d.kind in ("contradiction", "left out")
             summary.not_judged += bool(d.not_judged)
@@ -360,12 +373,12 @@ def _number(value) -> float | None:
 
 def _printed(s: Summary, is_reference: bool) -> list[str]:
     if s.skipped:
-        return [s.engine, f"skipped: {s.skipped}", *[""] * 12]
-    agree, differ = ("", "") if is_reference else (str(s.agreeing), str(s.hit_disagreements))
+        return [s.engine, f"skipped: {s.skipped}", *[""] * 13]
+    agree, differ, inside = ("", "", "") if is_reference else map(str, (s.agreeing, s.hit_disagreements, s.inside))
     off = s.wrong_distances if is_reference else s.distance_disagreements
     largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
     return [
-        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, str(s.wrong), str(s.wrong_within_rounding),
+        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong), str(s.wrong_within_rounding),
         str(s.not_judged), str(s.contradictions), str(off), *largest,
         str(len(s.failed)), str(sum(s.unsupported.values())),
     ]

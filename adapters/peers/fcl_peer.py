@@ -2,6 +2,7 @@
 
 Asked in a child process: on some inputs its signed distance throws through Cython and ends the
 interpreter, and any distance to a half-space crashes it. Of half-spaces only the boolean is asked.
+Meshes are BVHModels: surfaces, without an inside, and no depth where they meet.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ import math
 import numpy as np
 
 from collide.adapters.peers.facets import triangulate
-from collide.adapters.peers.protocol import PairwisePeer, Reply, swept
+from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply, swept
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery
-from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
+from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 
 class FclPeer(PairwisePeer):
@@ -44,6 +45,12 @@ class FclPeer(PairwisePeer):
         if isinstance(part, Halfspace):
             length = float(np.linalg.norm(part.normal))
             return fcl.Halfspace(part.normal / length, part.offset / length)
+        if isinstance(part, Mesh):
+            model = fcl.BVHModel()
+            model.beginModel(len(part.vertices), len(part.faces))
+            model.addSubModel(part.vertices, part.faces)
+            model.endModel()
+            return model
         points = corners(part)
         if points is None:
             raise UnsupportedQuery(f"python-fcl has no {type(part).__name__}")
@@ -60,6 +67,8 @@ class FclPeer(PairwisePeer):
         hit = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
         if isinstance(A, fcl.Halfspace) or isinstance(B, fcl.Halfspace):
             return Reply(hit, note="boolean only: python-fcl's distance to a half-space crashes")
+        if hit and (isinstance(A, fcl.BVHModel) or isinstance(B, fcl.BVHModel)):
+            return Reply(hit, note=NO_DEPTH)
         request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)
         result = fcl.DistanceResult()
         distance = float(fcl.distance(a, b, request, result))

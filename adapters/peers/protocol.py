@@ -53,6 +53,9 @@ ENGINES = {
     "exact": "collide.adapters.peers.exact_peer:ExactPeer",
 }
 
+#: The note of meshes that meet, of engines that look at one pair of facets at a time.
+NO_DEPTH = "boolean only: it gives no depth of meshes"
+
 ANSWERED, FAILED, UNSUPPORTED = STATUSES = "answered", "failed", "unsupported"
 BUILDING, ASKING = "building", "asking"
 _NOWHERE = (math.nan,) * 3

@@ -2,6 +2,7 @@
 
 pybullet has no boolean of its own for posed bodies: a hit is a closest distance ≤ 0. Hull corners
 are snapped to a grid by Bullet, up to 1e-4 of the hull's size; that error is Bullet's answer.
+Meshes are static concave triangle meshes, which Bullet tests against convex shapes only, facet by facet.
 Asked in a child process, since it prints when it is imported.
 """
 
@@ -11,10 +12,13 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from collide.adapters.peers.protocol import Event, PairwisePeer, Question, Reply
+from collide.adapters.peers.protocol import NO_DEPTH, Event, PairwisePeer, Question, Reply
 from collide.adapters.peers.question import corners
 from collide.errors import CollideError, UnsupportedQuery
-from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
+from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
+
+#: Of the arrays that createCollisionShape takes.
+_MOST_VERTICES, _MOST_INDICES = 131_072, 524_288
 
 
 class PybulletPeer(PairwisePeer):
@@ -66,6 +70,9 @@ class PybulletPeer(PairwisePeer):
 
         if isinstance(A[3], Halfspace) and isinstance(B[3], Halfspace):
             raise UnsupportedQuery("pybullet gives no distance between two planes")
+        meshes = isinstance(A[3], Mesh) + isinstance(B[3], Mesh)
+        if meshes and (meshes == 2 or isinstance(A[3], Halfspace) or isinstance(B[3], Halfspace)):
+            raise UnsupportedQuery("pybullet tests concave meshes against convex shapes only")
         for (body, X_PB, _, _), X_WP in ((A, X_WA), (B, X_WB)):
             X_WB_ = X_WP @ X_PB
             pybullet.resetBasePositionAndOrientation(
@@ -77,6 +84,8 @@ class PybulletPeer(PairwisePeer):
             raise CollideError(f"pybullet returned no closest points within {limit:g} m")
         nearest = min(found, key=lambda contact: contact[8])
         # Its normal stands on B and points towards A.
+        if meshes and nearest[8] <= 0:
+            return Reply(True, note=NO_DEPTH)
         normal = tuple(-x for x in nearest[7])
         return Reply(nearest[8] <= 0, nearest[8], normal, nearest[5], nearest[6])
 
@@ -90,6 +99,13 @@ def _collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
     if isinstance(part, Capsule | Cylinder):
         kind = pybullet.GEOM_CAPSULE if isinstance(part, Capsule) else pybullet.GEOM_CYLINDER
         return {"shapeType": kind, "radius": part.radius, "height": part.length}, part.radius + part.length
+    if isinstance(part, Mesh):
+        if len(part.vertices) > _MOST_VERTICES or 3 * len(part.faces) > _MOST_INDICES:
+            raise UnsupportedQuery(f"pybullet takes meshes of {_MOST_VERTICES} vertices and {_MOST_INDICES} indices at most")
+        return {
+            "shapeType": pybullet.GEOM_MESH, "vertices": part.vertices.tolist(), "indices": part.faces.ravel().tolist(),
+            "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        }, float(np.sqrt(np.square(part.vertices).sum(axis=1)).max())  # fmt: skip
     points = corners(part)
     if points is None:
         raise UnsupportedQuery(f"pybullet has no {type(part).__name__}")

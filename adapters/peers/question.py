@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidArgument
-from collide.shapes import Box, Capsule, Compound, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Shape, Sphere
+from collide.shapes import Box, Capsule, Compound, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Mesh, Shape, Sphere
 from collide.transforms import as_poses
 
 #: Pairs farther apart than this part of the scene are left out, unless every pair is asked for.
@@ -148,7 +148,7 @@ def _near(bodies: list[Body], pairs, max_distance: float) -> list[tuple[int, int
 
 
 def convex_parts(shape: Shape, X_WB: np.ndarray) -> Iterator[tuple[Shape, np.ndarray]]:
-    """The convex shapes whose union a body is, each with its pose in the world (4, 4)."""
+    """The convex shapes and meshes whose union a body is, each with its pose in the world (4, 4)."""
     if isinstance(shape, Compound):
         for part, X_BP in shape.items:
             yield from convex_parts(part, X_WB @ X_BP)
@@ -157,8 +157,14 @@ def convex_parts(shape: Shape, X_WB: np.ndarray) -> Iterator[tuple[Shape, np.nda
 
 
 def is_union(shape: Shape) -> bool:
-    """True where the body is a union of several convex parts: its depth is then no minimum of theirs."""
-    return sum(1 for _ in convex_parts(shape, np.eye(4))) > 1
+    """True where the body is a union of several parts, or a mesh: how deep it overlaps no engine can say."""
+    parts = [part for part, _ in convex_parts(shape, np.eye(4))]
+    return len(parts) > 1 or has_mesh(shape)
+
+
+def has_mesh(shape: Shape) -> bool:
+    """True where the body is a mesh, or has one among its parts."""
+    return any(isinstance(part, Mesh) for part, _ in convex_parts(shape, np.eye(4)))
 
 
 def corners(shape: Shape) -> tuple[np.ndarray, float] | None:
@@ -184,7 +190,7 @@ def bounds(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 def _part_bounds(shape: Shape, X_WP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     R_WP, p_WP = X_WP[:3, :3], X_WP[:3, 3]
-    points = corners(shape)
+    points = (shape.vertices[np.unique(shape.faces)], 0.0) if isinstance(shape, Mesh) else corners(shape)
     if points is not None:
         world = points[0] @ R_WP.T + p_WP
         return world.min(axis=0) - points[1], world.max(axis=0) + points[1]

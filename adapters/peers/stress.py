@@ -25,12 +25,16 @@ from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Questi
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.results import HOW, UNDECIDED
-from collide.scenes.families import Case, generate, names
+from collide.scenes.families import Case, MeshCase, generate, mesh_names, names
 
 #: Cases that go to a peer at a time: a child process that dies often is not given up.
 BATCH = 50
 
 HIT, BRACKET, CRASH = "boolean", "bracket", "failed"
+
+
+#: Why an engine's "apart" is no answer to the question.
+SURFACES = "one mesh lies inside the other, and this engine sees surfaces"
 
 
 class Reply(NamedTuple):
@@ -198,7 +202,7 @@ def run(
     """
     if engine not in ENGINES:
         raise InvalidArgument(f"no engine {engine!r}; there are {', '.join(sorted(ENGINES))}")
-    wanted = names() if families is None else [families] if isinstance(families, str) else list(families)
+    wanted = [*names(), *mesh_names()] if families is None else [families] if isinstance(families, str) else list(families)
     for family in wanted:
         generate(family, 0, seed)  # complain before the work begins
     ask, version = _asker(engine, timeout)
@@ -217,14 +221,14 @@ def run(
 # --- asking ---------------------------------------------------------------------------------------
 
 
-def _asker(name: str, timeout: float) -> tuple[Callable[[list[Case]], list[Reply]], str]:
+def _asker(name: str, timeout: float) -> tuple[Callable[[list[Case | MeshCase]], list[Reply]], str]:
     """A function from cases to replies, and the engine's version."""
     peer = engine(name, timeout=timeout)
     peer.require()
     if name == "collide":
         return (lambda cases: [_ask_collide(case) for case in cases]), peer.version
 
-    def ask(cases: list[Case]) -> list[Reply]:
+    def ask(cases: list[Case | MeshCase]) -> list[Reply]:
         replies = []
         for start in range(0, len(cases), BATCH):
             table = peer.answer(Question.from_pairs([case.shapes() for case in cases[start : start + BATCH]]))
@@ -242,7 +246,7 @@ def _from_row(row, reason: str) -> Reply:
     return Reply((bool(row["hit"]),), float(row["distance"]), normal=tuple(row["normal"].tolist()))
 
 
-def _ask_collide(case: Case) -> Reply:
+def _ask_collide(case: Case | MeshCase) -> Reply:
     """The engine's boolean and its distance; an exception is a failure, whatever its kind."""
     from collide import collide, distance
 
@@ -263,10 +267,12 @@ def _ask_collide(case: Case) -> Reply:
 # --- judging --------------------------------------------------------------------------------------
 
 
-def _judge(result: FamilyResult, name: str, case: Case, exact: Truth, reply: Reply) -> list[Finding]:
+def _judge(result: FamilyResult, name: str, case: Case | MeshCase, exact: Truth, reply: Reply) -> list[Finding]:
     """Count one reply, and return what is wrong with it."""
     result.cases += 1
     result.hits += exact.hit
+    if name != "collide" and exact.inside and not (reply.failed or reply.unsupported or any(reply.hits)):
+        reply = Reply(unsupported=SURFACES)
     if reply.failed or reply.unsupported:
         result.failed += bool(reply.failed)
         result.unsupported += not reply.failed
@@ -281,12 +287,14 @@ def _judge(result: FamilyResult, name: str, case: Case, exact: Truth, reply: Rep
     kinds += [BRACKET] if _count_bracket(result, name, exact, reply) else []
     _count_errors(result, exact, reply)
     along = gap_along(case, reply.normal)
-    if along is not None:
+    if along is not None and exact.distance is not None:
         result.see("normal_excess", max(0.0, float(exact.distance - along)) / exact.size)
     return [_finding(kind, name, case, exact, reply) for kind in kinds]
 
 
 def _gap(exact: Truth) -> float:
+    if exact.distance is None:
+        return 0.0
     return abs(float(exact.distance)) / exact.size
 
 
@@ -316,7 +324,8 @@ def _count_bracket(result: FamilyResult, name: str, exact: Truth, reply: Reply) 
         return False
     result.missed += 1
     if not (math.isnan(lower) or math.isnan(upper)):
-        ends = (Decimal(lower) - exact.distance, exact.distance - Decimal(upper))
+        about = exact.distance or Decimal(0)
+        ends = (Decimal(lower) - about, about - Decimal(upper))
         result.see("missed_by", float(max(*ends, Decimal(0))) / exact.size)
     return True
 
@@ -325,12 +334,14 @@ def _count_errors(result: FamilyResult, exact: Truth, reply: Reply) -> None:
     if not abs(reply.distance) < math.inf:
         return
     error, name = exact.off(reply.distance), "depth_error" if exact.hit else "distance_error"
+    if error is None or exact.distance is None:
+        return
     result.see(f"{name}_of_size", float(error) / exact.size)
     if exact.distance:
         result.see(name, error / abs(exact.distance))
 
 
-def _finding(kind: str, name: str, case: Case, exact: Truth, reply: Reply) -> Finding:
+def _finding(kind: str, name: str, case: Case | MeshCase, exact: Truth, reply: Reply) -> Finding:
     # JSON has no NaN and no infinity.
     answer = {key: _plain(value) for key, value in reply._asdict().items()}
     return Finding(

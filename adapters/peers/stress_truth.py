@@ -1,4 +1,4 @@
-"""The exact answer to a hard case: hulls by the oracle, half-spaces by one exact formula."""
+"""The exact answer to a hard case: hulls and meshes by the oracles, half-spaces by one exact formula."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from typing import NamedTuple
 
-from collide.adapters.peers import exact
-from collide.scenes.families import HALFSPACE, Case
+from collide.adapters.peers import exact, exact_meshes
+from collide.scenes.families import HALFSPACE, Case, MeshCase
 
 #: Digits of the signed distance.
 DIGITS = 30
@@ -18,26 +18,37 @@ _OPEN = Decimal(10) ** (2 - DIGITS)
 
 
 class Truth(NamedTuple):
-    """hit, the signed distance to `DIGITS` digits [m], and L: what a gap is measured against [m]."""
+    """hit, the signed distance to `DIGITS` digits [m], and L: what a gap is measured against [m].
+
+    Of meshes that meet the distance is None: nobody knows how deep they are. Gaps of meshes are doubles, rounded once.
+    """
 
     hit: bool
-    distance: Decimal
+    distance: Decimal | None
     size: float
+    #: What rounding the distance left open, as a part of it.
+    open: Decimal = _OPEN
+    #: No surfaces meet: it is a hit because one mesh lies inside the other.
+    inside: bool = False
 
-    def off(self, value: float) -> Decimal:
-        """By how much a distance [m] is off, 0 or more."""
-        return abs(Decimal(value) - self.distance)
+    def off(self, value: float) -> Decimal | None:
+        """By how much a distance [m] is off, 0 or more; None where the exact one is not known."""
+        return None if self.distance is None else abs(Decimal(value) - self.distance)
 
     def misses(self, lower: float, upper: float) -> bool:
         """Whether a bracket [m] does not hold the exact value; not-a-number holds nothing."""
         if math.isnan(lower) or math.isnan(upper):
             return True
-        slack = abs(self.distance) * _OPEN
+        if self.distance is None:
+            return lower > 0
+        slack = abs(self.distance) * self.open
         return not (Decimal(lower) <= self.distance + slack and Decimal(upper) >= self.distance - slack)
 
 
-def truth(case: Case) -> Truth:
+def truth(case: Case | MeshCase) -> Truth:
     """The exact answer; nothing is rounded but the digits read off."""
+    if isinstance(case, MeshCase):
+        return _mesh_truth(case)
     if case.kind == HALFSPACE:
         hit, distance = halfspace_distance(case)
         return Truth(hit, distance, case.b.diagonal() + 2 * case.radius_b or 1.0)
@@ -46,11 +57,19 @@ def truth(case: Case) -> Truth:
     return Truth(exact.hit(*pair, **radii), distance, _size(case))
 
 
-def gap_along(case: Case, normal) -> Decimal | None:
+def _mesh_truth(case: MeshCase) -> Truth:
+    A, B = (exact_meshes.mesh_cells(s.vertices, s.faces, s.solid, s.X) for s in (case.a, case.b))
+    verdict = exact_meshes.judge(A, B)
+    size = min((d for d in (case.a.diagonal(), case.b.diagonal()) if d > 0), default=1.0)
+    distance = None if verdict.distance is None else Decimal(verdict.distance)
+    return Truth(verdict.hit, distance, size, Decimal(2) ** -52, verdict.hit and not verdict.surfaces)
+
+
+def gap_along(case: Case | MeshCase, normal) -> Decimal | None:
     """How far the hulls are apart along a direction (3,) from A to B [m]: at most their signed distance,
-    and equal to it for the right normal. None for a half-space and where there is no direction.
+    and equal to it for the right normal. None for a half-space or meshes, and where there is no direction.
     """
-    if case.kind == HALFSPACE or not all(map(math.isfinite, normal)) or not any(normal):
+    if isinstance(case, MeshCase) or case.kind == HALFSPACE or not all(map(math.isfinite, normal)) or not any(normal):
         return None
     n = [Fraction(float(x)) for x in normal]
     (A, e_a), (B, e_b) = exact.world_points(*case[2:5]), exact.world_points(*case[5:8])

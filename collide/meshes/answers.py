@@ -22,6 +22,7 @@ from collide.meshes.way_out import way_out
 from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
+from collide.shapes.mesh import Mesh
 
 #: Gaps above so many times the smaller body may be more than its boxes, in floats, can tell.
 _FAR = 1e20
@@ -87,7 +88,7 @@ def given(X: np.ndarray) -> Posed:
 
 def hull_shape(shape: Shape) -> Shape:
     """The hull of a mesh, any other shape itself."""
-    return hull_of(body_of(shape)) if shape.meshed else shape
+    return shape.convex_hull if isinstance(shape, Mesh) else shape
 
 
 def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:

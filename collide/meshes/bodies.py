@@ -16,7 +16,6 @@ from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.shapes.base import Shape, is_plain
-from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh import Mesh
 
 
@@ -89,8 +88,7 @@ def facet_body(shape, caller: str) -> Body:
 def hull_of(body: Body) -> Shape:
     """The hull of a mesh, without points inside; a convex shape itself."""
     if not body.hull:
-        used = body.shape.vertices[np.unique(body.shape.faces)]  # type: ignore[attr-defined]
-        body.hull.append(ConvexHull(used[convex_hull(used).vertices]))
+        body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
     return body.hull[0]
 
 

@@ -40,15 +40,18 @@ def verdict(data: dict) -> str:
         f"no answer of {data['reference']} proven wrong",
         f"{count(data['pairs'], 'pair')} asked of {', '.join(asked)}",
     ]
-    if disputes:
-        parts.append(f"{count(len(disputes), 'disagreement')}, {judged} of them judged exactly")
+    inside = sum(dispute["kind"] == "inside" for dispute in disputes)
+    if len(disputes) > inside:
+        parts.append(f"{count(len(disputes) - inside, 'disagreement')}, {judged - inside} of them judged exactly")
     else:
         parts.append("no disagreement")
+    if inside:
+        parts.append(f"{count(inside, 'answer')} about insides of solids, which others do not see")
     return "; ".join(parts)
 
 
 def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Table:
-    """One column per engine: fourteen counts fit below one another, not beside."""
+    """One column per engine: fifteen counts fit below one another, not beside."""
     skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
     shown = [row for row in rows if row[0] not in skipped]
     columns = [Column(headers[0], "label"), *(Column(row[0]) for row in shown)]
@@ -59,6 +62,7 @@ def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Tabl
 
 _TITLES = {
     "hit": "DISAGREEMENTS  does the pair collide?",
+    "inside": "INSIDE  one body lies inside the other: engines that see surfaces call it free",
     "distance": "DISTANCES APART  by more than the tolerance",
     "contradiction": "CONTRADICTIONS  an engine's boolean against its own distance",
     "left out": "LEFT OUT  a World gave no row where its pair query finds one",

@@ -12,7 +12,7 @@ SENTENCES = {
     "by more than rounding can move them",
     "common point": "differences of points of A and B surround zero, clear of rounding: the bodies share a point",
     "swept overlap": "two core points are nearer than the sum of the radii, by more than rounding",
-    "exact arithmetic": "worked out in integers from the numbers given, because rounding would have decided it",
+    "exact arithmetic": "worked out from the numbers given, in integers wherever rounding would have decided it",
     "closed form": "a formula for this pair of shapes, its rounding error bounded",
     "broadphase": "bounding boxes of whole bodies, grown by the clearance and rounded outwards, do not meet",
 }
@@ -22,6 +22,7 @@ REASONS = {
     "static–static": "both bodies are fixed: their placement is taken as intended",
     "filtered by group and mask": "their groups and masks exclude each other",
     "allowed": "the scene allows this contact",
+    "cannot be answered": "listed above: whether these bodies collide is NOT known",
 }
 
 BROADPHASE = "broadphase"

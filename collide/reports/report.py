@@ -7,7 +7,7 @@ lower ≤ signed distance ≤ upper proven for every row:
 colliding  the bodies share a point: proven
 shallow    colliding, but proven less deep than ``min_depth``: −lower < min_depth
 touching   touching within rounding: doubles leave the sign open, and exact arithmetic has
-           settled it where it can
+           settled it where it can; with meshes: gap or overlap below rounding
 near       apart, and 0 < distance ≤ clearance
 ========== ================================================================================
 
@@ -22,12 +22,16 @@ import time
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
 
-from collide.errors import InvalidArgument
-from collide.reports import proofs
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.reports import meshes, proofs
 from collide.reports.progress import silent
 from collide.reports.units import brief_length, count
+from collide.results import UNDECIDED
 
-SCHEMA = "collide-report/1"
+SCHEMA = "collide-report/2"
+
+#: Why a pair that cannot be answered is not tested.
+UNANSWERED = "cannot be answered"
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,9 @@ class Report:
     shallow: list[Pair]
     touching: list[Pair]
     near: list[Pair]
+    meshes: list[dict]
     approximations: list[dict]
+    unanswered: list[dict]
     skipped: list[dict]
     proofs: list[dict]
     work: dict
@@ -93,6 +99,8 @@ class Report:
             parts.append(f"{len(self.touching)} touching within rounding")
         if clearance > 0:
             parts.append(f"{len(self.near) or 'none'} within {brief_length(clearance)}")
+        if self.unanswered:
+            parts.append(f"{count(len(self.unanswered), 'pair')} NOT ANSWERED")
         excluded, total = self.pairs["excluded"], self.pairs["total"]
         pairs = count(total, "pair")
         parts.append(
@@ -120,7 +128,9 @@ class Report:
             "query": self.query,
             "pairs": self.pairs,
             **classes,
+            "meshes": self.meshes,
             "approximations": self.approximations,
+            "unanswered": self.unanswered,
             "skipped": self.skipped,
             "proofs": self.proofs,
             "work": self.work,
@@ -149,8 +159,7 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
     clearance, min_depth = _length("clearance", clearance), _length("min_depth", min_depth)
     begun = time.perf_counter()
     with (progress or silent)("testing the scene"):
-        world = scene.world()
-        result = world.distances(max_distance=max(clearance, _rounding_of(scene)))
+        world, result, unanswered = _ask(scene, max(clearance, _rounding_of(scene)))
     tested = time.perf_counter()
     stats = world.stats
     classes = _classes(result, scene, clearance, min_depth)
@@ -162,7 +171,9 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
         shallow=classes["shallow"],
         touching=classes["touching"],
         near=classes["near"],
+        meshes=meshes.of_scene(scene),
         approximations=_approximations(scene),
+        unanswered=unanswered,
         skipped=_skipped(stats),
         proofs=_proofs(stats),
         work=_work(stats),
@@ -171,6 +182,22 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
     )
     report.seconds = _seconds(scene, stats, begun, tested, started)
     return report
+
+
+def _ask(scene, limit: float):
+    """(world, its distances up to a limit [m], pairs near each other that it cannot answer, as data)."""
+    world = scene.world()
+    try:
+        return world, world.distances(max_distance=limit), []
+    except UnsupportedQuery:
+        refused = world.unanswerable(max_distance=limit)
+        if not refused:
+            raise
+    for a, b, _ in refused:
+        world.allow(a, b, reason=UNANSWERED)
+    names = world.names
+    told = [{"a": names[a], "b": names[b], "why": why} for a, b, why in refused]
+    return world, world.distances(max_distance=limit), told
 
 
 def _length(name: str, value: float) -> float:
@@ -190,7 +217,7 @@ def _rounding_of(scene) -> float:
     """A distance [m] below which pairs of this scene may touch within rounding: 2⁻⁴⁰ of its size."""
     size = 0.0
     for body in scene.bodies:
-        reach = max((packed.reach + abs(X[:3, 3]).sum() for packed, X in body.shape.parts()), default=0.0)
+        reach = max((packed.reach + abs(X[:3, 3]).sum() for packed, X in body.shape.bounding_parts()), default=0.0)
         size = max(size, float(abs(body.X_WB[:3, 3]).max()) + float(reach))
     return size * 2.0**-40
 
@@ -198,9 +225,11 @@ def _rounding_of(scene) -> float:
 def _classes(result, scene, clearance: float, min_depth: float) -> dict[str, list[Pair]]:
     """The rows of a World result, each in its class, in the order people read them."""
     approximated = {body.name for body in scene.bodies if body.approximation}
+    meshed = {body.name for body in scene.bodies if meshes.is_meshed(body.shape)}
+    rounding = _rounding_of(scene) if meshed else 0.0
     classes: dict[str, list[Pair]] = {"colliding": [], "shallow": [], "touching": [], "near": []}
     for row, (a, b) in zip(result.rows, result.names):
-        kind = _class_of(row, min_depth)
+        kind = _class_of(row, min_depth, rounding if a in meshed or b in meshed else None)
         if not row["beyond"] and (kind != "near" or row["distance"] <= clearance):
             classes[kind].append(_pair(row, a, b, approximated))
     classes["colliding"].sort(key=_deepest_first)
@@ -210,8 +239,12 @@ def _classes(result, scene, clearance: float, min_depth: float) -> dict[str, lis
     return classes
 
 
-def _class_of(row, min_depth: float) -> str:
-    if proofs.is_below_rounding(int(row["how"])):
+def _class_of(row, min_depth: float, rounding: float | None) -> str:
+    """rounding : of pairs with a mesh, whose facets are tested exactly however deep the overlap: what is below it [m]."""
+    below = proofs.is_below_rounding(int(row["how"]))
+    if rounding is not None and row["how"] != UNDECIDED:
+        below = max(-row["lower"], row["upper"]) <= rounding
+    if below:
         return "touching"
     if not row["hit"]:
         return "near"

@@ -90,6 +90,8 @@ def _tables(report: Report, limit: int | None) -> list[Table]:
         _pair_table(shallower, "touching", report.shallow, "depth", limit),
         _pair_table("TOUCHING  gap or overlap below rounding", "touching", report.touching, "within", limit),
         _pair_table(near, "near", report.near, "distance", limit),
+        _unanswered_table(report),
+        _mesh_table(report, limit),
         _approximation_table(report, limit),
         _skip_table(report),
         _proof_table(report),
@@ -104,7 +106,7 @@ def _pair_table(title: str, style: str, pairs: list[Pair], measure: str, limit: 
     columns = [
         (Column("body A", "name"), [_marked(pair, pair.a) for pair in shown]),
         (Column("body B", "name"), [_marked(pair, pair.b) for pair in shown]),
-        (Column(measure), lengths([_measured(pair, measure) for pair in shown])),
+        (Column(measure), _at_most(shown, lengths([_measured(pair, measure) for pair in shown]))),
         (Column(f"at x y z [{unit}]", "label", 1), on_a),
         (Column("normal A→B", "label", 2), directions([pair.normal for pair in shown])),
     ]
@@ -122,14 +124,26 @@ def _pair_table(title: str, style: str, pairs: list[Pair], measure: str, limit: 
 
 def _bracket_notes(pairs: list[Pair], measure: str, limit: int | None) -> list[str]:
     """A line for each pair whose number is proven less tightly than promised."""
-    wide = [pair for pair in pairs if not pair.certified and measure != "within"]
-    notes = [
+    wide = [pair for pair in pairs if not pair.certified and measure != "within" and not _is_bound(pair)]
+    notes = ["≤: a move that long along the normal parts the bodies, proven; a shorter one may do"] if any(
+        map(_is_bound, pairs)
+    ) and measure != "within" else []
+    notes += [
         f"{pair.a} and {pair.b}: {measure} known to {lengths([_bracket(pair)])[0].strip()} only, wider than promised"
         for pair in wide
     ]
     if limit and len(notes) > 3:
         notes[3:] = [f"… and {len(notes) - 3} more with a wide bracket (--all)"]
     return notes
+
+
+def _is_bound(pair: Pair) -> bool:
+    """Whether no depth is known but that it is not larger: of bodies that are not convex."""
+    return pair.depth is not None and pair.upper == 0.0 and pair.depth > 0.0
+
+
+def _at_most(pairs: list[Pair], texts: list[str]) -> list[str]:
+    return [f"≤ {text}" if _is_bound(pair) else text for pair, text in zip(pairs, texts)]
 
 
 def _verdict(pair: Pair) -> str:
@@ -164,6 +178,27 @@ def _approximation_table(report: Report, limit: int | None) -> Table:
         [Column("body", "name"), Column("stands in", "text")],
         [[entry["body"], entry["what"]] for entry in shown],
         more=len(report.approximations) - len(shown),
+    )
+
+
+def _mesh_table(report: Report, limit: int | None) -> Table:
+    """Surfaces before solids: what has no inside is what a reader has to know."""
+    rows = sorted(report.meshes, key=lambda entry: entry["solid"])
+    shown = rows[:limit]
+    return Table(
+        "MESHES  as they are, triangle by triangle",
+        [Column("body", "name"), Column("taken as", "text")],
+        [[entry["body"], entry["what"]] for entry in shown],
+        more=len(rows) - len(shown),
+    )
+
+
+def _unanswered_table(report: Report) -> Table:
+    return Table(
+        "NOT ANSWERED  near each other; whether they collide is not known",
+        [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
+        [[entry["a"], entry["b"], entry["why"]] for entry in report.unanswered],
+        "colliding",
     )
 
 

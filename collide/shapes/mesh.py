@@ -9,6 +9,7 @@ import numpy as np
 from collide.errors import InvalidShape, UnsupportedQuery
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, positive, rows
+from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
 from collide.shapes.saved import read_arrays, write_arrays
 from collide.transforms import SMALLEST
@@ -41,7 +42,7 @@ class Mesh(Shape):
     Raises InvalidShape for anything but finite vertices and at least one row of ids in range.
     """
 
-    __slots__ = ("_copied", "_survey", "_tree", "faces", "scale", "solid", "vertices")
+    __slots__ = ("_copied", "_hull", "_survey", "_tree", "faces", "scale", "solid", "vertices")
     _fields = ("vertices", "faces", "solid")
     convex = False
     meshed = True
@@ -53,6 +54,7 @@ class Mesh(Shape):
     scale: float
     _survey: Survey
     _tree: MeshTree
+    _hull: ConvexHull
 
     def __init__(self, vertices, faces, *, solid: bool | None = None):
         vertices = _check_vertices(vertices)
@@ -109,6 +111,18 @@ class Mesh(Shape):
 
                 self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree
+
+    @property
+    def convex_hull(self) -> ConvexHull:
+        """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
+        if not hasattr(self, "_hull"):
+            used = self.vertices[np.unique(self.faces)]
+            if len(used) > _MANY:
+                from collide.geometry.hulls.hull import convex_hull
+
+                used = used[convex_hull(used).vertices]
+            self._store(_hull=ConvexHull(used))
+        return self._hull
 
     @property
     def base(self) -> Mesh:
@@ -222,6 +236,9 @@ def _around(points: np.ndarray) -> np.ndarray:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
     return np.unique(np.where(corners, highs, lows).reshape(-1, 3), axis=0)
 
+
+#: Hulls of so many vertices are asked as they are: leaving out those inside takes a kernel of its own.
+_MANY = 512
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1

@@ -22,6 +22,7 @@ from collide.errors import InvalidArgument
 from collide.scenes.families import (
     boxes,
     lattices,
+    meshes,
     nested,
     random_pairs,
     rounded,
@@ -31,8 +32,9 @@ from collide.scenes.families import (
     touching,
 )
 from collide.scenes.families.case import HALFSPACE, HULLS, Body, Case
+from collide.scenes.families.meshes import MeshCase
 
-__all__ = ["HALFSPACE", "HULLS", "STANDARD", "Body", "Case", "describe", "generate", "names"]
+__all__ = ["HALFSPACE", "HULLS", "STANDARD", "Body", "Case", "MeshCase", "describe", "generate", "mesh_names", "names"]
 
 _FAMILIES: dict[str, Callable[..., Case]] = {
     family.__name__: family
@@ -45,11 +47,18 @@ STANDARD: tuple[str, ...] = tuple(_FAMILIES)
 _FAMILIES |= {
     family.__name__: family for module in (touching, scales, thin, rounded, swept, lattices) for family in module.OWN
 }
+#: Of pairs of meshes; their cases are `MeshCase`.
+_MESHES: dict[str, Callable[..., MeshCase]] = {family.__name__: family for family in meshes.FAMILIES}
 
 
 def names() -> list[str]:
-    """All families, the 27 of the study first."""
+    """All families of convex bodies, the 27 of the study first."""
     return list(_FAMILIES)
+
+
+def mesh_names() -> list[str]:
+    """All families of triangle meshes."""
+    return list(_MESHES)
 
 
 def describe(name: str) -> str:
@@ -57,10 +66,10 @@ def describe(name: str) -> str:
     return " ".join((inspect.getdoc(_family(name)) or "").split())
 
 
-def generate(name: str, n: int, seed: int = 0, **size) -> list[Case]:
-    """n cases of a family.
+def generate(name: str, n: int, seed: int = 0, **size) -> list:
+    """n cases of a family: `Case`, or `MeshCase` for families of meshes.
 
-    name : one of `names`.   n, seed : whole numbers ≥ 0.
+    name : one of `names` or `mesh_names`.   n, seed : whole numbers ≥ 0.
     size : the family's own arguments, for example ``sides`` of "bipyramids" and ``copies`` of "repeats".
 
     Raises InvalidArgument for an unknown name or size, listing the known ones.
@@ -76,13 +85,14 @@ def generate(name: str, n: int, seed: int = 0, **size) -> list[Case]:
     return [_case(name, family, k, int(seed), size) for k in range(n)]
 
 
-def _case(name: str, family: Callable[..., Case], index: int, seed: int, size: dict) -> Case:
+def _case(name: str, family: Callable, index: int, seed: int, size: dict):
     rng = np.random.default_rng([seed, crc32(name.encode()), index])
     made = family(rng, index, **size)
     return made._replace(family=name, index=index, seed=seed, size=tuple(sorted(size.items())))
 
 
-def _family(name: str) -> Callable[..., Case]:
-    if name not in _FAMILIES:
-        raise InvalidArgument(f"no family is called {name!r}; there are {', '.join(_FAMILIES)}")
-    return _FAMILIES[name]
+def _family(name: str) -> Callable:
+    known = {**_FAMILIES, **_MESHES}
+    if name not in known:
+        raise InvalidArgument(f"no family is called {name!r}; there are {', '.join(known)}")
+    return known[name]

@@ -29,7 +29,7 @@ class Options:
 
     robot: Any = None
     srdf: Any = None
-    meshes: str = "hull"
+    meshes: str = "mesh"
     package_path: tuple = ()
     scale: float | None = None
     missing_meshes: str = "error"
@@ -44,7 +44,7 @@ def load(
     state: str | Path | Mapping[str, float] | None = None,
     robot: Robot | str | Path | None = None,
     srdf: str | Path | bool | None = None,
-    meshes: str = "hull",
+    meshes: str = "mesh",
     package_path: str | Path | Iterable = (),
     scale: float | None = None,
     missing_meshes: str = "error",
@@ -54,8 +54,9 @@ def load(
     state : the name of a state the files define, a file of joint values, or joint -> value.
     robot : for MoveIt planning scenes: the robot or its URDF.
     srdf : the SRDF of a URDF; None looks beside it, False does without.
-    meshes : "hull": a mesh becomes the convex hull of its vertices; "pieces": a union of convex
-        pieces (coacd). Each body's ``approximation`` says what that leaves out.
+    meshes : "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
+        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two
+        leave out.
     package_path : folders in which ``package://`` names are looked for first.
     scale : factor on the vertices of mesh files given directly, 0.001 for millimetres.
     missing_meshes : "error", or "skip": links whose mesh is absent are not checked, which is noted.
@@ -170,12 +171,14 @@ def load_meshes(path: Path, options: Options) -> Scene:
     scale = 1.0 if options.scale is None else options.scale
     if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not np.isfinite(scale) or scale == 0:
         raise SceneError(f"scale must be a finite number other than 0, got {scale!r}")
+    from collide.scenes.loaders.mesh_shapes import part_shape
+
     started = time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))
     for part in file.parts:
         source = f"{path}: {part.name}"
-        shape, approximation = mesh_loader.mesh_shape(part, scale, source)
+        shape, approximation = part_shape(part, scale, source)
         note = mesh_loader.size_note(float(np.ptp(part.points, axis=0).max()) * abs(scale), source)
         scene.notes += [note] if note else []
         scene.add(SceneBody(_free(part.name, scene), shape, np.eye(4), source=source, approximation=approximation))

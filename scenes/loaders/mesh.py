@@ -1,7 +1,6 @@
-"""Meshes as convex shapes: the hull of the vertices, or a union of convex pieces.
+"""Mesh files: read once by trimesh, looked at, and kept as arrays (`collide.scenes.cache`).
 
-A mesh is read once by trimesh and kept as arrays (`collide.scenes.cache`); afterwards neither
-trimesh nor scipy is imported. What the shape leaves out of the mesh is said for every body.
+Afterwards neither trimesh nor scipy nor a compiler is imported. `mesh_shapes.py` makes shapes of what is read here.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import importlib.util
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from collide.scenes import cache
 from collide.scenes.loaders.documents import read_bytes
 from collide.scenes.loaders.triangles import SUFFIXES, read_triangles
 from collide.shapes.base import Shape
-from collide.shapes.compound import Compound
-from collide.shapes.hull import ConvexHull
 
+#: What a mesh may become: itself, the hull of its vertices, or a union of convex pieces.
+OPTIONS = ("mesh", "hull", "pieces")
 #: A mesh whose volume is this much of its hull's is its hull.
 CONVEX_RATIO = 1.0 - 1e-6
 
@@ -32,10 +31,12 @@ class MeshPart:
     """One mesh of a file.
 
     points : (n, 3) distinct vertices that faces use, in the file's world frame and units.
-    fill : volume of the mesh over the volume of its hull; NaN where it has none (open, or scipy is absent).
-    closed : watertight, with consistent winding.
+    fill : of hulls: volume of the mesh over the volume of its hull; NaN where it has none (open, or scipy is absent).
+    closed : watertight, with consistent winding; of a mesh taken as it is: whether it is a solid.
     faces : how many triangles.
     pieces : the convex pieces as point sets, where a decomposition was asked for.
+    facets : (faces, 3) rows of ``points``, as the file has them, where the mesh is taken as it is.
+    own_hull : these are exactly the surface of their convex hull.   made : shapes made of it, by scale.
     """
 
     name: str
@@ -44,6 +45,9 @@ class MeshPart:
     closed: bool
     faces: int
     pieces: list[np.ndarray] | None = None
+    facets: np.ndarray | None = None
+    own_hull: bool = False
+    made: dict[tuple, Shape] = field(default_factory=dict)
 
 
 @dataclass
@@ -54,10 +58,10 @@ class MeshFile:
     notes: list[str]
 
 
-def read_mesh(path: Path, meshes: str = "hull") -> MeshFile:
+def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     """The meshes of a file, from the cache of prepared inputs or through trimesh.
 
-    meshes : "hull", or "pieces" for a convex decomposition of every mesh.
+    meshes : "mesh" for the triangles, "hull", or "pieces" for a convex decomposition of every mesh.
     """
     check_meshes_option(meshes)
     if path.suffix.lower() not in SUFFIXES:
@@ -65,12 +69,12 @@ def read_mesh(path: Path, meshes: str = "hull") -> MeshFile:
     blobs = [read_bytes(path)]
     if path.suffix.lower() == ".gltf":
         blobs += _gltf_buffers(blobs[0], path)
-    # Without scipy a volume is unknown; once it is installed the mesh is looked at again.
-    known = importlib.util.find_spec("scipy") is not None
+    # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
+    known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
     entry = cache.key(blobs, {"meshes": meshes, "suffix": path.suffix.lower(), "volumes": known})
     file = _kept(entry)
     if file is None:
-        file, raw = _read_with_trimesh(path)
+        file, raw = _read_with_trimesh(path, meshes == "mesh")
         if meshes == "pieces":
             for part, (vertices, faces) in zip(file.parts, raw):
                 part.pieces = _decompose(vertices, faces, path)
@@ -90,37 +94,9 @@ def _kept(entry: str) -> MeshFile | None:
         return None  # made by something else: read the file again
 
 
-def mesh_shape(part: MeshPart, scale, place: str) -> tuple[Shape, str | None]:
-    """A part as a shape, and what the shape leaves out of it (None: nothing).
-
-    scale : (3,) factors; negative ones mirror.   place : for messages.
-    """
-    factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
-    try:
-        if part.pieces is not None:
-            shape: Shape = _union([ConvexHull(points * factors) for points in part.pieces])
-            return shape, _about_pieces(part)
-        return ConvexHull(part.points * factors), _about_hull(part)
-    except InvalidShape as error:
-        raise InvalidShape(f"{place}: {error}") from None
-
-
-def element_parts(file: MeshFile) -> list[MeshPart]:
-    """The parts of a file that stands for one thing, such as a link.
-
-    Closed meshes stay apart: the union of their hulls is nearer to them than one hull. Open ones may
-    be patches of one surface, whose hulls would leave out the inside: they become one point set.
-    """
-    parts = file.parts
-    if len(parts) == 1 or all(part.closed for part in parts) or parts[0].pieces is not None:
-        return parts
-    points = _distinct(np.concatenate([part.points for part in parts]))
-    return [MeshPart(parts[0].name, points, np.nan, False, sum(part.faces for part in parts))]
-
-
 def check_meshes_option(meshes: str) -> None:
-    if meshes not in ("hull", "pieces"):
-        raise SceneError(f'meshes must be "hull" or "pieces", got {meshes!r}')
+    if meshes not in OPTIONS:
+        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {meshes!r}')
 
 
 def size_note(extent: float, what: str) -> str | None:
@@ -132,43 +108,17 @@ def size_note(extent: float, what: str) -> str | None:
     return None
 
 
-def _union(hulls: list[ConvexHull]) -> Shape:
-    return hulls[0] if len(hulls) == 1 else Compound([(hull, np.eye(4)) for hull in hulls])
-
-
-def _about_hull(part: MeshPart) -> str | None:
-    hull = f"hull of {len(part.points)} vertices"
-    if not part.faces:
-        return f"{hull} without faces"
-    if not part.closed:
-        return f"{hull} of an open mesh"
-    if np.isnan(part.fill):
-        return f"{hull} of a closed mesh"
-    if part.fill >= CONVEX_RATIO:
-        return None
-    extra = (1.0 / part.fill - 1.0) * 100.0
-    amount = f"{extra:.0f}" if extra >= 10 else f"{extra:.2g}"
-    return f"{hull}, fills {amount} % more volume"
-
-
-def _about_pieces(part: MeshPart) -> str | None:
-    pieces = part.pieces or []
-    if len(pieces) == 1 and part.closed and part.fill >= CONVEX_RATIO:
-        return None
-    return f"{len(pieces)} convex pieces of a mesh of {len(part.points)} vertices (coacd)"
-
-
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _read_with_trimesh(path: Path) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
+def _read_with_trimesh(path: Path, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
     found, notes = read_triangles(path)
     import trimesh  # what is missing has been told by now
 
     parts, raw = [], []
     for name, vertices, faces in found:
         if len(vertices):
-            part, about = _describe(trimesh, name, vertices, faces, path)
+            part, about = _describe(None if as_it_is else trimesh, name, vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
@@ -181,19 +131,34 @@ def _describe(trimesh, label: str, vertices: np.ndarray, faces: np.ndarray, path
     if not np.isfinite(vertices).all():
         row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
         raise SceneError(f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite", path=path)
-    if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
-        raise SceneError(f"a face names vertex {faces.max()}, but there are {len(vertices)}", path=path)
+    outside = ((faces < 0) | (faces >= len(vertices))).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise SceneError(
+            f"face {row} names vertices {faces[row].tolist()}, but there are 0 … {len(vertices) - 1}", path=path
+        )
     notes = []
     used = np.unique(faces) if len(faces) else np.arange(len(vertices))
     if len(used) < len(vertices):
         notes.append(f"{len(vertices) - len(used)} vertices that no face uses were left out")
     if not len(faces):
         notes.append("has points but no faces; their hull was taken")
+    elif trimesh is None:
+        return _as_it_is(label, vertices, faces, path), notes
     closed, fill = _volumes(trimesh, vertices, faces)
-    return MeshPart(label, _distinct(vertices[used]), fill, closed, len(faces)), notes
+    return MeshPart(label, distinct(vertices[used]), fill, closed, len(faces)), notes
 
 
-def _distinct(vertices: np.ndarray) -> np.ndarray:
+def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> MeshPart:
+    from collide.scenes.loaders.mesh_shapes import described
+
+    try:
+        return described(label, vertices, faces)
+    except InvalidShape as error:
+        raise SceneError(str(error), path=path, element=label) from None
+
+
+def distinct(vertices: np.ndarray) -> np.ndarray:
     """Every point once, in the order of first appearance; −0.0 and 0.0 are one number."""
     _, first = np.unique(vertices + 0.0, axis=0, return_index=True)
     return np.ascontiguousarray(vertices[np.sort(first)] + 0.0)
@@ -217,7 +182,7 @@ def _volumes(trimesh, vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, fl
 def _decompose(vertices: np.ndarray, faces: np.ndarray, path: Path) -> list[np.ndarray]:
     """Convex pieces by coacd, each the points of a hull."""
     if len(faces) < 4:
-        return [_distinct(vertices)]
+        return [distinct(vertices)]
     try:
         import coacd
     except ImportError:
@@ -251,9 +216,14 @@ def _pack(file: MeshFile) -> dict[str, np.ndarray]:
         fill = None if np.isnan(part.fill) else part.fill
         pieces = None if part.pieces is None else len(part.pieces)
         about["parts"].append(
-            {"name": part.name, "fill": fill, "closed": bool(part.closed), "faces": part.faces, "pieces": pieces}
+            {
+                "name": part.name, "fill": fill, "closed": bool(part.closed), "faces": part.faces, "pieces": pieces,
+                "own_hull": bool(part.own_hull),
+            }
         )
         arrays[f"points{k}"] = part.points
+        if part.facets is not None:
+            arrays[f"facets{k}"] = part.facets
         for j, points in enumerate(part.pieces or []):
             arrays[f"piece{k}_{j}"] = points
     arrays["about"] = np.array(json.dumps(about))
@@ -266,11 +236,23 @@ def _unpack(arrays: Mapping[str, np.ndarray]) -> MeshFile:
     for k, text in enumerate(about["parts"]):
         pieces = None if text["pieces"] is None else [_points(arrays[f"piece{k}_{j}"]) for j in range(text["pieces"])]
         fill = np.nan if text["fill"] is None else float(text["fill"])
-        parts.append(MeshPart(text["name"], _points(arrays[f"points{k}"]), fill, text["closed"], text["faces"], pieces))
+        points = _points(arrays[f"points{k}"])
+        facets = _facets(arrays[f"facets{k}"], len(points)) if f"facets{k}" in arrays else None
+        parts.append(
+            MeshPart(text["name"], points, fill, text["closed"], text["faces"], pieces, facets, bool(text["own_hull"]))
+        )
     return MeshFile(parts, list(about["notes"]))
 
 
 def _points(array: np.ndarray) -> np.ndarray:
     if array.dtype != np.float64 or array.ndim != 2 or array.shape[1] != 3 or not len(array):
         raise ValueError("not an array of points")
+    return array
+
+
+def _facets(array: np.ndarray, points: int) -> np.ndarray:
+    if array.dtype != np.int32 or array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise ValueError("not an array of facets")
+    if array.min() < 0 or array.max() >= points:
+        raise ValueError("facets of other points")
     return array

@@ -20,10 +20,10 @@ from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields, brief, did_you_mean
+from collide.scenes.loaders.mesh_shapes import inline_shape
 from collide.scenes.loaders.states import state_of
 from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
-from collide.shapes.hull import ConvexHull
 from collide.shapes.primitives import Box, Cone, Cylinder, Halfspace, Sphere
 from collide.transforms import pose
 
@@ -38,7 +38,7 @@ def is_planning_scene(data: Any) -> bool:
 
 
 def load_planning_scene(
-    path: Path, data: Mapping[str, Any], *, robot=None, srdf=None, meshes: str = "hull",
+    path: Path, data: Mapping[str, Any], *, robot=None, srdf=None, meshes: str = "mesh",
     package_path: Iterable = (), missing_meshes: str = "error",
 ) -> Scene:
     """The scene of a planning-scene document.
@@ -61,8 +61,8 @@ def load_planning_scene(
     # MoveIt's goal constrains the planned joints; the others stay as at the start.
     scene.states.update({name: {**states.get("scene", {}), **states.get("start", {}), **joints} for name, joints in states.items()})
     frames = _Frames(fields, scene, robot)
-    _add_objects(fields, scene, frames)
-    _add_attached(fields, scene, robot)
+    _add_objects(fields, scene, frames, meshes)
+    _add_attached(fields, scene, robot, meshes)
     _allow_pairs(fields, scene, robot)
     _note_what_is_ignored(fields, scene)
     return scene
@@ -217,7 +217,7 @@ class _Frames:
 # --- obstacles -----------------------------------------------------------------------------------
 
 
-def _add_objects(fields: Fields, scene: Scene, frames: _Frames) -> None:
+def _add_objects(fields: Fields, scene: Scene, frames: _Frames, meshes: str) -> None:
     world = fields.sub("world", ()) if isinstance(fields.get("world"), dict) else None
     for entry, place in world.items("collision_objects") if world else ():
         thing = Fields(entry, fields.path, place)
@@ -226,7 +226,7 @@ def _add_objects(fields: Fields, scene: Scene, frames: _Frames) -> None:
         if thing.get("operation", 0) in (1, "REMOVE", "remove"):
             continue
         X_WO = frames.pose(thing) @ (_pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4))
-        shape, X_OS, approximation = object_shape(thing)
+        shape, X_OS, approximation = object_shape(thing, meshes)
         scene.add(
             SceneBody(
                 name, shape, X_WO @ X_OS, static=True, source=f"{fields.path}: {thing.element}", approximation=approximation
@@ -234,12 +234,17 @@ def _add_objects(fields: Fields, scene: Scene, frames: _Frames) -> None:
         )
 
 
-def object_shape(thing: Fields) -> tuple[Shape, np.ndarray, str | None]:
-    """The shape of a collision object, its pose in the object, and its approximation; several make a compound."""
+def object_shape(thing: Fields, meshes: str = "mesh") -> tuple[Shape, np.ndarray, str | None]:
+    """The shape of a collision object, its pose in the object, and its approximation; several make a compound.
+
+    meshes : "mesh" takes triangles as they are, anything else the hull of their vertices.
+    """
     items: list[tuple[Shape, np.ndarray]] = []
     about: list[str] = []
     for kind, poses, make in (
-        ("primitives", "primitive_poses", _primitive), ("meshes", "mesh_poses", _inline_mesh), ("planes", "plane_poses", _plane)
+        ("primitives", "primitive_poses", _primitive),
+        ("meshes", "mesh_poses", lambda fields: _inline_mesh(fields, meshes)),
+        ("planes", "plane_poses", _plane),
     ):
         places = thing.items(poses)
         for k, (entry, place) in enumerate(thing.items(kind)):
@@ -270,14 +275,29 @@ def _primitive(fields: Fields) -> tuple[Shape, str | None]:
     return (Cylinder if name == "cylinder" else Cone)(size[1], size[0]), None  # height comes first
 
 
-def _inline_mesh(fields: Fields) -> tuple[Shape, str | None]:
+def _inline_mesh(fields: Fields, meshes: str) -> tuple[Shape, str | None]:
     vertices = fields.get("vertices")
     if isinstance(vertices, list) and vertices and isinstance(vertices[0], dict):
         points = np.array([_vector(Fields({"p": v}, fields.path, f"{fields.element}.vertices[{k}]"), "p", "xyz") for k, v in enumerate(vertices)])
     else:
         points = fields.numbers("vertices", (None, 3))
-    hull = ConvexHull(points).without_repeats()
-    return hull, f"hull of {len(hull.points)} vertices of a mesh in the file"
+    try:
+        return inline_shape(points, _triangles(fields), meshes, fields.element)
+    except SceneError as error:
+        raise SceneError(error.what, path=fields.path, element=fields.element) from None
+
+
+def _triangles(fields: Fields) -> np.ndarray:
+    """(m, 3) ids; each triangle is a list of three, or a shape_msgs/MeshTriangle. None at all means a cloud of points."""
+    given = fields.get("triangles")
+    if not given:
+        return np.zeros((0, 3), dtype=np.int64)
+    if isinstance(given, list) and isinstance(given[0], dict):
+        given = [entry.get("vertex_indices") if isinstance(entry, dict) else None for entry in given]
+    faces = Fields({"triangles": given}, fields.path, fields.element).numbers("triangles", (None, 3))
+    if (faces != np.floor(faces)).any() or np.abs(faces).max() >= 2**31:
+        fields.fail("must be whole numbers, the rows of vertices", "triangles")
+    return faces.astype(np.int64)
 
 
 def _plane(fields: Fields) -> tuple[Shape, str | None]:
@@ -286,7 +306,7 @@ def _plane(fields: Fields) -> tuple[Shape, str | None]:
     return Halfspace((a, b, c), -d), None
 
 
-def _add_attached(fields: Fields, scene: Scene, robot: Robot) -> None:
+def _add_attached(fields: Fields, scene: Scene, robot: Robot, meshes: str) -> None:
     """Objects that a link carries: they move with it and may touch the links named."""
     state = fields.get("robot_state")
     if not isinstance(state, dict):
@@ -299,7 +319,7 @@ def _add_attached(fields: Fields, scene: Scene, robot: Robot) -> None:
         thing = attached.sub("object", ())
         name = thing.text("id")
         X_LO = _pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4)
-        shape, X_OS, approximation = object_shape(thing)
+        shape, X_OS, approximation = object_shape(thing, meshes)
         body = SceneBody(name, shape, np.eye(4), source=f"{fields.path}: {thing.element}", approximation=approximation)
         scene.carry(robot.name, link, body, X_LO @ X_OS)
         for toucher in dict.fromkeys((link, *(attached.get("touch_links") or ()))):

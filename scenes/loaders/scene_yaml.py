@@ -17,6 +17,7 @@ from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose
+from collide.scenes.loaders.mesh import OPTIONS, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of
 
@@ -25,7 +26,7 @@ VERSION = 1
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _SCENE = ("collide", "name", "about", "units", "include", "robots", "bodies", "allow", "states")
-_ROBOT = ("urdf", "srdf", "robot", "name", "prefix", "pose", "state", "base")
+_ROBOT = ("urdf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
 _BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
 
 
@@ -42,19 +43,20 @@ class _Building:
     open_files: tuple[Path, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 
-    def mesh(self, filename: str, place: str):
-        """The mesh file that a shape names, read; its time counts as ``meshes``."""
-        from collide.scenes.loaders import mesh
+    def mesh(self, filename: str, place: str, taken: str | None = None):
+        """The mesh file that a shape names, read; its time counts as ``meshes``.
 
+        taken : how the shape itself says that the mesh is taken; else as meshes of the scene are.
+        """
         started = time.perf_counter()
-        file = mesh.read_mesh(resources.find(filename, self.path, self.package_path, element=place), self.meshes)
+        file = read_mesh(resources.find(filename, self.path, self.package_path, element=place), taken or self.meshes)
         self.scene.notes += [note for note in file.notes if note not in self.scene.notes]
         self.seconds["meshes"] = self.seconds.get("meshes", 0.0) + time.perf_counter() - started
         return file
 
 
 def build(
-    data: Any, path, *, meshes: str = "hull", package_path: Iterable = (), missing_meshes: str = "error",
+    data: Any, path, *, meshes: str = "mesh", package_path: Iterable = (), missing_meshes: str = "error",
 ) -> Scene:
     """The scene that a document of this format describes.
 
@@ -121,8 +123,11 @@ def _add_robot(building: _Building, entry: Fields) -> None:
 def _read_robot(building: _Building, entry: Fields) -> Robot:
     if ("urdf" in entry) == ("robot" in entry):
         entry.fail("give either urdf, a file, or robot, a description with links and joints")
+    meshes = entry.choice("meshes", OPTIONS, building.meshes)
     if "robot" in entry:
-        return inline_robot(entry, building.metres, building.mesh)
+        return inline_robot(
+            entry, building.metres, lambda filename, place, taken=None: building.mesh(filename, place, taken or meshes)
+        )
     srdf = entry.get("srdf")
     if isinstance(srdf, str):
         srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
@@ -130,7 +135,7 @@ def _read_robot(building: _Building, entry: Fields) -> Robot:
         entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
     file = resources.find(entry.text("urdf"), building.path, building.package_path, element=entry.place("urdf"))
     return urdf.load_robot(
-        file, srdf, meshes=building.meshes, package_path=building.package_path,
+        file, srdf, meshes=meshes, package_path=building.package_path,
         missing_meshes=building.missing_meshes, seconds=building.seconds,
     )
 

@@ -35,7 +35,7 @@ KINDS = {
     "halfspace": ("normal", "offset"),
     "hull": ("points", "radius"),
     "hpolytope": ("normals", "offsets"),
-    "mesh": ("file", "scale"),
+    "mesh": ("file", "scale", "as"),
     "compound": ("shape", "pose"),
 }
 
@@ -52,7 +52,7 @@ class Described:
 def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callable) -> Described:
     """A shape mapping such as ``{box: {size: [1, 2, 3]}}``.
 
-    metres : in a unit of length.   mesh : (file name, place) -> `MeshFile`.
+    metres : in a unit of length.   mesh : (file name, place, how it is taken or None) -> `MeshFile`.
     """
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
@@ -118,16 +118,18 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
     from collide.scenes.loaders import mesh as mesh_loader
+    from collide.scenes.loaders.mesh_shapes import element_shapes
 
     scale = _mesh_scale(fields)
-    parts = mesh_loader.element_parts(mesh(fields.text("file"), fields.place("file")))
-    shapes = [mesh_loader.mesh_shape(part, scale, f"{fields.path}: {fields.element}") for part in parts]
+    taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
+    file = mesh(fields.text("file"), fields.place("file"), taken)
+    shapes = element_shapes(file, scale, f"{fields.path}: {fields.element}")
     about = [approximation for _, approximation in shapes if approximation]
-    points = np.concatenate([part.points for part in parts]) * scale
+    points = np.concatenate([part.points for part in file.parts]) * scale
     note = mesh_loader.size_note(float(np.ptp(points, axis=0).max()), fields.element)
     notes = [note] if note else []
     if np.prod(scale) < 0:
-        notes.append(f"{fields.element}: the scale {scale.tolist()} mirrors; the vertices were mirrored")
+        notes.append(f"{fields.element}: the scale {scale.tolist()} mirrors; the mesh was mirrored")
     if len(shapes) == 1:
         return Described(shapes[0][0], about[0] if about else None, notes)
     return Described(Compound([(shape, np.eye(4)) for shape, _ in shapes]), "; ".join(about) or None, notes)

@@ -23,6 +23,7 @@ from collide.robot import Joint, LinkShape, Mimic, Robot
 from collide.scenes.loaders import mesh as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.documents import read_bytes
+from collide.scenes.loaders.mesh_shapes import element_shapes
 from collide.shapes.base import Shape
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
 from collide.transforms import pose
@@ -35,7 +36,7 @@ class Reading:
     """One URDF being read: where it lies, how meshes are taken, and what there is to say."""
 
     path: Path
-    meshes: str = "hull"
+    meshes: str = "mesh"
     package_path: tuple = ()
     missing_meshes: str = "error"
     notes: list[str] = field(default_factory=list)
@@ -47,13 +48,13 @@ class Reading:
 
 
 def load_robot(
-    path, srdf=None, *, meshes: str = "hull", package_path: Iterable = (), missing_meshes: str = "error",
+    path, srdf=None, *, meshes: str = "mesh", package_path: Iterable = (), missing_meshes: str = "error",
     seconds: dict[str, float] | None = None,
 ) -> Robot:
     """A `Robot` from a URDF file.
 
     srdf : path of the SRDF; None looks beside the URDF, False does without.
-    meshes : "hull" or "pieces".   package_path : folders that hold packages.
+    meshes : "mesh", "hull" or "pieces".   package_path : folders that hold packages.
     missing_meshes : "error", or "skip" to leave such a link unchecked, which is noted.
     seconds : receives the time spent on ``meshes`` and on the rest, ``read``.
 
@@ -331,8 +332,8 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
     if file not in reading.mesh_files:
         reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
         reading.notes += reading.mesh_files[file].notes
-    parts = mesh_loader.element_parts(reading.mesh_files[file])
-    shapes = [mesh_loader.mesh_shape(part, scale, f"{reading.path}: {place}") for part in parts]
+    parts = reading.mesh_files[file].parts
+    shapes = [(shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")]
     points = np.concatenate([part.points for part in parts]) * scale
     _note_size(float(np.ptp(points, axis=0).max()), place, reading)
     reading.seconds += time.perf_counter() - started
@@ -346,7 +347,7 @@ def _mesh_scale(element: ET.Element, place: str, reading: Reading) -> np.ndarray
     if not scale.all():
         reading.fail(place, f'<mesh> scale must not be 0, got "{text}"')
     if np.prod(scale) < 0:
-        reading.notes.append(f'{place}: the mesh scale "{text}" mirrors; its vertices were mirrored')
+        reading.notes.append(f'{place}: the mesh scale "{text}" mirrors; the mesh was mirrored')
     return scale
 
 

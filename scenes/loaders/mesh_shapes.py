@@ -1,0 +1,168 @@
+"""The meshes of a file as shapes: as they are, as hulls, or as unions of convex pieces.
+
+As they are is the rule: a mesh becomes a `collide.Mesh`, solid where it closes. One whose facets are exactly the
+surface of its own hull becomes that `ConvexHull`: the same set, with quicker answers and proven depths. Points
+without facets are their hull. Only hulls and pieces leave something out, and say what.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import InvalidShape, SceneError
+from collide.geometry.surfaces.own_hull import is_own_hull
+from collide.scenes.loaders.mesh import CONVEX_RATIO, MeshFile, MeshPart
+from collide.shapes.base import Shape
+from collide.shapes.compound import Compound
+from collide.shapes.hull import ConvexHull
+from collide.shapes.mesh import Mesh
+
+
+class Taken(NamedTuple):
+    """What a mesh became.   approximation : what the shape leaves out of the mesh; None: nothing."""
+
+    shape: Shape
+    approximation: str | None
+
+
+def part_shape(part: MeshPart, scale, place: str) -> Taken:
+    """One part of a file as a shape.
+
+    scale : (3,) factors; negative ones mirror, and the facets of a mesh are then turned over.   place : for messages.
+    Raises InvalidShape for sizes out of range.
+    """
+    factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
+    try:
+        if part.pieces is not None:
+            return Taken(_union([ConvexHull(points * factors) for points in part.pieces]), _about_pieces(part))
+        if part.facets is not None:
+            return Taken(_as_it_is(part, factors), None)
+        return Taken(ConvexHull(part.points * factors), _about_hull(part))
+    except InvalidShape as error:
+        raise InvalidShape(f"{place}: {error}") from None
+
+
+def element_shapes(file: MeshFile, scale, place: str) -> list[Taken]:
+    """The shapes of a file that stands for one thing, such as a link: together they are that thing.
+
+    Meshes as they are: where the facets of all parts together close, they are one solid; else those parts that
+    close are one, and the open ones one surface. Hulls: closed meshes stay apart, since the union of their hulls
+    is nearer to them than one hull; open ones may be patches of one surface, and become one point set.
+    """
+    parts = file.parts
+    if len(parts) == 1 or parts[0].pieces is not None:
+        return [part_shape(part, scale, place) for part in parts]
+    if all(part.facets is None for part in parts):
+        together = parts if all(part.closed for part in parts) else [_joined_points(parts)]
+        return [part_shape(part, scale, place) for part in together]
+    clouds = [part for part in parts if part.facets is None]
+    meshes = [part for part in parts if part.facets is not None]
+    if all(part.own_hull for part in meshes):
+        return [part_shape(part, scale, place) for part in parts]
+    whole = _joined(meshes)
+    groups = [whole] if whole.closed else [
+        _joined(group) for closed in (True, False) if (group := [part for part in meshes if part.closed is closed])
+    ]
+    return [part_shape(part, scale, place) for part in (*groups, *clouds)]
+
+
+def inline_shape(vertices: np.ndarray, faces: np.ndarray, meshes: str, place: str) -> Taken:
+    """A mesh that a scene file holds itself: (n, 3) vertices, and (m, 3) facets, of which there may be none.
+
+    meshes : "mesh", or anything else for the hull of the vertices. Raises SceneError for ids out of range.
+    """
+    if meshes == "mesh" and len(faces):
+        if (outside := ((faces < 0) | (faces >= len(vertices))).any(axis=1)).any():
+            row = int(np.argmax(outside))
+            raise SceneError(
+                f"triangle {row} names vertices {faces[row].tolist()}, but there are {len(vertices)}", element=place
+            )
+        return part_shape(described("mesh", vertices, faces), 1.0, place)
+    hull = ConvexHull(vertices).without_repeats()
+    return Taken(hull, f"hull of {len(hull.points)} vertices of a mesh in the file")
+
+
+def described(name: str, vertices: np.ndarray, faces: np.ndarray) -> MeshPart:
+    """A part that is to be taken as it is: equal vertices joined, and looked at. Raises InvalidShape."""
+    points, ids = _welded(vertices, faces)
+    mesh = Mesh(points, ids)
+    own_hull = mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
+    return MeshPart(name, points, np.nan, mesh.solid, len(ids), facets=mesh.faces, own_hull=own_hull)
+
+
+def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices that facets use, every point once in the order of first appearance, and facets by these."""
+    corners = vertices[faces.ravel()] + 0.0  # −0.0 and 0.0 are one number
+    _, first, inverse = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return np.ascontiguousarray(corners[first[order]]), rank[inverse.ravel()].reshape(-1, 3).astype(np.int32)
+
+
+def _as_it_is(part: MeshPart, factors: np.ndarray) -> Shape:
+    key = tuple(factors.tolist())
+    if key not in part.made:
+        part.made[key] = _scaled(part, factors)
+    return part.made[key]
+
+
+def _scaled(part: MeshPart, factors: np.ndarray) -> Shape:
+    """What is known of the mesh at its own size stays known where nothing is rounded, or its tree can be shared."""
+    facets = part.facets
+    assert facets is not None
+    base = Mesh._from_fields(part.points, facets, part.closed)
+    factor = float(factors[0])
+    if (factors == factor).all() and factor > 0.0:
+        mesh = base.scaled(factor)
+    else:
+        mesh = Mesh(part.points * factors, facets if np.prod(factors) > 0.0 else facets[:, ::-1])
+    exact = (np.abs(np.frexp(factors)[0]) == 0.5).all()
+    convex = part.own_hull if exact else mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
+    return ConvexHull(mesh.vertices) if convex else mesh
+
+
+def _joined(parts: list[MeshPart]) -> MeshPart:
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    faces = np.concatenate([part.facets + start for part, start in zip(parts, starts.tolist())])  # type: ignore[operator]
+    return described(parts[0].name, np.concatenate([part.points for part in parts]), faces)
+
+
+def _joined_points(parts: list[MeshPart]) -> MeshPart:
+    from collide.scenes.loaders.mesh import distinct
+
+    points = distinct(np.concatenate([part.points for part in parts]))
+    return MeshPart(parts[0].name, points, np.nan, False, sum(part.faces for part in parts))
+
+
+def _union(hulls: list[ConvexHull]) -> Shape:
+    return hulls[0] if len(hulls) == 1 else Compound([(hull, np.eye(4)) for hull in hulls])
+
+
+# --- what a shape leaves out ----------------------------------------------------------------------
+
+
+def _about_hull(part: MeshPart) -> str | None:
+    hull = f"hull of {len(part.points)} vertices"
+    if not part.faces:
+        return f"{hull} without faces"
+    if not part.closed:
+        return f"{hull} of an open mesh"
+    if np.isnan(part.fill):
+        return f"{hull} of a closed mesh"
+    if part.fill >= CONVEX_RATIO:
+        return None
+    extra = (1.0 / part.fill - 1.0) * 100.0
+    amount = f"{extra:.0f}" if extra >= 10 else f"{extra:.2g}"
+    return f"{hull}, fills {amount} % more volume"
+
+
+def _about_pieces(part: MeshPart) -> str | None:
+    pieces = part.pieces or []
+    if len(pieces) == 1 and part.closed and part.fill >= CONVEX_RATIO:
+        return None
+    return f"{len(pieces)} convex pieces of a mesh of {len(part.points)} vertices (coacd)"
