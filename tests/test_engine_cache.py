@@ -23,11 +23,11 @@ import numpy as np
 import collide
 from collide import _jit
 from collide.geometry.tables import ShapeTable, pose_table
-from collide.packed_world import PackedWorld
+from collide.geometry.boxes import boxes_of
 
 packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
 poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
-box = PackedWorld._boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64))
+box = boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64))
 print(json.dumps({
     "box": box.round(6).tolist(), "hash": _jit.source_hash(), "folder": str(_jit.kernel_cache_folder()),
     "package": collide.__file__,

@@ -192,3 +192,17 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
     assert len(c) == 1 and c.kind[0] == WAY_OUT and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
     cubes = collide.Mesh(*box()), collide.Mesh(*box((-0.5,) * 3, (0.5,) * 3))
     assert len(collide.contacts(*cubes, EYE, collide.pose((0, 0, 1.5)))) == 4
+
+
+@pytest.mark.parametrize("shape", [collide.Cylinder(0.1, 0.2), collide.Cone(0.1, 0.2), collide.Ellipsoid((0.1, 0.2, 0.1))])
+@pytest.mark.parametrize("height", [0.105, 0.25, -0.5])
+def test_curved_shapes_against_meshes_have_one_row(shape, height):
+    """Above the table, within it, and out of reach."""
+    top, place = collide.Mesh(*table(6)), collide.pose((0.1, 0.2, height))
+    r = collide.distance(top, shape, np.eye(4), place)
+    c, swapped = (collide.contacts(*asked, margin=0.1) for asked in ((top, shape, np.eye(4), place), (shape, top, place, np.eye(4))))
+    assert len(c) == len(swapped) == (r.distance <= 0.1)
+    if len(c):
+        assert c.kind[0] == (WAY_OUT if r.hit else GAP) and c.distance[0] == r.distance and c.lower[0] == r.lower
+        assert c.upper[0] == r.upper and np.array_equal(c.normal[0], r.normal) and c.facet_b[0] == -1 and c.facet_a[0] >= 0
+        assert np.array_equal(swapped.normal[0], -c.normal[0]) and swapped.facet_a[0] == -1

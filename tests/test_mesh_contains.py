@@ -11,7 +11,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, triangles_meet, winding, world_points
 
 import collide
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import InvalidArgument
 from collide.meshes.inside import winds_around
 
 
@@ -124,5 +124,11 @@ def test_what_is_refused():
         collide.contains(None, np.eye(4), (0, 0, 0))
     with pytest.raises(InvalidArgument, match="lengths do not match"):
         collide.contains(mesh, np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 3)))
-    with pytest.raises(UnsupportedQuery):
-        collide.contains(collide.Compound([(mesh, np.eye(4))]), np.eye(4), (0, 0, 0))
+
+
+def test_meshes_in_a_compound():
+    two = collide.Compound([(collide.Mesh(*box()), np.eye(4)), (collide.Sphere(0.5), collide.pose((3, 0, 0)))])
+    points = [(0, 0, 0), (1, 1, 1), (1, 1, 1 + 1e-15), (3, 0.5, 0), (2.4, 0, 0)]
+    edge = np.abs(box()[0]).max()
+    points[1:3] = [(edge, edge, edge), (edge, edge, edge * (1 + 1e-15))]
+    assert collide.contains(two, np.eye(4), points).tolist() == [True, True, False, True, False]

@@ -266,8 +266,8 @@ def test_pairs_that_cannot_be_answered_are_listed_and_the_rest_is_answered(tmp_p
             raise UnsupportedQuery("Cylinder against Mesh: not today")
         return honest(A, B, *rest, **options)
 
-    honest = hulls_first.mesh_rows
-    monkeypatch.setattr(hulls_first, "mesh_rows", refuse)
+    honest = hulls_first.pair_rows
+    monkeypatch.setattr(hulls_first, "pair_rows", refuse)
     L = Mesh(*l_solid())
     # The cylinder stands in the notch: hulls meet. The far one is answered by the hulls.
     scene = scene_of(

@@ -9,9 +9,9 @@ from collide.manifolds.facets import Posed, posed
 from collide.manifolds.patches import Patch, patches_of
 from collide.manifolds.points import across
 from collide.manifolds.reduce import chosen
-from collide.manifolds.rows import GAP, OVERLAP, WAY_OUT, Finished, rows_of, turned_round
+from collide.manifolds.rows import GAP, OVERLAP, WAY_OUT, Finished, no_rows, rows_of, turned_round
 from collide.meshes.answers import mesh_rows
-from collide.meshes.bodies import Body, body_of, is_halfspace
+from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
 from collide.shapes.base import Shape
 
 #: Points nearer than so many errors of a coordinate, or this share of the patch, are one point.
@@ -24,11 +24,23 @@ def surface_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -
         return against_plane(A, B, X_WA, X_WB, margin, most)
     if is_halfspace(B):
         return turned_round(against_plane(B, A, X_WB, X_WA, margin, most))
+    if not (has_facets(A) and has_facets(B)):
+        return _witness(A, B, X_WA, X_WB, margin)
     one, other = body_of(A), body_of(B)
     later = other.key < one.key or (one.key == other.key and X_WA[:3].tolist() > X_WB[:3].tolist())
     if later:
         return turned_round(_ordered(other, one, B, A, X_WB, X_WA, margin, most))
     return _ordered(one, other, A, B, X_WA, X_WB, margin, most)
+
+
+def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
+    """Where a curved body is nearest to a mesh, or a way out of it: what `distance` says, and no more."""
+    row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=margin)[0]
+    if row["beyond"] or row["lower"] > margin:
+        return no_rows()
+    found = rows_of([_told(A, B, row, WAY_OUT if row["hit"] else GAP)])
+    found["lower"], found["upper"] = row["lower"], row["upper"]
+    return found
 
 
 def _ordered(one: Body, other: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
@@ -69,10 +81,14 @@ def _facets(patch: Patch, kept) -> np.ndarray:
 
 
 def _way_out(A: Shape, B: Shape, X_WA, X_WB) -> Finished:
-    row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0]
-    facets = np.array([[row["part_a"], row["part_b"]]])
+    return _told(A, B, mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0], WAY_OUT)
+
+
+def _told(A: Shape, B: Shape, row, kind: int) -> Finished:
+    """One contact from a row of `distance`."""
+    facets = np.array([[row[part] if has_facets(shape) else -1 for part, shape in (("part_a", A), ("part_b", B))]])
     distance = np.array([row["distance"]])
+    apart = -float(row["lower"]) if kind == WAY_OUT else 0.0
     return Finished(
-        row["normal"], row["point_a"][None], row["point_b"][None], distance, distance - row["lower"], facets, WAY_OUT,
-        -float(row["lower"]),
-    )  # fmt: skip
+        row["normal"], row["point_a"][None], row["point_b"][None], distance, distance - row["lower"], facets, kind, apart
+    )

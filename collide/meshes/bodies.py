@@ -16,6 +16,7 @@ from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.shapes.base import Shape, is_plain
+from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 
 
@@ -75,11 +76,14 @@ def facet_body(shape, caller: str) -> Body:
     name = type(shape).__name__
     if is_halfspace(shape):
         raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
-    try:
-        body = body_of(shape)
-    except UnsupportedQuery as refused:
-        told = str(refused).replace(f"{name} against Mesh", name)
-        raise UnsupportedQuery(f"{caller}: {told}") from None
+    if isinstance(shape, Compound):
+        raise UnsupportedQuery(f"{caller}: {name} is a union; ask for each of its items")
+    if not has_facets(shape):
+        raise UnsupportedQuery(
+            f"{caller}: {name} has no facets of doubles: its surface is curved, or its corners are rounded; "
+            "a ConvexHull around it, or a Mesh, can stand in"
+        )
+    body = body_of(shape)
     if body.radius > 0.0:
         raise UnsupportedQuery(f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in")
     return body

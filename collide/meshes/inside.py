@@ -51,7 +51,7 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     solids, O(log n) for well-shaped ones.
 
     Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match;
-    UnsupportedQuery for a `Compound` with a mesh, and where rounding inside a Compound of rounded hulls leaves it open.
+    UnsupportedQuery where rounding inside a `Compound` of meshes or rounded hulls leaves it open.
     """
     if not isinstance(shape, Shape):
         raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
