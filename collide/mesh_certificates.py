@@ -17,6 +17,7 @@ import numpy as np
 
 from collide.certificates import Certificate, _minus, _Posed, _refused, _refused_by_plane, _search
 from collide.geometry.packing import HALFSPACE, POINTS, pack_points
+from collide.shapes.mesh import Mesh
 
 _IDENTITY = np.eye(4)
 #: Directions of the segments that count how often a surface winds around a point; the next one where an edge is met.
@@ -54,10 +55,12 @@ class _Side:
     """One body: its shape, pose, and vertices in use."""
 
     def __init__(self, shape, X: np.ndarray):
-        self.shape, self.X, self.meshed = shape, X, shape.meshed
-        self.packed = None if self.meshed else shape.parts()[0][0]
+        self.shape, self.X, self.meshed = shape, X, isinstance(shape, Mesh)
+        self.packed = None if shape.meshed else shape.parts()[0][0]
         self.kind = POINTS if self.packed is None else self.packed.kind
-        plain = self.meshed or (len(shape.parts()) == 1 and np.array_equal(shape.parts()[0][1], _IDENTITY))
+        plain = self.meshed or (
+            not shape.meshed and len(shape.parts()) == 1 and np.array_equal(shape.parts()[0][1], _IDENTITY)
+        )
         self.served = plain and self.kind in (POINTS, HALFSPACE) and (self.packed is None or self.packed.slop == 0.0)
         self.used = np.unique(shape.faces) if self.meshed else None
 
