@@ -17,7 +17,7 @@ import threading
 
 import numpy as np
 
-from collide._jit import address_of, kernel
+from collide._jit import address_of, kernel, view_f32, view_f64, view_i32, view_i64
 
 #: Layout of the arrays of `MeshTree.to_arrays`; to be raised with every change of it.
 VERSION = 1
@@ -188,6 +188,17 @@ def _depth(parents: np.ndarray, below: np.ndarray, n: int) -> int:
         at = parent[at]
         depth += 1
     return depth
+
+
+@kernel(inline=True)
+def open_tree(header_at):
+    """(header, numbers, boxes, links, triangles, facet numbers) of the tree whose header stands at an address."""
+    header = view_i64(header_at, INTS)
+    return (
+        header, view_f64(header[NUMBERS_AT], NUMBERS), view_f32(header[NODES_AT], NODE * header[N_NODES]),
+        view_i32(header[NODES_AT], NODE * header[N_NODES]), view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS]),
+        view_i32(header[IDS_AT], header[N_FACETS]),
+    )  # fmt: skip
 
 
 @kernel

@@ -12,22 +12,17 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import address_of, entry, kernel, view_f32, view_f64
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
-    INTS,
-    N_FACETS,
     N_NODES,
     NODE,
-    NODES_AT,
     NOTHING,
-    NUMBERS,
-    NUMBERS_AT,
     SLAB,
-    TRIANGLES_AT,
     WIDTH,
     MeshTree,
+    open_tree,
 )
 
 #: As in `build.py`: outward rounding to floats.
@@ -48,12 +43,8 @@ def make_slabs(tree: MeshTree) -> np.ndarray:
 @entry("void(int64, int64, int64)")
 def fill_slabs(header_at, slabs_at, work_at):
     """work : 5 doubles a node: the sum of its facets' normals, and the first and last of its facets."""
-    header = view_i64(header_at, INTS)
+    header, numbers, boxes, links, triangles, _ = open_tree(header_at)
     n = header[N_NODES]
-    boxes = view_f32(header[NODES_AT], NODE * n)
-    links = view_i32(header[NODES_AT], NODE * n)
-    numbers = view_f64(header[NUMBERS_AT], NUMBERS)
-    triangles = view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS])
     slabs = view_f32(slabs_at, SLAB * n)
     work = view_f64(work_at, 5 * n)
     scale = math.ldexp(1.0, int(-header[EXPONENT]))

@@ -14,24 +14,18 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, NEAR_PROBE, boxes_nearest
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
-    IDS_AT,
-    INTS,
-    N_FACETS,
     N_NODES,
     NODE,
-    NODES_AT,
-    NUMBERS,
-    NUMBERS_AT,
     REACH,
     SLAB,
     SLABS_AT,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact_points import CORNERS, STATE, forget_poses
 from collide.narrowphase.triangles.nearest import beyond, common_point, nearest_points, slab, widest_slab
@@ -401,20 +395,10 @@ def near_surfaces(
     limit : nothing farther than this is looked for; where nothing is found, facets are −1 and LOWER is it.
     results, marks : RESULT doubles and MARKS integers a pose.   stack : 2·n_stack words and 8 more.
     """
-    header_a = view_i64(header_a_at, INTS)
-    header_b = view_i64(header_b_at, INTS)
-    numbers_a = view_f64(header_a[NUMBERS_AT], NUMBERS)
-    numbers_b = view_f64(header_b[NUMBERS_AT], NUMBERS)
-    boxes_a = view_f32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    boxes_b = view_f32(header_b[NODES_AT], NODE * header_b[N_NODES])
+    header_a, numbers_a, boxes_a, links_a, P, ids_a = open_tree(header_a_at)
+    header_b, numbers_b, boxes_b, links_b, W, ids_b = open_tree(header_b_at)
     slabs_a = view_f32(header_a[SLABS_AT], SLAB * header_a[N_NODES])
     slabs_b = view_f32(header_b[SLABS_AT], SLAB * header_b[N_NODES])
-    links_a = view_i32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    links_b = view_i32(header_b[NODES_AT], NODE * header_b[N_NODES])
-    P = view_f64(header_a[TRIANGLES_AT], 9 * header_a[N_FACETS])
-    W = view_f64(header_b[TRIANGLES_AT], 9 * header_b[N_FACETS])
-    ids_a = view_i32(header_a[IDS_AT], header_a[N_FACETS])
-    ids_b = view_i32(header_b[IDS_AT], header_b[N_FACETS])
     stack = view_i64(stack_at, n_stack)
     bounds = view_f64(stack_at + 8 * n_stack, n_stack)
     order = view_i64(stack_at + 16 * n_stack, WIDTH)

@@ -14,21 +14,17 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
     INTS,
-    N_FACETS,
-    N_NODES,
     NODE,
-    NODES_AT,
     NUMBERS,
-    NUMBERS_AT,
     REACH,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact import BACK, BY, FROM, PASS, THROUGH, UNCLEAR, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
@@ -152,11 +148,7 @@ def points_inside(
 
     counters : boxes, triangles and exact decisions, a row a point.
     """
-    header_a = view_i64(header_a_at, INTS)
-    numbers_a = view_f64(header_a[NUMBERS_AT], NUMBERS)
-    boxes_a = view_f32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    links_a = view_i32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    P = view_f64(header_a[TRIANGLES_AT], 9 * header_a[N_FACETS])
+    header_a, numbers_a, boxes_a, links_a, P, _ = open_tree(header_a_at)
     stack = view_i64(stack_at, n_stack)
     header_b = view_i64(stack_at + 8 * n_stack, INTS)
     placing = view_f64(doubles_at, PLACING)

@@ -11,21 +11,14 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     EXPONENT,
-    IDS_AT,
-    INTS,
-    N_FACETS,
-    N_NODES,
     NODE,
-    NODES_AT,
-    NUMBERS,
-    NUMBERS_AT,
     REACH,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact_points import CORNERS, STATE, forget_poses
 from collide.narrowphase.triangles.nearest import beyond, common_point, nearest_points
@@ -166,18 +159,8 @@ def list_near_pairs(
     Every pair whose distance is at most ``reach`` is listed; a few that are farther by rounding may be.
     out, told : NUMBERS_OF_PAIR doubles and INTS_OF_PAIR integers a pair, room for ``capacity`` of them.
     """
-    header_a = view_i64(header_a_at, INTS)
-    header_b = view_i64(header_b_at, INTS)
-    numbers_a = view_f64(header_a[NUMBERS_AT], NUMBERS)
-    numbers_b = view_f64(header_b[NUMBERS_AT], NUMBERS)
-    boxes_a = view_f32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    boxes_b = view_f32(header_b[NODES_AT], NODE * header_b[N_NODES])
-    links_a = view_i32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    links_b = view_i32(header_b[NODES_AT], NODE * header_b[N_NODES])
-    P = view_f64(header_a[TRIANGLES_AT], 9 * header_a[N_FACETS])
-    W = view_f64(header_b[TRIANGLES_AT], 9 * header_b[N_FACETS])
-    ids_a = view_i32(header_a[IDS_AT], header_a[N_FACETS])
-    ids_b = view_i32(header_b[IDS_AT], header_b[N_FACETS])
+    header_a, numbers_a, boxes_a, links_a, P, ids_a = open_tree(header_a_at)
+    header_b, numbers_b, boxes_b, links_b, W, ids_b = open_tree(header_b_at)
     out = view_f64(out_at, NUMBERS_OF_PAIR * capacity)
     told = view_i64(told_at, INTS_OF_PAIR * capacity)
     stack = view_i64(stack_at, n_stack)

@@ -18,22 +18,17 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
-    IDS_AT,
     INTS,
-    N_FACETS,
-    N_NODES,
     NODE,
-    NODES_AT,
     NUMBERS,
-    NUMBERS_AT,
     REACH,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact import MEET, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
@@ -366,12 +361,7 @@ def cast_rays(
     first_only : of each ray only those that may be met first, by their brackets of t.
     hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : boxes, triangles, exact, a row a ray.
     """
-    header = view_i64(header_at, INTS)
-    numbers = view_f64(header[NUMBERS_AT], NUMBERS)
-    boxes = view_f32(header[NODES_AT], NODE * header[N_NODES])
-    links = view_i32(header[NODES_AT], NODE * header[N_NODES])
-    P = view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS])
-    ids = view_i32(header[IDS_AT], header[N_FACETS])
+    header, numbers, boxes, links, P, ids = open_tree(header_at)
     hits = view_f64(hits_at, HIT * capacity)
     where = view_i64(where_at, 2)
     stack = view_i64(stack_at, n_stack)

@@ -13,20 +13,14 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     EXPONENT,
-    IDS_AT,
-    INTS,
     N_FACETS,
-    N_NODES,
     NODE,
-    NODES_AT,
-    NUMBERS,
-    NUMBERS_AT,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact import MEET, OVERLAP, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
@@ -345,12 +339,7 @@ def walk_itself(
     planes : room for PLANE doubles a facet, kept between calls.
     pairs : out, the smaller facet number times the number of facets plus the larger.
     """
-    header = view_i64(header_at, INTS)
-    numbers = view_f64(header[NUMBERS_AT], NUMBERS)
-    boxes = view_f32(header[NODES_AT], NODE * header[N_NODES])
-    links = view_i32(header[NODES_AT], NODE * header[N_NODES])
-    P = view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS])
-    ids = view_i32(header[IDS_AT], header[N_FACETS])
+    header, numbers, boxes, links, P, ids = open_tree(header_at)
     pairs = view_i64(pairs_at, capacity)
     counters = view_i64(counters_at, 3)
     where = view_i64(where_at, 2)

@@ -10,21 +10,14 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i32, view_i64
+from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PRISM, PROBE, boxes_meeting, boxes_meeting_prism
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
-    IDS_AT,
-    INTS,
-    N_FACETS,
-    N_NODES,
     NODE,
-    NODES_AT,
-    NUMBERS,
-    NUMBERS_AT,
-    TRIANGLES_AT,
     WIDTH,
+    open_tree,
 )
 from collide.narrowphase.triangles.exact import MEET, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
@@ -312,18 +305,8 @@ def walk_surfaces(
         starts[k + 1]. With ``first_only`` at most one a pose.
     counters : COUNTERS integers a pose.   where : POSE, TOP, FOUND; zeros at first.
     """
-    header_a = view_i64(header_a_at, INTS)
-    header_b = view_i64(header_b_at, INTS)
-    numbers_a = view_f64(header_a[NUMBERS_AT], NUMBERS)
-    numbers_b = view_f64(header_b[NUMBERS_AT], NUMBERS)
-    boxes_a = view_f32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    boxes_b = view_f32(header_b[NODES_AT], NODE * header_b[N_NODES])
-    links_a = view_i32(header_a[NODES_AT], NODE * header_a[N_NODES])
-    links_b = view_i32(header_b[NODES_AT], NODE * header_b[N_NODES])
-    P = view_f64(header_a[TRIANGLES_AT], 9 * header_a[N_FACETS])
-    W = view_f64(header_b[TRIANGLES_AT], 9 * header_b[N_FACETS])
-    ids_a = view_i32(header_a[IDS_AT], header_a[N_FACETS])
-    ids_b = view_i32(header_b[IDS_AT], header_b[N_FACETS])
+    header_a, numbers_a, boxes_a, links_a, P, ids_a = open_tree(header_a_at)
+    header_b, numbers_b, boxes_b, links_b, W, ids_b = open_tree(header_b_at)
     pairs = view_i64(pairs_at, capacity)
     starts = view_i64(starts_at, n + 1)
     where = view_i64(where_at, 3)
