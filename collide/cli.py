@@ -148,12 +148,23 @@ def _check(args) -> int:
         sys.stdout.flush()
     if not args.quiet:
         _say(report.verdict())
+        _say_what_was_taken(report)
     if report.colliding or (args.touching_is_collision and report.touching):
         return YES
     if report.unanswered:
         first = report.unanswered[0]
         raise UnsupportedQuery(f"whether the scene is free is not known: {first['a']} and {first['b']}: {first['why']}")
     return FREE
+
+
+def _say_what_was_taken(report) -> None:
+    """Free may mean less than it seems: what has no inside, and what stands in for something else."""
+    surfaces = sorted({entry["body"] for entry in report.meshes if not entry["solid"]})
+    others = sorted({entry["body"] for entry in report.approximations})
+    for bodies, what in ((surfaces, "surfaces without an inside"), (others, "not the shape the scene names")):
+        if bodies:
+            more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""
+            _say(f"{what}: {', '.join(bodies[:3])}{more} (see: collide report)")
 
 
 def _make(args, **limits):
@@ -412,7 +423,8 @@ _CHECK = """examples:
 
 Each line of output is one pair, fields separated by tabs: `collision`,
 `shallow` or `touching`, body A, body B, signed distance in metres (negative:
-overlapping). The verdict goes to stderr.
+overlapping). The verdict goes to stderr, and there which bodies are surfaces
+without an inside or not the shape the scene names.
 
 exit status: 0 free, 1 collision, 2 error. Pairs that touch within rounding are
 printed, and do not count as collisions unless --touching-is-collision is given."""

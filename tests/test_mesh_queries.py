@@ -193,6 +193,30 @@ def test_gaps_beyond_the_range_of_floats():
             assert collide.distance(A, B, np.eye(4), X[k]).rows.tobytes() == rows[k].rows.tobytes()
 
 
+def test_limits_in_a_notch():
+    """The hulls meet, the surfaces are beyond the limit: a ball's core is a point, and no smaller than others for that."""
+    corner = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+    vertices = np.array([[x, y, z] for z in (0, 1) for x, y in corner], dtype=np.float64)
+    below = [[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 5, 4]]
+    walls = [row for i in range(6) for j in [(i + 1) % 6] for row in ([i, j, j + 6], [i, j + 6, i + 6])]
+    L = collide.Mesh(vertices, below + [[a + 6, c + 6, b + 6] for a, b, c in below] + walls)
+    assert L.solid
+    X_WB = collide.pose((1.5, 1.5, 0.5))
+    tiny = L.scaled(2.0**-100)
+    for B, gap in ((collide.Sphere(0.25), 0.25), (collide.ConvexHull([[0, 0, 0]]), 0.5), (tiny, 0.5), (collide.Box((0.5,) * 3), 0.25)):
+        for limit in (0.0, 0.125, 0.1875, 0.5625, np.inf):
+            for swapped in (False, True):
+                pair = (B, L, X_WB, np.eye(4)) if swapped else (L, B, np.eye(4), X_WB)
+                r = collide.distance(*pair, max_distance=limit)
+                said = f"collide.distance(*{pair}, max_distance={limit}) -> {r}"
+                assert not r.hit and r.lower - 2.0**-40 <= gap <= r.upper and r.distance > 0.0, said
+                assert B is tiny or (r.beyond and r.lower > limit if gap > limit else abs(r.distance - gap) < 2.0**-40), said
+    world = collide.World()
+    world.add(L, np.eye(4), name="L")
+    world.add(collide.Sphere(0.25), X_WB, name="ball")
+    assert not len(world.distances(max_distance=0.125)) and len(world.distances(max_distance=0.3)) == 1
+
+
 def test_depth_of_a_small_body_in_a_hollow_one():
     """The hulls overlap by far more: the way out of the wall is found, and proven."""
     ring, small = collide.Mesh(*block_ring()), collide.Mesh(*box((-0.1,) * 3, (0.1,) * 3))

@@ -327,3 +327,20 @@ def test_a_links_hull_and_meshes_in_compounds_are_found():
     both = Compound([(L, np.eye(4)), (Compound([(L.scaled(2.0), np.eye(4)), (Box((1, 1, 1)), np.eye(4))]), pose((1, 0, 0)))])
     assert list(meshes_of(both)) == [L, L.scaled(2.0)] and is_meshed(both) and not is_meshed(Box((1, 1, 1)))
     assert np.array_equal(np.sort(L.convex_hull.points, axis=0), np.sort(L.vertices, axis=0))
+
+
+def test_check_says_what_has_no_inside_and_what_stands_in(tmp_path, capsys):
+    """What lies inside a mesh whose facets are turned over is free of it: whoever reads "free" has to know."""
+    vertices, faces = l_solid()
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in vertices.tolist())
+    (tmp_path / "out.obj").write_text(text + "".join(f"f {a + 1} {c + 1} {b + 1}\n" for a, b, c in faces.tolist()))
+    bodies = [
+        {"name": "mesh", "shape": {"mesh": {"file": "out.obj"}}},
+        {"name": "ball", "shape": {"sphere": {"radius": 1e-3}}, "pose": {"xyz": [99, 0, 0]}},
+    ]
+    (tmp_path / "s.json").write_text(json.dumps({"collide": 1, "bodies": bodies}))
+    assert main(["check", str(tmp_path / "s.json")]) == 0
+    assert "collide: surfaces without an inside: mesh (see: collide report)\n" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "s.json"), "--meshes", "hull"]) == 0
+    err = capsys.readouterr().err
+    assert "surfaces" not in err and "collide: not the shape the scene names: mesh (see: collide report)\n" in err

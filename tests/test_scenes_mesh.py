@@ -99,6 +99,29 @@ def test_pieces(tmp_path):
         load(tmp_path / "l.stl", meshes="tetra")
 
 
+def test_pieces_of_a_convex_mesh_are_its_hull(tmp_path):
+    """coacd resamples what it does not like: its one piece of a box turned inside out is one in a hundred too large."""
+    pytest.importorskip("coacd")
+    pytest.importorskip("scipy")
+    box = trimesh.creation.box((1, 1, 1))
+    trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False).export(tmp_path / "inverted.stl")
+    box.export(tmp_path / "box.stl")
+    for name in ("inverted.stl", "box.stl"):
+        (body,) = load(tmp_path / name, meshes="pieces").bodies
+        assert np.abs(body.shape.points).tolist() == [[0.5] * 3] * 8 and body.approximation is None, name
+
+
+def test_messages_about_files_cut_short_and_numbers_out_of_range(tmp_path):
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / "box.stl")
+    (tmp_path / "cut.stl").write_bytes((tmp_path / "box.stl").read_bytes()[:-37])
+    with pytest.raises(SceneError, match=r"cut\.stl: has no vertices.*cut short"):
+        load(tmp_path / "cut.stl")
+    (tmp_path / "big.obj").write_text("v 0 0 0\nv 1e60 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(SceneError, match=r"big\.obj: Mesh: vertices\[1, 0\] is 1e\+60") as refusal:
+        load(tmp_path / "big.obj")
+    assert str(refusal.value).count("big.obj") == 1
+
+
 def test_repeated_and_unused_vertices(tmp_path):
     box = trimesh.creation.box((1, 1, 1))
     vertices = np.concatenate([box.vertices, box.vertices, [(9, 9, 9)]])

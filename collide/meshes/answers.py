@@ -24,7 +24,7 @@ from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipp
 from collide.shapes.base import Shape
 from collide.shapes.mesh import Mesh
 
-#: Gaps above so many times the smaller body may be more than its boxes, in floats, can tell.
+#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
 _FAR = 1e20
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
@@ -104,7 +104,7 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
         apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
         sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
-    if limit > _FAR * min(A.reach, B.reach):
+    if limit > _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent)):
         for k in left[found.facets[:, 0] < 0].tolist():
             rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
     rows["hit"], rows["hit"][left] = True, ~apart
@@ -160,6 +160,10 @@ def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
         one, other = (X[:3, 3] + (X[:3, :3] * body.points[0]).sum(axis=1) for body, X in ((A, X_WA), (B, X_WB)))
         across = float(np.sqrt(np.square(other - one).sum())) * (1 + 2.0**-45) - A.radius - B.radius
         row["upper"] = max(across, float(row["upper"][0]))
+        if row["lower"][0] <= 0.0:  # the hulls meet, and these points are all that is known
+            row["normal"] = _unit((other - one)[None])
+            row["lower"], row["distance"] = 0.0, row["upper"]
+            row["point_a"], row["point_b"] = one + A.radius * row["normal"], other - B.radius * row["normal"]
         size = _size(A, B, X_WA[None], X_WB[None])[0]
         row["certified"] = bool(row["lower"][0] > 0.0 and row["upper"][0] <= row["lower"][0] + PROMISE * size)
     return row[0]

@@ -123,7 +123,7 @@ def _read_with_trimesh(path: Path, as_it_is: bool) -> tuple[MeshFile, list[tuple
             raw.append((vertices, faces))
             notes += about
     if not parts:
-        raise SceneError("has no vertices; a mesh needs at least one", path=path)
+        raise SceneError("has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path)
     return MeshFile(parts, notes), raw
 
 
@@ -155,7 +155,7 @@ def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -
     try:
         return described(label, vertices, faces)
     except InvalidShape as error:
-        raise SceneError(str(error), path=path, element=label) from None
+        raise SceneError(str(error), path=path, element=None if label == path.name else label) from None
 
 
 def distinct(vertices: np.ndarray) -> np.ndarray:

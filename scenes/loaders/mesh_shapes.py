@@ -35,7 +35,7 @@ def part_shape(part: MeshPart, scale, place: str) -> Taken:
     """
     factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
     try:
-        if part.pieces is not None:
+        if part.pieces is not None and not _is_convex(part):
             return Taken(_union([ConvexHull(points * factors) for points in part.pieces]), _about_pieces(part))
         if part.facets is not None:
             return Taken(_as_it_is(part, factors), None)
@@ -154,15 +154,18 @@ def _about_hull(part: MeshPart) -> str | None:
         return f"{hull} of an open mesh"
     if np.isnan(part.fill):
         return f"{hull} of a closed mesh"
-    if part.fill >= CONVEX_RATIO:
+    if _is_convex(part):
         return None
     extra = (1.0 / part.fill - 1.0) * 100.0
     amount = f"{extra:.0f}" if extra >= 10 else f"{extra:.2g}"
     return f"{hull}, fills {amount} % more volume"
 
 
-def _about_pieces(part: MeshPart) -> str | None:
+def _is_convex(part: MeshPart) -> bool:
+    """Whether the mesh is its own hull by its volume: then that hull is nearer to it than a decomposition, which resamples."""
+    return part.closed and part.fill >= CONVEX_RATIO
+
+
+def _about_pieces(part: MeshPart) -> str:
     pieces = part.pieces or []
-    if len(pieces) == 1 and part.closed and part.fill >= CONVEX_RATIO:
-        return None
-    return f"{len(pieces)} convex pieces of a mesh of {len(part.points)} vertices (coacd)"
+    return f"{len(pieces)} convex {'piece' if len(pieces) == 1 else 'pieces'} of a mesh of {len(part.points)} vertices (coacd)"
