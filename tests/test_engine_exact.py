@@ -226,6 +226,23 @@ def test_witness_points_and_normal(family):
             assert naive.distance_to_body(r.point_b, case.B, case.X_WB) <= slack, "point_b is not on B"
 
 
+def test_witness_points_of_segments_end_to_end():
+    """The foot of the origin is an end of the feature that decided, within rounding: not its other end."""
+    apart = 0
+    for seed in range(100):
+        rng = naive.rng_of("end to end", seed)
+        ends = rng.normal(size=(2, 3))
+        X = naive.random_pose(rng)
+        Y = X.copy()
+        Y[:3, 3] += (X[:3, :3] * (ends[seed % 2] - ends[1 - seed % 2])).sum(axis=1)
+        segment = collide.ConvexHull(ends)
+        r = collide.distance(segment, segment, X, Y)
+        case = f"ConvexHull({ends.tolist()}), X_WA = {X.tolist()}, X_WB = {Y.tolist()}"
+        apart += not r.hit
+        assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() < 1e-14 and r.distance < 1e-14, case
+    assert apart > 50, apart
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_moving_by_the_distance_brings_to_touch(family):
     for case in cases_of(family):

@@ -304,6 +304,24 @@ def test_within_rounding_nothing_is_claimed_that_is_not_so():
     assert open_ones > 20 and 10 < hits < tested - 10, (open_ones, hits, tested)
 
 
+def test_only_narrow_brackets_are_certified():
+    """Rounded products of poses far from the world's origin: brackets hold, and are as wide as rounding there."""
+    rng = rng_of("far unions")
+    cube, plane = collide.Mesh(*box()), collide.Halfspace((0.0, 0.0, 1.0), 0.0)
+    told = []
+    for away in (0.0, 1e3, 1e6, 1e8):
+        union = collide.Compound([(cube, any_pose(rng, 1.0)), (cube, any_pose(rng, 1.0))])
+        X, Y = any_pose(rng, 1.0), any_pose(rng, 1.0)
+        X[:3, 3] += away
+        Y[:3, 3] = X[:3, 3] - 9.0 * Y[:3, 2]
+        for other in (cube, collide.Box((1, 1, 1)), collide.Sphere(0.5), plane, union):
+            r = collide.distance(union, other, X, Y)
+            size = 40.0
+            assert not r.hit and (not r.certified or r.upper - r.lower <= 2.0**-43 * size), (away, other, r.lower, r.upper)
+            told.append((away, bool(r.certified)))
+    assert all(sure for away, sure in told if away == 0.0) and not any(sure for away, sure in told if away > 1e5), told
+
+
 def test_curved_parts_inside_solids():
     """Their poses are rounded products, so that no polytope answers: a point inside does."""
     rng = rng_of("curved inside")

@@ -199,7 +199,7 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
 
 def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
     """(n,) S of `narrowphase/bounds.py`."""
-    reach = float(np.sqrt(np.square(A.tree.numbers[REACH:]).sum())) + E.packed.reach
+    reach = float(np.sqrt(np.square(A.tree.numbers[REACH : REACH + 3]).sum())) + E.packed.reach
     return reach + np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
 
 

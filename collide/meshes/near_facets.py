@@ -99,7 +99,7 @@ class _Spans:
         slop = (packed.radius + packed.slop + A.slop + B.slop)[:, None]
         self.high = across + _support(packed, g) + slop
         self.low = across - _support(packed, -g) - slop
-        reach_a = _dot(np.abs(self.along), tree.numbers[REACH:])
+        reach_a = _dot(np.abs(self.along), tree.numbers[REACH : REACH + 3])
         reach_b = packed.reach * np.sqrt(_dot(g, g))
         self.slack = _ROUNDING * (reach_a + reach_b + np.abs(t).sum(axis=1)[:, None] + slop)
         self.worth = np.stack([_worth(D[:, :3]), _worth(D[:, 3:6])], axis=1)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from collide.batches import ask
-from collide.meshes.answers import facet_rows_of, hull_shape, mesh_hits, mesh_rows
+from collide.meshes.answers import PROMISE, facet_rows_of, hull_shape, mesh_hits, mesh_rows
 from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
 from collide.meshes.curved import APART, HIT, OPEN, curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
@@ -102,18 +102,28 @@ def part_rows(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed, limit: float) -> np.
 def _plane_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
     rows = ask(hull_shape(A), hull_shape(B), PA.X, PB.X, False, math.inf, False, 1)
     rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1
-    _widen(rows, PA.slop + PB.slop, limit)
+    _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
     crossing = (rows["lower"] <= 0.0) & (rows["upper"] > 0.0)
     rows["how"][crossing] = UNDECIDED
     rows["hit"] = ~(rows["lower"] > 0.0)
     return rows
 
 
-def _widen(rows: np.ndarray, slop: np.ndarray, limit: float) -> None:
-    """Brackets that hold however rounding moved the parts, in place."""
+def _size(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:
+    """(n,) of pairs of parts, as `narrowphase/bounds.py` has it."""
+    size = np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
+    for shape in (A, B):
+        bound = shape.bounding_parts()[0][0]
+        size = size + (abs(float(bound.params[3])) if is_halfspace(shape) else bound.reach + bound.radius)
+    return size
+
+
+def _widen(rows: np.ndarray, size: np.ndarray, slop: np.ndarray, limit: float) -> None:
+    """Brackets that hold however rounding moved the parts, in place; far from the world's origin they are wide."""
     rows["lower"] = np.nextafter(rows["lower"] - slop, -np.inf)
     rows["upper"] = np.nextafter(rows["upper"] + slop, np.inf)
     rows["certified"] &= (rows["lower"] > 0.0) | (rows["upper"] < 0.0)
+    rows["certified"] &= (rows["upper"] - rows["lower"] <= PROMISE * size) | (rows["lower"] <= 0.0)
     beyond = rows["lower"] > limit
     rows["beyond"] = beyond
     rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], np.inf
@@ -123,7 +133,7 @@ def _loose_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.nd
     states = loose_states(body_of(A), body_of(B), PA, PB)
     rows = facet_rows_of(A, B, PA.X, PB.X)
     hit = rows["hit"].copy()
-    _widen(rows, PA.slop + PB.slop, limit)
+    _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
     apart = states == APART
     rows["lower"][~apart & hit] = 0.0  # no depth is told
     rows["upper"][states == HIT] = 0.0

@@ -56,11 +56,10 @@ def weigh_foot(fine, n, parallelogram, weights):
         square = ex * ex + ey * ey + ez * ez
         along = -(x * ex + y * ey + z * ez)
         margin = _WEIGHT_ERROR * w * e
-        if not (margin < along < square - margin):
-            return False
-        weights[1] = along / square
-        weights[0] = 1.0 - weights[1]
-        return True
+        if square > 0.0:
+            weights[1] = min(max(along / square, 0.0), 1.0)
+            weights[0] = 1.0 - weights[1]
+        return margin < along < square - margin
     fx, _, fy, _, fz, _ = fine_edge(fine, 2, 0)
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
