@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import combinations
+from operator import index
 from typing import NamedTuple
 
 import numpy as np
@@ -95,6 +96,11 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     Raises CertificateRefused with the reason; InvalidArgument where there is nothing to check.
     Looks at every vertex; O(vertices) integer operations a pair of parts.
     """
+    for name, shape in (("A", A), ("B", B)):
+        if not (hasattr(shape, "meshed") and hasattr(shape, "parts")):
+            raise InvalidArgument(f"verify: {name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+    if not (hasattr(r, "hit") and hasattr(r, "__len__")):
+        raise InvalidArgument(f"verify: r must be a result of distance, got {r!r}")
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
     if len(X_WA) != 1 or len(X_WB) != 1 or len(r) != 1:
         raise InvalidArgument("verify: one pair at one pose each; index a batch first")
@@ -104,6 +110,7 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
             "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which one is "
             "a mesh whose hull meets the other)"
         )
+    given = _as_certificates(given)
     wanted = "together" if bool(np.all(r.hit)) else "apart"
     if A.meshed or B.meshed:
         from collide.mesh_certificates import refused_mesh
@@ -126,6 +133,16 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
         seen.add((i, j))
     if not seen or (wanted == "apart" and len(seen) < len(parts_a) * len(parts_b)):
         raise CertificateRefused(f"{len(parts_a) * len(parts_b)} pairs of parts, {len(seen)} of them certified")
+
+
+def _as_certificates(given) -> list[Certificate]:
+    """What may come from a file, as certificates of Python integers; refused where it has not their form."""
+    try:
+        return [
+            Certificate(kind, index(i), index(j), tuple((index(p), index(q)) for p, q in pairs)) for kind, i, j, pairs in given
+        ]
+    except (TypeError, ValueError):
+        raise CertificateRefused("a certificate is rows of (kind, part, part, pairs of vertex numbers), all numbers whole") from None
 
 
 # --- exact points -------------------------------------------------------------------------------

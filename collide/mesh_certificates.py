@@ -132,11 +132,11 @@ def _one_of_each_part(body: _Side) -> list[int]:
 
 
 def _refused_pairs(one: _Side, other: _Side, i: int, j: int, pairs, *, hit: bool) -> str | None:
+    for side, k, name in ((one, i, "A"), (other, j, "B")):
+        if not 0 <= k < (len(side.shape.faces) if side.meshed else 1):
+            return f"{name} has no facet {k}"
     if HALFSPACE in (one.kind, other.kind):
         return _refused_by_plane(one.posed(), other.posed(), _numbered(one, other, pairs), hit=hit)
-    for side, k, name in ((one, i, "A"), (other, j, "B")):
-        if hit and side.meshed and not 0 <= k < len(side.shape.faces):
-            return f"{name} has no facet {k}"
     if not hit:
         named = _numbered(one, other, pairs)
         if not 1 <= len(named) <= 4:

@@ -58,7 +58,7 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, R=None) -> np.ndarray
 def _finite(name: str, values, shape) -> np.ndarray:
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidPose(f"pose: {name} must be numbers of shape {shape}, got {values!r}") from None
     if array.shape != shape or not np.isfinite(array).all():
         raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {values!r}")
@@ -120,7 +120,7 @@ def as_poses(X, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
 def _to_floats(X, name: str) -> np.ndarray:
     try:
         return np.asarray(X, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidPose(f"{name} must be a (4, 4) matrix of numbers, got {X!r}") from None
 
 

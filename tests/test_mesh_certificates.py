@@ -126,3 +126,38 @@ def test_world_rows_have_them():
         pair = rows.pair(k)
         collide.verify(*pair.question, pair)
     assert len(rows) == 3
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        5, "x", [5], [None], ["together"], [("together", 0, 0)], [("together", 0, 0, 5)], [("together", 0, 0, [(0,)])],
+        [("together", 0, 0, [(0, 1, 2)])], [("together", 0.5, 0, [(0, 0)])], [("together", None, "a", [(0, 0)])],
+        [("together", 0, 0, [(0.5, 0)])], [("inside", 0, 0, [(-1, "a")])], [("inside", 0, 0, [(-1, None)])], [("apart", 0, 0, None)],
+        {"kind": "together"},
+    ],
+)  # fmt: skip
+def test_what_has_not_the_form_is_refused(given):
+    mesh, X_WB = collide.Mesh(*box()), collide.pose((1.5, 0.25, 0.125))
+    for B in (mesh, collide.Box((2, 2, 2)), collide.Halfspace((0, 0, 1), 0.0)):
+        for A in (mesh, collide.Box((2, 2, 2))):
+            r = collide.distance(A, B, EYE, X_WB)
+            with pytest.raises(CertificateRefused):
+                collide.verify(A, B, EYE, X_WB, r, certificate=given)
+
+
+def test_half_spaces_have_one_part():
+    mesh, plane = collide.Mesh(*box()), collide.Halfspace((0, 0, 1), 0.0)
+    r = collide.distance(mesh, plane, EYE, EYE)
+    (c,) = r.certificate
+    for wrong in (c._replace(part_a=99), c._replace(part_b=1), c._replace(part_b=-1)):
+        with pytest.raises(CertificateRefused, match="no facet"):
+            collide.verify(mesh, plane, EYE, EYE, r, certificate=[wrong])
+
+
+def test_verify_names_what_is_no_shape_and_no_result():
+    mesh = collide.Mesh(*box())
+    r = collide.distance(mesh, mesh, EYE, EYE)
+    for arguments in ((None, mesh, EYE, EYE, r), ([mesh], mesh, EYE, EYE, r), (mesh, mesh, EYE, EYE, None), (mesh, mesh, EYE, EYE, True)):
+        with pytest.raises(collide.InvalidArgument, match="must be a"):
+            collide.verify(*arguments)

@@ -255,3 +255,22 @@ def test_any_size(scale):
 def test_one_point_a_contact():
     c = collide.contacts(collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), np.eye(4), collide.pose((0.0, 0.0, 1.25)), margin=0.5)
     assert np.array_equal(c.point[:, 2], np.full(4, 0.625)) and c.point.shape == (4, 3) and (c.distance == 0.25).all()
+
+
+def test_next_to_a_hollow_edge_some_row_is_told():
+    """Nearer to the edge of two walls than rounding tells it from the edge: neither wall's nearest point looks like a local one."""
+    walls = np.array([[-4.0, 0, 0], [4, 0, 0], [4, 4, 0], [-4, 4, 0], [4, 0, 4], [-4, 0, 4]])
+    surface = collide.Mesh(walls, [[0, 1, 2], [0, 2, 3], [0, 4, 1], [0, 5, 4]], solid=False)
+    X_WB = collide.pose((1, 1e-9, 1e-9))
+    for shape in (collide.Sphere(0.5), collide.ConvexHull([[0.0, 0, 0]])):
+        d = collide.distance(surface, shape, np.eye(4), X_WB)
+        for margin in (0.0, 0.1, 1e-9 * (1 + 1e-3)):
+            c = collide.contacts(surface, shape, np.eye(4), X_WB, margin=margin)
+            s = collide.contacts(shape, surface, X_WB, np.eye(4), margin=margin)
+            assert bool(len(c)) == bool(len(s)) == (d.hit or d.upper <= margin), (shape, margin)
+            if not d.hit and margin:
+                assert c.lower[0] <= d.upper and d.lower <= c.upper[0]
+    mixed = np.concatenate([walls, [[1e6, 1e6, 9], [1e6, -1e6, 9], [-1e6, 0, 9]]])  # and coordinates of few digits
+    far = collide.Mesh(mixed, [[0, 1, 2], [0, 2, 3], [0, 4, 1], [0, 5, 4], [6, 7, 8]], solid=False)
+    assert collide.collide(far, collide.Sphere(0.5), np.eye(4), X_WB)
+    assert len(collide.contacts(far, collide.Sphere(0.5), np.eye(4), X_WB))

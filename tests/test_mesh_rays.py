@@ -285,3 +285,21 @@ def test_exact_settling_of_a_walk_that_sees_nothing():
     tree = build_mesh_tree(*box())
     given = np.array([[0.0, 0, 5, 0, 0, -1, 16, np.inf]])
     assert kernels.RAY == 8 and len(facets_on_rays(tree, np.eye(4), given, True)[0]) == 2
+
+
+def test_empty_batches_of_poses_and_numbers_beyond_doubles():
+    mesh, none = collide.Mesh(*box()), np.zeros((0, 3))
+    for poses, origins, directions in (
+        (np.zeros((0, 4, 4)), none, none), (np.zeros((0, 4, 4)), np.zeros(3), np.ones(3)), (np.eye(4), none, np.ones(3)),
+    ):  # fmt: skip
+        for every in (False, True):
+            r = collide.raycast(mesh, poses, origins, directions, all_hits=every)
+            assert len(r.hit) == len(r.facet) == 0 and r.point.shape == (0, 3)
+    beyond = 10**400
+    for more in ({"max_distance": beyond}, {"origins_W": [beyond, 0, 0]}, {"directions_W": [beyond, 0, 0]}):
+        with pytest.raises(collide.InvalidArgument):
+            collide.raycast(**{"shape": mesh, "X_WA": np.eye(4), "origins_W": np.zeros(3), "directions_W": np.ones(3), **more})
+    with pytest.raises(collide.InvalidArgument):
+        collide.contacts(mesh, mesh, np.eye(4), np.eye(4), margin=beyond)
+    with pytest.raises(collide.InvalidPose):
+        collide.raycast(mesh, [[beyond] * 4] * 4, np.zeros(3), np.ones(3))

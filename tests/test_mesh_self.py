@@ -110,3 +110,27 @@ def test_many_pairs_are_not_lost():
     vertices[::2] = vertices[::2, :, [2, 0, 1]]
     pairs, _ = self_hits(build_mesh_tree(vertices.reshape(-1, 3), faces))
     assert len(pairs) >= (n // 2) ** 2 and len(np.unique(pairs, axis=0)) == len(pairs)
+
+
+def test_facets_without_area_are_what_their_corners_span():
+    """In either order: a facet that is no more than a common edge or corner is no pair, a longer one is."""
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [5, 5, 5], [2, 0, 0], [3, 0, 0], [-1, 0, 0]])
+    for a, b, want in (
+        ([0, 1, 2], [0, 0, 1], False), ([0, 1, 2], [1, 0, 0], False), ([0, 1, 2], [0, 0, 0], False), ([0, 1, 2], [0, 3, 1], False),
+        ([0, 1, 2], [0, 3, 3], True), ([0, 1, 2], [0, 4, 4], False), ([0, 1, 2], [5, 1, 6], False), ([0, 1, 2], [7, 0, 5], True),
+        ([0, 1, 2], [7, 0, 7], False), ([2, 4, 0], [7, 0, 1], False), ([0, 3, 1], [0, 3, 3], False), ([0, 1, 5], [0, 1, 6], True),
+        ([0, 1, 5], [0, 1, 7], False), ([3, 1, 5], [0, 3, 5], False), ([0, 0, 1], [0, 1, 1], False), ([0, 1, 4], [0, 0, 3], True),
+    ):  # fmt: skip
+        for faces in ([a, b], [b, a], [a[::-1], b[1:] + b[:1]], [b[2:] + b[:2], a]):
+            pairs, _ = self_hits(build_mesh_tree(line, np.array(faces)))
+            assert (len(pairs) == 1) is want, faces
+
+
+def test_the_order_of_facets_says_nothing():
+    rng = np.random.default_rng(47)
+    for _ in range(40):
+        vertices, faces = grid(rng, 20, 3)
+        pairs, _ = self_hits(build_mesh_tree(vertices, faces))
+        turned, _ = self_hits(build_mesh_tree(vertices, faces[::-1]))
+        last = len(faces) - 1
+        assert sorted(map(tuple, pairs.tolist())) == sorted((last - j, last - i) for i, j in turned.tolist()), faces.tolist()

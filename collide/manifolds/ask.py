@@ -110,7 +110,7 @@ def check_margin(name: str, value) -> float:
     """A margin [m]."""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidArgument(f"{name}: margin must be a number ≥ 0 [m], got {value!r}") from None
     if not 0.0 <= number <= _LARGEST_MARGIN:
         raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {value!r}")

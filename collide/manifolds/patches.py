@@ -40,7 +40,7 @@ class Patch(NamedTuple):
 
 
 def patches_of(here: Posed, margin: float) -> tuple[list[Patch], bool]:
-    """(patches, whether the bodies overlap in a way that none of them tells)."""
+    """(patches, whether `distance` is to be asked: for an overlap that none tells, or where pairs within reach made none)."""
     A, B = here.A, here.B
     reach = margin + A.radius + B.radius
     pairs = here.pairs(reach)
@@ -79,7 +79,8 @@ def patches_of(here: Posed, margin: float) -> tuple[list[Patch], bool]:
         for _, members in made:
             covered |= members
     gaps = _gaps(here, pairs, links, covered, found, reach)
-    return [*(patch for patch, _ in found), *gaps], deep
+    told = [*(patch for patch, _ in found), *gaps]
+    return told, deep or not told
 
 
 def _overlapping(
@@ -124,6 +125,9 @@ def _gaps(here: Posed, pairs: Pairs, links: Links, covered: np.ndarray, found: l
     least = local_minima(pairs.take(asked), u[asked], slack[asked], A, B, (topology_of(A), topology_of(B)), poses)
     starts = np.zeros(len(pairs), dtype=bool)
     starts[asked[least]] = True
+    nearest = asked[int(np.argmin(length))]
+    if not found and pairs.near.lower[starts].min(initial=np.inf) > pairs.near.length[nearest] + CLEAR * here.error:
+        starts[nearest] = True  # nothing is nearer, whatever rounding makes of its neighbours
     for patch, members in found:  # what hangs on to an overlap, the same way, is part of it
         same = starts & (lengths_of(u - patch.normal) <= slack + 2.0**-20)
         starts &= ~links.reached(members, same)

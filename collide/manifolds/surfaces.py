@@ -38,7 +38,7 @@ def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
     row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=margin)[0]
     if row["beyond"] or row["lower"] > margin:
         return no_rows()
-    found = rows_of([_told(A, B, row, WAY_OUT if row["hit"] else GAP)])
+    found = rows_of([_told(A, B, row)])
     found["lower"], found["upper"] = row["lower"], row["upper"]
     return found
 
@@ -46,6 +46,8 @@ def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
 def _ordered(one: Body, other: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
     here = posed(one, other, X_WA, X_WB)
     patches, deep = patches_of(here, margin)
+    if not patches:
+        return _witness(A, B, X_WA, X_WB, margin) if deep else no_rows()
     made = [finished(here, patch, margin, most) for patch in patches]
     if deep:
         made.append(_way_out(A, B, X_WA, X_WB))
@@ -81,11 +83,12 @@ def _facets(patch: Patch, kept) -> np.ndarray:
 
 
 def _way_out(A: Shape, B: Shape, X_WA, X_WB) -> Finished:
-    return _told(A, B, mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0], WAY_OUT)
+    return _told(A, B, mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0])
 
 
-def _told(A: Shape, B: Shape, row, kind: int) -> Finished:
+def _told(A: Shape, B: Shape, row) -> Finished:
     """One contact from a row of `distance`."""
+    kind = WAY_OUT if row["hit"] else GAP
     facets = np.array([[row[part] if has_facets(shape) else -1 for part, shape in (("part_a", A), ("part_b", B))]])
     distance = np.array([row["distance"]])
     apart = -float(row["lower"]) if kind == WAY_OUT else 0.0

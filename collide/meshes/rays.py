@@ -104,7 +104,7 @@ def raycast(
     body = facet_body(shape, "raycast")
     X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, max_distance, check_poses)
     n = len(given)
-    hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) > 1 else X_WA[0], given, not all_hits)
+    hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], given, not all_hits)
     found = _Found(body, X_WA, given, exponents, hits, float(max_distance))
     found.settle(all_hits)
     ray, facet, t = found.kept()
@@ -130,7 +130,7 @@ def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
     """((n, 3) finite float64, whether a single one was given)."""
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidArgument(f"{caller}: {name} must be numbers (3,) or (N, 3), got {values!r}") from None
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {array.shape}")
@@ -172,7 +172,7 @@ def _asked(body: Body, X_WA, origins_W, directions_W, max_distance, check: bool)
     _refuse("raycast", "directions_W", directions, (sizes < low) | (sizes > high), f"has no component within [{low:g}, {high:g}]")
     try:
         limit = float(max_distance)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidArgument(f"raycast: max_distance must be a number ≥ 0, got {max_distance!r}") from None
     if not limit >= 0.0:
         raise InvalidArgument(f"raycast: max_distance must be ≥ 0, got {max_distance!r}")

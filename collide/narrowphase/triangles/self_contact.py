@@ -3,8 +3,8 @@
 Corners are the same where their coordinates are. Facets with no common corner must not meet at all. With one, v, they
 share more exactly if the edge opposite v of one meets the other: whatever point besides v both have, the ray from v
 through it leaves one of them over that edge. With two, they overlap exactly if they lie in one plane on one side of the
-common edge. With three they are one facet twice. Facets without area hide nothing: their corners and edges are
-their neighbours' too, and what else they meet is found, by the rule for the corners they have.
+common edge. With three they are one facet twice. Common corners are points, each counted once. A facet without area is
+the segment or the point that its corners span: an edge that a neighbour has too is nothing more, a longer one is.
 """
 
 from __future__ import annotations
@@ -54,11 +54,13 @@ def _same(P, a, b):
 
 @kernel(inline=True)
 def _shared(P, a, b):
-    """(how many corners of b are corners of a, which of a the last one is, and which of b)."""
+    """(how many points are corners of both, which corner of a the last one is, and which of b)."""
     count = 0
     of_a = -1
     of_b = -1
     for j in range(3):
+        if (j > 0 and _same(P, b, b + 3 * j)) or (j > 1 and _same(P, b + 3, b + 3 * j)):
+            continue
         for i in range(3):
             if _same(P, a + 3 * i, b + 3 * j):
                 count += 1
@@ -81,10 +83,39 @@ def _load(P, a, i, j, k, corners, at):
 
 
 @kernel
-def _edge_meets(P, a, i, b, corners, error, arguments, decide, counters):
-    """Whether the edge of facet a opposite its corner i meets facet b."""
+def _between(P, v, p, q, corners, arguments, decide, counters):
+    """Whether corner v lies between corners p and q: facets without area can be so, and no others."""
+    for axis in range(3):
+        if P[v + axis] < min(P[p + axis], P[q + axis]) or P[v + axis] > max(P[p + axis], P[q + axis]):
+            return False
+    counters[EXACT] += 1
+    _load(P, v, 0, 0, 0, corners, 0)
+    _load(P, p, 0, (q - p) // 3, (q - p) // 3, corners, 3)
+    return call_exactly(decide, (MEET, *arguments)) != 0
+
+
+@kernel
+def _opposite_meets(P, a, i, b, corners, error, arguments, decide, counters):
+    """Whether what facet a has opposite its corner i meets facet b: an edge, or less where a has no area."""
+    v = a + 3 * i
     p = a + 3 * ((i + 1) % 3)
     q = a + 3 * ((i + 2) % 3)
+    if _same(P, p, v):
+        p = q
+    if _same(P, q, v):
+        q = p
+    if _same(P, p, v):
+        return False
+    if _between(P, v, p, q, corners, arguments, decide, counters):
+        return _edge_meets(P, p, p, b, corners, error, arguments, decide, counters) or _edge_meets(
+            P, q, q, b, corners, error, arguments, decide, counters
+        )
+    return _edge_meets(P, p, q, b, corners, error, arguments, decide, counters)
+
+
+@kernel
+def _edge_meets(P, p, q, b, corners, error, arguments, decide, counters):
+    """Whether the edge between corners p and q of one facet meets facet b."""
     far = 0.0
     for axis in range(3):
         x = P[b + axis]
@@ -105,7 +136,7 @@ def _edge_meets(P, a, i, b, corners, error, arguments, decide, counters):
         return False
     counters[EXACT] += 1
     _load(P, b, 0, 1, 2, corners, 0)
-    _load(P, a, (i + 1) % 3, (i + 2) % 3, (i + 2) % 3, corners, 3)
+    _load(P, p, 0, (q - p) // 3, (q - p) // 3, corners, 3)
     return call_exactly(decide, (MEET, *arguments)) != 0
 
 
@@ -272,7 +303,7 @@ def _conflict(P, a, b, corners, error, arguments, decide, counters):
     if count == 1:
         if _one_side(P, a + 3 * i, b, j, a, i, error) or _one_side(P, a + 3 * i, a, i, b, j, error):
             return False
-        return _edge_meets(P, a, i, b, corners, error, arguments, decide, counters) or _edge_meets(
+        return _opposite_meets(P, a, i, b, corners, error, arguments, decide, counters) or _opposite_meets(
             P, b, j, a, corners, error, arguments, decide, counters
         )
     if count > 2:
@@ -294,7 +325,17 @@ def _conflict(P, a, b, corners, error, arguments, decide, counters):
     counters[EXACT] += 1
     _load(P, a, (free_a + 1) % 3, (free_a + 2) % 3, free_a, corners, 0)
     _load(P, b, (free_b + 1) % 3, (free_b + 2) % 3, free_b, corners, 3)
-    return call_exactly(decide, (OVERLAP, *arguments)) != 0
+    if call_exactly(decide, (OVERLAP, *arguments)) != 0:
+        return True
+    x = a + 3 * free_a
+    y = b + 3 * free_b
+    for _ in range(2):  # neither has an area, and both reach beyond the same end of the common edge
+        if _between(P, w, v, x, corners, arguments, decide, counters) and _between(
+            P, w, v, y, corners, arguments, decide, counters
+        ):
+            return True
+        v, w = w, v
+    return False
 
 
 @kernel
