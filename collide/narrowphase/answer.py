@@ -63,6 +63,8 @@ _FOOT, _FINE = 60, 64
 _NEAREST, _TIES = 10, 16
 _TIED = _TIES + GAP_INTEGERS
 _OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIED + ENTRY
+#: Rounding of a point that stands for the foot on a facet, in units of its corners.
+_NEAR_MISS = 2.0**-42
 #: Workspace of one thread; the requests to the exact stage stand last.
 REQUESTS_AT = _OWN_INTEGERS + EPA_INTEGERS
 DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, REQUESTS_AT + REQUESTS
@@ -126,6 +128,44 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
         weights[0] = 1.0
         weights[1] = 0.0
         weights[2] = 0.0
+    size = 0.0
+    for k in range(3):
+        size = max(size, abs(points[POINT * k]), abs(points[POINT * k + 1]), abs(points[POINT * k + 2]))
+    if _miss(points, weights, x, y, z) > _NEAR_MISS * size:
+        _weigh_edges(points, weights, x, y, z)
+
+
+@kernel(inline=True)
+def _miss(points, weights, x, y, z):
+    """How far the weighted point of three lies from (x, y, z)."""
+    return abs(_combine(points, weights, 3, 0) - x) + abs(_combine(points, weights, 3, 1) - y) + abs(_combine(points, weights, 3, 2) - z)
+
+
+@kernel
+def _weigh_edges(points, weights, x, y, z):
+    """Weights of the point of three edges that is nearest (x, y, z): a needle's area says nothing, its edges do."""
+    best = math.inf
+    chosen = 0
+    share = 0.0
+    for k in range(3):
+        a = POINT * k
+        b = POINT * ((k + 1) % 3)
+        ex = points[b] - points[a]
+        ey = points[b + 1] - points[a + 1]
+        ez = points[b + 2] - points[a + 2]
+        square = ex * ex + ey * ey + ez * ez
+        along = (x - points[a]) * ex + (y - points[a + 1]) * ey + (z - points[a + 2]) * ez
+        s = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+        away = abs(points[a] + s * ex - x) + abs(points[a + 1] + s * ey - y) + abs(points[a + 2] + s * ez - z)
+        if away < best:
+            best = away
+            chosen = k
+            share = s
+    if best < _miss(points, weights, x, y, z):
+        for k in range(3):
+            weights[k] = 0.0
+        weights[chosen] = 1.0 - share
+        weights[(chosen + 1) % 3] = share
 
 
 @kernel(inline=True)
@@ -227,6 +267,7 @@ def _swept(
     words[ITERATIONS] = rounds
     distance = -depth - radius
     width = math.inf
+    vague = False
     if not boolean:
         width = PROMISE_CURVED * size if curved else (0.0 if exactly else PROMISE_STORED * size)
         if exactly and not curved and depth < -error and lower <= limit:
@@ -235,6 +276,8 @@ def _swept(
                 pair, terms_at, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, view_i64(integers_at + 8 * _NEAREST, 6),
                 used, parallelogram, view_f64(doubles_at + 8 * _FOOT, 3), size, slop, error,
             )  # fmt: skip
+            # Radii may prove an overlap of cores between which doubles see no clear direction.
+            vague = not proven and radius > 0.0
             if proven:
                 _take_foot(weights, n, view_f64(doubles_at + 8 * _FOOT, 3))
                 swept, swept_low = two_sum(radius_a, radius_b)
@@ -253,7 +296,7 @@ def _swept(
         upper = min(upper, -shallowest - radius + rounding)
     write_verdict(row, marks, distance, lower, upper, how, width, limit)
     unfinished = marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0) and (depths or upper > 0.0)
-    if width == 0.0 and (not decided or unfinished):
+    if width == 0.0 and (not decided or unfinished or vague):
         marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
         tied = view_i64(integers_at + 8 * _TIED, ENTRY)
         if closed_form:
