@@ -17,7 +17,6 @@ import numpy as np
 
 from collide.certificates import Certificate, _minus, _Posed, _refused, _refused_by_plane, _search
 from collide.geometry.packing import HALFSPACE, POINTS, pack_points
-from collide.shapes.mesh import Mesh
 
 _IDENTITY = np.eye(4)
 #: Directions of the segments that count how often a surface winds around a point; the next one where an edge is met.
@@ -55,7 +54,7 @@ class _Side:
     """One body: its shape, pose, and vertices in use."""
 
     def __init__(self, shape, X: np.ndarray):
-        self.shape, self.X, self.meshed = shape, X, isinstance(shape, Mesh)
+        self.shape, self.X, self.meshed = shape, X, shape.meshed and hasattr(shape, "faces")
         self.packed = None if shape.meshed else shape.parts()[0][0]
         self.kind = POINTS if self.packed is None else self.packed.kind
         plain = self.meshed or (

@@ -8,4 +8,4 @@ mypy_target=$(mktemp -d)
 trap 'rm -rf "$mypy_target"' EXIT
 python -m pip install --quiet --disable-pip-version-check --no-deps --target "$mypy_target" .
 MYPYPATH="$mypy_target" mypy -p collide
-python -m pytest "$@"
+python -m pytest -n auto --maxprocesses 4 --dist loadfile "$@"
