@@ -55,30 +55,33 @@ def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = Tr
         return flipped(mesh_rows(B, A, X_WB, X_WA, limit=limit, depths=depths))
     if not has_facets(B):
         return curved_rows(body_of(A), enclosure_of(B), given(X_WA), given(X_WB), limit=limit, depths=depths)
-    rows = _ordered(body_of(A), body_of(B), X_WA, X_WB, limit, depths)
+    rows = rows_in_order(_rows, body_of(A), body_of(B), X_WA, X_WB, limit, depths)
     out = np.zeros(len(rows), dtype=PAIR_DTYPE)
     for name in FIELDS:  # padding stays 0: equal answers are equal bytes
         out[name] = rows[name]
     return out
 
 
-def _ordered(one: Body, other: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
-    """Rows worked out on the same numbers for swapped questions."""
+def rows_in_order(rows_of, one, other, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+    """``rows_of(one, other, X_WA, X_WB, limit, depths)``, worked out on the same numbers for swapped questions.
+
+    one, other : bodies or unions, whose ``key`` orders them by content.
+    """
     if other.key < one.key:
-        return flipped(_rows(other, one, X_WB, X_WA, limit, depths))
+        return flipped(rows_of(other, one, X_WB, X_WA, limit, depths))
     if one.key == other.key:
         turned = np.array([X.tolist() > Y.tolist() for X, Y in zip(X_WA[:, :3], X_WB[:, :3])], dtype=bool)
         if turned.any():
             rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
-            rows[~turned] = _rows(one, other, X_WA[~turned], X_WB[~turned], limit, depths)
-            rows[turned] = flipped(_rows(other, one, X_WB[turned], X_WA[turned], limit, depths))
+            rows[~turned] = rows_of(one, other, X_WA[~turned], X_WB[~turned], limit, depths)
+            rows[turned] = flipped(rows_of(other, one, X_WB[turned], X_WA[turned], limit, depths))
             return rows
-    return _rows(one, other, X_WA, X_WB, limit, depths)
+    return rows_of(one, other, X_WA, X_WB, limit, depths)
 
 
 def facet_rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """Rows of two bodies of facets, without depths."""
-    return _ordered(body_of(A), body_of(B), X_WA, X_WB, math.inf, False)
+    return rows_in_order(_rows, body_of(A), body_of(B), X_WA, X_WB, math.inf, False)
 
 
 def given(X: np.ndarray) -> Posed:

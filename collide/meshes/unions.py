@@ -12,12 +12,13 @@ import math
 import numpy as np
 
 from collide.batches import ask
+from collide.meshes.answers import rows_in_order
 from collide.meshes.bodies import is_halfspace
 from collide.meshes.curved import APART, HIT, OPEN
 from collide.meshes.union_pairs import part_rows, part_states
 from collide.meshes.union_parts import UnionParts, union_of
 from collide.meshes.way_out import Parting, shortened
-from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
+from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 from collide.shapes.base import Shape
 
 
@@ -80,17 +81,7 @@ def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
 
 def union_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
     """Rows (PAIR_DTYPE) for poses (n, 4, 4) of two shapes, one at least a union; limit, depths as in `distance`."""
-    one, other = union_of(A), union_of(B)
-    if other.key < one.key:
-        return flipped(_rows(other, one, X_WB, X_WA, limit, depths))
-    if one.key == other.key:
-        turned = np.array([X.tolist() > Y.tolist() for X, Y in zip(X_WA[:, :3], X_WB[:, :3])], dtype=bool)
-        if turned.any():
-            rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
-            rows[~turned] = _rows(one, other, X_WA[~turned], X_WB[~turned], limit, depths)
-            rows[turned] = flipped(_rows(other, one, X_WB[turned], X_WA[turned], limit, depths))
-            return rows
-    return _rows(one, other, X_WA, X_WB, limit, depths)
+    return rows_in_order(_rows, union_of(A), union_of(B), X_WA, X_WB, limit, depths)
 
 
 def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:

@@ -38,6 +38,7 @@ from collide.narrowphase.triangles.placing import (
     UNITS,
     later,
     place,
+    to_world,
     transform,
 )
 from collide.narrowphase.triangles.surfaces import box_size, certainly_meeting, link_of, set_probe
@@ -228,18 +229,6 @@ def _own_gap(near, which, nodes, slabs, triangles, numbers, scale, link, ref):
     return max(plain, thin)
 
 
-@kernel(inline=True)
-def _to_world(X, sx, sy, sz, V, at, out, to):
-    """Three corners in the world's axes."""
-    for k in range(3):
-        x = V[at + 3 * k]
-        y = V[at + 3 * k + 1]
-        z = V[at + 3 * k + 2]
-        out[to + 3 * k] = (X[0] * x + X[1] * y + X[2] * z) + sx
-        out[to + 3 * k + 1] = (X[4] * x + X[5] * y + X[6] * z) + sy
-        out[to + 3 * k + 2] = (X[8] * x + X[9] * y + X[10] * z) + sz
-
-
 @kernel
 def _near_leaves(P, W, run_a, run_b, XA, XB, placing, near, T, new, of_a, corners, context, marks):
     """Triangles of two leaves against the best so far; 2 where two of them meet, 1 where the best got better."""
@@ -247,10 +236,10 @@ def _near_leaves(P, W, run_a, run_b, XA, XB, placing, near, T, new, of_a, corner
     better = 0
     error = 4.0 * near[_WORLD_ERROR]
     for j in range(run_a & 7):
-        _to_world(XA, 0.0, 0.0, 0.0, P, 9 * (first_a + j), of_a, 9 * j)
+        to_world(XA, 0.0, 0.0, 0.0, P, 9 * (first_a + j), of_a, 9 * j)
     for i in range(run_b & 7):
         b = (run_b >> 3) + i
-        _to_world(XB, XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11], W, 9 * b, T, 9)
+        to_world(XB, XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11], W, 9 * b, T, 9)
         for j in range(run_a & 7):
             for k in range(9):
                 T[k] = of_a[9 * j + k]

@@ -22,7 +22,16 @@ from collide.geometry.mesh_tree.layout import (
 )
 from collide.narrowphase.triangles.exact_points import CORNERS, STATE, forget_poses
 from collide.narrowphase.triangles.nearest import beyond, common_point, nearest_points
-from collide.narrowphase.triangles.placing import ERROR, INVERSE_A, INVERSE_B, PLACING, UNITS, place, transform
+from collide.narrowphase.triangles.placing import (
+    ERROR,
+    INVERSE_A,
+    INVERSE_B,
+    PLACING,
+    UNITS,
+    place,
+    to_world,
+    transform,
+)
 from collide.narrowphase.triangles.surfaces import (
     FULL,
     SINGULAR,
@@ -96,18 +105,6 @@ def _world_error(numbers_a, XA, numbers_b, XB):
     return 8.0 * _U * size
 
 
-@kernel(inline=True)
-def _turn(X, sx, sy, sz, V, at, T, to):
-    """Three corners in the world's axes."""
-    for k in range(3):
-        x = V[at + 3 * k]
-        y = V[at + 3 * k + 1]
-        z = V[at + 3 * k + 2]
-        T[to + 3 * k] = (X[0] * x + X[1] * y + X[2] * z) + sx
-        T[to + 3 * k + 1] = (X[4] * x + X[5] * y + X[6] * z) + sy
-        T[to + 3 * k + 2] = (X[8] * x + X[9] * y + X[10] * z) + sz
-
-
 @kernel
 def _near_leaves(
     P, W, ids_a, ids_b, run_a, run_b, XA, XB, placing, corners, context, reach, error, T, new, marks, out, told, found
@@ -115,11 +112,11 @@ def _near_leaves(
     """All triangles of two leaves; returns how many pairs there are now."""
     for i in range(run_b & 7):
         b = (run_b >> 3) + i
-        _turn(XB, XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11], W, 9 * b, T, 9)
+        to_world(XB, XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11], W, 9 * b, T, 9)
         transform(placing, W, 9 * b, corners, 9)
         for j in range(run_a & 7):
             a = (run_a >> 3) + j
-            _turn(XA, 0.0, 0.0, 0.0, P, 9 * a, T, 0)
+            to_world(XA, 0.0, 0.0, 0.0, P, 9 * a, T, 0)
             if beyond(T, reach + 8.0 * error):
                 continue
             meets = certainly_meeting(P, W, 9 * a, 9 * b, corners, context, marks, 0)

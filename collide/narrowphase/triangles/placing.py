@@ -251,3 +251,15 @@ def transform(placing, w, at, out, to):
             out[to + 3 * k + i] = (
                 placing[3 * i] * x + placing[3 * i + 1] * y + placing[3 * i + 2] * z
             ) + placing[SHIFT + i]
+
+
+@kernel(inline=True)
+def to_world(X, sx, sy, sz, V, at, out, to):
+    """Three corners in the world's axes."""
+    for k in range(3):
+        x = V[at + 3 * k]
+        y = V[at + 3 * k + 1]
+        z = V[at + 3 * k + 2]
+        out[to + 3 * k] = (X[0] * x + X[1] * y + X[2] * z) + sx
+        out[to + 3 * k + 1] = (X[4] * x + X[5] * y + X[6] * z) + sy
+        out[to + 3 * k + 2] = (X[8] * x + X[9] * y + X[10] * z) + sz
