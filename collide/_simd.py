@@ -126,9 +126,14 @@ def _scan(builder: ir.IRBuilder, values, count):
     first = block(zero)
     last = builder.sub(count, one)
     last_but_one = builder.sub(last, one)
-    begin = builder.block
-    several, pairs, ends, reduce = (builder.append_basic_block(name) for name in ("several", "pairs", "ends", "reduce"))
-    builder.cbranch(builder.icmp_signed("==", last, zero), reduce, several)
+    single, several, pairs, ends, done = (
+        builder.append_basic_block(name) for name in ("single", "several", "pairs", "ends", "done")
+    )
+    builder.cbranch(builder.icmp_signed("==", last, zero), single, several)
+
+    builder.position_at_end(single)
+    only = _reduced_block(builder, first[0])
+    builder.branch(done)
 
     builder.position_at_end(several)
     builder.cbranch(builder.icmp_signed("<", one, last_but_one), pairs, ends)
@@ -151,14 +156,15 @@ def _scan(builder: ir.IRBuilder, values, count):
     within = builder.select(builder.icmp_signed("<", last_but_one, zero), zero, last_but_one)
     odd_all = _later(builder, odd_left, block(within))
     merged = _earlier_of(builder, _later(builder, even_left, block(last)), odd_all)
-    builder.branch(reduce)
+    several_best = _reduced(builder, merged)
+    builder.branch(done)
 
-    builder.position_at_end(reduce)
-    best = _phi_pair(builder)
-    for phi, only, larger in zip(best, first, merged):
-        phi.add_incoming(only, begin)
-        phi.add_incoming(larger, ends)
-    return _reduced(builder, best)
+    builder.position_at_end(done)
+    value, index = builder.phi(_F64), builder.phi(_I64)
+    for phi, of_one, of_several in zip((value, index), only, several_best):
+        phi.add_incoming(of_one, single)
+        phi.add_incoming(of_several, ends)
+    return value, index
 
 
 def _later(builder, best, found):
@@ -186,6 +192,14 @@ def _reduced(builder, best):
     indices = builder.select(holds_it, best[1], ir.Constant(_INDICES, [_NOWHERE] * LANES))
     lowest = _halved(builder, indices, lambda a, b: builder.select(builder.icmp_signed("<", b, a), b, a))
     return builder.fadd(largest, ir.Constant(_F64, 0.0)), lowest  # −0 becomes 0: lanes may hold both
+
+
+def _reduced_block(builder, values):
+    """`_reduced` of eight numbers in the order of their indices: the first lane that holds the largest."""
+    largest = _halved(builder, values, lambda a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+    holds_it = builder.fcmp_ordered("==", values, _splat(builder, largest, _VALUES))
+    lane = builder.cttz(builder.zext(builder.bitcast(holds_it, ir.IntType(8)), _I64), ir.Constant(ir.IntType(1), 1))
+    return builder.fadd(largest, ir.Constant(_F64, 0.0)), lane
 
 
 def _halved(builder, vector, better):

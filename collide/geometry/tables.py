@@ -19,10 +19,10 @@ INTS = 8
 # One row of doubles a shape; PARAMS is the first of four.
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
-# One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), and the row of the exact
-# terms where R and t are a rounded product of two poses (1), else −1.
-POSE = 14
-POSE_SLOP, POSE_TERMS = 12, 13
+# One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), the row of the exact terms where R and
+# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel asks.
+POSE = 15
+POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
 #: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
 TERMS = 7
 
@@ -103,7 +103,7 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     rows[:, :9] = R_WB.reshape(-1, 9)
     rows[:, 9:12] = p_WB
     rows[:, POSE_SLOP] = 0.0
-    rows[:, POSE_TERMS] = -1.0
+    rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
     identity = np.eye(4)
     own = (X_BP != identity).any(axis=(1, 2))
     if not own.any():

@@ -13,7 +13,7 @@ import numpy as np
 from collide.geometry.facet_table import FacetTable
 from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import POSE, POSE_SLOP, POSE_TERMS, TERMS, PoseTable
+from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, TERMS, PoseTable
 from collide.narrowphase.run import run_pairs
 
 
@@ -45,7 +45,7 @@ def facet_rows(
         rows[part, :9] = side.X[chosen, :3, :3].reshape(-1, 9)
         rows[part, 9:12] = side.X[chosen, :3, 3]
         rows[part, POSE_SLOP] = side.slop[chosen]
-    rows[:, POSE_TERMS] = -1.0
+    rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
     shape_of = np.concatenate([own.ravel(), np.full(len(which), len(corners))]).astype(np.int64)
     pairs = np.stack([np.arange(len(pose)), len(pose) + again.ravel()], axis=1)
     return run_pairs(table, PoseTable(rows, _NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit)  # type: ignore[arg-type]

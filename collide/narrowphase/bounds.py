@@ -2,13 +2,15 @@
 
 Write u = 2⁻⁵³ and, for a pair, t = p_WB − p_WA and
 
-    S = ρ_A + ρ_B + |t| + r_A + r_B (+ |offset| for a half-space),    ρ = reach · longest row of R.
+    S = ρ_A + ρ_B + |t| + r_A + r_B (+ |offset| for a half-space),    ρ = reach · stretch of R,
+
+where the stretch is a bound of |R| (`posed_pair.stretch_of`), 1 and a rounding for a rotation, and no row is longer.
 
 1. A difference point w = R_A a − R_B b − t. Each coordinate is two products-and-sums of three terms
    (γ₃ of Σ|R_kj||a_j| ≤ ρ), two subtractions, and t itself rounded once: at most 5u·(ρ_A + ρ_B + |t|)
    a coordinate, so |error of w| ≤ √3·5u·S < 9u·S. Curved supports place the point to 6u·ρ more
    across its normal, and its value along the direction to as much: < 16u·S in all.
-2. A plane. Direction d; g = R_Aᵀd is good to 3√3·u·|d|·(longest row), the scan's products to γ₃, so the
+2. A plane. Direction d; g = R_Aᵀd is good to 3√3·u·|d|·stretch, the scan's products to γ₃, so the
    vertex chosen is within 2·(3√3 + 3)u·ρ|d| < 17u·ρ|d| of the best one, for each body (one of a support tree,
    settled, is the best one for g exactly). With w·d itself
    rounded (3u·|w||d|) and step 1: every point x of A ⊖ B has x·d/|d| ≥ fl(w·d)/|d| − (16 + 17 + 3 + 2)u·S.
@@ -17,7 +19,7 @@ Write u = 2⁻⁵³ and, for a pair, t = p_WB − p_WA and
 
 All of it together stays below 45u·S, and the error used is 64u·S, plus the slop of stored points
 and of composed poses (`PackedConvex.slop`, `pose_table`). It holds whatever the matrix, not only for
-rotations, since ρ is measured with the rows given. Where the bracket spans zero, the exact stage
+rotations, since ρ is measured with the matrix given. Where the bracket spans zero, the exact stage
 (`decide.py`) settles the sign.
 """
 

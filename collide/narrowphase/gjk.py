@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
+from collide.narrowphase.grown_simplex import pick, with_newest
 from collide.narrowphase.minkowski import (
     POINT,
     copy_point,
@@ -48,8 +49,9 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     )
     if status != ENCLOSED:
         length = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
+        over = 1.0 / length if length > 0.0 else 0.0
         for axis in range(3):
-            weights[7 + axis] = weights[4 + axis] / length if length > 0.0 else 0.0
+            weights[7 + axis] = weights[4 + axis] * over
         if status != APART and length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
             dx, dy, dz = across_simplex(points, n, weights[4], weights[5], weights[6])
             along = math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -70,8 +72,11 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
 
 
 @kernel(inline=True)
-def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
-    """The rounds of GJK; see `gjk` for arguments and results."""
+def _direction(pair, weights, touch_suffices):
+    """(x, y, z, factor, whether it is the line between the frames' origins, for a boolean): where to look first.
+
+    Times the factor, it is that line.
+    """
     tx = weights[7]
     ty = weights[8]
     tz = weights[9]
@@ -80,27 +85,35 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         ty = pair[15]
         tz = pair[16]
     largest = max(abs(tx), abs(ty), abs(tz))
-    between = touch_suffices and tx == pair[14] and ty == pair[15] and tz == pair[16]
+    between = touch_suffices and largest > 0.0 and tx == pair[14] and ty == pair[15] and tz == pair[16]
     if largest == 0.0:
-        tx = 1.0
-    else:  # squares of tiny components would vanish
-        tx /= largest
-        ty /= largest
-        tz /= largest
-    if between and largest > 0.0:
+        return 1.0, ty, tz, largest, False
+    if 2.0**-400 < largest < 2.0**400:
+        return tx, ty, tz, 1.0, between
+    return tx / largest, ty / largest, tz / largest, largest, between  # squares would vanish or overflow
+
+
+@kernel(inline=True)
+def _set_parting(weights, tx, ty, tz, along):
+    """The nearest point, as far as a plane across the direction t tells."""
+    weights[4] = -tx * along
+    weights[5] = -ty * along
+    weights[6] = -tz * along
+
+
+@kernel(inline=True)
+def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
+    """The rounds of GJK; see `gjk` for arguments and results."""
+    tx, ty, tz, largest, between = _direction(pair, weights, touch_suffices)
+    span = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if between:
         # Balls about the origins of the bodies' frames: no support is asked.
-        span = math.sqrt(tx * tx + ty * ty + tz * tz)
         lower = largest * span - reach_of_both(pair)
         if lower - error - radius > limit:
-            weights[4] = -tx * (lower / span)
-            weights[5] = -ty * (lower / span)
-            weights[6] = -tz * (lower / span)
+            _set_parting(weights, tx, ty, tz, lower / span)
             return APART, 0, lower, 0.0, 0
     inlined_difference_point(pair, points, ids, 0, tx, ty, tz, False)
-    n = 1
-    square = nearest_in_simplex(points, n, weights, 15)
     # The first support plane already parts most pairs that are farther apart than asked about.
-    span = math.sqrt(tx * tx + ty * ty + tz * tz)
     trees = has_trees(pair)
     lower = -_height(points, 0, tx, ty, tz) / span
     if trees:
@@ -110,58 +123,117 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         else:
             lower = -math.inf  # not proven
     if lower - error - radius > limit:
-        weights[4] = -tx * (lower / span)
-        weights[5] = -ty * (lower / span)
-        weights[6] = -tz * (lower / span)
-        return APART, n, lower, 0.0, 0
+        _set_parting(weights, tx, ty, tz, lower / span)
+        return APART, 1, lower, 0.0, 0
     # Coarse hulls that overlap are a proof, at a tenth of the price.
     coarse = touch_suffices and (pair[19] != 0 or pair[20] != 0)
-    for used in range(1, rounds + 1):
+    # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
+    n = 1
+    at_a = 0
+    at_b = 1
+    at_c = 2
+    at_d = 3
+    ax = points[0]
+    ay = points[1]
+    az = points[2]
+    bx = by = bz = 0.0
+    cx = cy = cz = 0.0
+    wa = 1.0
+    wb = 0.0
+    wc = 0.0
+    vx = ax
+    vy = ay
+    vz = az
+    square = vx * vx + vy * vy + vz * vz
+    status = NEAREST
+    clearance = 0.0
+    used = 0
+    while used < rounds:
+        used += 1
         length = math.sqrt(square)
         if length <= error:
-            return MEETING, n, lower, 0.0, used
+            status = MEETING
+            break
         if touch_suffices and length + error <= radius:
-            return NEAREST, n, lower, 0.0, used
-        vx = weights[4]
-        vy = weights[5]
-        vz = weights[6]
-        inlined_difference_point(pair, points, ids, n, -vx, -vy, -vz, coarse)
-        bound = _height(points, n, vx, vy, vz) / length
-        if coarse and (bound > 0.0 or _repeated(ids, n)):
+            break
+        inlined_difference_point(pair, points, ids, at_d, -vx, -vy, -vz, coarse)
+        bound = _height(points, at_d, vx, vy, vz) / length
+        repeated = _repeated(ids, n, at_a, at_b, at_c, at_d)
+        if coarse and (bound > 0.0 or repeated):
             coarse = False  # the coarse hulls are apart here, and tell no more
-            difference_point(pair, points, ids, n, -vx, -vy, -vz)
-            bound = _height(points, n, vx, vy, vz) / length
+            difference_point(pair, points, ids, at_d, -vx, -vy, -vz)
+            bound = _height(points, at_d, vx, vy, vz) / length
+            repeated = _repeated(ids, n, at_a, at_b, at_c, at_d)
         if trees and (
-            bound - error - radius > limit or length - bound <= 0.125 * error or _repeated(ids, n) or used == rounds
+            bound - error - radius > limit or length - bound <= 0.125 * error or repeated or used == rounds
         ):
-            settle_point(pair, points, ids, n, -vx, -vy, -vz)
-            bound = _height(points, n, vx, vy, vz) / length
+            settle_point(pair, points, ids, at_d, -vx, -vy, -vz)
+            bound = _height(points, at_d, vx, vy, vz) / length
+            repeated = _repeated(ids, n, at_a, at_b, at_c, at_d)
             lower = max(lower, bound)
         elif not trees and not coarse:
             lower = max(lower, bound)
         if lower - error - radius > limit:
-            return APART, n, lower, 0.0, used
-        if length - bound <= 0.125 * error or _repeated(ids, n):
-            return NEAREST, n, lower, 0.0, used
-        faces = 15
-        if n == 3:
-            faces, clearance = faces_in_sight(points, error)
-            if faces == 0:
-                return ENCLOSED, 4, lower, clearance, used
-        before = (weights[0], weights[1], weights[2], weights[3])
-        closer = nearest_in_simplex(points, n + 1, weights, faces)
+            status = APART
+            break
+        if length - bound <= 0.125 * error or repeated:
+            break
+        dx = points[POINT * at_d]
+        dy = points[POINT * at_d + 1]
+        dz = points[POINT * at_d + 2]
+        kept, turn, wd, wf, ws, x, y, z, closer = with_newest(
+            n, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error, 0.125 * error * length
+        )
+        if kept == 4:
+            status = ENCLOSED
+            clearance = wd
+            break
+        if kept == 0:
+            at_a, at_b, at_c, at_d = _in_order(points, ids, n, at_a, at_b, at_c, at_d)
+            faces = 15
+            if n == 3:
+                faces, clearance = faces_in_sight(points, error)
+                if faces == 0:
+                    status = ENCLOSED
+                    break
+            closer = nearest_in_simplex(points, n + 1, weights, faces)
+            if closer < square:
+                n = _drop_unused(points, ids, weights, n + 1)
+                at_a, at_b, at_c, at_d = 0, 1, 2, 3
+                ax, ay, az = points[0], points[1], points[2]
+                bx, by, bz = points[POINT], points[POINT + 1], points[POINT + 2]
+                cx, cy, cz = points[2 * POINT], points[2 * POINT + 1], points[2 * POINT + 2]
+                wa, wb, wc = weights[0], weights[1], weights[2]
+                vx, vy, vz = weights[4], weights[5], weights[6]
+        elif closer < square:
+            n = kept
+            fx, fy, fz = pick(turn, ax, bx, cx), pick(turn, ay, by, cy), pick(turn, az, bz, cz)
+            cx, cy, cz = pick(turn, bx, cx, ax), pick(turn, by, cy, ay), pick(turn, bz, cz, az)
+            bx, by, bz = fx, fy, fz
+            ax, ay, az = dx, dy, dz
+            first = pick(turn, at_a, at_b, at_c)
+            second = pick(turn, at_b, at_c, at_a)
+            at_a, at_b, at_c, at_d = at_d, first, second, 6 - at_d - first - second
+            wa, wb, wc = wd, wf, ws
+            vx, vy, vz = x, y, z
         if not closer < square:
-            weights[0], weights[1], weights[2], weights[3] = before
-            weights[4] = vx
-            weights[5] = vy
-            weights[6] = vz
             if trees:
-                settle_point(pair, points, ids, n, -vx, -vy, -vz)
-                lower = max(lower, _height(points, n, vx, vy, vz) / length)
-            return NEAREST, n, lower, 0.0, used
+                settle_point(pair, points, ids, at_d, -vx, -vy, -vz)
+                lower = max(lower, _height(points, at_d, vx, vy, vz) / length)
+            break
         square = closer
-        n = _drop_unused(points, ids, weights, n + 1)
-    return NEAREST, n, lower, 0.0, rounds
+    if status == ENCLOSED:
+        return ENCLOSED, 4, lower, clearance, used
+    if not (touch_suffices and status == APART):  # of a miss nothing else is wanted
+        _in_order(points, ids, n, at_a, at_b, at_c, at_d)
+    weights[0] = wa
+    weights[1] = wb if n > 1 else 0.0
+    weights[2] = wc if n > 2 else 0.0
+    weights[3] = 0.0
+    weights[4] = vx
+    weights[5] = vy
+    weights[6] = vz
+    return status, n, lower, 0.0, used
 
 
 @kernel(inline=True)
@@ -171,14 +243,45 @@ def _height(points, k, dx, dy, dz):
 
 
 @kernel(inline=True)
-def _repeated(ids, n):
-    """Whether point n is one of the n before it (curved cores have no ids and never repeat)."""
-    if ids[2 * n] < 0 or ids[2 * n + 1] < 0:
+def _repeated(ids, n, at_a, at_b, at_c, at_d):
+    """Whether point D is one of the n others (curved cores have no ids and never repeat)."""
+    i = ids[2 * at_d]
+    j = ids[2 * at_d + 1]
+    if i < 0 or j < 0:
         return False
-    for k in range(n):
-        if ids[2 * k] == ids[2 * n] and ids[2 * k + 1] == ids[2 * n + 1]:
-            return True
-    return False
+    if ids[2 * at_a] == i and ids[2 * at_a + 1] == j:
+        return True
+    if n > 1 and ids[2 * at_b] == i and ids[2 * at_b + 1] == j:
+        return True
+    return n > 2 and ids[2 * at_c] == i and ids[2 * at_c + 1] == j
+
+
+@kernel
+def _in_order(points, ids, n, at_a, at_b, at_c, at_d):
+    """Bring the n points A, B, C to the front, and D behind them; returns where all of them stand then."""
+    if at_a != 0:
+        _exchange_points(points, ids, 0, at_a)
+        at_b = at_a if at_b == 0 else at_b
+        at_c = at_a if at_c == 0 else at_c
+        at_d = at_a if at_d == 0 else at_d
+    if n > 1 and at_b != 1:
+        _exchange_points(points, ids, 1, at_b)
+        at_c = at_b if at_c == 1 else at_c
+        at_d = at_b if at_d == 1 else at_d
+    if n > 2 and at_c != 2:
+        _exchange_points(points, ids, 2, at_c)
+        at_d = at_c if at_d == 2 else at_d
+    if at_d != n:
+        _exchange_points(points, ids, n, at_d)
+    return 0, 1 if n > 1 else 2, 2 if n > 2 else 3, n
+
+
+@kernel(inline=True)
+def _exchange_points(points, ids, k, j):
+    for i in range(POINT):
+        points[POINT * k + i], points[POINT * j + i] = points[POINT * j + i], points[POINT * k + i]
+    for i in range(2):
+        ids[2 * k + i], ids[2 * j + i] = ids[2 * j + i], ids[2 * k + i]
 
 
 @kernel(inline=True)

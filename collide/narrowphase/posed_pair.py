@@ -21,6 +21,7 @@ from collide.geometry.tables import (
     PARAMS,
     POSE,
     POSE_SLOP,
+    POSE_STRETCH,
     POSE_TERMS,
     RADIUS,
     RANK,
@@ -28,17 +29,6 @@ from collide.geometry.tables import (
     SLOP,
     TREE,
 )
-
-
-@kernel(inline=True)
-def _longest_row(poses, p):
-    longest = 0.0
-    for k in range(3):
-        x = poses[p + 3 * k]
-        y = poses[p + 3 * k + 1]
-        z = poses[p + 3 * k + 2]
-        longest = max(longest, x * x + y * y + z * z)
-    return math.sqrt(longest)
 
 
 @kernel(inline=True)
@@ -81,7 +71,7 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     tx = poses[q + 9] - poses[p + 9]
     ty = poses[q + 10] - poses[p + 10]
     tz = poses[q + 11] - poses[p + 11]
-    size = numbers[at_a + REACH] * _longest_row(poses, p) + numbers[at_b + REACH] * _longest_row(poses, q)
+    size = numbers[at_a + REACH] * _stretch(poses, p) + numbers[at_b + REACH] * _stretch(poses, q)
     # The largest coordinate too: squares of tiny ones vanish, and such a pair must be refused, not 0.
     size += max(math.sqrt(tx * tx + ty * ty + tz * tz), abs(tx), abs(ty), abs(tz)) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
     shapes = numbers[at_a + SLOP] + numbers[at_b + SLOP]
@@ -108,21 +98,36 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
 
 @kernel(inline=True)
 def reach_of_both(pair):
-    """How far from 0 a point of A ⊖ B + t can be: both balls about the frames' origins, stretched as R does."""
+    """How far from 0 a point of A ⊖ B + t can be: both balls about the frames' origins, stretched as R does.
+
+    Of a pair whose size is known (`size_and_slop`).
+    """
     (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
-    reach_a = numbers[at_a - PARAMS + REACH] * _stretch(poses, p)
-    return reach_a + numbers[at_b - PARAMS + REACH] * _stretch(poses, q)
+    reach_a = numbers[at_a - PARAMS + REACH] * poses[p + POSE_STRETCH]
+    return reach_a + numbers[at_b - PARAMS + REACH] * poses[q + POSE_STRETCH]
 
 
 @kernel(inline=True)
 def _stretch(R, p):
-    """No vector gets longer by more than this factor: |R|² is at most the largest row sum of |RᵀR|."""
-    xx = R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6]
-    yy = R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7]
-    zz = R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8]
-    xy = abs(R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7])
-    yz = abs(R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8])
-    zx = abs(R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6])
+    """No vector gets longer by more than this factor; worked out once a pose."""
+    if R[p + POSE_STRETCH] < 0.0:
+        R[p + POSE_STRETCH] = stretch_of(
+            R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
+            R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
+            R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
+            R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
+            R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
+            R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
+        )
+    return R[p + POSE_STRETCH]
+
+
+@kernel(inline=True)
+def stretch_of(xx, yy, zz, xy, yz, zx):
+    """A bound of |R| from the entries of RᵀR: its square is at most the largest row sum of |RᵀR|."""
+    xy = abs(xy)
+    yz = abs(yz)
+    zx = abs(zx)
     return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx))
 
 

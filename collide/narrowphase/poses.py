@@ -14,8 +14,9 @@ import sys
 import numpy as np
 
 from collide._jit import address_in_kernel, entry, kernel, native_call, view_f64, view_i64, view_u8
-from collide.geometry.tables import POSE, POSE_SLOP, POSE_TERMS
+from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.answer import SIGNATURE
+from collide.narrowphase.posed_pair import stretch_of
 from collide.narrowphase.rows import HIT, HOW, NORMAL, ROW
 from collide.results import REFUSED, UNDECIDED
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
@@ -62,12 +63,16 @@ def _set_pose(R, at, X, check):
     if not (X[12] == 0.0 and X[13] == 0.0 and X[14] == 0.0 and X[15] == 1.0):
         return False
     # Six products instead of nine comparisons; what is no number fails them too.
-    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8] - 1.0
-    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9] - 1.0
-    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10] - 1.0
+    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8]
+    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9]
+    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10]
     xy = X[0] * X[1] + X[4] * X[5] + X[8] * X[9]
     yz = X[1] * X[2] + X[5] * X[6] + X[9] * X[10]
     zx = X[2] * X[0] + X[6] * X[4] + X[10] * X[8]
+    R[at + POSE_STRETCH] = stretch_of(xx, yy, zz, xy, yz, zx)
+    xx -= 1.0
+    yy -= 1.0
+    zz -= 1.0
     off = xx * xx + yy * yy + zz * zz + xy * xy + yz * yz + zx * zx
     shift = abs(X[3]) + abs(X[7]) + abs(X[11])
     if off <= ROTATION_TOLERANCE * ROTATION_TOLERANCE and shift <= LARGEST:
