@@ -108,13 +108,56 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
 
 
 def _scan(builder: ir.IRBuilder, values, count):
-    """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on.
+    """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on."""
+    zero = ir.Constant(_I64, 0)
+    last = builder.sub(count, ir.Constant(_I64, LANES))
+    blocks = {name: builder.append_basic_block(name) for name in ("one", "more", "four", "many", "done")}
+    builder.cbranch(builder.icmp_signed("==", last, zero), blocks["one"], blocks["more"])
+    builder.position_at_end(blocks["more"])
+    builder.cbranch(builder.icmp_signed("<=", last, ir.Constant(_I64, 3 * LANES)), blocks["four"], blocks["many"])
+    found = []
+    for name, scan in (("one", _scan_one), ("four", _scan_four), ("many", _scan_many)):
+        builder.position_at_end(blocks[name])
+        found.append((scan(builder, values, last), builder.block))
+        builder.branch(blocks["done"])
+    builder.position_at_end(blocks["done"])
+    value, index = builder.phi(_F64), builder.phi(_I64)
+    for (one_value, one_index), block in found:
+        value.add_incoming(one_value, block)
+        index.add_incoming(one_index, block)
+    return builder.fadd(value, ir.Constant(_F64, 0.0)), index  # −0 becomes 0: lanes may hold both
 
-    Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
 
-    The last two blocks end with the last point, so they may overlap those before: what is seen twice ties with
-    itself. No branch but the loop's depends on the number of points, since mispredicted ones cost more than
-    blocks. Blocks of one maximum come in the order of their indices, as `_later` takes for granted.
+def _scan_one(builder, values, _last):
+    """`_scan` of eight."""
+    numbers = values(ir.Constant(_I64, 0))
+    largest = _largest(builder, numbers)
+    return largest, _first_holding(builder, numbers, largest)
+
+
+def _scan_four(builder, values, last):
+    """`_scan` of up to 32, in four blocks that may overlap: what is seen twice ties with itself."""
+    zero, one = (ir.Constant(_I64, LANES * blocks) for blocks in range(2))
+    second = builder.select(builder.icmp_signed("<", one, last), one, last)
+    third = builder.sub(last, one)
+    third = builder.select(builder.icmp_signed("<", third, zero), zero, third)
+    starts = (zero, second, third, last)
+    numbers = [values(start) for start in starts]
+    pairs = [_larger(builder, numbers[k], numbers[k + 1]) for k in (0, 2)]
+    largest = _largest(builder, _larger(builder, *pairs))
+    lowest = None
+    for start, block in zip(starts, numbers):
+        index = builder.add(start, _first_holding(builder, block, largest))
+        lowest = index if lowest is None else builder.select(builder.icmp_signed("<", index, lowest), index, lowest)
+    return largest, lowest
+
+
+def _scan_many(builder, values, last):
+    """`_scan` in a loop. Blocks go in turns to two running maxima, the even and the odd: neither waits for the other.
+
+    The last two blocks end with the last point, so they may overlap those before. No branch but the loop's depends on
+    the number of points, since mispredicted ones cost more than blocks. Blocks of one maximum come in the order of
+    their indices, as `_later` takes for granted.
     """
     lanes = ir.Constant(_INDICES, list(range(LANES)))
 
@@ -124,47 +167,41 @@ def _scan(builder: ir.IRBuilder, values, count):
     zero, one, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
     none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
     first = block(zero)
-    last = builder.sub(count, one)
     last_but_one = builder.sub(last, one)
-    single, several, pairs, ends, done = (
-        builder.append_basic_block(name) for name in ("single", "several", "pairs", "ends", "done")
-    )
-    builder.cbranch(builder.icmp_signed("==", last, zero), single, several)
-
-    builder.position_at_end(single)
-    only = _reduced_block(builder, first[0])
-    builder.branch(done)
-
-    builder.position_at_end(several)
-    builder.cbranch(builder.icmp_signed("<", one, last_but_one), pairs, ends)
+    begin = builder.block
+    pairs, ends = (builder.append_basic_block(name) for name in ("pairs", "ends"))
+    builder.branch(pairs)
 
     builder.position_at_end(pairs)  # blocks ``at`` and ``at + 8``, before the last two
     at, even_best, odd_best = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
     odd_next = _later(builder, odd_best, block(at))
     even_next = _later(builder, even_best, block(builder.add(at, one)))
     following = builder.add(at, two)
+    for phi, initial, again in zip((at, *even_best, *odd_best), (one, *first, *none), (following, *even_next, *odd_next)):
+        phi.add_incoming(initial, begin)
+        phi.add_incoming(again, pairs)
     builder.cbranch(builder.icmp_signed("<", following, last_but_one), pairs, ends)
 
     builder.position_at_end(ends)
-    even_left, odd_left = _phi_pair(builder), _phi_pair(builder)
-    for phi, initial, again in zip((at, *even_best, *odd_best), (one, *first, *none), (following, *even_next, *odd_next)):
-        phi.add_incoming(initial, several)
-        phi.add_incoming(again, pairs)
-    for phi, initial, again in zip((*even_left, *odd_left), (*first, *none), (*even_next, *odd_next)):
-        phi.add_incoming(initial, several)
-        phi.add_incoming(again, pairs)
-    within = builder.select(builder.icmp_signed("<", last_but_one, zero), zero, last_but_one)
-    odd_all = _later(builder, odd_left, block(within))
-    merged = _earlier_of(builder, _later(builder, even_left, block(last)), odd_all)
-    several_best = _reduced(builder, merged)
-    builder.branch(done)
+    odd_all = _later(builder, odd_next, block(last_but_one))
+    return _reduced(builder, _earlier_of(builder, _later(builder, even_next, block(last)), odd_all))
 
-    builder.position_at_end(done)
-    value, index = builder.phi(_F64), builder.phi(_I64)
-    for phi, of_one, of_several in zip((value, index), only, several_best):
-        phi.add_incoming(of_one, single)
-        phi.add_incoming(of_several, ends)
-    return value, index
+
+def _larger(builder, a, b):
+    return builder.select(builder.fcmp_ordered(">", b, a), b, a)
+
+
+def _largest(builder, numbers):
+    """The largest of eight."""
+    return _halved(builder, numbers, lambda a, b: _larger(builder, a, b))
+
+
+def _first_holding(builder, numbers, largest):
+    """The first of eight that equals the largest; beyond every index where none does."""
+    holds_it = builder.fcmp_ordered("==", numbers, _splat(builder, largest, _VALUES))
+    bits = builder.or_(builder.zext(builder.bitcast(holds_it, _I8), _I64), ir.Constant(_I64, _NOWHERE))
+    lane = builder.cttz(bits, ir.Constant(ir.IntType(1), 1))
+    return lane
 
 
 def _later(builder, best, found):
@@ -187,19 +224,10 @@ def _reduced(builder, best):
 
     The second half waits only for a comparison; carrying pairs down three times takes twice as long.
     """
-    largest = _halved(builder, best[0], lambda a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+    largest = _largest(builder, best[0])
     holds_it = builder.fcmp_ordered("==", best[0], _splat(builder, largest, _VALUES))
     indices = builder.select(holds_it, best[1], ir.Constant(_INDICES, [_NOWHERE] * LANES))
-    lowest = _halved(builder, indices, lambda a, b: builder.select(builder.icmp_signed("<", b, a), b, a))
-    return builder.fadd(largest, ir.Constant(_F64, 0.0)), lowest  # −0 becomes 0: lanes may hold both
-
-
-def _reduced_block(builder, values):
-    """`_reduced` of eight numbers in the order of their indices: the first lane that holds the largest."""
-    largest = _halved(builder, values, lambda a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
-    holds_it = builder.fcmp_ordered("==", values, _splat(builder, largest, _VALUES))
-    lane = builder.cttz(builder.zext(builder.bitcast(holds_it, ir.IntType(8)), _I64), ir.Constant(ir.IntType(1), 1))
-    return builder.fadd(largest, ir.Constant(_F64, 0.0)), lane
+    return largest, _halved(builder, indices, lambda a, b: builder.select(builder.icmp_signed("<", b, a), b, a))
 
 
 def _halved(builder, vector, better):

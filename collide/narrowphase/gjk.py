@@ -27,6 +27,9 @@ from collide.narrowphase.simplex import across_simplex, faces_in_sight, nearest_
 #: tetrahedron of A ⊖ B, clear of rounding. APART: proven farther apart than the limit.
 NEAREST, MEETING, ENCLOSED, APART = range(4)
 
+#: Bodies whose frames are nearer than this share of their reaches probably overlap.
+_LIKELY = 0.75
+
 
 @kernel(inline=True)
 def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
@@ -106,17 +109,27 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     """The rounds of GJK; see `gjk` for arguments and results."""
     tx, ty, tz, largest, between = _direction(pair, weights, touch_suffices)
     span = math.sqrt(tx * tx + ty * ty + tz * tz)
+    # Coarse hulls that overlap are a proof, at a tenth of the price.
+    coarse = touch_suffices and (pair[19] != 0 or pair[20] != 0)
+    look = False
     if between:
         # Balls about the origins of the bodies' frames: no support is asked.
-        lower = largest * span - reach_of_both(pair)
+        reach = reach_of_both(pair)
+        lower = largest * span - reach
         if lower - error - radius > limit:
             _set_parting(weights, tx, ty, tz, lower / span)
             return APART, 0, lower, 0.0, 0
-    inlined_difference_point(pair, points, ids, 0, tx, ty, tz, False)
+        look = coarse and largest * span < _LIKELY * reach
+    inlined_difference_point(pair, points, ids, 0, tx, ty, tz, look)
+    if look and _height(points, 0, tx, ty, tz) < 0.0:
+        coarse = look = False
+        difference_point(pair, points, ids, 0, tx, ty, tz)
     # The first support plane already parts most pairs that are farther apart than asked about.
     trees = has_trees(pair)
     lower = -_height(points, 0, tx, ty, tz) / span
-    if trees:
+    if look:
+        lower = -math.inf  # a few points tell nothing of what lies beyond them
+    elif trees:
         if lower - error - radius > limit:
             settle_point(pair, points, ids, 0, tx, ty, tz)
             lower = -_height(points, 0, tx, ty, tz) / span
@@ -125,8 +138,6 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     if lower - error - radius > limit:
         _set_parting(weights, tx, ty, tz, lower / span)
         return APART, 1, lower, 0.0, 0
-    # Coarse hulls that overlap are a proof, at a tenth of the price.
-    coarse = touch_suffices and (pair[19] != 0 or pair[20] != 0)
     # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     n = 1
     at_a = 0
