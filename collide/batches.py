@@ -35,7 +35,9 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
     """
     n = length_of(A, B, X_WA, X_WB)
-    workers = min(_workers(threads), n // (_FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD))
+    workers = _workers(threads)
+    if workers > 1:
+        workers = min(workers, n // (_FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD))
     if workers < 2:
         return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes, depths)
     bounds = np.linspace(0, n, workers + 1).astype(int)
@@ -146,7 +148,7 @@ def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
 
 def _any_meshed(side) -> bool:
     if isinstance(side, Picked):
-        return any(shape.meshed for shape in side.shape_set.shapes)
+        return side.shape_set.meshed
     return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
 
 

@@ -58,6 +58,11 @@ class ShapeSet:
         return np.array([is_plain(shape) for shape in self.shapes])
 
     @cached_property
+    def meshed(self) -> bool:
+        """Whether one of them is a mesh or has one in it."""
+        return any(shape.meshed for shape in self.shapes)
+
+    @cached_property
     def table(self) -> ShapeTable:
         """What kernels read, a row a shape; of a union its first part and of a mesh its box, which nobody asks for."""
         from collide.geometry.tables import ShapeTable
