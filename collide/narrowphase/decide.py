@@ -13,7 +13,7 @@ from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
-from collide.narrowphase.exact.all_planes import ROOM, depth_by_all_planes
+from collide.narrowphase.exact.all_planes import ROOM
 from collide.narrowphase.exact.plane_depth import nearest_plane
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_exactly
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
@@ -49,7 +49,7 @@ WORKSPACE = DIGITS + 24 + ROOM
 
 
 @kernel
-def _set_normal(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, vx, vy, vz, distance, flip):
+def set_normal(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, vx, vy, vz, distance, flip):
     """The normal from the exact direction, and the witness points on the feature that decided.
 
     Those found in doubles carry the direction of a difference of nearly equal points, which says nothing where the gap
@@ -90,9 +90,9 @@ def _set_normal(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, 
         row[POINT_B + axis] = second
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)")
 def decide_pairs(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
 ):  # fmt: skip
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
@@ -104,7 +104,6 @@ def decide_pairs(
     terms = view_f64(terms_at, 12 * TERMS * n_terms)
     digits = view_i64(digits_at, DIGITS)
     ids = view_i64(digits_at + 8 * DIGITS, 16)
-    corners = view_i64(digits_at + 8 * (DIGITS + 16), 8)
     requests = view_i64(requests_at, REQUESTS)
     asked_at = 1
     settled = 0
@@ -154,7 +153,6 @@ def decide_pairs(
                 pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                 numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
             )  # fmt: skip
-        by_planes = False
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]
@@ -181,12 +179,6 @@ def decide_pairs(
                     pair, terms, digits, requests, entry_at if asked else 0, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
                     size, error,
                 )  # fmt: skip
-                if not proven and depths:
-                    proven, depth, depth_low, vx, vy, vz = depth_by_all_planes(
-                        pair, terms, terms_at, digits, digits_at + 8 * (DIGITS + 24), corners, ints[INTS * sa + LOWEST],
-                        low_b, numbers[NUMBERS * sa + REACH], reach_b, size, error,
-                    )  # fmt: skip
-                    by_planes = proven
                 if proven:
                     slack = SUBNORMAL if 0.0 < depth < SMALLEST_NORMAL else 0.0
                     swept, swept_low = two_sum(numbers[NUMBERS * sa + RADIUS], radius_b)
@@ -194,14 +186,9 @@ def decide_pairs(
                     low, distance, high = bracket(-total, -total_low, EXACT_ERROR * total + slack)
                     lower = max(lower, low)
                     upper = min(upper, high)
-        if by_planes:
-            _set_normal(
-                row, pair, terms_at, corners, 3, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size,
-                -vx, -vy, -vz, distance, flip,
-            )  # fmt: skip
         if not plane and apart:
             # The digits have done their work; their place is as good as any for doubles.
-            _set_normal(
+            set_normal(
                 row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, vx, vy, vz,
                 distance, flip,
             )  # fmt: skip

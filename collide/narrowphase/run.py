@@ -12,6 +12,7 @@ from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.decide import WORKSPACE, decide_pairs
+from collide.narrowphase.deepen import deepen_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
     ANSWERED,
@@ -27,7 +28,7 @@ from collide.narrowphase.poses import (
     distance_single,
 )
 from collide.narrowphase.requests import ROWS_TOGETHER
-from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.results import EXACT, PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
 #: Set by tests: no pair of hulls is settled in doubles, whatever they have proven.
@@ -92,9 +93,14 @@ def _finish(
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
         decide_pairs(
-            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, depths, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
+            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
             _of_thread.space.addresses[1] + 8 * REQUESTS_AT, address_of(_of_thread.space.digits),
         )  # fmt: skip
+        if depths and not boolean and (open_depths := (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]).any():
+            deepen_pairs(
+                *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), address_of(open_depths),
+                len(rows), limit, address_of(rows), address_of(poses.terms), len(poses.terms), address_of(_of_thread.space.digits),
+            )  # fmt: skip
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
 
 
