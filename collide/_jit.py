@@ -129,6 +129,12 @@ class Entry:
             self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
         return self._address
 
+    @property
+    def c_address(self) -> int:
+        """Where the machine code starts that C calls, with the integers of the signature."""
+        (compiled,) = self.ready.overloads.values()  # type: ignore[attr-defined]
+        return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
     def _compiled(self) -> Callable:
         """Compiled for its signature, or read from the disk cache."""
         dispatcher = numba.njit(self._function, **self._flags)

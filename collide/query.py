@@ -60,12 +60,9 @@ def collide(
     if threads != 1:
         return _batched(A, B, X_WA, X_WB, check_poses, threads)
     try:
-        pair = A._prepared[B._serial]
-        hit = pair.collide(pair.address, id(X_WA), id(X_WB))
-        if hit == 1:
-            return True
-        if hit == 0:
-            return False
+        hit = A._prepared[B._serial].collide(X_WA, X_WB)
+        if hit is not None:
+            return hit
     except (AttributeError, KeyError, TypeError):
         pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
     return _batched(A, B, X_WA, X_WB, check_poses, threads)

@@ -32,7 +32,7 @@ from collide.shapes.base import Shape
 class PreparedPair:
     """Two bodies in the order of their contents, as `collide.query` asks prepared pairs.
 
-    address, collide : as `run.SinglePair` has them.
+    collide : as `run.SinglePair` has it.
     """
 
     #: Overlaps are left to the long way.
@@ -40,7 +40,7 @@ class PreparedPair:
 
     def __init__(self, one: Body, other: Body, sides: tuple[Side, Side], exchanged: bool):
         self._pair = SingleMeshPair(*sides, exchanged, one.radius + other.radius)
-        self.address, self.collide = self._pair.address, self._pair.collide
+        self.collide = self._pair.collide
         self._exchanged, self._radii = exchanged, (one.radius, other.radius)
         self._reaches = sum(float(body.tree.numbers[REACH : REACH + 3].sum()) + body.radius for body in (one, other))
 
@@ -104,8 +104,8 @@ def one_state(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, kept: dict
     if key not in kept:
         kept[key] = single_pair(A, B) if run.single_calls_are_safe() else None
     pair = kept[key]
-    said = pair.collide(pair.address, id(X_WA), id(X_WB)) if pair is not None else -1
-    return int(pair_states(A, B, X_WA[None], X_WB[None])[0]) if said < 0 else HIT if said else APART
+    said = pair.collide(X_WA, X_WB) if pair is not None else None
+    return int(pair_states(A, B, X_WA[None], X_WB[None])[0]) if said is None else HIT if said else APART
 
 
 def _side(body: Body) -> Side:

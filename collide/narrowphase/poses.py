@@ -1,4 +1,4 @@
-"""Two convex sets at many pairs of poses, and at one: from matrices to answers inside kernels.
+"""Two convex sets at many pairs of poses: from matrices to answers inside kernels.
 
 Checking a pose, laying out a row and reading a boolean took numpy five times as long as a pair of boxes
 takes GJK. Poses go through in blocks that stay in the cache; the narrowphase is called where it was
@@ -7,13 +7,7 @@ compiled (`_jit.native_call`), not compiled once more.
 
 from __future__ import annotations
 
-import ctypes
-import math
-import sys
-
-import numpy as np
-
-from collide._jit import address_in_kernel, entry, kernel, native_call, view_f64, view_i64, view_u8
+from collide._jit import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.answer import SIGNATURE
 from collide.narrowphase.posed_pair import stretch_of
@@ -21,7 +15,7 @@ from collide.narrowphase.rows import HIT, HOW, NORMAL, ROW
 from collide.results import REFUSED, UNDECIDED
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
-_answer_at = native_call(SIGNATURE)
+answer_at = native_call(SIGNATURE)
 
 #: Poses that go through together.
 BLOCK = 64
@@ -32,19 +26,13 @@ OPEN, BAD_POSE = range(1, 3)
 # Workspace, integers: addresses of everything (see `Workspace` in `run.py`).
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED,
-    ARRAY_TYPE, ARRAY_DTYPE,
-) = range(12)  # fmt: skip
+) = range(10)  # fmt: skip
 #: Integers of the header.
-HEADER = 12
-
-# Words of an array object.
-_TYPE, _DATA, _DIMENSIONS, _SHAPE, _STRIDES, _, _DTYPE = range(1, 8)
-_FIELDS = 8
-_F8 = np.dtype(np.float64)
+HEADER = 10
 
 
 @kernel(inline=True)
-def _set_pose(R, at, X, check):
+def set_pose(R, at, X, check):
     """Pose row at ``at`` becomes the matrix X; False where it is no pose (`transforms.as_poses`)."""
     R[at] = X[0]
     R[at + 1] = X[1]
@@ -138,10 +126,10 @@ def answer_poses(
                 shape_of[BLOCK + k] = which[1]
             # A pose that goes with all of the other's is laid out once, where shapes are.
             if pairs[2 * k] == k:
-                good = _set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
+                good = set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
             if pairs[2 * k + 1] == BLOCK + k:
                 at = (BLOCK + k) * POSE
-                good = _set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
+                good = set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
         if not good:
             header[ANSWERED] = done
             return BAD_POSE
@@ -156,7 +144,7 @@ def answer_poses(
                         row[NORMAL + j] = axis[j]
         else:
             rows_at = out_at + ROW * done
-        _answer_at(
+        answer_at(
             header[CORE],
             (
                 header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], count,
@@ -179,83 +167,3 @@ def answer_poses(
         if left_open:
             return OPEN
     return 0
-
-
-@kernel(inline=True)
-def matrix_at(object_at, header):
-    """Address of the 16 doubles of a C-contiguous (4, 4) numpy array of float64, given where the object is; else 0.
-
-    Read from the array object itself, whose layout is part of numpy's binary interface (and is looked at once
-    before anything relies on it: `array_layout_is_known`). numba's own reading of two arrays takes as long
-    as GJK takes for two boxes.
-    """
-    fields = view_i64(object_at, _FIELDS)
-    if fields[_TYPE] != header[ARRAY_TYPE] or fields[_DTYPE] != header[ARRAY_DTYPE]:
-        return 0
-    if fields[_DIMENSIONS] & 0xFFFFFFFF != 2 or fields[_DATA] & 7 != 0:
-        return 0
-    shape = view_i64(fields[_SHAPE], 2)
-    strides = view_i64(fields[_STRIDES], 2)
-    if shape[0] != 4 or shape[1] != 4 or strides[0] != 32 or strides[1] != 8:
-        return 0
-    return fields[_DATA]
-
-
-@kernel
-def _single(header_at, A_object, B_object, boolean, row_at):
-    """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for."""
-    header = view_i64(header_at, HEADER)
-    XA_at = matrix_at(A_object, header)
-    XB_at = matrix_at(B_object, header)
-    if XA_at == 0 or XB_at == 0:
-        return -1
-    poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
-    good_a = _set_pose(poses, 0, view_f64(XA_at, 16), True)
-    good_b = _set_pose(poses, BLOCK * POSE, view_f64(XB_at, 16), True)
-    if not (good_a and good_b):
-        return -1
-    _answer_at(
-        header[CORE],
-        (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
-            not boolean, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
-        ),
-    )  # fmt: skip
-    marks = view_u8(row_at, ROW)
-    if marks[HOW] == UNDECIDED or marks[HOW] == REFUSED:
-        return -1
-    return int(marks[HIT])
-
-
-@entry("int64(int64, int64, int64)", nogil=False)
-def collide_single(header_at, A_object, B_object):
-    """The boolean of one pair, as `_single` says it; the poses by `id`, and held by the caller.
-
-    All threads share its workspace: it keeps Python's lock.
-    """
-    rows_at = view_i64(header_at, HEADER)[ROWS_AT]
-    row = view_i64(rows_at, ROW // 8)
-    for k in range(ROW // 8):
-        row[k] = 0
-    return _single(header_at, A_object, B_object, True, rows_at)
-
-
-@entry("int64(int64, int64, int64, uint8[::1])", nogil=False)
-def distance_single(header_at, A_object, B_object, row):
-    """The row of one pair into ``row``, ROW zero bytes; returns as `collide_single` does."""
-    return _single(header_at, A_object, B_object, False, address_in_kernel(row))
-
-
-def array_layout_is_known() -> bool:
-    """Whether array objects lie in memory as `matrix_at` reads them: CPython with its lock, 64 bits."""
-    if sys.implementation.name != "cpython" or sys.maxsize < 2**60 or not getattr(sys, "_is_gil_enabled", lambda: True)():
-        return False
-    probe = np.zeros((4, 4))
-    fields = (ctypes.c_int64 * _FIELDS).from_address(id(probe))
-    words = (ctypes.c_int64 * 2).from_address
-    return (
-        (fields[_TYPE], fields[_DTYPE], fields[_DATA]) == (id(np.ndarray), id(_F8), probe.ctypes.data)
-        and fields[_DIMENSIONS] & 0xFFFFFFFF == 2
-        and tuple(words(fields[_SHAPE])) == (4, 4)
-        and tuple(words(fields[_STRIDES])) == (32, 8)
-    )

@@ -11,23 +11,20 @@ from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
+from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
 from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.deepen import deepen_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
     ANSWERED,
-    ARRAY_DTYPE,
-    ARRAY_TYPE,
     BAD_POSE,
     BLOCK,
     HEADER,
     POSES_AT,
     answer_poses,
-    array_layout_is_known,
-    collide_single,
-    distance_single,
 )
 from collide.narrowphase.requests import ROWS_TOGETHER
+from collide.narrowphase.single_calls import collide_single, distance_single
 from collide.results import EXACT, PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
@@ -170,7 +167,6 @@ class _Workspace:
         buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
         self._header = np.zeros(HEADER, dtype=np.int64)
         self._header[POSES_AT:ANSWERED] = *map(address_of, buffers), *self.addresses
-        self._header[ARRAY_TYPE], self._header[ARRAY_DTYPE] = id(np.ndarray), id(np.dtype(np.float64))
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `poses.py` reads first: addresses of the kernel, the tables and this workspace."""
@@ -191,11 +187,14 @@ _of_thread = _OfThread()
 
 @cache
 def single_calls_are_safe() -> bool:
-    return not PLAIN_PYTHON and array_layout_is_known()  # plain Python lets go of its lock in mid-kernel
+    return not PLAIN_PYTHON and layouts_are_known()  # plain Python lets go of its lock in mid-kernel
 
 
 class SinglePair:
-    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call."""
+    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call.
+
+    collide : a built-in function of two poses; None where it leaves the answer to the long way.
+    """
 
     #: One for all single calls: their kernels keep Python's lock.
     _space: _Workspace | None = None
@@ -207,14 +206,10 @@ class SinglePair:
             SinglePair._space = _Workspace()
         table.plant(np.arange(2))
         self.table = table  # held, since kernels read its buffers
-        self._header = SinglePair._space.header_of(table)
-        self.address = address_of(self._header)
-        self.collide, self._distance = collide_single.unchecked, distance_single.unchecked
+        header = np.array([*object_words(), *SinglePair._space.header_of(table).tolist()])
+        self.collide, self._distance = built_in(collide_single, header), built_in(distance_single, header)
 
     def distance(self, X_WA, X_WB) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        if self._distance(self.address, id(X_WA), id(X_WB), rows.view(np.uint8)) < 0:
-            return None
-        rows["b"] = 1
-        return rows if rows["distance"][0] > -np.inf else None
+        return None if self._distance(X_WA, X_WB, rows) is None else rows

@@ -14,8 +14,8 @@ import numpy as np
 from collide._jit import address_of, entry, kernel, native_call, view_f64, view_i64
 from collide.geometry.mesh_tree.layout import WIDTH, MeshTree
 from collide.geometry.mesh_tree.slabs import make_slabs
-from collide.narrowphase.poses import ARRAY_DTYPE, ARRAY_TYPE, is_pose, matrix_at
-from collide.narrowphase.poses import HEADER as POSES_HEADER
+from collide.narrowphase.array_objects import OBJECT_WORDS, answered, built_in, data_at, matrix_at, object_words
+from collide.narrowphase.poses import is_pose
 from collide.narrowphase.triangles import distances, inside, surfaces
 from collide.narrowphase.triangles.exact import decide_exactly
 from collide.narrowphase.triangles.inside import OUTSIDE, UNDECIDED
@@ -26,13 +26,13 @@ _walk = native_call(surfaces.SIGNATURE)
 _ask_inside = native_call(inside.SIGNATURE)
 _measure = native_call(distances.SIGNATURE)
 
-# Header, integers, after what `poses.matrix_at` reads: trees and kernels, both sides' solids and points, buffers.
+# Header, integers, after what `array_objects.py` reads: trees and kernels, both sides' solids and points, buffers.
 (
     TREE_A, TREE_B, ALIKE, EXCHANGED, WALK_AT, INSIDE_AT, SOLID_A, SOLID_B, POINTS_A, POINTS_B, MANY_A, MANY_B, BALLS_AT,
     KEYS_AT, MARKS_AT, STACK_AT, N_STACK, DOUBLES_AT, INTEGERS_AT, DECIDE, SWEPT,
     DISTANCES_AT, ROOM_AT, HEAP_AT, N_HEAP,
-) = range(POSES_HEADER, POSES_HEADER + 25)  # fmt: skip
-HEADER = POSES_HEADER + 25
+) = range(OBJECT_WORDS, OBJECT_WORDS + 25)  # fmt: skip
+HEADER = OBJECT_WORDS + 25
 # Doubles of the room for distances: the sum of the radii, how far to look, the result.
 _RADIUS, _LIMIT, _RESULT = range(3)
 #: Room for facet pairs: what a walk that stops at the first asks for.
@@ -130,17 +130,21 @@ def _cores_meet(header, XA_at, XB_at):
 
 
 @entry("int64(int64, int64, int64)", nogil=False)
-def meet_single(header_at, A_object, B_object):
-    """0 apart, 1 hit, −1 where the long way answers, or says what is wrong; poses by `id`, held by the caller.
+def meet_single(header_object, arguments_at, count):
+    """`array_objects.built_in` of two poses: whether the bodies meet; None where the long way answers, or says what is wrong.
 
     All threads share the workspace: this keeps Python's lock.
     """
-    header = view_i64(header_at, HEADER)
-    XA_at, XB_at = _posed(header, A_object, B_object)
-    if XA_at == 0:
-        return -1
-    said = _cores_meet(header, XA_at, XB_at)
-    return _swept(header, XA_at, XB_at) if said == 0 and header[SWEPT] != 0 else said
+    header = view_i64(data_at(header_object), HEADER)
+    said = -1
+    if count == 2:
+        arguments = view_i64(arguments_at, 2)
+        XA_at, XB_at = _posed(header, arguments[0], arguments[1])
+        if XA_at != 0:
+            said = _cores_meet(header, XA_at, XB_at)
+            if said == 0 and header[SWEPT] != 0:
+                said = _swept(header, XA_at, XB_at)
+    return answered(header, said)
 
 
 @entry("int64(int64, int64, int64, int64, int64)", nogil=False)
@@ -211,7 +215,7 @@ class SingleMeshPair:
         self._balls = np.concatenate([A.ball, B.ball])
         self._keys, self._marks = np.zeros(_KEYS, dtype=np.int64), np.zeros(8, dtype=np.int64)
         header = self._header = np.zeros(HEADER, dtype=np.int64)
-        header[ARRAY_TYPE], header[ARRAY_DTYPE] = id(np.ndarray), id(np.dtype(np.float64))
+        header[:OBJECT_WORDS] = object_words()
         header[TREE_A:] = (
             A.tree.address, B.tree.address, A.tree.content == B.tree.content, exchanged, surfaces.walk_surfaces.address,
             inside.points_inside.address, A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
@@ -219,8 +223,7 @@ class SingleMeshPair:
             decide_exactly.address, radius > 0.0, distances.near_surfaces.address, address_of(self._room),
             self._heap_address if radius > 0.0 else 0, HEAP,
         )  # fmt: skip
-        self.address = address_of(header)
-        self.collide = meet_single.unchecked
+        self.collide = built_in(meet_single, header)
 
     @staticmethod
     def serves(A: Side, B: Side) -> bool:
@@ -241,5 +244,5 @@ class SingleMeshPair:
             self._prepare_distances()
             self._header[HEAP_AT] = self._heap_address
         row, marks = np.empty(distances.RESULT), np.empty(distances.MARKS, dtype=np.int64)
-        said = near_single.unchecked(self.address, id(X_WA), id(X_WB), row.ctypes.data, marks.ctypes.data)
+        said = near_single.unchecked(address_of(self._header), id(X_WA), id(X_WB), row.ctypes.data, marks.ctypes.data)
         return None if said < 1 else (row, marks)
