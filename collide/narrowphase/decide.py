@@ -11,18 +11,16 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
-from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
+from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact.all_planes import ROOM
 from collide.narrowphase.exact.plane_depth import nearest_plane
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_exactly
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
-from collide.narrowphase.exact_plane import reach_plane_exactly
 from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, fine_points, scale_of, write_low_parts
 from collide.narrowphase.gap import weigh_foot
-from collide.narrowphase.halfspace_convex import reach_of_plane
-from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import REQUESTS, find_request
 from collide.narrowphase.rows import (
     COUNT,
@@ -95,7 +93,7 @@ def decide_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
 ):  # fmt: skip
-    """Settle the undecided rows of `answer_pairs`, in place; returns how many it settled.
+    """Settle the undecided rows of `answer_pairs`, in place; returns how many it leaves to `decide_planes.py`.
 
     Arguments as there; terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
     workspace of WORKSPACE. What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
@@ -106,30 +104,22 @@ def decide_pairs(
     ids = view_i64(digits_at + 8 * DIGITS, 16)
     requests = view_i64(requests_at, REQUESTS)
     asked_at = 1
-    settled = 0
+    left = 0
     for k in range(n_pairs):
         row = view_f64(rows_at + ROW * k, 12)
         words = view_i32(rows_at + ROW * k, ROW // 4)
         marks = view_u8(rows_at + ROW * k, ROW)
         if marks[HOW] != UNDECIDED:
             continue
-        pa = pairs[2 * k]
-        pb = pairs[2 * k + 1]
-        shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
-        sa = shape_of[pa]
-        sb = shape_of[pb]
-        ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
-        numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
-        poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
-        sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
-        size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
-        plane = ints[INTS * sa + KIND] == HALFSPACE
-        if not (plane or ints[INTS * sa + KIND] == POINTS) or ints[INTS * sb + KIND] != POINTS or not known:
+        pair, ints, numbers, sa, sb, flip, size, slop, known = pair_of(
+            ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1]
+        )
+        if not known or pair[9] != POINTS:
+            continue
+        if pair[3] != POINTS:
+            left += 1 if pair[3] == HALFSPACE else 0
             continue
         error = ERROR * size + slop
-        at_a, n_a = coordinates_of(ints, sa)
-        at_b, n_b = coordinates_of(ints, sb)
-        pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
         count = max(int(marks[COUNT]), 1)
         ids[0] = 0  # a row decided as a boolean names no vertices (asked again only where tests distrust doubles)
         ids[1] = 0
@@ -139,20 +129,10 @@ def decide_pairs(
         low_b = ints[INTS * sb + LOWEST]
         reach_b = numbers[NUMBERS * sb + REACH]
         radius_b = numbers[NUMBERS * sb + RADIUS]
-        if plane:
-            rounds = 1
-            shown = 1
-            _, skew = reach_of_plane(numbers, pair[4], poses, pair[5])
-            apart = False
-            vx = vy = vz = 0.0
-            verdict, vertex, excess, excess_low = reach_plane_exactly(pair, terms, digits, low_b, reach_b, radius_b, size, error * skew)
-            ids[0] = -1
-            ids[1] = vertex
-        else:
-            verdict, shown, apart, excess, excess_low, vx, vy, vz, rounds = touch_exactly(
-                pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
-                numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
-            )  # fmt: skip
+        verdict, shown, apart, excess, excess_low, vx, vy, vz, rounds = touch_exactly(
+            pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+            numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
+        )  # fmt: skip
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]
@@ -162,7 +142,7 @@ def decide_pairs(
             if lower > 0.0 or upper <= 0.0:
                 marks[HOW] = PLANE if lower > 0.0 else SWEPT
             continue
-        if apart or plane:
+        if apart:
             # Cores apart by less than the radii are as exact as a gap.
             low, distance, high = bracket(excess, excess_low, EXACT_ERROR * abs(excess) + slack)
             lower = max(lower, low)
@@ -186,7 +166,7 @@ def decide_pairs(
                     low, distance, high = bracket(-total, -total_low, EXACT_ERROR * total + slack)
                     lower = max(lower, low)
                     upper = min(upper, high)
-        if not plane and apart:
+        if apart:
             # The digits have done their work; their place is as good as any for doubles.
             set_normal(
                 row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, vx, vy, vz,
@@ -199,5 +179,4 @@ def decide_pairs(
             marks[HOW] = EXACT
         write_vertices(words, marks, ids, shown, flip)
         marks[EXACT_ROUNDS] = min(rounds, 255)
-        settled += 1
-    return settled
+    return left

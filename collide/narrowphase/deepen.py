@@ -9,11 +9,11 @@ from collide._jit import entry, view_f64, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import POINTS
-from collide.geometry.tables import INTS, KIND, LOWEST, NUMBERS, POSE, RADIUS, REACH, TERMS
+from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.decide import DIGITS, set_normal
 from collide.narrowphase.exact.all_planes import depth_by_all_planes
-from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.rows import LOWER, ROW, UPPER, write_verdict
 from collide.results import EXACT
 
@@ -38,21 +38,11 @@ def deepen_pairs(
             continue
         row = view_f64(rows_at + ROW * k, 12)
         marks = view_u8(rows_at + ROW * k, ROW)
-        pa = pairs[2 * k]
-        pb = pairs[2 * k + 1]
-        shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
-        sa = shape_of[pa]
-        sb = shape_of[pb]
-        ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
-        numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
-        poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
-        sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
-        if ints[INTS * sa + KIND] != POINTS or ints[INTS * sb + KIND] != POINTS:
+        pair, ints, numbers, sa, sb, flip, size, slop, _ = pair_of(
+            ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1]
+        )
+        if pair[3] != POINTS or pair[9] != POINTS:
             continue
-        size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
-        at_a, n_a = coordinates_of(ints, sa)
-        at_b, n_b = coordinates_of(ints, sb)
-        pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
         proven, depth, depth_low, vx, vy, vz = depth_by_all_planes(
             pair, terms, terms_at, digits, digits_at + 8 * (DIGITS + 24), corners, ints[INTS * sa + LOWEST],
             ints[INTS * sb + LOWEST], numbers[NUMBERS * sa + REACH], numbers[NUMBERS * sb + REACH], size, ERROR * size + slop,

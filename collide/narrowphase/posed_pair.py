@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.packing import HALFSPACE
 from collide.geometry.tables import (
     ADDRESS,
@@ -94,6 +94,26 @@ def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
         poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11],
         ints[INTS * sa + TREE], ints[INTS * sb + TREE], ints[INTS * sa + COARSE_AT], ints[INTS * sb + COARSE_AT],
     )  # fmt: skip
+
+
+@kernel(inline=True)
+def pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb):
+    """(`posed_pair`, ints, numbers, shape of A, of B, exchanged, size, slop, known) of two parts, by their numbers.
+
+    Everything in the order worked on; the last three are those of `size_and_slop`. Addresses as in `answer_pairs`.
+    """
+    shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
+    sa = shape_of[pa]
+    sb = shape_of[pb]
+    ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
+    numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
+    poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
+    sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
+    at_a, n_a = coordinates_of(ints, sa)
+    at_b, n_b = coordinates_of(ints, sb)
+    pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
+    size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
+    return pair, ints, numbers, sa, sb, flip, size, slop, known
 
 
 @kernel(inline=True)

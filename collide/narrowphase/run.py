@@ -13,6 +13,7 @@ from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
 from collide.narrowphase.decide import WORKSPACE, decide_pairs
+from collide.narrowphase.decide_planes import decide_planes
 from collide.narrowphase.deepen import deepen_pairs
 from collide.narrowphase.halfspaces import settle
 from collide.narrowphase.poses import (
@@ -89,15 +90,19 @@ def _finish(
     if distrust_doubles:
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
-        decide_pairs(
-            *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), len(rows), boolean, limit, address_of(rows), address_of(poses.terms), len(poses.terms),
-            _of_thread.space.addresses[1] + 8 * REQUESTS_AT, address_of(_of_thread.space.digits),
+        tables = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
+        terms = address_of(poses.terms), len(poses.terms)
+        digits = address_of(_of_thread.space.digits)
+        planes = decide_pairs(
+            *tables, len(rows), boolean, limit, address_of(rows), *terms,
+            _of_thread.space.addresses[1] + 8 * REQUESTS_AT, digits,
         )  # fmt: skip
-        if depths and not boolean and (open_depths := (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]).any():
-            deepen_pairs(
-                *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs), address_of(open_depths),
-                len(rows), limit, address_of(rows), address_of(poses.terms), len(poses.terms), address_of(_of_thread.space.digits),
-            )  # fmt: skip
+        if planes:
+            decide_planes(*tables, len(rows), boolean, limit, address_of(rows), *terms, digits)
+        if depths and not boolean:
+            shallow = (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]
+            if shallow.any():
+                deepen_pairs(*tables, address_of(shallow), len(rows), limit, address_of(rows), *terms, digits)
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
 
 
