@@ -25,10 +25,10 @@ from collide.narrowphase.bounds import (
     TOLERANCE_CURVED,
 )
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
-from collide.narrowphase.epa.expand import FLAT, epa, facet_of
+from collide.narrowphase.epa.expand import FLAT, epa, facet_of, height_over
 from collide.narrowphase.epa.refine import refine
 from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
-from collide.narrowphase.epa.surface import FACET, workspace
+from collide.narrowphase.epa.surface import FACET, number, workspace
 from collide.narrowphase.epa.surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.gap import GAP_DOUBLES, GAP_INTEGERS, polish_gap
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
@@ -65,6 +65,10 @@ _TIED = _TIES + GAP_INTEGERS
 _OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIED + ENTRY
 #: Rounding of a point that stands for the foot on a facet, in units of its corners.
 _NEAR_MISS = 2.0**-42
+#: Least weight of a foot well inside its facet.
+_WELL_INSIDE = 2.0**-10
+#: So many vertices of two cores are worth a better seed for EPA than GJK's.
+_MANY = 48
 #: Workspace of one thread; the requests to the exact stage stand last.
 REQUESTS_AT = _OWN_INTEGERS + EPA_INTEGERS
 DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, REQUESTS_AT + REQUESTS
@@ -106,7 +110,7 @@ def _segments(pair, points, ids, weights, error):
 
 @kernel
 def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
-    """The corners of EPA's facet become points 0..2, weighted for the point (x, y, z) of it."""
+    """The corners of EPA's facet become points 0..2, weighted for the point (x, y, z) of it; returns the least weight."""
     source, _, _, _, source_ids, facets, _, _, _ = surface
     for k in range(3):
         v = facets[FACET * facet + k]
@@ -116,6 +120,7 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
             ids[2 * k] = source_ids[2 * v]
             ids[2 * k + 1] = source_ids[2 * v + 1]
     w0, w1, w2 = face_weights(points, 0, POINT, 2 * POINT, x, y, z)
+    inside = min(w0, w1, w2)
     w0 = max(w0, 0.0)
     w1 = max(w1, 0.0)
     w2 = max(w2, 0.0)
@@ -133,6 +138,7 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
         size = max(size, abs(points[POINT * k]), abs(points[POINT * k + 1]), abs(points[POINT * k + 2]))
     if _miss(points, weights, x, y, z) > _NEAR_MISS * size:
         _weigh_edges(points, weights, x, y, z)
+    return inside
 
 
 @kernel(inline=True)
@@ -196,12 +202,12 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
             weigh_enclosed(points, weights)
         return -above, -math.inf, above, -math.inf, math.inf, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
-    # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
     roomy = status == ENCLOSED and clearance > ROOMY * size
+    many = depths and not curved and pair[1] + pair[7] > _MANY
     epa_at = doubles_at + 8 * _OWN_DOUBLES
     ids_at = integers_at + 8 * _OWN_INTEGERS
     outcome, depth, surface, nx, ny, nz, facet, vertices, count = epa(
-        pair, view_f64(doubles_at, 4 * POINT if roomy else 0), ids, epa_at, ids_at, not depths, error, tolerance
+        pair, points, ids, status == ENCLOSED, roomy, many, epa_at, ids_at, not depths, size, error, tolerance
     )
     rounds += 65536 * max(vertices - 4, 0)
     shallowest = -math.inf
@@ -220,12 +226,18 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
         )  # fmt: skip
         if sound:
             shallowest, depth, deepest, nx, ny, nz, facet = low, level, high, ux, uy, uz, nearest
-    facet = facet_of(
-        workspace(epa_at, ids_at), count, facet, depth * nx, depth * ny, depth * nz, tolerance + 2.0 * error
-    )
-    _load_facet(
-        workspace(epa_at, ids_at), facet, points, ids, weights, status != ENCLOSED, depth * nx, depth * ny, depth * nz
-    )
+    polytope = workspace(epa_at, ids_at)
+    facet = number(facet)
+    x = depth * nx
+    y = depth * ny
+    z = depth * nz
+    slack = tolerance + 2.0 * error
+    named = status != ENCLOSED
+    inside = _load_facet(polytope, facet, points, ids, weights, named, x, y, z)
+    # What is well inside one facet is in no other.
+    if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, x, y, z)) <= slack):
+        facet = facet_of(polytope, count, facet, x, y, z, slack)
+        _load_facet(polytope, facet, points, ids, weights, named, x, y, z)
     if surface > error:
         above = min(above, -surface)
     return depth, -depth, above, shallowest, deepest, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds

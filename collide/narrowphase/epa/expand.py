@@ -8,13 +8,16 @@ from collide._jit import kernel
 from collide.geometry.scan import least
 from collide.narrowphase.bounds import EPA_VERTICES
 from collide.narrowphase.epa.prove import prove_facets
-from collide.narrowphase.epa.seed import extremal_tetrahedron
+from collide.narrowphase.epa.seed import capped_tetrahedron, extremal_tetrahedron
 from collide.narrowphase.epa.surface import (
     FACET,
     PLANE,
+    TWIN,
+    ample,
     expand,
     find_patch,
     has_room,
+    number,
     set_tetrahedron,
     workspace,
 )
@@ -43,7 +46,7 @@ def _is_corner(ids, facets, f, k):
     if ids[2 * k] < 0 or ids[2 * k + 1] < 0:
         return False
     for side in range(4):
-        g = f if side == 3 else facets[FACET * f + 3 + side]
+        g = f if side == 3 else facets[FACET * f + TWIN + side] // FACET
         for corner in range(3):
             v = facets[FACET * g + corner]
             if ids[2 * v] == ids[2 * k] and ids[2 * v + 1] == ids[2 * k + 1]:
@@ -56,20 +59,28 @@ def _is_corner(ids, facets, f, k):
 
 
 @kernel(inline=True)
+def _print(ids, k):
+    """One bit of 64, from point k's support vertices: what has none of the bits met is new."""
+    return 1 << ((8 * ids[2 * k] + ids[2 * k + 1]) & 63)
+
+
+@kernel(inline=True)
 def _surface_clearance(clearances, count, error):
     """Least distance of a facet from the origin, or −1 unless every facet provably faces outwards."""
     nearest = clearances[least(clearances, max(count, 8))]
     return nearest if nearest > error else -1.0
 
 
-@kernel
-def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, error, tolerance):
+@kernel(inline=True)
+def epa(
+    pair, simplex, simplex_ids, enclosed, roomy, many, doubles_at, integers_at, overlap_suffices, size, error, tolerance
+):  # fmt: skip
     """Expand until the nearest facet of A ⊖ B is known.
 
-    simplex, simplex_ids : four points of A ⊖ B around the origin to begin with, clear of rounding by far;
-        or no doubles, and an extremal tetrahedron is found.
+    simplex, simplex_ids : four points of A ⊖ B, which are ``enclosed`` if the origin is proven to lie among them, and
+        ``roomy`` if it does so clear of rounding by far.   many : of vertices, so that rounds cost more than supports.
     overlap_suffices : stop once the origin is proven inside (a boolean is asked).
-    error : absolute error of a bound.   tolerance : stop once the bracket is this narrow.
+    size, error : of the pair, as in `bounds.py`.   tolerance : stop once the bracket is this narrow.
 
     Returns
     -------
@@ -85,28 +96,33 @@ def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, e
     points, planes, reaches, clearances, ids, facets, starts, _, _ = surface
     rank = 3
     nx = ny = nz = 0.0
-    if len(simplex) == 0:
+    for k in range(4 if enclosed else 0):
+        for j in range(POINT):
+            points[POINT * k + j] = simplex[POINT * k + j]
+        ids[2 * k] = simplex_ids[2 * k]
+        ids[2 * k + 1] = simplex_ids[2 * k + 1]
+    # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
+    if not (enclosed and ((many and capped_tetrahedron(pair, points, ids, size)) or roomy)):
         rank, nx, ny, nz = extremal_tetrahedron(pair, points, ids, error)
-    else:
-        for k in range(4):
-            for j in range(POINT):
-                points[POINT * k + j] = simplex[POINT * k + j]
-            ids[2 * k] = simplex_ids[2 * k]
-            ids[2 * k + 1] = simplex_ids[2 * k + 1]
     if rank < 3:
         up = _extent(pair, points, ids, nx, ny, nz)
         down = _extent(pair, points, ids, -nx, -ny, -nz)
         if down < up:
             return FLAT, down, -1.0, -nx, -ny, -nz, -1, rank + 1, 0
         return FLAT, up, -1.0, nx, ny, nz, -1, rank + 1, 0
-    set_tetrahedron(surface, error)
+    enough = ample(size, error)
+    set_tetrahedron(surface, error, enough)
+    met = 0
+    for k in range(4):
+        met |= _print(ids, k)
     count = 4
     depth = math.inf
-    facet = -1
+    facet = 0
     vertices = 4
+    f = least(reaches, 8)
+    distance = reaches[f]
     while True:
-        f = least(reaches, max(count, 8))
-        distance = reaches[f]
+        f = number(f)
         if distance == math.inf:  # no facet is left that could be nearer than the way out that is known
             break
         if overlap_suffices and distance > 2.0 * error and _surface_clearance(clearances, count, error) > error:
@@ -126,11 +142,20 @@ def epa(pair, simplex, simplex_ids, doubles_at, integers_at, overlap_suffices, e
             nz = planes[PLANE * f + 2]
         if overlap_suffices and value < -error:
             return EXPANDED, depth, -1.0, nx, ny, nz, facet, vertices, count
-        if depth - distance <= tolerance or _is_corner(ids, facets, f, vertices) or not has_room(vertices, count):
+        if depth - distance <= tolerance or not has_room(vertices, count):
+            break
+        if met & _print(ids, vertices) != 0 and _is_corner(ids, facets, f, vertices):
             break
         starts[2 * vertices + 1] = -1
         found, edges = find_patch(surface, f, vertices, 0.0625 * error)
-        count = expand(surface, f, vertices, count, found, edges, depth, error)
+        # The nearest of what stays, while the cone's planes are worked out: neither has to wait for the other.
+        nearest = least(reaches, max(count, 8))
+        reach = reaches[nearest]
+        count, f, distance = expand(surface, f, vertices, count, found, edges, depth, error, enough)
+        stays = reach < distance
+        f = nearest if stays else f
+        distance = reach if stays else distance
+        met |= _print(ids, vertices)
         vertices += 1
     clearance = _surface_clearance(clearances, count, error)
     if clearance < 0.0:
@@ -157,19 +182,27 @@ def facet_of(surface, count, best, x, y, z, slack):
     covered by several facets; and where the bodies just touch, the foot may be a corner or lie on an
     edge of facets in other planes.
     """
-    points, planes, _, _, _, facets, _, _, _ = surface
+    points, _, _, _, _, facets, _, _, _ = surface
     most = -math.inf
     for g in range(count):
-        height = planes[PLANE * g] * x + planes[PLANE * g + 1] * y + planes[PLANE * g + 2] * z - planes[PLANE * g + 3]
-        if abs(height) <= slack:
+        if abs(height_over(surface, g, x, y, z)) <= slack:
+            at = FACET * g
             w0, w1, w2 = face_weights(
-                points, POINT * facets[FACET * g], POINT * facets[FACET * g + 1], POINT * facets[FACET * g + 2], x, y, z
+                points, POINT * number(facets[at]), POINT * number(facets[at + 1]), POINT * number(facets[at + 2]), x, y, z
             )
             inside = min(w0, w1, w2)
             if inside > most:
                 most = inside
                 best = g
     return best
+
+
+@kernel(inline=True)
+def height_over(surface, g, x, y, z):
+    """Height of a point over the plane of a facet."""
+    _, planes, _, _, _, _, _, _, _ = surface
+    at = PLANE * g
+    return planes[at] * x + planes[at + 1] * y + planes[at + 2] * z - planes[at + 3]
 
 
 @kernel

@@ -15,14 +15,16 @@ from collide.geometry.double_double import divide, subtract
 from collide.geometry.scan import least
 from collide.narrowphase.epa.surface import (
     FACET,
+    MARKS,
     POINTS,
     SEEN,
     SURE,
+    TWIN,
     WIDEST_BORDER,
-    edge_from,
     expand,
     fine_workspace,
     flip,
+    following,
     has_room,
     workspace,
 )
@@ -125,11 +127,10 @@ def _flip_to(surface, f, v, error):
     """Exchange a diagonal of facet f so that vertex v, across one of its edges, becomes a corner; whether it could."""
     _, _, _, _, _, facets, _, _, _ = surface
     for e in range(3):
-        h = facets[FACET * f + 3 + e]
-        begin = edge_from(facets, h, facets[FACET * f + e])
-        if facets[FACET * h + (begin + 1) % 3] == v:
+        t = facets[FACET * f + TWIN + e]
+        if facets[following(t) + 1] == v:
             flip(surface, f, e, error)
-            return h
+            return t // FACET
     return -1
 
 
@@ -138,7 +139,7 @@ def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, sca
     """`surface.find_patch` by the fine planes."""
     _, _, _, _, ids, facets, _, border, patch = surface
     _load(pair, low, fine, known, ids, apex, scale)
-    facets[FACET * f + SEEN] = 1
+    facets[FACET * f + MARKS] |= SEEN
     patch[0] = f
     found = 1
     visited = 0
@@ -147,16 +148,16 @@ def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, sca
         g = patch[visited]
         visited += 1
         for e in range(3):
-            h = facets[FACET * g + 3 + e]
-            if facets[FACET * h + SEEN] == 1:
+            t = facets[FACET * g + TWIN + e]
+            h = t // FACET
+            if facets[FACET * h + MARKS] & SEEN:
                 continue
             if found < WIDEST_BORDER - 2 and _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale):
-                facets[FACET * h + SEEN] = 1
+                facets[FACET * h + MARKS] |= SEEN
                 patch[found] = h
                 found += 1
             else:
-                border[2 * edges] = h
-                border[2 * edges + 1] = edge_from(facets, h, facets[FACET * g + (e + 1) % 3])
+                border[edges] = t
                 edges += 1
     return found, edges
 
@@ -185,7 +186,7 @@ def _forget(surface, distances, f, error, scale):
     _, _, _, clearances, _, facets, _, _, _ = surface
     distances[2 * f] = -math.inf
     if clearances[f] < math.inf:
-        clearances[f] = (clearances[f] - error) * scale if facets[FACET * f + SURE] == 1 else -math.inf
+        clearances[f] = (clearances[f] - error) * scale if facets[FACET * f + MARKS] & SURE else -math.inf
 
 
 @kernel
@@ -284,7 +285,7 @@ def refine(
         known[vertices] = 0
         starts[2 * vertices + 1] = -1
         found, edges = _find_patch(pair, low, surface, fine, known, direction, f, vertices, unsure, scale)
-        count = expand(surface, f, vertices, count, found, edges, math.inf, error)
+        count, _, _ = expand(surface, f, vertices, count, found, edges, math.inf, error, math.inf)
         for g in range(count):
             if vertices == facets[FACET * g + 2]:  # the apex stands last in what was made for it
                 _forget(surface, distances, g, error, scale)

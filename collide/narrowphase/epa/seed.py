@@ -12,6 +12,16 @@ from collide._jit import kernel
 from collide.narrowphase.bounds import EPA_VERTICES
 from collide.narrowphase.minkowski import POINT, copy_point, difference_point
 
+#: Centres as near as this, in units of S, tell no direction.
+_CENTRED = 2.0**-20
+#: Cosine of directions that need not be told apart.
+_ALIKE = 0.9
+#: How far around the way out three points are looked for: sines.
+_NARROWEST, _WIDEST = 0.35, 0.9
+_HALF_ROOT = math.sqrt(0.75)
+#: Least volume of four points to begin with, times six, in units of S³.
+_SPACIOUS = 2.0**-16
+
 
 @kernel
 def extremal_tetrahedron(pair, points, ids, error):
@@ -78,6 +88,84 @@ def extremal_tetrahedron(pair, points, ids, error):
     if above <= 8.0 * error and below <= 8.0 * error:
         return 2, nx, ny, nz
     return 3, nx, ny, nz
+
+
+@kernel
+def capped_tetrahedron(pair, points, ids, size):
+    """Points 0..3 become three about the likely way out and the one opposite; whether they did, and span enough.
+
+    The likely way out leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
+    are the bodies' centres. The three lie far enough around it for the other sides to be farther off than that.
+
+    Where there are many vertices this saves a quarter to a third of the rounds: 12.6 became 8.6 on hulls of 128 on a
+    sphere. Of long thin bodies it saves none. More rounds than from GJK's own tetrahedron were needed with a corner on
+    the way out, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
+    """
+    spare = EPA_VERTICES
+    ux = pair[14]
+    uy = pair[15]
+    uz = pair[16]
+    length = math.sqrt(ux * ux + uy * uy + uz * uz)
+    if not length > _CENTRED * size:
+        return False
+    ux /= length
+    uy /= length
+    uz /= length
+    way_out = 0.0
+    width = 0.0
+    for turn in range(2):
+        difference_point(pair, points, ids, spare, -ux, -uy, -uz)
+        difference_point(pair, points, ids, spare + 1, ux, uy, uz)
+        at = POINT * spare
+        out = POINT * (spare + 1)
+        way_out = points[out] * ux + points[out + 1] * uy + points[out + 2] * uz
+        width = way_out - (points[at] * ux + points[at + 1] * uy + points[at + 2] * uz)
+        mx = points[at] + points[out]
+        my = points[at + 1] + points[out + 1]
+        mz = points[at + 2] + points[out + 2]
+        length = math.sqrt(mx * mx + my * my + mz * mz)
+        if turn == 1 or not -(mx * ux + my * uy + mz * uz) < _ALIKE * length:
+            break
+        ux = -mx / length
+        uy = -my / length
+        uz = -mz / length
+    if not width > 0.0:
+        return False
+    sine = min(max(4.0 * way_out / width, _NARROWEST), _WIDEST)
+    cosine = math.sqrt(1.0 - sine * sine)
+    ex, ey, ez = _across(ux, uy, uz)
+    fx = uy * ez - uz * ey
+    fy = uz * ex - ux * ez
+    fz = ux * ey - uy * ex
+    for k in range(3):
+        along = sine if k == 0 else -0.5 * sine
+        beside = 0.0 if k == 0 else (_HALF_ROOT * sine if k == 1 else -_HALF_ROOT * sine)
+        difference_point(
+            pair, points, ids, spare + 1 + k,
+            cosine * ux + along * ex + beside * fx,
+            cosine * uy + along * ey + beside * fy,
+            cosine * uz + along * ez + beside * fz,
+        )  # fmt: skip
+    if not abs(_volume(points, POINT * spare)) > _SPACIOUS * size * size * size:
+        return False
+    for k in range(4):
+        copy_point(points, ids, spare + k, k)
+    return True
+
+
+@kernel
+def _volume(points, at):
+    """Six times the signed volume of four points in a row."""
+    ex = points[at + POINT] - points[at]
+    ey = points[at + POINT + 1] - points[at + 1]
+    ez = points[at + POINT + 2] - points[at + 2]
+    fx = points[at + 2 * POINT] - points[at]
+    fy = points[at + 2 * POINT + 1] - points[at + 1]
+    fz = points[at + 2 * POINT + 2] - points[at + 2]
+    gx = points[at + 3 * POINT] - points[at]
+    gy = points[at + 3 * POINT + 1] - points[at + 1]
+    gz = points[at + 3 * POINT + 2] - points[at + 2]
+    return gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
 
 
 @kernel

@@ -1,6 +1,6 @@
 """The growing polytope of EPA: a closed, oriented surface of triangles over points of A ⊖ B.
 
-A facet is a slot: three vertices and the three slots across its edges. Expanding takes a patch of facets out and
+A facet is a slot: three vertices and the three half-edges across its own. Expanding takes a patch of facets out and
 puts a cone over the patch's border in, into the same slots and two new ones, so all slots up to the number of
 facets are in use.
 """
@@ -15,10 +15,12 @@ from collide.narrowphase.minkowski import POINT, copy_point
 
 #: Doubles a facet's plane: unit normal, and the least of its corners along it.
 PLANE = 4
-#: Integers a facet: vertices 0 … 2, slots across the edges 0→1, 1→2, 2→0, whether it is seen from the apex, and whether
-#: the origin lies behind it wherever its corners truly are.
-FACET = 8
-SEEN, SURE = 6, 7
+#: Integers a facet: vertices 0 … 2 and vertex 0 again, half-edges across 0→1, 1→2, 2→0, marks. The half-edge that
+#: begins at corner e of facet f is the number FACET·f + e: its origin stands there, its end next to it, and the
+#: half-edge across TWIN places on.
+FACET, TWIN, MARKS = 8, 4, 7
+#: Marks: the facet is seen from the apex; the origin lies behind it wherever its corners truly are.
+SEEN, SURE = 1, 2
 #: Vertices stand in this many points; the last ones are for trying.
 POINTS = EPA_VERTICES + 8
 #: Rounding of the determinant of three corners, in units of |a|·|b − a|·|c − a| as sums of coordinates: eight roundings
@@ -26,10 +28,19 @@ POINTS = EPA_VERTICES + 8
 DETERMINANT_ERROR = 16 * 2.0**-53
 #: Most edges of a border.
 WIDEST_BORDER = 512
+#: Above every number of a vertex, facet or half-edge.
+_NUMBERS = (1 << 16) - 1
 
 #: Doubles and integers of workspace one run needs (see `workspace`).
 DOUBLES = (POINT + 6) * POINTS + (PLANE + 4) * EPA_FACETS
 INTEGERS = 3 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST_BORDER
+
+
+@kernel(inline=True)
+def number(stored):
+    """A vertex, facet or half-edge as it is stored. The mask changes nothing but what the compiler knows: an index that
+    may be negative is compared and replaced at every access."""
+    return stored & _NUMBERS
 
 
 @kernel(inline=True)
@@ -72,9 +83,28 @@ def fine_workspace(doubles_at, integers_at):
 
 
 @kernel(inline=True)
-def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
+def ample(size, error):
+    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their triangle.
+
+    Coordinates of a point add up to √3·size at most, those of an edge to twice that: the bounds of `_sides` for such.
+    """
+    return 128.0 * error * size * size
+
+
+@kernel(inline=True)
+def _sides(determinant, ax, ay, az, ex, ey, ez, fx, fy, fz, error):
+    """(behind, sure) of `plane_of`, from the lengths of this very triangle."""
+    e = abs(ex) + abs(ey) + abs(ez)
+    f = abs(fx) + abs(fy) + abs(fz)
+    a = abs(ax) + abs(ay) + abs(az)
+    return determinant > DETERMINANT_ERROR * a * e * f, determinant > 2.0 * error * (e * f + 2.0 * a * (e + f))
+
+
+@kernel(inline=True)
+def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error, enough):
     """(nx, ny, nz, distance, clearance, sure) of a triangle, counter-clockwise from outside; n = 0 where it has no area.
 
+    enough : `ample`, which nearly all triangles are beyond, or ∞.
     distance : the least of the corners' along the unit normal: for any unit normal, however badly a thin triangle
         defines it, no point of the triangle lies nearer the origin.
     clearance : the same where the origin provably lies behind the triangle of the corners as they stand, else −1.
@@ -90,14 +120,13 @@ def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
     square = nx * nx + ny * ny + nz * nz
-    if square == 0.0:
-        return 0.0, 0.0, 0.0, math.inf, -1.0, False
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    a = abs(ax) + abs(ay) + abs(az)
     determinant = nx * ax + ny * ay + nz * az
-    behind = determinant > DETERMINANT_ERROR * a * e * f
-    sure = determinant > 2.0 * error * (e * f + 2.0 * a * (e + f))
+    behind = True
+    sure = True
+    if not determinant > enough:
+        if square == 0.0:
+            return 0.0, 0.0, 0.0, math.inf, -1.0, False
+        behind, sure = _sides(determinant, ax, ay, az, ex, ey, ez, fx, fy, fz, error)
     shorten = 1.0 / math.sqrt(square)
     nx *= shorten
     ny *= shorten
@@ -109,37 +138,41 @@ def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error):
 
 
 @kernel(inline=True)
-def set_facet(surface, f, i, j, k, error, depth):
-    """Slot f becomes the facet on vertices i, j, k, counter-clockwise from outside.
+def set_facet(surface, f, i, j, k, error, enough, depth):
+    """Slot f becomes the facet on vertices i, j, k, counter-clockwise from outside; returns its reach.
 
     Eight at a time in vectors took longer than one by one: corners have to be gathered, and what is stored singly
     is slow to load together.
     """
     points, planes, reaches, clearances, _, facets, _, _, _ = surface
-    a = POINT * i
-    b = POINT * j
-    c = POINT * k
+    f = number(f)
+    a = POINT * number(i)
+    b = POINT * number(j)
+    c = POINT * number(k)
     nx, ny, nz, distance, clearance, sure = plane_of(
         points[a], points[a + 1], points[a + 2], points[b], points[b + 1], points[b + 2],
-        points[c], points[c + 1], points[c + 2], error,
+        points[c], points[c + 1], points[c + 2], error, enough,
     )  # fmt: skip
-    facets[FACET * f] = i
-    facets[FACET * f + 1] = j
-    facets[FACET * f + 2] = k
-    facets[FACET * f + SEEN] = 0
-    facets[FACET * f + SURE] = 1 if sure else 0
+    at = FACET * f
+    facets[at] = i
+    facets[at + 1] = j
+    facets[at + 2] = k
+    facets[at + 3] = i
+    facets[at + MARKS] = SURE if sure else 0
     at = PLANE * f
     planes[at] = nx
     planes[at + 1] = ny
     planes[at + 2] = nz
     planes[at + 3] = distance
     # A facet farther off than a known way out will never be the nearest.
-    reaches[f] = distance if distance <= depth else math.inf
+    reach = distance if distance <= depth else math.inf
+    reaches[f] = reach
     clearances[f] = clearance
+    return reach
 
 
 @kernel
-def set_tetrahedron(surface, error):
+def set_tetrahedron(surface, error, enough):
     """The first four facets, outwards, over points 0 … 3, with their neighbours."""
     points, _, reaches, clearances, ids, facets, starts, _, _ = surface
     ex = points[POINT] - points[0]
@@ -160,142 +193,143 @@ def set_tetrahedron(surface, error):
         i = 0 if f < 2 else f - 1
         j = 1 if f == 0 else 3
         k = 2 if f == 0 or f == 2 else (1 if f == 1 else 0)
-        set_facet(surface, f, i, j, k, error, math.inf)
+        set_facet(surface, f, i, j, k, error, enough, math.inf)
         starts[2 * f + 1] = -1
         reaches[f + 4] = math.inf
         clearances[f + 4] = math.inf
-    _set_neighbours(facets, 0, 1, 2, 3)
-    _set_neighbours(facets, 1, 3, 2, 0)
-    _set_neighbours(facets, 2, 1, 3, 0)
-    _set_neighbours(facets, 3, 2, 1, 0)
+    join(facets, 0, FACET + 2)
+    join(facets, 1, 2 * FACET + 2)
+    join(facets, 2, 3 * FACET + 2)
+    join(facets, FACET, 3 * FACET + 1)
+    join(facets, FACET + 1, 2 * FACET)
+    join(facets, 2 * FACET + 1, 3 * FACET)
 
 
 @kernel(inline=True)
-def _set_neighbours(facets, f, across_first, across_second, across_third):
-    facets[FACET * f + 3] = across_first
-    facets[FACET * f + 4] = across_second
-    facets[FACET * f + 5] = across_third
+def join(facets, s, t):
+    """Two half-edges lie across from one another."""
+    facets[s + TWIN] = t
+    facets[t + TWIN] = s
 
 
 @kernel(inline=True)
-def edge_from(facets, f, vertex):
-    """The edge of facet f that begins at one of its vertices."""
-    if facets[FACET * f] == vertex:
-        return 0
-    return 1 if facets[FACET * f + 1] == vertex else 2
-
-
-@kernel(inline=True)
-def is_seen(planes, h, x, y, z, slack):
-    """Whether a point lies beyond the plane of facet h by more than the slack."""
-    at = PLANE * h
-    return planes[at] * x + planes[at + 1] * y + planes[at + 2] * z > planes[at + 3] + slack
+def following(t):
+    """The next half-edge of the same facet."""
+    return t - 2 if t % FACET == 2 else t + 1
 
 
 @kernel(inline=True)
 def find_patch(surface, f, apex, slack):
     """(facets, border edges) of what the apex sees, spreading from f over shared edges; marks it as seen.
 
-    The border stands in ``border``: pairs (facet that stays, its edge).
+    ``border`` gets the half-edges of facets that stay, ``patch`` the facets, whose reach becomes ∞. No branch depends
+    on what is seen: a mispredicted one costs more than an edge.
     """
-    points, planes, _, _, _, facets, _, border, patch = surface
-    x = points[POINT * apex]
-    y = points[POINT * apex + 1]
-    z = points[POINT * apex + 2]
-    facets[FACET * f + SEEN] = 1
+    points, planes, reaches, _, _, facets, _, border, patch = surface
+    at = POINT * number(apex)
+    x = points[at]
+    y = points[at + 1]
+    z = points[at + 2]
+    facets[FACET * f + MARKS] |= SEEN
     patch[0] = f
     found = 1
     visited = 0
     edges = 0
     while visited < found:
-        g = patch[visited]
+        g = number(patch[visited])
+        reaches[g] = math.inf
+        first = FACET * g + TWIN
         visited += 1
+        margin = slack if found < WIDEST_BORDER - 4 else math.inf
         for e in range(3):
-            h = facets[FACET * g + 3 + e]
-            if facets[FACET * h + SEEN] == 1:
-                continue
-            if is_seen(planes, h, x, y, z, slack) and found < WIDEST_BORDER - 2:
-                facets[FACET * h + SEEN] = 1
-                patch[found] = h
-                found += 1
-            else:
-                # The same edge, as the neighbour that stays runs through it.
-                border[2 * edges] = h
-                border[2 * edges + 1] = edge_from(facets, h, facets[FACET * g + (e + 1) % 3])
-                edges += 1
+            t = number(facets[first + e])
+            h = t // FACET
+            marks = facets[FACET * h + MARKS]
+            at = PLANE * h
+            height = planes[at] * x + planes[at + 1] * y + planes[at + 2] * z
+            fresh = 1 - (marks & SEEN)
+            seen = fresh if height > planes[at + 3] + margin else 0
+            facets[FACET * h + MARKS] = marks | seen
+            patch[number(found)] = h
+            found += seen
+            border[number(edges)] = t
+            edges += fresh - seen
     return found, edges
 
 
 @kernel(inline=True)
-def expand(surface, f, apex, count, found, edges, depth, error):
-    """Replace the patch that the apex sees by a cone to it; returns the number of facets.
+def expand(surface, f, apex, count, found, edges, depth, error, enough):
+    """Replace the patch that the apex sees by a cone to it; returns (number of facets, nearest of patch and cone, its reach).
 
     Where the patch is no disc, as rounding may have it, the facet f alone is replaced.
     """
     _, planes, reaches, clearances, _, facets, starts, border, patch = surface
+    nearest = EPA_FACETS
+    least_reach = math.inf
     for k in range(edges):
-        start = facets[FACET * border[2 * k] + (border[2 * k + 1] + 1) % 3]
+        start = number(facets[number(border[k]) + 1])
         if starts[2 * start + 1] == apex:
             edges = 0  # pinched: the border passes a vertex twice
             break
+        starts[2 * start] = patch[k] if k < found else count + k - found
         starts[2 * start + 1] = apex
     if edges == 0:
         for k in range(1, found):
-            facets[FACET * patch[k] + SEEN] = 0
-        for e in range(3):
-            h = facets[FACET * f + 3 + e]
-            border[2 * e] = h
-            border[2 * e + 1] = edge_from(facets, h, facets[FACET * f + (e + 1) % 3])
+            h = number(patch[k])
+            facets[FACET * h + MARKS] &= SURE
+            distance = planes[PLANE * h + 3]
+            reaches[h] = distance if distance <= depth else math.inf
+            if reaches[h] < least_reach:
+                least_reach = reaches[h]
+                nearest = h
         found = 1
         edges = 3
+        for e in range(3):
+            t = number(facets[FACET * f + TWIN + e])
+            border[e] = t
+            starts[2 * number(facets[t + 1])] = f if e == 0 else count + e - 1
     for k in range(edges):
-        h = border[2 * k]
-        edge = border[2 * k + 1]
-        start = facets[FACET * h + (edge + 1) % 3]
-        end = facets[FACET * h + edge]
-        new = patch[k] if k < found else count + k - found
+        t = number(border[k])
+        end = number(facets[t])
+        start = number(facets[t + 1])
+        new = number(starts[2 * start])
         patch[k] = new
-        starts[2 * start] = new
-        border[2 * k] = end
-        set_facet(surface, new, start, end, apex, error, depth)
-        facets[FACET * new + 3] = h
-        facets[FACET * h + 3 + edge] = new
-    for k in range(edges):
-        new = patch[k]
-        following = starts[2 * border[2 * k]]
-        facets[FACET * new + 4] = following
-        facets[FACET * following + 5] = new
+        reach = set_facet(surface, new, start, end, apex, error, enough, depth)
+        nearer = reach < least_reach
+        least_reach = reach if nearer else least_reach
+        nearest = new if nearer else nearest
+        join(facets, FACET * new, t)
+        join(facets, FACET * new + 1, FACET * number(starts[2 * end]) + 2)
     for k in range(edges, found):  # slots of a patch around several vertices: given up
-        reaches[patch[k]] = math.inf
-        clearances[patch[k]] = math.inf
-        planes[PLANE * patch[k] + 3] = math.inf
-    return count + max(edges - found, 0)
+        h = number(patch[k])
+        reaches[h] = math.inf
+        clearances[h] = math.inf
+        planes[PLANE * h + 3] = math.inf
+    return count + max(edges - found, 0), nearest, least_reach
 
 
 @kernel
 def flip(surface, f, e, error):
     """Exchange the diagonal of facet f and its neighbour across edge e: two facets with the same border."""
     _, _, _, _, _, facets, _, _, _ = surface
-    h = facets[FACET * f + 3 + e]
-    p = facets[FACET * f + e]
-    q = facets[FACET * f + (e + 1) % 3]
-    r = facets[FACET * f + (e + 2) % 3]
-    across_qr = facets[FACET * f + 3 + (e + 1) % 3]
-    across_rp = facets[FACET * f + 3 + (e + 2) % 3]
-    begin = edge_from(facets, h, p)
-    v = facets[FACET * h + (begin + 1) % 3]
-    across_pv = facets[FACET * h + 3 + begin]
-    across_vq = facets[FACET * h + 3 + (begin + 1) % 3]
-    facets[FACET * across_pv + 3 + edge_from(facets, across_pv, v)] = f
-    facets[FACET * across_qr + 3 + edge_from(facets, across_qr, r)] = h
-    set_facet(surface, f, p, v, r, error, math.inf)
-    set_facet(surface, h, v, q, r, error, math.inf)
-    facets[FACET * f + 3] = across_pv
-    facets[FACET * f + 4] = h
-    facets[FACET * f + 5] = across_rp
-    facets[FACET * h + 3] = across_vq
-    facets[FACET * h + 4] = across_qr
-    facets[FACET * h + 5] = f
+    s = FACET * f + e
+    t = facets[s + TWIN]
+    h = t // FACET
+    across_qr = facets[following(s) + TWIN]
+    across_rp = facets[following(following(s)) + TWIN]
+    across_pv = facets[following(t) + TWIN]
+    across_vq = facets[following(following(t)) + TWIN]
+    p = facets[s]
+    q = facets[s + 1]
+    r = facets[following(s) + 1]
+    v = facets[following(t) + 1]
+    set_facet(surface, f, p, v, r, error, math.inf, math.inf)
+    set_facet(surface, h, v, q, r, error, math.inf, math.inf)
+    join(facets, FACET * f, across_pv)
+    join(facets, FACET * f + 1, FACET * h + 2)
+    join(facets, FACET * f + 2, across_rp)
+    join(facets, FACET * h, across_vq)
+    join(facets, FACET * h + 1, across_qr)
 
 
 @kernel(inline=True)
