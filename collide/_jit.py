@@ -1,4 +1,4 @@
-"""The one way to compile a kernel. Nothing else in collide imports numba, but for `_simd.py`.
+"""The one way to compile a kernel. Nothing else in collide imports numba, but for `_simd.py` and `_lanes.py`.
 
 Rules, each measured or forced by a bug met:
 
@@ -48,7 +48,7 @@ PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
 _FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 #: Packages whose sources are kernels: an edit in any of them makes all cached kernels stale.
-_KERNEL_SOURCES = ("_jit.py", "_simd.py", "results.py", "geometry", "broadphase", "narrowphase")
+_KERNEL_SOURCES = ("_jit.py", "_lanes.py", "_simd.py", "results.py", "geometry", "broadphase", "narrowphase")
 
 
 def kernel(function: Callable | None = None, *, inline: bool = False) -> Callable:

@@ -26,17 +26,6 @@ _NOWHERE = 1 << 62
 
 
 @intrinsic
-def product_error(_context, a, b, product):
-    """a·b − product, rounded once: the exact error of the product a·b that was rounded to ``product``."""
-    real = types.float64
-
-    def codegen(_context, builder, _signature, args):
-        return builder.fma(args[0], args[1], builder.fneg(args[2]))
-
-    return real(real, real, real), codegen
-
-
-@intrinsic
 def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
     """(index, value) of the largest x·gx + y·gy + z·gz; described in `geometry/scan.py`."""
     if not (isinstance(coordinates, types.Array) and coordinates.ndim == 1 and coordinates.layout == "C"):

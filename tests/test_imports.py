@@ -27,13 +27,14 @@ ROOMS = {
     "errors": set(),
     "cache_folder": set(),
     "_jit": {"cache_folder"},
+    "_lanes": set(),
     "_simd": set(),
     "transforms": {"errors"},
     "results": {"errors"},
-    "geometry": {"_jit", "_simd", "errors"},
+    "geometry": {"_jit", "_lanes", "_simd", "errors"},
     "shapes": {"errors", "transforms", "geometry"},
     "broadphase": {"_jit", "errors", "geometry"},
-    "narrowphase": {"_jit", "errors", "transforms", "geometry", "results"},
+    "narrowphase": {"_jit", "_lanes", "errors", "transforms", "geometry", "results"},
     "certificates": {"errors", "transforms", "geometry", "results"},
     "mesh_certificates": {"certificates", "geometry"},
     "unions": {"geometry", "narrowphase", "results"},
@@ -70,7 +71,7 @@ COMPILERS = {
     "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
 }  # fmt: skip
 #: The files that make code, and what they need for it: everything else goes through them.
-COMPILER_PACKAGES = {"collide/_jit.py": {"numba"}, "collide/_simd.py": {"numba", "llvmlite"}}
+COMPILER_PACKAGES = {"collide/_jit.py": {"numba"}, "collide/_simd.py": {"numba", "llvmlite"}, "collide/_lanes.py": {"numba", "llvmlite"}}
 BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
 
 

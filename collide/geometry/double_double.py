@@ -5,14 +5,13 @@ error bounds for basic building blocks of double-word arithmetic" (ACM TOMS 44, 
 product, a quotient or a root is good to a relative 16 u² = 2⁻¹⁰², barring overflow and underflow: what goes in
 should lie between 2⁻⁴⁰⁰ and 2⁴⁰⁰, or be 0.
 
-A number is passed as two doubles and returned as a pair.
+A number is passed as two doubles, or as two `Lanes` for eight numbers at once, and returned as a pair.
 """
 
 from __future__ import annotations
 
-import math
-
 from collide._jit import kernel
+from collide._lanes import root_of, select
 from collide.geometry.error_free import two_product, two_sum
 
 #: Relative error of an operation of this file.
@@ -61,37 +60,53 @@ def divide(a, a_low, b, b_low):
 @kernel(inline=True)
 def square_root(a, a_low):
     """√a for a ≥ 0, to a relative 8u²: one step of Newton from the root of the leading part."""
-    if a <= 0.0:
-        return 0.0, 0.0
-    root = math.sqrt(a)
+    positive = a > 0.0
+    root = root_of(select(positive, a, 1.0))
     square, error = two_product(root, root)
     rest = ((a - square) - error) + a_low
-    return quick_sum(root, rest / (2.0 * root))
+    root, rest = quick_sum(root, rest / (2.0 * root))
+    return select(positive, root, 0.0), select(positive, rest, 0.0)
 
 
 @kernel(inline=True)
 def cross(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
     """a × b, each component to 2⁻¹⁰¹·(|products|)."""
-    p, p_low = multiply(ay, ay_low, bz, bz_low)
-    q, q_low = multiply(az, az_low, by, by_low)
-    x, x_low = subtract(p, p_low, q, q_low)
-    p, p_low = multiply(az, az_low, bx, bx_low)
-    q, q_low = multiply(ax, ax_low, bz, bz_low)
-    y, y_low = subtract(p, p_low, q, q_low)
-    p, p_low = multiply(ax, ax_low, by, by_low)
-    q, q_low = multiply(ay, ay_low, bx, bx_low)
-    z, z_low = subtract(p, p_low, q, q_low)
+    x, x_low = _determinant(ay, ay_low, az, az_low, by, by_low, bz, bz_low)
+    y, y_low = _determinant(az, az_low, ax, ax_low, bz, bz_low, bx, bx_low)
+    z, z_low = _determinant(ax, ax_low, ay, ay_low, bx, bx_low, by, by_low)
     return x, x_low, y, y_low, z, z_low
 
 
 @kernel(inline=True)
+def _determinant(a, a_low, b, b_low, c, c_low, d, d_low):
+    """a·d − b·c, to 13u²·(|a·d| + |b·c|): lower parts are at most 4u of that, and rounded in three sums."""
+    p, e = two_product(a, d)
+    q, f = two_product(b, c)
+    s, g = two_sum(p, -q)
+    return two_sum(s, g + ((e + (a * d_low + a_low * d)) - (f + (b * c_low + b_low * c))))
+
+
+@kernel(inline=True)
 def product_of_vectors(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
-    """a·b, to 2⁻¹⁰⁰·Σ|products|."""
-    x, x_low = multiply(ax, ax_low, bx, bx_low)
-    y, y_low = multiply(ay, ay_low, by, by_low)
-    z, z_low = multiply(az, az_low, bz, bz_low)
-    x, x_low = add(x, x_low, y, y_low)
-    return add(x, x_low, z, z_low)
+    """a·b, to 2⁻¹⁰¹·Σ|products|."""
+    total, rest = loose_product(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low)
+    return two_sum(total, rest)
+
+
+@kernel(inline=True)
+def loose_product(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
+    """a·b as two doubles, the second of which may be larger than the first, to 25u²·Σ|products|.
+
+    Errors of products and sums, and lower parts, are at most 5u·Σ|products| together; sums of them round by 24u².
+    """
+    total, e = two_product(ax, bx)
+    term, f = two_product(ay, by)
+    total, g = two_sum(total, term)
+    rest = (e + f) + g
+    term, f = two_product(az, bz)
+    total, g = two_sum(total, term)
+    low = (ax * bx_low + ax_low * bx) + (ay * by_low + ay_low * by) + (az * bz_low + az_low * bz)
+    return total, rest + ((f + g) + low)
 
 
 @kernel(inline=True)
@@ -101,7 +116,7 @@ def bracket(a, a_low, error):
     Adding or taking off a little more than half a unit in the last place rounds to the neighbour.
     """
     s, e = two_sum(a, a_low - error)
-    lower = s if e >= 0.0 else s - abs(s) * _TO_NEIGHBOUR
+    lower = select(e >= 0.0, s, s - abs(s) * _TO_NEIGHBOUR)
     s, e = two_sum(a, a_low + error)
-    upper = s if e <= 0.0 else s + abs(s) * _TO_NEIGHBOUR
+    upper = select(e <= 0.0, s, s + abs(s) * _TO_NEIGHBOUR)
     return lower, a + a_low, upper

@@ -34,7 +34,7 @@ def dekker_product(a, b):
 if PLAIN_PYTHON:
     two_product = dekker_product
 else:
-    from collide._simd import product_error
+    from collide._lanes import product_error
 
     @kernel(inline=True)
     def two_product(a, b):

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide._lanes import LANES
 from collide.geometry.double_double import add, bracket
-from collide.geometry.error_free import two_sum
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
@@ -30,9 +30,10 @@ from collide.narrowphase.epa.refine import refine
 from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.surface import FACET, number, workspace
 from collide.narrowphase.epa.surface import INTEGERS as EPA_INTEGERS
-from collide.narrowphase.gap import GAP_DOUBLES, GAP_INTEGERS, polish_gap
+from collide.narrowphase.fine import FINE
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height, reach_of_plane
+from collide.narrowphase.level import MOST_TIES
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
@@ -54,24 +55,36 @@ from collide.narrowphase.rows import (
     write_vertices,
 )
 from collide.narrowphase.simplex import face_weights, weigh_enclosed
+from collide.narrowphase.waiting import (
+    KINDS,
+    WAITING_DOUBLES,
+    WAITING_INTEGERS,
+    can_wait,
+    nobody_waits,
+    polish_waiting,
+    put_down,
+    write_guess,
+)
 from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
 from collide.transforms import SMALLEST
 
-# Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits need.
+# Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits of depths and
+# heights need: four points, a direction, low parts of two poses, ties.
 _WEIGHTS = 5 * POINT
-_FOOT, _FINE = 60, 64
+_FINE = 64
 _NEAREST, _TIES = 10, 16
-_TIED = _TIES + GAP_INTEGERS
-_OWN_DOUBLES, _OWN_INTEGERS = _FINE + GAP_DOUBLES, _TIED + ENTRY
+_TIED = _TIES + 2 * (MOST_TIES + 1)
+_OWN_DOUBLES, _OWN_INTEGERS = _FINE + 5 * FINE + 24, _TIED + ENTRY
 #: Rounding of a point that stands for the foot on a facet, in units of its corners.
 _NEAR_MISS = 2.0**-42
 #: Least weight of a foot well inside its facet.
 _WELL_INSIDE = 2.0**-10
 #: So many vertices of two cores are worth a better seed for EPA than GJK's.
 _MANY = 48
-#: Workspace of one thread; the requests to the exact stage stand last.
-REQUESTS_AT = _OWN_INTEGERS + EPA_INTEGERS
-DOUBLES, INTEGERS = _OWN_DOUBLES + EPA_DOUBLES, REQUESTS_AT + REQUESTS
+#: Workspace of one thread: behind EPA's what waits for its last digits; the requests to the exact stage stand last.
+_WAITING_DOUBLES_AT, _WAITING_INTEGERS_AT = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
+REQUESTS_AT = _WAITING_INTEGERS_AT + WAITING_INTEGERS
+DOUBLES, INTEGERS = _WAITING_DOUBLES_AT + WAITING_DOUBLES, REQUESTS_AT + REQUESTS
 
 
 @kernel
@@ -245,10 +258,13 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
 
 @kernel(inline=True)
 def _swept(
-    pair, terms_at, shape_a, shape_b, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
-    slop, error, exactly, flip, row_number,
+    pair, terms_at, shape_a, part_a, shape_b, part_b, row, words, marks, doubles_at, integers_at, boolean, depths, limit,
+    size, slop, error, exactly, flip, row_number,
 ):  # fmt: skip
-    """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
+    """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii.
+
+    Returns the kind of gap of a row that waits for its last digits and is finished then (`waiting.py`), or −1.
+    """
     (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
     radius_b = numbers[NUMBERS * shape_b + RADIUS]
@@ -279,28 +295,19 @@ def _swept(
     words[ITERATIONS] = rounds
     distance = -depth - radius
     width = math.inf
-    vague = False
+    gap = False
     if not boolean:
         width = PROMISE_CURVED * size if curved else (0.0 if exactly else PROMISE_STORED * size)
-        if exactly and not curved and depth < -error and lower <= limit:
-            used, parallelogram = _nearest_of_four(ids, weights, n, integers_at)
-            proven, value, value_low, unsure, ux, uy, uz = polish_gap(
-                pair, terms_at, doubles_at + 8 * _FINE, integers_at + 8 * _TIES, view_i64(integers_at + 8 * _NEAREST, 6),
-                used, parallelogram, view_f64(doubles_at + 8 * _FOOT, 3), size, slop, error,
+        gap = exactly and not curved and depth < -error and lower <= limit
+        if gap and can_wait(size):
+            write_guess(row, distance, lower, upper, nx, ny, nz)
+            write_vertices(words, marks, ids, vertices, flip)
+            return put_down(
+                pair, terms_at, ids, weights, n, shape_a, part_a, shape_b, part_b, flip, how, row_number, size, slop,
+                error, doubles_at + 8 * _WAITING_DOUBLES_AT, integers_at + 8 * _WAITING_INTEGERS_AT,
             )  # fmt: skip
-            # Radii may prove an overlap of cores between which doubles see no clear direction.
-            vague = not proven and radius > 0.0
-            if proven:
-                _take_foot(weights, n, view_f64(doubles_at + 8 * _FOOT, 3))
-                swept, swept_low = two_sum(radius_a, radius_b)
-                value, value_low = add(value, value_low, -swept, -swept_low)
-                low, distance, high = bracket(value, value_low, unsure)
-                lower = max(lower, low)
-                upper = min(upper, high)
-                nx = -ux
-                ny = -uy
-                nz = -uz
-                depth = -distance - radius
+    # Radii may prove an overlap of cores between which doubles see no clear direction.
+    vague = gap and radius > 0.0
     decided = lower > 0.0 or upper <= 0.0
     if deepest < math.inf:
         rounding = 4.0 * 2.0**-53 * radius
@@ -320,7 +327,7 @@ def _swept(
             row[NORMAL] = sign * nx
             row[NORMAL + 1] = sign * ny
             row[NORMAL + 2] = sign * nz
-        return
+        return -1
     ax = _combine(points, weights, n, 3)
     ay = _combine(points, weights, n, 4)
     az = _combine(points, weights, n, 5)
@@ -343,6 +350,7 @@ def _swept(
         flip,
     )  # fmt: skip
     write_vertices(words, marks, ids, vertices, flip)
+    return -1
 
 
 @kernel
@@ -352,43 +360,6 @@ def _name_plane(ids, tied):
     tied[1] = 1
     for k in range(6):
         tied[2 + k] = ids[k]
-
-
-@kernel(inline=True)
-def _take_foot(weights, n, foot):
-    """Replace the weights of the points that have one by those of `polish_gap`.
-
-    Of four points of two segments, three corners have told the plane: the weights of the parallelogram are products.
-    """
-    if n == 4 and weights[0] > 0.0 and weights[1] > 0.0 and weights[2] > 0.0 and weights[3] > 0.0:
-        s = foot[1]
-        t = foot[2]
-        weights[0] = (1.0 - s) * (1.0 - t)
-        weights[1] = s * (1.0 - t)
-        weights[2] = (1.0 - s) * t
-        weights[3] = s * t
-        return
-    used = 0
-    for k in range(n):
-        if weights[k] > 0.0 and used < 3:
-            weights[k] = foot[used]
-            used += 1
-
-
-@kernel(inline=True)
-def _nearest_of_four(ids, weights, n, integers_at):
-    """(points, whether they span a parallelogram): the vertex pairs with a weight, put where `polish_gap` reads them.
-
-    Of two segments all four have one where both are met inside; three corners tell the same plane.
-    """
-    nearest = view_i64(integers_at + 8 * _NEAREST, 6)
-    used = 0
-    for k in range(n):
-        if weights[k] > 0.0 and used < 3:
-            nearest[2 * used] = ids[2 * k]
-            nearest[2 * used + 1] = ids[2 * k + 1]
-            used += 1
-    return used, n == 4
 
 
 @kernel(inline=True)
@@ -490,26 +461,36 @@ def answer_pairs(
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     view_i64(integers_at + 8 * REQUESTS_AT, 1)[0] = 0
-    for k in range(n_pairs):
-        row = view_f64(rows_at + ROW * k, 12)
-        words = view_i32(rows_at + ROW * k, ROW // 4)
-        marks = view_u8(rows_at + ROW * k, ROW)
-        pa = pairs[2 * k]
-        pb = pairs[2 * k + 1]
-        _answer(
-            ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, k, boolean, depths, limit, row, words, marks,
-            doubles_at, integers_at,
-        )  # fmt: skip
-        if stop_at_hit and marks[HIT] == 1:
-            return k + 1
+    waiting_at = integers_at + 8 * _WAITING_INTEGERS_AT
+    waiting = view_i64(waiting_at, KINDS)
+    nobody_waits(waiting_at)
+    # Whoever still waits when all pairs have had their turn is seen to then, kind by kind.
+    most = 1 if stop_at_hit else LANES
+    for turn in range(n_pairs if boolean else n_pairs + KINDS):
+        kind = turn - n_pairs
+        if turn < n_pairs:
+            kind = _answer(
+                ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1], turn, boolean,
+                depths, limit, rows_at, doubles_at, integers_at,
+            )  # fmt: skip
+        if kind >= 0 and waiting[kind] >= (most if turn < n_pairs else 1):
+            polish_waiting(
+                ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, doubles_at + 8 * _WAITING_DOUBLES_AT, waiting_at
+            )
+        if stop_at_hit and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HIT] == 1:
+            return turn + 1
     return n_pairs
 
 
 @kernel(inline=True)
 def _answer(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, row_number, boolean, depths, limit, row, words, marks,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, row_number, boolean, depths, limit, rows_at,
     doubles_at, integers_at,
 ):  # fmt: skip
+    """Answer one pair; returns the kind of gap if the row waits for its last digits, else −1."""
+    row = view_f64(rows_at + ROW * row_number, 12)
+    words = view_i32(rows_at + ROW * row_number, ROW // 4)
+    marks = view_u8(rows_at + ROW * row_number, ROW)
     shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
     sa = shape_of[pa]
     sb = shape_of[pb]
@@ -527,18 +508,19 @@ def _answer(
     how = method(pair[3], pair[1], pair[9], pair[7])
     if 0.0 < size < SMALLEST:
         marks[HOW] = REFUSED
-        return
+        return -1
     if how == HALFSPACES:
         _halves(pair, row, marks, flip)
-    elif how == HALFSPACE_CONVEX:
+        return -1
+    if how == HALFSPACE_CONVEX:
         offset, skew = reach_of_plane(numbers, pair[4], poses, pair[5])
         size += offset
         error = ERROR * size * skew + slop
         _half(
             pair, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip
         )
-    else:
-        _swept(
-            pair, terms_at, sa, sb, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
-            slop, ERROR * size + slop, known, flip, row_number,
-        )  # fmt: skip
+        return -1
+    return _swept(
+        pair, terms_at, sa, pa, sb, pb, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+        slop, ERROR * size + slop, known, flip, row_number,
+    )  # fmt: skip

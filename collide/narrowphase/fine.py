@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel, view_f64
+from collide._lanes import any_of, root_of, select
 from collide.geometry.double_double import cross, multiply, product_of_vectors, square_root, subtract
 from collide.geometry.error_free import two_product, two_sum
 from collide.geometry.tables import POSE_SLOP, POSE_TERMS, TERMS
@@ -29,6 +30,16 @@ SMALLEST_FINE, LARGEST_FINE = 2.0**-300, 2.0**300
 #: Directions shorter than this, of a pair of size 1, say nothing.
 _SHORTEST = 2.0**-200
 
+
+
+@kernel(inline=True)
+def larger(a, b):
+    return select(b > a, b, a)
+
+
+@kernel(inline=True)
+def smaller(a, b):
+    return select(b < a, b, a)
 
 
 @kernel(inline=True)
@@ -60,6 +71,21 @@ def is_composed(poses, p):
 
 
 @kernel(inline=True)
+def add_turned(total, rest, rx, ry, rz, x, y, z):
+    """(total, rest) with a row of a rotation times a vector added: the total without error, the rest rounded."""
+    term, e = two_product(rx, x)
+    total, f = two_sum(total, term)
+    rest += e + f
+    term, e = two_product(ry, y)
+    total, f = two_sum(total, term)
+    rest += e + f
+    term, e = two_product(rz, z)
+    total, f = two_sum(total, term)
+    rest += e + f
+    return total, rest
+
+
+@kernel(inline=True)
 def fine_points(pair, low, fine, ids, n, scale):
     """Points 0 … n − 1 become the differences of these vertex pairs, times ``scale``."""
     for k in range(n):
@@ -83,24 +109,8 @@ def fine_point(pair, low, fine, k, i, j, scale):
         r = p + 3 * axis
         s = q + 3 * axis
         total, rest = two_sum(poses[p + 9 + axis], -poses[q + 9 + axis])
-        term, e = two_product(poses[r], ax)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(poses[r + 1], ay)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(poses[r + 2], az)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(poses[s], -bx)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(poses[s + 1], -by)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(poses[s + 2], -bz)
-        total, f = two_sum(total, term)
-        rest += e + f
+        total, rest = add_turned(total, rest, poses[r], poses[r + 1], poses[r + 2], ax, ay, az)
+        total, rest = add_turned(total, rest, poses[s], poses[s + 1], poses[s + 2], -bx, -by, -bz)
         if len(low) > 0:
             at = 3 * axis
             rest += low[9 + axis] - low[21 + axis]
@@ -134,29 +144,10 @@ def fine_height(fine, k, direction):
 
 @kernel
 def set_plane(fine, i, j, k, direction):
-    """The normal of three points, as long as twice their area, into ``direction``.
-
-    From the two shorter edges: long ones that are nearly parallel would leave little of it.
-    """
-    ex = fine[FINE * j] - fine[FINE * i]
-    ey = fine[FINE * j + 2] - fine[FINE * i + 2]
-    ez = fine[FINE * j + 4] - fine[FINE * i + 4]
-    fx = fine[FINE * k] - fine[FINE * j]
-    fy = fine[FINE * k + 2] - fine[FINE * j + 2]
-    fz = fine[FINE * k + 4] - fine[FINE * j + 4]
-    gx = fine[FINE * i] - fine[FINE * k]
-    gy = fine[FINE * i + 2] - fine[FINE * k + 2]
-    gz = fine[FINE * i + 4] - fine[FINE * k + 4]
-    ij = ex * ex + ey * ey + ez * ez
-    jk = fx * fx + fy * fy + fz * fz
-    ki = gx * gx + gy * gy + gz * gz
-    if ij >= jk and ij >= ki:
-        i, j, k = k, i, j
-    elif ki >= jk:
-        i, j, k = j, k, i
+    """The normal of three points, as long as twice their area, into ``direction``."""
     ex, ex_low, ey, ey_low, ez, ez_low = fine_edge(fine, j, i)
     fx, fx_low, fy, fy_low, fz, fz_low = fine_edge(fine, k, i)
-    x, x_low, y, y_low, z, z_low = cross(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low)
+    x, x_low, y, y_low, z, z_low = normal_of_edges(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low)
     direction[0] = x
     direction[1] = x_low
     direction[2] = y
@@ -166,53 +157,88 @@ def set_plane(fine, i, j, k, direction):
 
 
 @kernel
-def set_away_from_edge(fine, direction):
-    """The part of point 0 across the edge to point 1, into ``direction``, lengthened by the edge's square.
+def normal_of_edges(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low):
+    """e × f, of two edges e and f from a corner of a triangle, as three double-doubles.
+
+    From the two shorter of its three edges: long ones that are nearly parallel would leave little of it.
+    """
+    gx, gx_low = subtract(fx, fx_low, ex, ex_low)
+    gy, gy_low = subtract(fy, fy_low, ey, ey_low)
+    gz, gz_low = subtract(fz, fz_low, ez, ez_low)
+    ee = ex * ex + ey * ey + ez * ez
+    ff = fx * fx + fy * fy + fz * fz
+    gg = gx * gx + gy * gy + gz * gz
+    without_e = (ee >= ff) & (ee >= gg)
+    without_f = (ff > ee) & (ff >= gg)
+    # e × f = f × g = g × −e, with g from e's end to f's.
+    ux = select(without_e, fx, select(without_f, gx, ex))
+    ux_low = select(without_e, fx_low, select(without_f, gx_low, ex_low))
+    uy = select(without_e, fy, select(without_f, gy, ey))
+    uy_low = select(without_e, fy_low, select(without_f, gy_low, ey_low))
+    uz = select(without_e, fz, select(without_f, gz, ez))
+    uz_low = select(without_e, fz_low, select(without_f, gz_low, ez_low))
+    vx = select(without_e, gx, select(without_f, -ex, fx))
+    vx_low = select(without_e, gx_low, select(without_f, -ex_low, fx_low))
+    vy = select(without_e, gy, select(without_f, -ey, fy))
+    vy_low = select(without_e, gy_low, select(without_f, -ey_low, fy_low))
+    vz = select(without_e, gz, select(without_f, -ez, fz))
+    vz_low = select(without_e, gz_low, select(without_f, -ez_low, fz_low))
+    return cross(ux, ux_low, uy, uy_low, uz, uz_low, vx, vx_low, vy, vy_low, vz, vz_low)
+
+
+@kernel
+def across_edge(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low):
+    """The part of a point across an edge from it, three double-doubles, lengthened by the edge's square.
 
     Taken twice where that is short: the first time leaves what rounding at |w| makes, the second what rounding at the
-    result makes.
+    result makes. Where the edge is not much nearer than its length, once is enough.
     """
-    ex, ex_low, ey, ey_low, ez, ez_low = fine_edge(fine, 1, 0)
     square, square_low = product_of_vectors(ex, ex_low, ey, ey_low, ez, ez_low, ex, ex_low, ey, ey_low, ez, ez_low)
-    x = fine[0]
-    x_low = fine[1]
-    y = fine[2]
-    y_low = fine[3]
-    z = fine[4]
-    z_low = fine[5]
-    for turn in range(2):
-        # Where the edge is not much nearer than its length, once is enough.
-        left = abs(x) + abs(y) + abs(z)
-        if turn == 1 and left > 2.0**-20 * square * (abs(fine[0]) + abs(fine[2]) + abs(fine[4]) + math.sqrt(square)):
-            break
-        along, along_low = product_of_vectors(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low)
-        p, p_low = multiply(x, x_low, square, square_low)
-        q, q_low = multiply(ex, ex_low, along, along_low)
-        x, x_low = subtract(p, p_low, q, q_low)
-        p, p_low = multiply(y, y_low, square, square_low)
-        q, q_low = multiply(ey, ey_low, along, along_low)
-        y, y_low = subtract(p, p_low, q, q_low)
-        p, p_low = multiply(z, z_low, square, square_low)
-        q, q_low = multiply(ez, ez_low, along, along_low)
-        z, z_low = subtract(p, p_low, q, q_low)
-    direction[0] = x
-    direction[1] = x_low
-    direction[2] = y
-    direction[3] = y_low
-    direction[4] = z
-    direction[5] = z_low
+    full = abs(x) + abs(y) + abs(z)
+    x, x_low, y, y_low, z, z_low = _less_along(
+        x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low
+    )
+    left = abs(x) + abs(y) + abs(z)
+    again = left <= 2.0**-20 * square * (full + root_of(square))
+    if any_of(again):
+        u, u_low, v, v_low, w, w_low = _less_along(
+            x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low
+        )
+        x = select(again, u, x)
+        x_low = select(again, u_low, x_low)
+        y = select(again, v, y)
+        y_low = select(again, v_low, y_low)
+        z = select(again, w, z)
+        z_low = select(again, w_low, z_low)
+    return x, x_low, y, y_low, z, z_low
+
+
+@kernel
+def _less_along(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low):
+    """w |e|² − e (w·e)."""
+    along, along_low = product_of_vectors(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low)
+    p, p_low = multiply(x, x_low, square, square_low)
+    q, q_low = multiply(ex, ex_low, along, along_low)
+    x, x_low = subtract(p, p_low, q, q_low)
+    p, p_low = multiply(y, y_low, square, square_low)
+    q, q_low = multiply(ey, ey_low, along, along_low)
+    y, y_low = subtract(p, p_low, q, q_low)
+    p, p_low = multiply(z, z_low, square, square_low)
+    q, q_low = multiply(ez, ez_low, along, along_low)
+    z, z_low = subtract(p, p_low, q, q_low)
+    return x, x_low, y, y_low, z, z_low
 
 
 @kernel
 def fine_length(direction):
     """(|d|, low), or zeros where the direction says nothing."""
-    if not abs(direction[0]) + abs(direction[2]) + abs(direction[4]) > _SHORTEST:
-        return 0.0, 0.0
     square, square_low = product_of_vectors(
         direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
         direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
     )  # fmt: skip
-    return square_root(square, square_low)
+    length, length_low = square_root(square, square_low)
+    some = abs(direction[0]) + abs(direction[2]) + abs(direction[4]) > _SHORTEST
+    return select(some, length, 0.0), select(some, length_low, 0.0)
 
 
 @kernel

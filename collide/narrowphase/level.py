@@ -22,12 +22,7 @@ def are_alone(pair, ids, n, direction, slack):
     their vertices might not be level with them: n pairs over n + 1 vertices hang together, so that it must be.
     """
     (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
-    last = n - 1
-    middle = min(last, 1)
-    own_a = 1 + (1 if ids[2 * middle] != ids[0] else 0)
-    own_a += 1 if ids[2 * last] != ids[0] and ids[2 * last] != ids[2 * middle] else 0
-    own_b = 1 + (1 if ids[2 * middle + 1] != ids[1] else 0)
-    own_b += 1 if ids[2 * last + 1] != ids[1] and ids[2 * last + 1] != ids[2 * middle + 1] else 0
+    own_a, own_b = own_vertices(ids, n)
     if own_a + own_b != n + 1:
         return False
     largest = max(abs(direction[0]), abs(direction[2]), abs(direction[4]))
@@ -35,21 +30,35 @@ def are_alone(pair, ids, n, direction, slack):
     dy = direction[2] / largest
     dz = direction[4] / largest
     slack *= abs(dx) + abs(dy) + abs(dz)
-    if not _no_other_is_level(
-        coords_a, n_a, m_a, tree_a, ids[0], ids[2 * middle], ids[2 * last], own_a,
-        poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
-        poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
-        poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
-        slack,
-    ):  # fmt: skip
-        return False
-    return _no_other_is_level(
-        coords_b, n_b, m_b, tree_b, ids[1], ids[2 * middle + 1], ids[2 * last + 1], own_b,
-        -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
-        -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
-        -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
-        slack,
-    )  # fmt: skip
+    for body in range(2):
+        coordinates = coords_a if body == 0 else coords_b
+        m = m_a if body == 0 else m_b
+        at = p if body == 0 else q
+        sign = 1.0 if body == 0 else -1.0
+        gx = sign * (poses[at] * dx + poses[at + 3] * dy + poses[at + 6] * dz)
+        gy = sign * (poses[at + 1] * dx + poses[at + 4] * dy + poses[at + 7] * dz)
+        gz = sign * (poses[at + 2] * dx + poses[at + 5] * dy + poses[at + 8] * dz)
+        least = math.inf
+        for k in range(n):
+            least = min(least, _product(coordinates, m, ids[2 * k + body], gx, gy, gz))
+        if not no_other_is_level(
+            coordinates, n_a if body == 0 else n_b, m, tree_a if body == 0 else tree_b, ids, n, body,
+            own_a if body == 0 else own_b, gx, gy, gz, least + slack,
+        ):  # fmt: skip
+            return False
+    return True
+
+
+@kernel(inline=True)
+def own_vertices(ids, n):
+    """How many different vertices of A, and of B, n ≤ 3 pairs have."""
+    last = 2 * (n - 1)
+    middle = min(last, 2)
+    own_a = 1 + (1 if ids[middle] != ids[0] else 0)
+    own_a += 1 if ids[last] != ids[0] and ids[last] != ids[middle] else 0
+    own_b = 1 + (1 if ids[middle + 1] != ids[1] else 0)
+    own_b += 1 if ids[last + 1] != ids[1] and ids[last + 1] != ids[middle + 1] else 0
+    return own_a, own_b
 
 
 @kernel(inline=True)
@@ -57,19 +66,22 @@ def _product(coordinates, m, i, gx, gy, gz):
     return coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
 
 
-@kernel(inline=True)
-def _no_other_is_level(coordinates, n, m, tree, i, j, k, own, gx, gy, gz, slack):
-    """Whether no vertex but i, j, k (``own`` different ones) has a product with g within the slack of theirs.
+@kernel
+def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz, limit):
+    """Whether no vertices have a product with g of at most the limit, but those of a body's in some vertex pairs.
+
+    ids : the pairs, at most three, with ``own`` different vertices of body 0 or 1; these are below the limit.
 
     A scan; or, where there is a support tree, a look at their neighbours: the vertices of a hull below a level hang
     together.
     """
-    limit = _product(coordinates, m, i, gx, gy, gz)
-    limit = min(limit, _product(coordinates, m, j, gx, gy, gz), _product(coordinates, m, k, gx, gy, gz)) + slack
     if tree == 0:
         # What fills up the last block are copies of vertex 0.
         copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
         return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
+    i = ids[body]
+    j = ids[2 * min(pairs - 1, 1) + body]
+    k = ids[2 * (pairs - 1) + body]
     starts, ring, corners = rings_of(tree)
     for turn in range(own):
         # The last is a new one if the one in the middle is not.

@@ -1,0 +1,236 @@
+"""Eight doubles at once: a number for kernels, whose arithmetic is that of doubles in every lane.
+
+`Lanes` have the operators of numbers, so that a kernel of plain expressions compiles for them as it stands: eight
+questions of one kind are worked on in the time of one or two. What has branches says `select` instead of ``if``; the
+functions here take doubles as well, so that one source serves both. Comparisons of lanes give a mask: eight booleans,
+with ``&``, ``|`` and ``~``. No lane depends on another, and each has the bits that doubles would have.
+
+LLVM has vectors of eight doubles whatever the processor: see `_simd.py`.
+
+Without compilation lanes are numpy arrays of eight, masks arrays of booleans.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import operator
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.errors import TypingError
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, models, register_model
+from numba.np.arrayobj import make_array, populate_array
+
+PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
+
+#: Doubles to a number.
+LANES = 8
+
+_F64, _I64, _I1 = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
+_VALUES, _BITS = ir.VectorType(_F64, LANES), ir.VectorType(_I1, LANES)
+
+
+class _Lanes(types.Type):
+    """Eight doubles; a double becomes eight of the same where lanes are wanted."""
+
+    def __init__(self):
+        super().__init__(name="Lanes")
+
+    def can_convert_from(self, _context, other):
+        return Conversion.safe if other == types.float64 else None
+
+
+class _Mask(types.Type):
+    """Eight booleans."""
+
+    def __init__(self):
+        super().__init__(name="Mask")
+
+
+lanes, mask = _Lanes(), _Mask()
+
+
+@register_model(_Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _VALUES)
+
+
+@register_model(_Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _BITS)
+
+
+def _splat(builder: ir.IRBuilder, scalar):
+    kind = ir.VectorType(scalar.type, LANES)
+    nothing = ir.Constant(kind, ir.Undefined)
+    one = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+
+
+@lower_cast(types.float64, lanes)
+def _double_to_lanes(_context, builder, _from, _to, value):
+    return _splat(builder, value)
+
+
+def _operation(functions, arguments, result, code) -> None:
+    """Have operators for arguments of these types; code(builder, *values) makes the result."""
+    for function in functions:
+
+        @infer_global(function)
+        class _Template(ConcreteTemplate):
+            cases = [signature(result, *arguments)]
+
+        @lower_builtin(function, *arguments)
+        def _lower(_context, builder, _signature, values):
+            return code(builder, *values)
+
+
+def _called(builder: ir.IRBuilder, name: str, *values):
+    """LLVM's own function of this name for numbers, or vectors, of the values' type."""
+    kind = values[0].type
+    suffix = "f64" if kind == _F64 else f"v{LANES}f64"
+    name = f"llvm.{name}.{suffix}"
+    known = builder.module.globals.get(name)
+    return builder.call(known or ir.Function(builder.module, ir.FunctionType(kind, [kind] * len(values)), name=name), values)
+
+
+_operation((operator.add, operator.iadd), (lanes, lanes), lanes, lambda builder, a, b: builder.fadd(a, b))
+_operation((operator.sub, operator.isub), (lanes, lanes), lanes, lambda builder, a, b: builder.fsub(a, b))
+_operation((operator.mul, operator.imul), (lanes, lanes), lanes, lambda builder, a, b: builder.fmul(a, b))
+_operation((operator.truediv, operator.itruediv), (lanes, lanes), lanes, lambda builder, a, b: builder.fdiv(a, b))
+_operation((operator.neg,), (lanes,), lanes, lambda builder, a: builder.fneg(a))
+_operation((abs,), (lanes,), lanes, lambda builder, a: _called(builder, "fabs", a))
+for _compare, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "==")):
+    _operation((_compare,), (lanes, lanes), mask, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+_operation((operator.ne,), (lanes, lanes), mask, lambda builder, a, b: builder.fcmp_unordered("!=", a, b))
+_operation((operator.and_, operator.iand), (mask, mask), mask, lambda builder, a, b: builder.and_(a, b))
+_operation((operator.or_, operator.ior), (mask, mask), mask, lambda builder, a, b: builder.or_(a, b))
+_operation((operator.invert,), (mask,), mask, lambda builder, a: builder.not_(a))
+
+
+def _number(*kinds):
+    """Lanes if one of the types is, else double."""
+    if any(kind not in (lanes, types.float64) for kind in kinds):
+        raise TypingError(f"numbers must be doubles or Lanes, not {kinds}")
+    return lanes if lanes in kinds else types.float64
+
+
+if PLAIN_PYTHON:
+
+    class _Eight(np.ndarray):
+        """Numbers do not change: ``a += b`` gives ``a`` another value, and nothing else that had the old one."""
+
+        def __iadd__(self, other):  # type: ignore[misc]
+            return self + other
+
+        def __isub__(self, other):  # type: ignore[misc]
+            return self - other
+
+        def __imul__(self, other):  # type: ignore[misc]
+            return self * other
+
+        def __itruediv__(self, other):  # type: ignore[misc]
+            return self / other
+
+    class _Rows:
+        """What `view_lanes` gives without compilation; reading copies, as it does compiled."""
+
+        def __init__(self, rows):
+            self._rows = rows
+
+        def __getitem__(self, k):
+            return self._rows[k].copy().view(_Eight)
+
+        def __setitem__(self, k, value):
+            self._rows[k] = value
+
+    def view_lanes(address, n):
+        buffer = (ctypes.c_double * (LANES * int(n))).from_address(int(address))
+        return _Rows(np.frombuffer(buffer).reshape(n, LANES))
+
+    def select(condition, a, b):
+        if isinstance(condition, np.ndarray):
+            return np.where(condition, a, b).view(_Eight)
+        return a if condition else b
+
+    def root_of(a):
+        return np.sqrt(a)
+
+    def any_of(condition):
+        return bool(np.any(condition))
+
+else:
+
+    @intrinsic
+    def view_lanes(_context, address, n):
+        """n times eight doubles at an address, as an array of Lanes; the caller keeps the buffer alive."""
+        array = types.Array(lanes, 1, "C", aligned=False)
+
+        def codegen(context, builder, _signature, args):
+            size = context.get_constant(types.intp, 8 * LANES)
+            result = make_array(array)(context, builder)
+            populate_array(
+                result,
+                data=builder.inttoptr(args[0], _VALUES.as_pointer()),
+                shape=[args[1]],
+                strides=[size],
+                itemsize=size,
+                meminfo=None,
+            )
+            return result._getvalue()
+
+        return array(types.int64, types.int64), codegen
+
+    @intrinsic
+    def select(_context, condition, a, b):
+        """``a`` where the condition holds, else ``b``, lane by lane; both are worked out."""
+        number = _number(a, b)
+        if condition not in (mask, types.boolean):
+            raise TypingError(f"a condition must be a boolean or a Mask, not {condition}")
+        number = lanes if condition == mask else number
+
+        def codegen(_context, builder, _signature, args):
+            return builder.select(*args)
+
+        return number(condition, number, number), codegen
+
+    @intrinsic
+    def root_of(_context, a):
+        """√a, correctly rounded; of numbers below 0, NaN."""
+        number = _number(a)
+
+        def codegen(_context, builder, _signature, args):
+            return _called(builder, "sqrt", *args)
+
+        return number(number), codegen
+
+    @intrinsic
+    def any_of(_context, condition):
+        """Whether a condition holds in any lane."""
+
+        def codegen(_context, builder, _signature, args):
+            if args[0].type == _BITS:
+                bits = builder.bitcast(args[0], ir.IntType(LANES))
+                return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
+            return cgutils.is_not_null(builder, args[0])
+
+        if condition not in (mask, types.boolean):
+            raise TypingError(f"a condition must be a boolean or a Mask, not {condition}")
+        return types.boolean(condition), codegen
+
+    @intrinsic
+    def product_error(_context, a, b, product):
+        """a·b − product, rounded once: the exact error of the product a·b that was rounded to ``product``."""
+        number = _number(a, b, product)
+
+        def codegen(_context, builder, _signature, args):
+            return _called(builder, "fma", args[0], args[1], builder.fneg(args[2]))
+
+        return number(number, number, number), codegen

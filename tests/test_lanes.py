@@ -1,0 +1,223 @@
+"""Eight doubles at once: every lane has the bits that doubles have, compiled and as plain Python, whatever its neighbours."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import collide
+from collide._jit import address_of, entry, kernel, view_f64
+from collide._lanes import LANES, any_of, root_of, select, view_lanes
+from collide.geometry import double_double
+from collide.geometry.error_free import dekker_product, two_product, two_sum
+from collide.narrowphase import fine, gap
+
+#: Numbers that go into one round of all operations, and that come out.
+IN, OUT = 12, 50
+
+
+@kernel
+def _everything(x, y):
+    """All that lanes can do, and the kernels that are compiled for them; x and y are views of doubles or of lanes."""
+    a = x[0]
+    b = x[1]
+    c = x[2]
+    d = x[3]
+    y[0] = a + b
+    y[1] = a - b
+    y[2] = a * b
+    y[3] = a / b
+    y[4] = -a
+    y[5] = abs(a)
+    y[6] = root_of(abs(a))
+    y[7], y[8] = two_sum(a, b)
+    y[9], y[10] = two_product(a, b)
+    y[11] = 1.5 * a + b / 3.0 - 1.0
+    y[12] = 1.0 / (2.0 - a)
+    s = a
+    s += b
+    s -= c
+    s *= 0.75
+    s /= d
+    y[13] = s
+    y[14] = select(a < b, a, b)
+    y[15] = select(a <= b, a, 1.0)
+    y[16] = select((a > b) & (c >= d), 1.0, 0.0)
+    y[17] = select((a == b) | (c != d), a, c)
+    y[18] = select(~(a < 0.0), a, -a)
+    y[19] = select(0.0 < a, 2.0, d)
+    y[20], y[21] = double_double.add(a, b, c, d)
+    y[22], y[23] = double_double.subtract(a, b, c, d)
+    y[24], y[25] = double_double.multiply(a, b, c, d)
+    y[26], y[27] = double_double.divide(a, b, c, d)
+    y[28], y[29] = double_double.square_root(a, b)
+    y[30], y[31], y[32] = double_double.bracket(a, b, abs(c))
+    y[33], y[34], y[35], y[36], y[37], y[38] = double_double.cross(
+        a, b, c, d, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11]
+    )
+    y[39], y[40] = double_double.product_of_vectors(a, b, c, d, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
+    y[41], y[42] = dekker_product(a, b)
+    y[43] = fine.larger(a, b)
+    y[44] = fine.smaller(a, b)
+    y[45] = a
+    y[46] = b
+    if any_of(a > b):
+        y[45] = select(a > b, c, a)
+    if not any_of(c >= 0.0):
+        y[46] = select(c >= 0.0, a, b)
+    t = 0.0
+    for k in range(4):
+        t = fine.larger(t, x[k])
+    y[47] = t
+    y[48] = 0.0
+    y[49] = select(c > d, y[48], y[47])
+
+
+@entry("void(int64, int64, int64)")
+def _eight_at_once(x_at, y_at, n):
+    for k in range(n):
+        _everything(view_lanes(x_at + 8 * LANES * IN * k, IN), view_lanes(y_at + 8 * LANES * OUT * k, OUT))
+
+
+@entry("void(int64, int64, int64)")
+def _one_by_one(x_at, y_at, n):
+    for k in range(n):
+        _everything(view_f64(x_at + 8 * IN * k, IN), view_f64(y_at + 8 * OUT * k, OUT))
+
+
+def _numbers() -> np.ndarray:
+    """(n, IN, LANES): of all sizes, nearly equal ones, and all that is odd about doubles."""
+    rng = np.random.default_rng(11)
+    x = rng.normal(size=(1000, IN, LANES)) * 2.0 ** rng.integers(-60, 60, size=(1000, IN, LANES))
+    x[:300, 1::2] = x[:300, ::2] * rng.uniform(-1, 1, size=(300, IN // 2, LANES)) * 2.0**-54
+    x[100:200, 4:6] = x[100:200, :2] * (1 + rng.integers(-3, 4, size=(100, 1, LANES)) * 2.0**-52)
+    odd = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.7e308, -1.7e308, 1 + 2**-52, 3.0, 2.0**-1000]
+    x[300:700] = rng.choice(odd, size=(400, IN, LANES))
+    return x
+
+
+def _columns(x: np.ndarray) -> np.ndarray:
+    """Lanes as rows of their own, each in one piece of memory."""
+    return np.ascontiguousarray(x.transpose(0, 2, 1))
+
+
+def _bits(x: np.ndarray) -> np.ndarray:
+    """Words that are equal where doubles are the same; NaN is NaN, of whatever sign."""
+    return np.where(np.isnan(x), 0x7FF8000000000000, np.ascontiguousarray(x).view(np.int64))
+
+
+def _run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    n = len(x)
+    x = np.ascontiguousarray(x)
+    eight, apart, ones = np.zeros((n, OUT, LANES)), _columns(x), np.zeros((n, LANES, OUT))
+    with np.errstate(all="ignore"):
+        _eight_at_once(address_of(x), address_of(eight), n)
+        _one_by_one(address_of(apart), address_of(ones), n * LANES)
+    return _columns(eight), ones
+
+
+def test_lanes_have_the_bits_of_doubles():
+    x = _numbers()
+    eight, ones = _run(x)
+    wrong = np.argwhere(_bits(eight) != _bits(ones))
+    for k, lane, field in wrong[:1]:
+        raise AssertionError(f"number {field} of {x[k, :, lane].tolist()}: {eight[k, lane, field]!r}, not {ones[k, lane, field]!r}")
+    assert np.isfinite(ones).mean() > 0.6
+
+
+def test_lanes_do_not_see_each_other():
+    x = _numbers()
+    turned, _ = _run(x[:, :, np.roll(np.arange(LANES), 3)])
+    mixed, _ = _run(np.concatenate([x[1:], x[:1]]))
+    eight, _ = _run(x)
+    assert np.array_equal(_bits(eight)[:, np.roll(np.arange(LANES), 3)], _bits(turned))
+    assert np.array_equal(_bits(np.roll(eight, -1, axis=0)), _bits(mixed))
+
+
+def test_without_compilation_the_bits_are_the_same():
+    """Only where nothing over- or underflows: there Dekker's products have not the error that a fused one has."""
+    x = np.ascontiguousarray(_numbers()[:200])
+    code = (
+        f"import sys, numpy as np; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_lanes\n"
+        "from collide import _jit; assert _jit.PLAIN_PYTHON\n"
+        "x = np.frombuffer(sys.stdin.buffer.read()).reshape(200, test_lanes.IN, test_lanes.LANES)\n"
+        "sys.stdout.buffer.write(np.stack(test_lanes._run(x)).tobytes())\n"
+    )
+    child = subprocess.run(
+        [sys.executable, "-c", code], input=x.tobytes(), env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert child.returncode == 0, child.stderr.decode()[-2000:]
+    plain = np.frombuffer(child.stdout).reshape(2, 200, LANES, OUT)
+    for found in plain:
+        assert np.array_equal(_bits(found), _bits(_run(x)[0]))
+
+
+@entry("void(int64, int64, int64, int64)")
+def _polish(room_at, out_at, n, parts):
+    """One room of questions; out: the feature, its direction, the answer."""
+    direction_at = out_at + 8 * LANES * gap.FEATURE
+    gap.polish_gaps(
+        view_lanes(room_at, gap.QUESTION), n, parts, False, view_lanes(out_at, gap.FEATURE),
+        view_lanes(direction_at, fine.FINE), view_lanes(direction_at + 8 * LANES * fine.FINE, gap.ANSWER),
+    )  # fmt: skip
+
+
+@entry("void(int64, int64, int64, int64)")
+def _polish_one(room_at, out_at, n, parts):
+    direction_at = out_at + 8 * gap.FEATURE
+    gap.polish_gaps(
+        view_f64(room_at, gap.QUESTION), n, parts, False, view_f64(out_at, gap.FEATURE),
+        view_f64(direction_at, fine.FINE), view_f64(direction_at + 8 * fine.FINE, gap.ANSWER),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("parts", [1, 2])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_gaps_eight_at_a_time_are_those_one_by_one(n, parts):
+    """The same source, compiled for doubles; questions are random, or have an edge that is nothing or a direction too."""
+    rng = np.random.default_rng(100 * n + parts)
+    room = rng.normal(size=(gap.QUESTION, LANES))
+    room[gap.POSE_B + 9] += 8.0
+    room[gap.SCALE] = 2.0**-4
+    room[[gap.SLOP, gap.ERROR]] = 0.0
+    room[gap.PARALLELOGRAM] = rng.integers(0, 2, LANES)
+    for edge in range(2):
+        for part in range(2):
+            room[gap.EDGES + gap.EDGE * edge + gap.PART * part + gap.OF_A] = (1 - part) if parts == 2 else rng.integers(0, 2, LANES)
+    room[gap.EDGES : gap.EDGES + 3, 5] = room[gap.EDGES + 3 : gap.EDGES + 6, 5]
+    room[gap.POSE_A : gap.POSE_B + 12, 6] = room[gap.CORNER_A : gap.CORNER_B + 3, 6] = 0.0
+    size = gap.FEATURE + fine.FINE + gap.ANSWER
+    eight = np.zeros((size, LANES))
+    _polish(address_of(room), address_of(eight), n, parts)
+    for lane in range(LANES):
+        question, one = np.ascontiguousarray(room[:, lane]), np.zeros(size)
+        _polish_one(address_of(question), address_of(one), n, parts)
+        assert np.array_equal(_bits(one), _bits(eight[:, lane])), (lane, question.tolist())
+
+
+def test_rows_do_not_depend_on_who_waits_with_them():
+    """Gaps of all kinds in one list: the same rows in another order, and one by one."""
+    rng = np.random.default_rng(12)
+    hulls = [collide.ConvexHull(rng.normal(size=(n, 3))) for n in (4, 9, 60)]
+    shapes = [
+        *hulls, collide.ConvexHull(rng.normal(size=(6, 3)), radius=0.3), collide.Box((1, 1, 1)), collide.Sphere(0.5),
+        collide.Capsule(0.3, 1.0), collide.ConvexHull([(0, 0, 0), (1, 1, 0)]),
+    ]  # fmt: skip
+    A, B = zip(*[(shapes[i], shapes[j]) for i, j in rng.integers(0, len(shapes), size=(400, 2))])
+    X = np.array([collide.pose(rng.uniform(-3, 3, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(400)])
+    X[::4, :3, :3] = np.eye(3)  # level faces
+    rows = collide.distance(list(A), list(B), np.eye(4), X, signed=False).rows
+    assert (rows["distance"] > 0.0).sum() > 200
+    order = rng.permutation(400)
+    again = collide.distance([A[k] for k in order], [B[k] for k in order], np.eye(4), X[order], signed=False).rows
+    for field in rows.dtype.names:
+        assert np.array_equal(rows[field][order], again[field]), field
+    for k in range(0, 400, 7):
+        alone = collide.distance([A[k]], [B[k]], np.eye(4), X[k : k + 1], signed=False).rows
+        assert alone.tobytes() == rows[k : k + 1].tobytes(), (A[k], B[k], X[k].tolist())
