@@ -287,3 +287,44 @@ def test_a_sliver_does_not_leave_a_curved_overlap_without_proof():
         wide += r.hit and not r.certified
     assert hits > 1000
     assert wide == 0, f"{wide} of {hits} overlaps"
+
+
+@pytest.mark.parametrize("exponent", [-140, -165, -171, -200, -206, -300])
+def test_matrices_whose_squares_vanish_are_refused_as_too_small(exponent):
+    """A pair of size 0 was not: its distance was NaN, or certified 0 where the bodies are apart."""
+    X = np.diag([2.9, 5.8, 2.6, 1.0])
+    X[:3, :3] *= 10.0**exponent
+    triangle, wedge = collide.ConvexHull([[0.5, 0, 0], [0, 1, 0], [0, 0, 1]]), collide.ConvexHull(np.eye(3) + 0.25)
+    part = collide.Compound([(wedge, pose(t=(0.25, 0.0, 0.0)))])
+    for B in (triangle, wedge, part, collide.ConvexHull([[-1, 0, 0], [-2, 0, 0]])):
+        for X_WB in (X, np.array([X] * 9)):
+            for ask in (collide.distance, collide.collide):
+                with pytest.raises(collide.CollideError):
+                    ask(triangle, B, X, X_WB, check_poses=False)
+    far = pose(t=(3.0, 0.0, 0.0))
+    r = collide.distance(triangle, collide.Sphere(1.0), X, far, check_poses=False)
+    assert r.certified and r.lower <= 2.0 <= r.upper
+
+
+def test_functions_of_single_calls_outlive_their_module():
+    """When Python ends, functions were left with a name, and a table of their method, that had been freed."""
+    script = """
+import os, sys
+import numpy as np
+import collide
+
+class Late:
+    def __init__(self):
+        A, B = collide.Box((1, 1, 1)), collide.Sphere(0.4)
+        collide.collide(A, B, np.eye(4), np.eye(4))
+        self.function = A._prepared[B._serial].collide if hasattr(A, "_prepared") else None
+        self.write = os.write
+
+    def __del__(self):
+        self.write(1, repr(self.function).encode("utf8", "replace"))
+
+sys.late = Late()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == b"None" or done.stdout.startswith(b"<built-in method collide_single "), done.stdout

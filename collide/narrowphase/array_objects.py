@@ -68,7 +68,7 @@ class _Method(ctypes.Structure):
 
 #: METH_FASTCALL: the kernel gets the header's array, the address of the arguments and their number.
 _FAST_CALL = 0x80
-_methods: dict[str, _Method] = {}  # read by the functions made from them
+_methods: dict[str, _Method] = {}
 
 
 def built_in(kernel_entry: Entry, header: np.ndarray) -> Callable:
@@ -81,6 +81,8 @@ def built_in(kernel_entry: Entry, header: np.ndarray) -> Callable:
     if method is None:
         name = kernel_entry.name.encode()
         method = _methods[kernel_entry.name] = _Method(name, kernel_entry.c_address, _FAST_CALL, None)
+        # Functions read it as long as they live, and some outlive this module when Python ends: it is never freed.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(method))
     make = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p)
     return make(("PyCFunction_NewEx", ctypes.pythonapi))(method, header, None)
 

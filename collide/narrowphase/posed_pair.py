@@ -30,6 +30,9 @@ from collide.geometry.tables import (
     TREE,
 )
 
+#: A matrix is said to stretch by the root of this at least, 3e-151.
+_LEAST_SQUARE = 2.0**-1000
+
 
 @kernel(inline=True)
 def _exchange(ints, poses, sa, pa, sb, pb):
@@ -144,11 +147,14 @@ def _stretch(R, p):
 
 @kernel(inline=True)
 def stretch_of(xx, yy, zz, xy, yz, zx):
-    """A bound of |R| from the entries of RᵀR: its square is at most the largest row sum of |RᵀR|."""
+    """A bound of |R| from the entries of RᵀR: its square is at most the largest row sum of |RᵀR|.
+
+    The square of a tiny one vanishes: a bound of 0 would make pairs of size 0 of what must be refused as too small.
+    """
     xy = abs(xy)
     yz = abs(yz)
     zx = abs(zx)
-    return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx))
+    return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx, _LEAST_SQUARE))
 
 
 @kernel(inline=True)
