@@ -14,7 +14,7 @@ from collide._lanes import LANES
 from collide.geometry.double_double import add, bracket
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
-from collide.geometry.tables import INTS, NUMBERS, POSE, RADIUS
+from collide.geometry.tables import NUMBERS, POSE, RADIUS
 from collide.narrowphase.bounds import (
     ERROR,
     GJK_ROUNDS,
@@ -36,7 +36,7 @@ from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_w
 from collide.narrowphase.level import MOST_TIES
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
-from collide.narrowphase.posed_pair import coordinates_of, in_order, posed_pair, size_and_slop
+from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import ENTRY, REQUESTS, add_request
 from collide.narrowphase.rows import (
     CERTIFIED,
@@ -491,17 +491,7 @@ def _answer(
     row = view_f64(rows_at + ROW * row_number, 12)
     words = view_i32(rows_at + ROW * row_number, ROW // 4)
     marks = view_u8(rows_at + ROW * row_number, ROW)
-    shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
-    sa = shape_of[pa]
-    sb = shape_of[pb]
-    ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
-    numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
-    poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
-    sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
-    at_a, n_a = coordinates_of(ints, sa)
-    at_b, n_b = coordinates_of(ints, sb)
-    pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
-    size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
+    pair, _, numbers, sa, sb, flip, size, slop, known = pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb)
     for k in range(4):
         words[VERTICES_A + k] = -1
         words[VERTICES_B + k] = -1
@@ -513,7 +503,7 @@ def _answer(
         _halves(pair, row, marks, flip)
         return -1
     if how == HALFSPACE_CONVEX:
-        offset, skew = reach_of_plane(numbers, pair[4], poses, pair[5])
+        offset, skew = reach_of_plane(numbers, pair[4], pair[13], pair[5])
         size += offset
         error = ERROR * size * skew + slop
         _half(
@@ -521,6 +511,6 @@ def _answer(
         )
         return -1
     return _swept(
-        pair, terms_at, sa, pa, sb, pb, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+        pair, terms_at, sa, pair[5] // POSE, sb, pair[11] // POSE, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
         slop, ERROR * size + slop, known, flip, row_number,
     )  # fmt: skip
