@@ -353,9 +353,6 @@ if PLAIN_PYTHON:
     def native_call(signature: str):
         return lambda address, arguments: _functions[int(address)](*arguments)
 
-    def address_in_kernel(array):
-        return array.ctypes.data
-
 else:
 
     def native_call(signature: str):
@@ -374,16 +371,6 @@ else:
             return result(types.int64, types.Tuple(arguments)), codegen
 
         return intrinsic(make)
-
-    @intrinsic
-    def address_in_kernel(_context, array):
-        """Address of an array's first element, inside a kernel."""
-
-        def codegen(cgctx, builder, signature, args):
-            data = make_array(signature.args[0])(cgctx, builder, args[0]).data
-            return builder.ptrtoint(data, cgctx.get_value_type(types.int64))
-
-        return types.int64(array), codegen
 
 
 #: ``view_f64(address, n)``: n doubles at an address, as a one-dimensional array; the caller keeps

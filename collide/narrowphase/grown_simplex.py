@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
+from collide.narrowphase.simplex import height_behind
 
 #: How far, relatively, the square of a length may be from the least product of a corner with it.
 _OPTIMAL = 1.0 - 2.0**-40
@@ -75,16 +76,11 @@ def _on_triangle(ax, ay, az, bx, by, bz, dx, dy, dz):
     nx = ey * fz - ez * fy
     ny = ez * fx - ex * fz
     nz = ex * fy - ey * fx
-    whole = nx * nx + ny * ny + nz * nz
-    first = nx * (fy * dz - fz * dy) + ny * (fz * dx - fx * dz) + nz * (fx * dy - fy * dx)
-    second = nx * (dy * ez - dz * ey) + ny * (dz * ex - dx * ez) + nz * (dx * ey - dy * ex)
-    if first > 0.0 and second > 0.0 and first + second < whole:
-        wf = first / whole
-        ws = second / whole
-        x = dx + wf * ex + ws * fx
-        y = dy + wf * ey + ws * fy
-        z = dz + wf * ez + ws * fz
-        return 3, 0, 1.0 - wf - ws, wf, ws, x, y, z
+    within, wf, ws = _shares(
+        nx, ny, nz, dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex, dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
+    )
+    if within:
+        return _on_face(0, wf, ws, dx, dy, dz, ex, ey, ez, fx, fy, fz)
     p = -(dx * ex + dy * ey + dz * ez)
     q = -(dx * fx + dy * fy + dz * fz)
     if p <= 0.0 and q <= 0.0:
@@ -153,23 +149,17 @@ def _on_tetrahedron(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error):
     wy = dz * gx - dx * gz
     wz = dx * gy - dy * gx
     if l_sees:
-        whole = lx * lx + ly * ly + lz * lz
-        first = -(lx * vx + ly * vy + lz * vz)
-        second = lx * ux + ly * uy + lz * uz
-        if first > 0.0 and second > 0.0 and first + second < whole:
-            return _on_face(0, first / whole, second / whole, dx, dy, dz, ex, ey, ez, fx, fy, fz)
+        within, wf, ws = _shares(lx, ly, lz, ux, uy, uz, vx, vy, vz)
+        if within:
+            return _on_face(0, wf, ws, dx, dy, dz, ex, ey, ez, fx, fy, fz)
     if m_sees:
-        whole = mx * mx + my * my + mz * mz
-        first = -(mx * wx + my * wy + mz * wz)
-        second = mx * vx + my * vy + mz * vz
-        if first > 0.0 and second > 0.0 and first + second < whole:
-            return _on_face(1, first / whole, second / whole, dx, dy, dz, fx, fy, fz, gx, gy, gz)
+        within, wf, ws = _shares(mx, my, mz, vx, vy, vz, wx, wy, wz)
+        if within:
+            return _on_face(1, wf, ws, dx, dy, dz, fx, fy, fz, gx, gy, gz)
     if n_sees:
-        whole = nx * nx + ny * ny + nz * nz
-        first = -(nx * ux + ny * uy + nz * uz)
-        second = nx * wx + ny * wy + nz * wz
-        if first > 0.0 and second > 0.0 and first + second < whole:
-            return _on_face(2, first / whole, second / whole, dx, dy, dz, gx, gy, gz, ex, ey, ez)
+        within, wf, ws = _shares(nx, ny, nz, wx, wy, wz, ux, uy, uz)
+        if within:
+            return _on_face(2, wf, ws, dx, dy, dz, gx, gy, gz, ex, ey, ez)
     # The edge along which the way to D is shortened most, its square by along² / |edge|².
     along = max(-(dx * ex + dy * ey + dz * ez), 0.0)
     edge = ex * ex + ey * ey + ez * ez
@@ -185,25 +175,31 @@ def _on_tetrahedron(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error):
     if along == 0.0:
         return 1, 0, 1.0, 0.0, 0.0, dx, dy, dz
     w = min(along / edge, 1.0)
-    x = dx + w * (ex if turn == 0 else (fx if turn == 1 else gx))
-    y = dy + w * (ey if turn == 0 else (fy if turn == 1 else gy))
-    z = dz + w * (ez if turn == 0 else (fz if turn == 1 else gz))
+    x = dx + w * pick(turn, ex, fx, gx)
+    y = dy + w * pick(turn, ey, fy, gy)
+    z = dz + w * pick(turn, ez, fz, gz)
     return 2, turn, 1.0 - w, w, 0.0, x, y, z
 
 
 @kernel(inline=True)
 def _behind(turned, nx, ny, nz, ax, ay, az, bx, by, bz, cx, cy, cz, error):
-    """h² / |n|² for the normal n of a triangle, turned outwards: see `simplex._height_behind`; −1 unless it does for certain."""
-    e = abs(bx - ax) + abs(by - ay) + abs(bz - az)
-    f = abs(cx - ax) + abs(cy - ay) + abs(cz - az)
-    p = abs(ax) + abs(ay) + abs(az)
-    height = turned * (nx * ax + ny * ay + nz * az)
-    if not height > 2.0 * error * (e * f + 2.0 * p * (e + f)):
-        return -1.0
-    height = min(height, turned * (nx * bx + ny * by + nz * bz), turned * (nx * cx + ny * cy + nz * cz))
-    if height <= 0.0:
-        return -1.0
-    return height * height / (nx * nx + ny * ny + nz * nz)
+    """h² / |n|² for the normal n of a triangle, turned outwards: see `height_behind`; −1 unless the origin lies behind."""
+    height, square = height_behind(
+        turned * nx, turned * ny, turned * nz, ax, ay, az, bx, by, bz, cx, cy, cz, error
+    )
+    return height * height / square if height > 0.0 else -1.0
+
+
+@kernel(inline=True)
+def _shares(nx, ny, nz, ux, uy, uz, vx, vy, vz):
+    """(whether the foot lies within a triangle, weights of its second and third corner).
+
+    n : e × f, the edges from the first corner d to the others.   u, v : d × e and d × f.
+    """
+    whole = nx * nx + ny * ny + nz * nz
+    first = -(nx * vx + ny * vy + nz * vz)
+    second = nx * ux + ny * uy + nz * uz
+    return first > 0.0 and second > 0.0 and first + second < whole, first / whole, second / whole
 
 
 @kernel(inline=True)

@@ -194,9 +194,33 @@ def face_weights(points, a, b, c, x, y, z):
 
 @kernel(inline=True)
 def _height_behind(points, a, b, c, error):
+    """`height_behind` of three points, whose starts are given counter-clockwise as seen from outside."""
+    px = points[a]
+    py = points[a + 1]
+    pz = points[a + 2]
+    qx = points[b]
+    qy = points[b + 1]
+    qz = points[b + 2]
+    rx = points[c]
+    ry = points[c + 1]
+    rz = points[c + 2]
+    ex = qx - px
+    ey = qy - py
+    ez = qz - pz
+    fx = rx - px
+    fy = ry - py
+    fz = rz - pz
+    nx = ey * fz - ez * fy
+    ny = ez * fx - ex * fz
+    nz = ex * fy - ey * fx
+    return height_behind(nx, ny, nz, px, py, pz, qx, qy, qz, rx, ry, rz, error)
+
+
+@kernel(inline=True)
+def height_behind(nx, ny, nz, px, py, pz, qx, qy, qz, rx, ry, rz, error):
     """(h, |n|²): the origin lies h / |n| behind the plane of a triangle; (−1, 0) unless it provably does.
 
-    a, b, c : starts of three points, counter-clockwise as seen from outside.
+    nx, ny, nz : the computed normal e × f of the corners p, q = p + e and r = p + f, outwards.
     error : how far each point may be from its true place.
 
     The side is the sign of det(p, q, r) = p·(e × f). Moving the three points by ``error`` moves it by
@@ -205,29 +229,13 @@ def _height_behind(points, a, b, c, error):
     the three corners' distances along the computed normal, a lower bound for any unit normal. Lengths are
     bounded by sums: no roots.
     """
-    px = points[a]
-    py = points[a + 1]
-    pz = points[a + 2]
-    ex = points[b] - px
-    ey = points[b + 1] - py
-    ez = points[b + 2] - pz
-    fx = points[c] - px
-    fy = points[c + 1] - py
-    fz = points[c + 2] - pz
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
     height = px * nx + py * ny + pz * nz
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
+    e = abs(qx - px) + abs(qy - py) + abs(qz - pz)
+    f = abs(rx - px) + abs(ry - py) + abs(rz - pz)
     p = abs(px) + abs(py) + abs(pz)
     if not height > 2.0 * error * (e * f + 2.0 * p * (e + f)):
         return -1.0, 0.0
-    height = min(
-        height,
-        nx * points[b] + ny * points[b + 1] + nz * points[b + 2],
-        nx * points[c] + ny * points[c + 1] + nz * points[c + 2],
-    )
+    height = min(height, nx * qx + ny * qy + nz * qz, nx * rx + ny * ry + nz * rz)
     return height, nx * nx + ny * ny + nz * nz
 
 
