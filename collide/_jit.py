@@ -1,4 +1,4 @@
-"""The one way to compile a kernel. Nothing else in collide imports numba, but for `_simd.py` and `_lanes.py`.
+"""The one way to compile a kernel. But for `_simd.py`, `_lanes.py` and `_lean_compile.py`, nothing else imports numba.
 
 Rules, each measured or forced by a bug met:
 
@@ -24,22 +24,19 @@ import os
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache, lru_cache
 from pathlib import Path
 
 import numba
 import numpy as np
-from numba import _dynfunc
 from numba.core import types
 from numba.core.caching import FunctionCache, _CacheLocator
-from numba.core.codegen import CPUCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.cpu import CPUContext
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
+from collide._lean_compile import lean_compiling
 from collide.cache_folder import cache_folder
 
 log = logging.getLogger("collide")
@@ -48,7 +45,7 @@ PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
 _FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 #: Packages whose sources are kernels: an edit in any of them makes all cached kernels stale.
-_KERNEL_SOURCES = ("_jit.py", "_lanes.py", "_simd.py", "results.py", "geometry", "broadphase", "narrowphase")
+_KERNEL_SOURCES = ("_jit.py", "_lanes.py", "_lean_compile.py", "_simd.py", "results.py", "geometry", "broadphase", "narrowphase")
 
 
 def kernel(function: Callable | None = None, *, inline: bool = False) -> Callable:
@@ -139,7 +136,7 @@ class Entry:
         """Compiled for its signature, or read from the disk cache."""
         dispatcher = numba.njit(self._function, **self._flags)
         dispatcher._cache = _KernelCache.of(self._function)
-        with _once_at_the_end(self._function):
+        with lean_compiling(self._function):
             dispatcher.compile(self._signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -164,51 +161,6 @@ class Entry:
                     dispatcher = self._compiled()
             seconds[self.name] = time.perf_counter() - started
             self._ready = dispatcher
-
-
-@contextmanager
-def _once_at_the_end(function: Callable) -> Iterator[None]:
-    """While an entry is compiled: optimise and translate the entry, with all it calls linked in, and nothing else.
-
-    Numba does both for every callee as well, and once more for each caller on the way up: of 40 s for
-    a cold narrowphase that was half. Kernels are reached through entries only, so that work is lost.
-    """
-    if not all(hasattr(CPUCodeLibrary, name) for name in ("_optimize_final_module", "_finalize_final_module")):
-        yield  # another numba: slower, not wrong
-        return
-    # The lock first: another thread may have these functions replaced, and they must not be taken for numba's.
-    with global_compiler_lock, _replaced(function.__qualname__):
-        yield
-
-
-@contextmanager
-def _replaced(own: str) -> Iterator[None]:
-    """Numba's three steps after lowering, done for the function of this name alone."""
-    optimise, finish = CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module
-    executable = CPUContext.get_executable
-
-    def optimise_entry(library):
-        if library.name == own:
-            optimise(library)
-
-    def finish_entry(library):
-        if library.name == own:
-            finish(library)
-        else:
-            library._finalized = True
-
-    def executable_of_entry(context, library, fndesc, env):
-        if library.name == own:
-            return executable(context, library, fndesc, env)
-        return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "not callable", 0, env, (library,))
-
-    CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise_entry, finish_entry
-    CPUContext.get_executable = executable_of_entry
-    try:
-        yield
-    finally:
-        CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module = optimise, finish
-        CPUContext.get_executable = executable
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:

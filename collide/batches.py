@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,33 +36,40 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
     """
     n = length_of(A, B, X_WA, X_WB)
-    workers = _workers(threads)
-    if workers > 1:
-        workers = min(workers, n // (_FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD))
-    if workers < 2:
-        return _answers(A, B, X_WA, X_WB, n, boolean, limit, check, axes, depths)
-    bounds = np.linspace(0, n, workers + 1).astype(int)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
+    workers, fewest = _workers(threads), _FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD
+    workers = min(workers, n // fewest)
+    if workers < 2:
+        _answer_into(out, A, B, X_WA, X_WB, boolean, limit, check, axes, depths)
+        return out
+    pieces = iter(_pieces(n, workers, fewest))
 
-    def piece(k: int) -> None:
-        part = slice(bounds[k], bounds[k + 1])
-        one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
-        X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
-        own = None if axes is None else axes[part]
-        try:
-            count = int(bounds[k + 1] - bounds[k])
-            out[part] = _answers(one, other, X_WO, X_WT, count, boolean, limit, check, own, depths)
-        except InvalidPose:
-            _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
-            raise
+    def work(_worker: int) -> None:
+        for part in pieces:  # a thread takes the next as it becomes free: pairs do not all cost the same
+            one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
+            X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
+            own = None if axes is None else axes[part]
+            try:
+                _answer_into(out[part], one, other, X_WO, X_WT, boolean, limit, check, own, depths)
+            except InvalidPose:
+                _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
+                raise
 
-    list(_pool(workers).map(piece, range(workers)))
+    list(_pool(workers).map(work, range(workers)))
     return out
+
+
+def _pieces(n: int, workers: int, fewest: int) -> list[slice]:
+    """What is handed out of a batch at a time: some pieces a thread, none smaller than pays."""
+    many = max(workers, min(_PIECES_A_THREAD * workers, n // fewest))
+    bounds = np.linspace(0, n, many + 1).astype(int).tolist()
+    return [slice(*ends) for ends in pairwise(bounds)]
 
 
 #: A thread is handed at least so many poses: below, handing over takes longer than answering.
 _FEWEST_A_THREAD = 2000
 _FEWEST_OF_MESHES = 16
+_PIECES_A_THREAD = 8
 
 
 @lru_cache(maxsize=4)
@@ -85,32 +93,33 @@ def _refuse_poses(X_WA, X_WB, check: bool) -> None:
     as_poses(X_WB, "X_WB", check=check)
 
 
-def _answers(A, B, X_WA, X_WB, n: int, boolean: bool, limit: float, check: bool, axes=None, depths=True) -> np.ndarray:
+def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, axes=None, depths=True) -> None:
+    """Answer a batch in this thread into out, zeroed: bool[n] or rows."""
+    n = len(out)
     if n == 0:
-        return np.zeros(0, dtype=bool if boolean else PAIR_DTYPE)
+        return
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
         table, which = _table(A, B, n)
-        for checked in (check, False):
-            out = run.run_poses(
-                table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=checked, axes=axes, depths=depths
-            )
-            if out is not None:
-                return out
-            _refuse_poses(X_WA, X_WB, check)  # unless it is a pose on the brink of the tolerance
-        raise AssertionError("a pose that is none")
+        wanted = {"boolean": boolean, "limit": limit, "axes": axes, "depths": depths}
+        if run.run_poses(out, table, which, X_WA, X_WB, check=check, **wanted):
+            return
+        _refuse_poses(X_WA, X_WB, check)
+        out.fill(0)  # it is a pose after all, on the brink of the tolerance
+        if not run.run_poses(out, table, which, X_WA, X_WB, check=False, **wanted):
+            raise AssertionError("a pose that is none")
+        return
     _refuse_poses(X_WA, X_WB, check)
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if not (isinstance(A, Shape) and isinstance(B, Shape)):
-        return _pair_by_pair(A, B, X_WA, X_WB, boolean, limit, depths)
-    rows = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
-    return rows["hit"] if boolean and rows.dtype != bool else rows
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        out[:] = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
+    else:
+        _pair_by_pair(out, A, B, X_WA, X_WB, boolean, limit, depths)
 
 
-def _pair_by_pair(A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -> np.ndarray:
+def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -> None:
     """The same for shapes that differ from pose to pose, poses (n, 4, 4): each distinct pair of them is one batch."""
-    n = len(X_WA)
+    n = len(out)
     (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
     plain_a, plain_b = (np.array([is_plain(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
     keys = which_a * len(shapes_b) + which_b
     if not run.distrust_doubles:
@@ -118,14 +127,14 @@ def _pair_by_pair(A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -
         some = np.flatnonzero(plain)
         if len(some):
             sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
-            out[some] = _answers(*sides, X_WA[some], X_WB[some], len(some), boolean, limit, False, None, depths)
+            rows = np.zeros_like(out, shape=len(some))
+            _answer_into(rows, *sides, X_WA[some], X_WB[some], boolean, limit, False, None, depths)
+            out[some] = rows
         keys[plain] = -1
     for key in np.unique(keys[keys >= 0]).tolist():
         some = np.flatnonzero(keys == key)
         one, other = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
-        rows = _parts(one, other, X_WA[some], X_WB[some], boolean=boolean, limit=limit, depths=depths)
-        out[some] = rows["hit"] if boolean and rows.dtype != bool else rows
-    return out
+        out[some] = _parts(one, other, X_WA[some], X_WB[some], boolean=boolean, limit=limit, depths=depths)
 
 
 def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
@@ -184,7 +193,7 @@ def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
 def _parts(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float, depths: bool
 ) -> np.ndarray:
-    """One row a pose: every part of A against every part of B, combined. Of meshes, booleans come as bool[n]."""
+    """bool[n], or one row a pose: every part of A against every part of B, combined."""
     if A.meshed or B.meshed:
         from collide.meshes.pair_queries import pair_hits, pair_rows
 
@@ -203,7 +212,7 @@ def _parts(
     pairs = np.stack([first.ravel(), second.ravel()], axis=1)
     rows = run.run_pairs(table, poses, np.repeat(np.arange(len(parts)), n), pairs, boolean=boolean, limit=limit)
     if many == 1:
-        return rows
+        return rows["hit"] if boolean else rows
     rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
 
     def sides(k: int) -> tuple[Union, Union]:
@@ -214,8 +223,5 @@ def _parts(
         )
 
     if boolean:
-        hits = rows["hit"].reshape(n, many).any(axis=1)
-        rows = rows[::many].copy()
-        rows["hit"] = hits
-        return rows
+        return np.logical_or.reduce(rows["hit"].reshape(n, many), axis=1)
     return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)

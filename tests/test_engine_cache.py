@@ -119,3 +119,55 @@ def test_a_damaged_kernel_is_compiled_anew(site, tmp_path, damage):
     assert again["box"] == first["box"] and "damaged" in said
     last, said = ask(site, cache)
     assert last["box"] == first["box"] and "damaged" not in said
+
+
+#: Compiles a kernel, and one that cannot be, and compares what `_lean_compile.py` exchanges before and after.
+COMPILES = """
+import gc, sys
+import collide._lean_compile as lean
+from collide import _jit
+
+def parts():
+    return [
+        (owner.__name__, name, vars(owner)[name])
+        for owner, name, _ in lean._translated_once("x") + lean._without_idle_work()
+    ]
+
+@_jit.kernel
+def twice(x):
+    return 2.0 * x
+
+@_jit.entry("float64(float64, int64)")
+def power(x, n):
+    '''x to the power 2ⁿ, doubled.'''
+    for _ in range(n):
+        x = x * x
+    return twice(max(x, 0.0))
+
+@_jit.entry("float64(float64)")
+def wrong(x):
+    return nobody_knows_this(x)
+
+before, thresholds = parts(), gc.get_threshold()
+assert len(before) >= 10, before
+assert power(3.0, 2) == 162.0
+try:
+    wrong(1.0)
+except Exception as error:
+    assert "nobody_knows_this" in str(error), error
+else:
+    raise AssertionError("compiled what is not there")
+assert parts() == before and gc.get_threshold() == thresholds
+print("as before")
+"""
+
+
+def test_compiling_leaves_numba_and_the_garbage_collector_as_they_were(tmp_path):
+    script = tmp_path / "compiles.py"
+    script.write_text(COMPILES)
+    root = str(Path(collide.__file__).parent.parent)
+    child = subprocess.run(
+        [sys.executable, script], env={**os.environ, "COLLIDE_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": root},
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert child.stdout == "as before\n", child.stderr[-3000:]

@@ -26,8 +26,9 @@ FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "coll
 ROOMS = {
     "errors": set(),
     "cache_folder": set(),
-    "_jit": {"cache_folder"},
+    "_jit": {"cache_folder", "_lean_compile"},
     "_lanes": set(),
+    "_lean_compile": set(),
     "_simd": set(),
     "transforms": {"errors"},
     "results": {"errors"},
@@ -71,7 +72,12 @@ COMPILERS = {
     "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
 }  # fmt: skip
 #: The files that make code, and what they need for it: everything else goes through them.
-COMPILER_PACKAGES = {"collide/_jit.py": {"numba"}, "collide/_simd.py": {"numba", "llvmlite"}, "collide/_lanes.py": {"numba", "llvmlite"}}
+COMPILER_PACKAGES = {
+    "collide/_jit.py": {"numba"},
+    "collide/_lean_compile.py": {"numba"},
+    "collide/_simd.py": {"numba", "llvmlite"},
+    "collide/_lanes.py": {"numba", "llvmlite"},
+}
 BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
 
 

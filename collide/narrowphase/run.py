@@ -112,6 +112,7 @@ def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
 
 
 def run_poses(
+    out: np.ndarray,
     table: ShapeTable,
     which: np.ndarray | None,
     X_WA: np.ndarray,
@@ -122,20 +123,20 @@ def run_poses(
     check: bool,
     axes: np.ndarray | None = None,
     depths: bool = True,
-) -> np.ndarray | None:
-    """Two convex sets at n pairs of poses: bool[n], or rows of `PAIR_DTYPE`; None where a pose is no pose.
+) -> bool:
+    """Answer two convex sets at n pairs of poses; False where a pose is no pose.
 
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
     which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
     X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
     check : refuse matrices that are no rotation.
     axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
     depths : of rows: whether it is wanted how deep overlaps are.
     """
-    n = len(which) if which is not None else number_of_poses(X_WA, X_WB)
+    n = len(out)
     table.plant(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)
-    out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
     done = 0
     while done < n:
         said = answer_poses(
@@ -144,7 +145,7 @@ def run_poses(
             0 if axes is None else address_of(axes), address_of(out),
         )  # fmt: skip
         if said == BAD_POSE:
-            return None
+            return False
         done = int(header[ANSWERED])
         if said:
             start = done - 1 - (done - 1) % BLOCK
@@ -152,7 +153,7 @@ def run_poses(
             _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)
             if boolean:
                 out[start:done] = rows["hit"]
-    return out
+    return True
 
 
 class _Workspace:
