@@ -26,6 +26,7 @@ from collide.narrowphase.bounds import (
 )
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa.expand import FLAT, epa, facet_of, height_over
+from collide.narrowphase.epa.foot import weigh_nearest
 from collide.narrowphase.epa.refine import refine
 from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.surface import FACET, number, workspace
@@ -75,8 +76,8 @@ _FINE = 64
 _NEAREST, _TIES = 10, 16
 _TIED = _TIES + 2 * (MOST_TIES + 1)
 _OWN_DOUBLES, _OWN_INTEGERS = _FINE + 5 * FINE + 24, _TIED + ENTRY
-#: Rounding of a point that stands for the foot on a facet, in units of its corners.
-_NEAR_MISS = 2.0**-42
+#: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
+_NEAR_MISS = 2.0**-48
 #: Least weight of a foot well inside its facet.
 _WELL_INSIDE = 2.0**-10
 #: So many vertices of two cores are worth a better seed for EPA than GJK's.
@@ -146,11 +147,6 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
         weights[0] = 1.0
         weights[1] = 0.0
         weights[2] = 0.0
-    size = 0.0
-    for k in range(3):
-        size = max(size, abs(points[POINT * k]), abs(points[POINT * k + 1]), abs(points[POINT * k + 2]))
-    if _miss(points, weights, x, y, z) > _NEAR_MISS * size:
-        _weigh_edges(points, weights, x, y, z)
     return inside
 
 
@@ -158,33 +154,6 @@ def _load_facet(surface, facet, points, ids, weights, with_ids, x, y, z):
 def _miss(points, weights, x, y, z):
     """How far the weighted point of three lies from (x, y, z)."""
     return abs(_combine(points, weights, 3, 0) - x) + abs(_combine(points, weights, 3, 1) - y) + abs(_combine(points, weights, 3, 2) - z)
-
-
-@kernel
-def _weigh_edges(points, weights, x, y, z):
-    """Weights of the point of three edges that is nearest (x, y, z): a needle's area says nothing, its edges do."""
-    best = math.inf
-    chosen = 0
-    share = 0.0
-    for k in range(3):
-        a = POINT * k
-        b = POINT * ((k + 1) % 3)
-        ex = points[b] - points[a]
-        ey = points[b + 1] - points[a + 1]
-        ez = points[b + 2] - points[a + 2]
-        square = ex * ex + ey * ey + ez * ez
-        along = (x - points[a]) * ex + (y - points[a + 1]) * ey + (z - points[a + 2]) * ez
-        s = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
-        away = abs(points[a] + s * ex - x) + abs(points[a + 1] + s * ey - y) + abs(points[a + 2] + s * ez - z)
-        if away < best:
-            best = away
-            chosen = k
-            share = s
-    if best < _miss(points, weights, x, y, z):
-        for k in range(3):
-            weights[k] = 0.0
-        weights[chosen] = 1.0 - share
-        weights[(chosen + 1) % 3] = share
 
 
 @kernel(inline=True)
@@ -231,8 +200,11 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
             _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
             _name_plane(spanning, view_i64(integers_at + 8 * _TIED, ENTRY))
         return depth, -depth, above, shallowest, deepest, nx, ny, nz, n, shown, rounds
+    bound = -depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
     width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
-    if exactly and depths and not (surface > error and width <= PROMISE_DEPTH * (depth + radius)):
+    # The foot misses the surface by as much as doubles leave between that and the plane.
+    settled = surface > error and width <= PROMISE_DEPTH * (depth + radius) and depth - surface <= _NEAR_MISS * size
+    if exactly and depths and not settled:
         sound, low, level, high, ux, uy, uz, nearest, count = refine(
             pair, terms_at, epa_at, ids_at, doubles_at + 8 * _FINE, integers_at + 8 * _NEAREST, integers_at + 8 * _TIES,
             view_i64(integers_at + 8 * _TIED, ENTRY), count, vertices, size, slop, error,
@@ -251,9 +223,11 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, x, y, z)) <= slack):
         facet = facet_of(polytope, count, facet, x, y, z, slack)
         _load_facet(polytope, facet, points, ids, weights, named, x, y, z)
+    if depths and not curved and _miss(points, weights, x, y, z) > _NEAR_MISS * size:
+        weigh_nearest(polytope, count, facet, points, ids, weights, named, x, y, z, _NEAR_MISS * size)
     if surface > error:
         above = min(above, -surface)
-    return depth, -depth, above, shallowest, deepest, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds
+    return depth, bound, above, shallowest, deepest, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds
 
 
 @kernel(inline=True)

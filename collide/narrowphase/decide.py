@@ -13,13 +13,13 @@ from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
+from collide.narrowphase.epa.foot import weigh_corners
 from collide.narrowphase.exact.all_planes import ROOM
 from collide.narrowphase.exact.plane_depth import nearest_plane
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_exactly
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, fine_points, scale_of, write_low_parts
-from collide.narrowphase.gap import weigh_foot
 from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import REQUESTS, find_request
 from collide.narrowphase.rows import (
@@ -44,6 +44,8 @@ from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 #: Digits of workspace; 24 integers for ids follow them, and doubles for planes.
 DIGITS = max(HULL_DIGITS, PLANE_DIGITS)
 WORKSPACE = DIGITS + 24 + ROOM
+#: Witness points may be off by this much of the pair's size, or of their largest coordinate.
+_NEAR_MISS = 2.0**-48
 
 
 @kernel
@@ -54,38 +56,64 @@ def set_normal(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, v
     is below rounding, and need not lie on that feature.
     """
     sign = 1.0 if flip else -1.0
+    row[NORMAL] = sign * vx + 0.0
+    row[NORMAL + 1] = sign * vy + 0.0
+    row[NORMAL + 2] = sign * vz + 0.0
+    if SMALLEST_FINE < size < LARGEST_FINE:
+        _set_points(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, distance, flip)
+        return
+    for axis in range(3):
+        v = row[NORMAL + axis]
+        first = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis]) - 0.5 * distance * v
+        row[POINT_A + axis] = first
+        row[POINT_B + axis] = first + distance * v
+
+
+@kernel
+def _set_points(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, distance, flip):
+    """The witness points where n ≤ 4 points of A ⊖ B come nearest to what the row's distance and normal say."""
     fine = view_f64(room_at, 4 * FINE)
-    weights = view_f64(room_at + 8 * 4 * FINE, 3)
-    low_at = room_at + 8 * (4 * FINE + 3)
-    known = n <= 3 and SMALLEST_FINE < size < LARGEST_FINE
-    if known:
-        low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
-        fine_points(pair, low, fine, ids, n, scale_of(size))
-        weigh_foot(fine, n, False, weights)
+    corners = view_f64(room_at + 8 * 4 * FINE, 4 * FINE)
+    weights = view_f64(room_at + 8 * 8 * FINE, 4)
+    low_at = room_at + 8 * (8 * FINE + 4)
+    low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
+    scale = scale_of(size)
+    fine_points(pair, low, fine, ids, n, scale)
+    for k in range(n):
+        for axis in range(3):
+            corners[FINE * k + axis] = fine[FINE * k + 2 * axis]
+    own = -1.0 if flip else 1.0  # the normal is that of the pair as asked; the bodies here may be exchanged
+    shift = -own * (distance + (radius_a + radius_b)) * scale
+    weigh_corners(
+        corners, FINE, n, weights, shift * row[NORMAL], shift * row[NORMAL + 1], shift * row[NORMAL + 2]
+    )
     poses = pair[13]
     for axis in range(3):
-        v = sign * (vx if axis == 0 else (vy if axis == 1 else vz))
-        first = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis]) - 0.5 * distance * v
-        second = first + distance * v
-        if known:
-            a = 0.0
-            b = 0.0
-            p = pair[5] + 3 * axis
-            q = pair[11] + 3 * axis
-            for k in range(n):
-                i = ids[2 * k]
-                j = ids[2 * k + 1]
-                a += weights[k] * (poses[p] * pair[0][i] + poses[p + 1] * pair[0][pair[2] + i] + poses[p + 2] * pair[0][2 * pair[2] + i])
-                b += weights[k] * (poses[q] * pair[6][j] + poses[q + 1] * pair[6][pair[8] + j] + poses[q + 2] * pair[6][2 * pair[8] + j])
-            # v is the normal of the pair as asked; the bodies here may be exchanged.
-            own = -v if flip else v
-            a += poses[pair[5] + 9 + axis] + radius_a * own
-            b += poses[pair[11] + 9 + axis] - radius_b * own
-            first = b if flip else a
-            second = a if flip else b
-        row[NORMAL + axis] = v + 0.0
-        row[POINT_A + axis] = first
-        row[POINT_B + axis] = second
+        a = 0.0
+        b = 0.0
+        p = pair[5] + 3 * axis
+        q = pair[11] + 3 * axis
+        for k in range(n):
+            i = ids[2 * k]
+            j = ids[2 * k + 1]
+            a += weights[k] * (poses[p] * pair[0][i] + poses[p + 1] * pair[0][pair[2] + i] + poses[p + 2] * pair[0][2 * pair[2] + i])
+            b += weights[k] * (poses[q] * pair[6][j] + poses[q + 1] * pair[6][pair[8] + j] + poses[q + 2] * pair[6][2 * pair[8] + j])
+        v = own * row[NORMAL + axis]
+        a += poses[pair[5] + 9 + axis] + radius_a * v
+        b += poses[pair[11] + 9 + axis] - radius_b * v
+        row[POINT_A + axis] = b if flip else a
+        row[POINT_B + axis] = a if flip else b
+
+
+@kernel
+def _points_miss(row, size):
+    """Whether the witness points are not what the distance and the normal say, by more than rounding."""
+    miss = 0.0
+    reach = size
+    for axis in range(3):
+        miss += abs(row[POINT_B + axis] - row[POINT_A + axis] - row[DISTANCE] * row[NORMAL + axis])
+        reach = max(reach, abs(row[POINT_A + axis]), abs(row[POINT_B + axis]))
+    return miss > _NEAR_MISS * reach
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)")
@@ -136,6 +164,7 @@ def decide_pairs(
         distance = row[DISTANCE]
         lower = row[LOWER]
         upper = row[UPPER]
+        proven = False
         # Relative errors do not hold among subnormal doubles; 0 is exact.
         slack = SUBNORMAL if 0.0 < abs(excess) < SMALLEST_NORMAL else 0.0
         if verdict == UNDONE:
@@ -174,6 +203,11 @@ def decide_pairs(
             )  # fmt: skip
         width = math.inf if boolean else 0.0
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
+        if proven and not apart and SMALLEST_FINE < size < LARGEST_FINE and _points_miss(row, size):
+            _set_points(
+                row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, row[DISTANCE],
+                flip,
+            )  # fmt: skip
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0
             marks[HOW] = EXACT

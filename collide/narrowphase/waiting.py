@@ -57,11 +57,25 @@ from collide.narrowphase.gap import (
 )
 from collide.narrowphase.level import MOST_TIES, no_other_is_level, settle_level
 from collide.narrowphase.posed_pair import coordinates_of, posed_pair
-from collide.narrowphase.rows import CERTIFIED, DISTANCE, HOW, LOWER, NORMAL, ROW, UPPER, write_vectors, write_verdict
+from collide.narrowphase.rows import (
+    BEYOND,
+    CERTIFIED,
+    DISTANCE,
+    HOW,
+    LOWER,
+    NORMAL,
+    ROW,
+    UPPER,
+    write_vectors,
+    write_verdict,
+)
 from collide.results import UNDECIDED
 
 #: Kinds of gap: one to three points, edges of one part or of two, poses as given or composed.
 KINDS = 12
+
+#: Witness points may be off by this much of the pair's size, or of their largest coordinate.
+_NEAR_MISS = 2.0**-47
 
 # What is noted of a row that waits: its number, both shapes and poses as they are worked on, whether they are exchanged,
 # how it was decided, its vertex pairs.
@@ -323,7 +337,18 @@ def _write(row, marks, question, answer, note, proven, depths, limit):
     unfinished = marks[CERTIFIED] == 0 and (depths or upper > 0.0)
     # Radii may prove an overlap of cores between which doubles see no clear direction.
     vague = not proven and radius_a + radius_b > 0.0
-    if not decided or unfinished or vague:
+    # Shares of a triangle's edges say little if it is thin; the exact stage takes more care.
+    reach = 1.0 / question[LANES * SCALE]
+    miss = 0.0
+    core = row[DISTANCE] + (radius_a + radius_b)
+    for axis in range(3):
+        a = answer[LANES * (POINT_A + axis)]
+        b = answer[LANES * (POINT_B + axis)]
+        n = nx if axis == 0 else (ny if axis == 1 else nz)
+        reach = max(reach, abs(a), abs(b))
+        miss = max(miss, abs((b - a) - core * n))
+    missed = proven and miss > _NEAR_MISS * reach and marks[BEYOND] == 0
+    if not decided or unfinished or vague or missed:
         marks[HOW] = UNDECIDED
     write_vectors(
         row, nx, ny, nz,

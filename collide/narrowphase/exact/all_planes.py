@@ -15,6 +15,7 @@ import math
 from collide._jit import kernel, view_f64
 from collide.geometry.digits import BITS, add_product, as_double_double, carry, clear
 from collide.geometry.double_double import add, cross, divide, square_root
+from collide.narrowphase.epa.foot import nearest_of_triangle
 from collide.narrowphase.exact.directions import scaled_by, set_normal, side_of
 from collide.narrowphase.exact.supports import support_pair
 from collide.narrowphase.exact.workspace import (
@@ -54,8 +55,8 @@ _PLANES = _LOW + 24
 ROOM = _PLANES + _PLANE * _KEPT
 #: What rounding does to a normal, in doubles and in double-doubles, in units of |e||f| and of |e| + |f|.
 _IN_DOUBLES, _FINELY = 2.0**-49, 2.0**-96
-#: Extents are told apart to this, relatively; integers do the rest.
-_ROUNDED = 2.0**-46
+#: Extents are told apart to this, relatively, four roundings of doubles doubled; integers do the rest.
+_ROUNDED = 2.0**-50
 
 
 @kernel
@@ -183,6 +184,8 @@ def _nearest_planes(pair, terms_at, room_at, n_a, n_b, size):
                     else:
                         for s in range(r + 1, last):
                             kept, best = _weigh(fine, room_at, planes, n_a, n_b, p, q, r, s, kept, best)
+                            if kept < 0:
+                                return 0
                     if kept < 0:
                         return 0
     return _pruned(planes, kept, best)
@@ -308,17 +311,17 @@ def _pruned(planes, kept, best):
 def _find_corners(pair, room_at, ids, nx, ny, nz, depth, error):
     """The vertex pairs of three points of the facet across n, around the foot of the origin.
 
-    Any three of its corners may not do; the triangle that holds the foot deepest does.
+    Any three of its corners may not do; the triangle that comes nearest does, or an edge, or a corner.
     """
     corners = view_f64(room_at, 5 * _CORNERS)
     count = _facet(pair, corners, nx, ny, nz, depth, error)
-    best = -math.inf
+    best = math.inf
     for i in range(count):
-        for j in range(i):
-            for k in range(j):
-                inside = _holds(corners, 5 * i, 5 * j, 5 * k)
-                if inside > best:
-                    best = inside
+        for j in range(i + 1):
+            for k in range(j + 1):
+                away, _, _, _ = nearest_of_triangle(corners, 5 * i, 5 * j, 5 * k, 0.0, 0.0, 0.0)
+                if away < best:
+                    best = away
                     for corner, at in ((0, 5 * i), (1, 5 * j), (2, 5 * k)):
                         ids[2 * corner] = int(corners[at + 3])
                         ids[2 * corner + 1] = int(corners[at + 4])
@@ -359,26 +362,3 @@ def _facet(pair, corners, nx, ny, nz, depth, error):
             corners[5 * count + 4] = j
             count += 1
     return count
-
-
-@kernel
-def _holds(corners, i, j, k):
-    """The least barycentric coordinate of the origin in a triangle; −∞ where that has no area."""
-    ex = corners[j] - corners[i]
-    ey = corners[j + 1] - corners[i + 1]
-    ez = corners[j + 2] - corners[i + 2]
-    fx = corners[k] - corners[i]
-    fy = corners[k + 1] - corners[i + 1]
-    fz = corners[k + 2] - corners[i + 2]
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    square = nx * nx + ny * ny + nz * nz
-    if not square > 0.0:
-        return -math.inf
-    wx = -corners[i]
-    wy = -corners[i + 1]
-    wz = -corners[i + 2]
-    beta = ((wy * fz - wz * fy) * nx + (wz * fx - wx * fz) * ny + (wx * fy - wy * fx) * nz) / square
-    gamma = ((ey * wz - ez * wy) * nx + (ez * wx - ex * wz) * ny + (ex * wy - ey * wx) * nz) / square
-    return min(beta, gamma, 1.0 - beta - gamma)
