@@ -33,7 +33,7 @@ _OUTWARD = 32 * 2.0**-53
 @kernel
 def _proven(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
     """`support`, of a support tree the vertex that is farthest for certain."""
-    k, x, y, z = support(kind, coordinates, n, m, params, at, tree, 0, gx, gy, gz)
+    k, x, y, z, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, gx, gy, gz)
     if tree != 0:
         k = settled_vertex(coordinates, n, m, tree, k, gx, gy, gz)
         return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]

@@ -11,7 +11,7 @@ import math
 from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.packing import COARSE, CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
-from collide.geometry.support_tree.query import extreme_vertex
+from collide.geometry.support_tree.query import extreme_vertex_listed
 from collide.geometry.support_tree.settle import settle_vertex
 
 
@@ -46,20 +46,21 @@ def settled_vertex(coordinates, n, m, tree, vertex, gx, gy, gz):
 
 
 @kernel(inline=True)
-def support(kind, coordinates, n, m, params, at, tree, coarse, gx, gy, gz):
-    """(id, x, y, z): a point of the core farthest in direction g; id is −1 on curved cores.
+def support(kind, coordinates, n, m, params, at, tree, coarse, listed, gx, gy, gz):
+    """(id, x, y, z, list): a point of the core farthest in direction g; id is −1 on curved cores.
 
     tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
     coarse : address of a few of the points, to be asked alone (`coarse_vertex`), or 0.
     params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
     """
     if coarse != 0:
-        return coarse_vertex(coarse, gx, gy, gz)
+        k, x, y, z = coarse_vertex(coarse, gx, gy, gz)
+        return k, x, y, z, listed
     if tree != 0:
-        return extreme_vertex(tree, gx, gy, gz)
+        return extreme_vertex_listed(tree, listed, gx, gy, gz, view_i64(0, 0))
     if kind == POINTS:
         k = support_vertex(coordinates, n, m, gx, gy, gz)
-        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]
+        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k], listed
     p0 = params[at]
     p1 = params[at + 1]
     if kind == ELLIPSOID:
@@ -70,12 +71,12 @@ def support(kind, coordinates, n, m, params, at, tree, coarse, gx, gy, gz):
         az = p2 * gz
         largest = max(abs(ax), abs(ay), abs(az))
         if largest == 0.0:
-            return -1, p0, 0.0, 0.0
+            return -1, p0, 0.0, 0.0, listed
         ax /= largest
         ay /= largest
         az /= largest
         length = math.sqrt(ax * ax + ay * ay + az * az)
-        return -1, p0 * (ax / length), p1 * (ay / length), p2 * (az / length)
+        return -1, p0 * (ax / length), p1 * (ay / length), p2 * (az / length), listed
     # Cylinder and cone: a disc of radius p0 across z, at ±p1.
     largest = max(abs(gx), abs(gy))
     x = 0.0
@@ -89,7 +90,7 @@ def support(kind, coordinates, n, m, params, at, tree, coarse, gx, gy, gz):
         y = p0 * (uy / length)
         across = p0 * (length * largest)
     if kind == CYLINDER:
-        return -1, x, y, p1 if gz > 0.0 else -p1
+        return -1, x, y, p1 if gz > 0.0 else -p1, listed
     if p1 * gz >= across - p1 * gz:  # cone: the apex, or the rim of the base
-        return -1, 0.0, 0.0, p1
-    return -1, x, y, -p1
+        return -1, 0.0, 0.0, p1, listed
+    return -1, x, y, -p1, listed

@@ -357,7 +357,7 @@ def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, li
     gx = -(poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz)
     gy = -(poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz)
     gz = -(poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz)
-    k, x, y, z = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, 0, gx, gy, gz)
+    k, x, y, z, _ = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, 0, -1, gx, gy, gz)
     if tree_b != 0:
         k = settled_vertex(coords_b, n_b, m_b, tree_b, k, gx, gy, gz)
         x = coords_b[k]

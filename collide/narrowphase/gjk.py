@@ -28,7 +28,9 @@ from collide.narrowphase.simplex import across_simplex, faces_in_sight, nearest_
 NEAREST, MEETING, ENCLOSED, APART = range(4)
 
 #: Bodies whose frames are nearer than this share of their reaches probably overlap.
-_LIKELY = 0.75
+_LIKELY = 0.9
+#: Directions ask the same lists of support trees of n vertices that are within an angle whose sine squared is this / n.
+_SAME_LISTS = 64.0
 
 
 @kernel(inline=True)
@@ -75,8 +77,8 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
 
 
 @kernel(inline=True)
-def _direction(pair, weights, touch_suffices):
-    """(x, y, z, factor, whether it is the line between the frames' origins, for a boolean): where to look first.
+def _direction(pair, weights):
+    """(x, y, z, factor, whether it is the line between the frames' origins): where to look first.
 
     Times the factor, it is that line.
     """
@@ -88,7 +90,7 @@ def _direction(pair, weights, touch_suffices):
         ty = pair[15]
         tz = pair[16]
     largest = max(abs(tx), abs(ty), abs(tz))
-    between = touch_suffices and largest > 0.0 and tx == pair[14] and ty == pair[15] and tz == pair[16]
+    between = largest > 0.0 and tx == pair[14] and ty == pair[15] and tz == pair[16]
     if largest == 0.0:
         return 1.0, ty, tz, largest, False
     if 2.0**-400 < largest < 2.0**400:
@@ -107,23 +109,25 @@ def _set_parting(weights, tx, ty, tz, along):
 @kernel(inline=True)
 def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds):
     """The rounds of GJK; see `gjk` for arguments and results."""
-    tx, ty, tz, largest, between = _direction(pair, weights, touch_suffices)
+    tx, ty, tz, largest, between = _direction(pair, weights)
     span = math.sqrt(tx * tx + ty * ty + tz * tz)
     # Coarse hulls that overlap are a proof, at a tenth of the price.
-    coarse = touch_suffices and (pair[19] != 0 or pair[20] != 0)
+    coarse = pair[19] != 0 or pair[20] != 0
     look = False
     if between:
         # Balls about the origins of the bodies' frames: no support is asked.
         reach = reach_of_both(pair)
         lower = largest * span - reach
-        if lower - error - radius > limit:
+        if touch_suffices and lower - error - radius > limit:
             _set_parting(weights, tx, ty, tz, lower / span)
             return APART, 0, lower, 0.0, 0
         look = coarse and largest * span < _LIKELY * reach
-    inlined_difference_point(pair, points, ids, 0, tx, ty, tz, look)
+    # Lists of the support trees in which the last vertices were found; −1 for a walk from above.
+    listed_a, listed_b = inlined_difference_point(pair, points, ids, 0, tx, ty, tz, look, -1, -1)
+    coarse = coarse and (look or touch_suffices)
     if look and _height(points, 0, tx, ty, tz) < 0.0:
         coarse = look = False
-        difference_point(pair, points, ids, 0, tx, ty, tz)
+        listed_a, listed_b = difference_point(pair, points, ids, 0, tx, ty, tz)
     # The first support plane already parts most pairs that are farther apart than asked about.
     trees = has_trees(pair)
     lower = -_height(points, 0, tx, ty, tz) / span
@@ -158,6 +162,11 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     square = vx * vx + vy * vy + vz * vz
     status = NEAREST
     clearance = 0.0
+    # Against u support trees were last walked from above. Within an angle of it only the lists are asked where that ended.
+    ux = -tx
+    uy = -ty
+    uz = -tz
+    squared_cosine = _of_same_lists(pair)
     used = 0
     while used < rounds:
         used += 1
@@ -167,12 +176,21 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             break
         if touch_suffices and length + error <= radius:
             break
-        inlined_difference_point(pair, points, ids, at_d, -vx, -vy, -vz, coarse)
+        if trees and not coarse:
+            along = ux * vx + uy * vy + uz * vz
+            if along <= 0.0 or along * along < squared_cosine * square * (ux * ux + uy * uy + uz * uz):
+                listed_a = listed_b = -1
+                ux, uy, uz = vx, vy, vz
+        hasty = coarse or listed_a >= 0 or listed_b >= 0
+        listed_a, listed_b = inlined_difference_point(
+            pair, points, ids, at_d, -vx, -vy, -vz, coarse, listed_a, listed_b
+        )
         bound = _height(points, at_d, vx, vy, vz) / length
         repeated = _repeated(ids, n, at_a, at_b, at_c, at_d)
-        if coarse and (bound > 0.0 or repeated):
-            coarse = False  # the coarse hulls are apart here, and tell no more
-            difference_point(pair, points, ids, at_d, -vx, -vy, -vz)
+        if hasty and _tells_no_more(coarse, length, bound, repeated, error, radius, limit):
+            hasty = coarse = False
+            ux, uy, uz = vx, vy, vz
+            listed_a, listed_b = difference_point(pair, points, ids, at_d, -vx, -vy, -vz)
             bound = _height(points, at_d, vx, vy, vz) / length
             repeated = _repeated(ids, n, at_a, at_b, at_c, at_d)
         if trees and (
@@ -228,6 +246,10 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             wa, wb, wc = wd, wf, ws
             vx, vy, vz = x, y, z
         if not closer < square:
+            if hasty and used < rounds:
+                coarse = False
+                ux = uy = uz = 0.0  # the next is asked of the whole bodies
+                continue
             if trees:
                 settle_point(pair, points, ids, at_d, -vx, -vy, -vz)
                 lower = max(lower, _height(points, at_d, vx, vy, vz) / length)
@@ -245,6 +267,23 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     weights[5] = vy
     weights[6] = vz
     return status, n, lower, 0.0, used
+
+
+@kernel(inline=True)
+def _of_same_lists(pair):
+    """The squared cosine of that angle for a pair's support trees."""
+    n = max(pair[1] if pair[17] != 0 else 64, pair[7] if pair[18] != 0 else 64)
+    return 1.0 - _SAME_LISTS / n
+
+
+@kernel(inline=True)
+def _tells_no_more(coarse, length, bound, repeated, error, radius, limit):
+    """Whether a point found in haste is no good: the one that lies farthest is to be asked for."""
+    if repeated:
+        return True
+    if coarse:
+        return bound > 0.0
+    return bound - error - radius > limit or length - bound <= 0.125 * error
 
 
 @kernel(inline=True)

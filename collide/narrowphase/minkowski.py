@@ -16,25 +16,28 @@ POINT = 9
 @kernel
 def difference_point(pair, points, ids, k, dx, dy, dz):
     """`inlined_difference_point`, called: a copy at every place where one is asked for took 8 s to compile."""
-    inlined_difference_point(pair, points, ids, k, dx, dy, dz, False)
+    return inlined_difference_point(pair, points, ids, k, dx, dy, dz, False, -1, -1)
 
 
 @kernel(inline=True)
-def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse):
+def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse, listed_a, listed_b):
     """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
+
+    Returns the lists of the bodies' support trees in which vertices were found (`extreme_vertex_listed`).
 
     pair : `posed_pair.posed_pair`.   coarse : ask the coarse points alone, where there are any.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
+    listed_a, listed_b : lists to look in alone, or −1.
     """
     (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b, coarse_a, coarse_b) = pair
-    ia, ax, ay, az = support(
-        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse_a if coarse else 0,
+    ia, ax, ay, az, listed_a = support(
+        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse_a if coarse else 0, listed_a,
         poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
         poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
         poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
     )  # fmt: skip
-    ib, bx, by, bz = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse_b if coarse else 0,
+    ib, bx, by, bz, listed_b = support(
+        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse_b if coarse else 0, listed_b,
         -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
         -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
         -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
@@ -42,6 +45,7 @@ def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse):
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
     _place(pair, points, k, ax, ay, az, bx, by, bz)
+    return listed_a, listed_b
 
 
 @kernel(inline=True)

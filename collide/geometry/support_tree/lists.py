@@ -306,7 +306,7 @@ def _follow_arc(
         gx = px + t * dx
         gy = py + t * dy
         gz = pz + t * dz
-        node, x, y, z = walk(nodes, entries, coordinates, depth, gx, gy, gz, none)
+        node, x, y, z, _ = walk(nodes, entries, coordinates, 0, depth, gx, gy, gz, none)
         owner = node - first_node
         new = True
         if step >= 2:

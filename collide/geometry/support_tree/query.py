@@ -36,12 +36,16 @@ COUNTERS = 4
 
 
 @kernel
-def walk(nodes, entries, coordinates, depth, gx, gy, gz, counters):
-    """(entry, x, y, z) that ``depth`` scans lead to; counts entries scanned where counters has room."""
-    node = 0
+def walk(nodes, entries, coordinates, listed, depth, gx, gy, gz, counters):
+    """(entry, x, y, z, the list it stands in) that ``depth`` ≥ 1 scans from a list on lead to.
+
+    Counts entries scanned where counters has room.
+    """
+    node = listed
     at = 0
     count = 0
     for _ in range(depth):
+        listed = node
         begin = nodes[node]
         count = nodes[node + 1] - begin
         k, _ = farthest(coordinates, 3 * begin, count, count, gx, gy, gz)
@@ -49,17 +53,22 @@ def walk(nodes, entries, coordinates, depth, gx, gy, gz, counters):
         at = 3 * begin + k
         if len(counters) > 0:
             counters[SCANNED] += count
-    return node, coordinates[at], coordinates[at + count], coordinates[at + 2 * count]
+    return node, coordinates[at], coordinates[at + count], coordinates[at + 2 * count], listed
 
 
 @kernel
-def extreme_vertex_counted(tree_at, gx, gy, gz, counters):
-    """`extreme_vertex`, adding to ``counters`` (COUNTERS,) int64 unless that is empty."""
+def extreme_vertex_listed(tree_at, listed, gx, gy, gz, counters):
+    """(id, x, y, z, list): `extreme_vertex` and the last list; or the best of one of its last lists alone.
+
+    listed : such a list, or −1 for the whole walk. While directions change little the list stays the same, so that
+        one scan often finds what the walk would; whether it has is for the caller to ask in the end.
+    counters : (COUNTERS,) int64 that is added to, or empty.
+    """
     header = view_i64(tree_at, HEADER)
     nodes = view_i32(header[AT_NODES], header[NODES] + 1)
     entries = view_i32(header[AT_ENTRIES], header[ENTRIES])
     coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES])
-    return walk(nodes, entries, coordinates, header[DEPTH], gx, gy, gz, counters)
+    return walk(nodes, entries, coordinates, max(listed, 0), header[DEPTH] if listed < 0 else 1, gx, gy, gz, counters)
 
 
 @kernel
@@ -68,7 +77,8 @@ def extreme_vertex(tree_at, gx, gy, gz):
 
     tree_at : `SupportTree.address`. id : row of the tree's points. Not proven: see `settle_vertex`.
     """
-    return extreme_vertex_counted(tree_at, gx, gy, gz, view_i64(0, 0))
+    vertex, x, y, z, _ = extreme_vertex_listed(tree_at, -1, gx, gy, gz, view_i64(0, 0))
+    return vertex, x, y, z
 
 
 @kernel
@@ -94,7 +104,7 @@ def many_extreme_vertices(tree_at, directions_at, n, settled, ids_at, counters_a
         gx = directions[3 * i]
         gy = directions[3 * i + 1]
         gz = directions[3 * i + 2]
-        vertex, _, _, _ = extreme_vertex_counted(tree_at, gx, gy, gz, counters)
+        vertex, _, _, _, _ = extreme_vertex_listed(tree_at, -1, gx, gy, gz, counters)
         if settled:
             vertex = climb(tree_at, vertex, gx, gy, gz, counters)
         ids[i] = vertex

@@ -128,7 +128,7 @@ def epa(
         if overlap_suffices and distance > 2.0 * error and _surface_clearance(clearances, count, error) > error:
             break
         inlined_difference_point(
-            pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2], False
+            pair, points, ids, vertices, planes[PLANE * f], planes[PLANE * f + 1], planes[PLANE * f + 2], False, -1, -1
         )
         value = _height(points, planes, vertices, f)
         if overlap_suffices and value < -error and has_trees(pair):
