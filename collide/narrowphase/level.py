@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_i64
-from collide.geometry.double_double import add, subtract
+from collide._jit import kernel, view_f64
+from collide.geometry.double_double import add
 from collide.geometry.scan import count_level
+from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
 from collide.geometry.support_tree.query import rings_of
-from collide.narrowphase.fine import fine_height, fine_point
+from collide.narrowphase.descent import descend, direction_in_body, lowest_of_all
 
-#: Most level vertices of a body that are listed; where there are more, all vertices are looked through.
+#: Most level vertices that `tied_vertices` lists.
 MOST_TIES = 24
+#: Vertices scanned in the time of a look at one neighbour, about.
+SCANNED_PER_NEIGHBOUR = 16
 
 
 @kernel(inline=True)
@@ -73,15 +76,15 @@ def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz
     ids : the pairs, at most three, with ``own`` different vertices of body 0 or 1; these are below the limit.
 
     A scan; or, where there is a support tree, a look at their neighbours: the vertices of a hull below a level hang
-    together.
+    together. Also a scan where they have very many, as the tip of a cone has.
     """
-    if tree == 0:
-        # What fills up the last block are copies of vertex 0.
-        copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
-        return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
     i = ids[body]
     j = ids[2 * min(pairs - 1, 1) + body]
     k = ids[2 * (pairs - 1) + body]
+    if tree == 0 or _has_many_neighbours(tree, m, i, j, k):
+        # What fills up the last block are copies of vertex 0.
+        copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
+        return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
     starts, ring, corners = rings_of(tree)
     for turn in range(own):
         # The last is a new one if the one in the middle is not.
@@ -92,6 +95,14 @@ def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz
             if height <= limit and w != i and w != j and w != k:
                 return False
     return True
+
+
+@kernel(inline=True)
+def _has_many_neighbours(tree, m, i, j, k):
+    """Whether a scan of all m vertices, in vectors, takes less time than a look at the neighbours of three."""
+    starts, _, _ = rings_of(tree)
+    degree = max(starts[i + 1] - starts[i], starts[j + 1] - starts[j], starts[k + 1] - starts[k])
+    return SCANNED_PER_NEIGHBOUR * degree > m
 
 
 @kernel
@@ -142,70 +153,32 @@ def _with_tie(ties, count, i):
 
 @kernel
 def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_at, scale):
-    """How far the least of A ⊖ B along a direction lies beyond points that nearly are the least.
+    """How far the least of A ⊖ B along a direction lies beyond the first of points that nearly are the least.
 
-    ids : their vertex pairs, n of them.
-    first, spare : index in ``fine`` of the first of them, and of a point to be used.
-    slack : how far doubles may be wrong along |direction| = 1.
-    ties_at : integer workspace of 2·(MOST_TIES + 1).
+    ids : vertex pairs of the points; only the first one is looked at.
+    low : low parts of both poses, or no doubles where both are as given.
+    ties_at : workspace of PRODUCT_TERMS numbers.   scale : what heights are multiplied with, a power of two.
 
-    Returns (excess, low, i, j): the least height is that of the first point plus the excess, ≤ 0, at vertices i, j.
-    Asked where they are not alone (`are_alone`).
+    Returns (excess, low, i, j): the least height is that of the first point plus the excess, ≤ 0, at vertices i, j. For
+    the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `descent.py`.
+    Asked where they are not alone (`are_alone`). O(log n) where there are support trees, but for vertices of very many
+    neighbours; else O(n).
     """
     (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
-    own_a = 0
-    own_b = 0
-    ties_a = view_i64(ties_at, MOST_TIES + 1)
-    ties_b = view_i64(ties_at + 8 * (MOST_TIES + 1), MOST_TIES + 1)
-    for k in range(n):
-        own_a = _with_tie(ties_a, own_a, ids[2 * k])
-        own_b = _with_tie(ties_b, own_b, ids[2 * k + 1])
-    largest = max(abs(direction[0]), abs(direction[2]), abs(direction[4]))
-    dx = direction[0] / largest
-    dy = direction[2] / largest
-    dz = direction[4] / largest
-    slack *= abs(dx) + abs(dy) + abs(dz)
-    ax = poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz
-    ay = poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz
-    az = poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz
-    bx = -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz)
-    by = -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz)
-    bz = -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz)
-    count_a, limit_a = tied_vertices(coords_a, n_a, m_a, tree_a, ties_a, own_a, ax, ay, az, slack)
-    count_b, limit_b = tied_vertices(coords_b, n_b, m_b, tree_b, ties_b, own_b, bx, by, bz, slack)
-    base, base_low = fine_height(fine, first, direction)
-    i, excess, excess_low = _lowest(
-        pair, low, fine, spare, ids[1], True, ties_a, count_a, limit_a, ax, ay, az, direction, scale, base, base_low
-    )
-    j, more, more_low = _lowest(
-        pair, low, fine, spare, ids[0], False, ties_b, count_b, limit_b, bx, by, bz, direction, scale, base, base_low
-    )
+    i, excess, excess_low = _lowest(coords_a, n_a, m_a, tree_a, ids[0], poses, p, low, 0, direction, 1.0, ties_at)
+    j, more, more_low = _lowest(coords_b, n_b, m_b, tree_b, ids[1], poses, q, low, 12, direction, -1.0, ties_at)
     excess, excess_low = add(excess, excess_low, more, more_low)
-    return excess, excess_low, i, j
+    return excess * scale, excess_low * scale, i, j
 
 
 @kernel
-def _lowest(pair, low, fine, spare, other, of_a, ties, count, limit, gx, gy, gz, direction, scale, base, base_low):
-    """(vertex, height, low): the lowest of a body's level vertices, with a vertex of the other; heights above the base.
-
-    ties, count : what is level; of more than MOST_TIES all vertices are looked through that are below the limit.
-    """
-    coordinates = pair[0] if of_a else pair[6]
-    n = pair[1] if of_a else pair[7]
-    m = pair[2] if of_a else pair[8]
-    many = count > MOST_TIES
-    best = ties[0]
-    least = 0.0
-    least_low = 0.0
-    for k in range(n if many else count):
-        i = k if many else ties[k]
-        if many and _product(coordinates, m, i, gx, gy, gz) > limit:
-            continue
-        fine_point(pair, low, fine, spare, i if of_a else other, other if of_a else i, scale)
-        height, height_low = fine_height(fine, spare, direction)
-        height, height_low = subtract(height, height_low, base, base_low)
-        if height < least or (height == least and height_low < least_low):
-            best = i
-            least = height
-            least_low = height_low
-    return best, least, least_low
+def _lowest(coordinates, n, m, tree, first, poses, p, low, at, direction, sign, terms_at):
+    """(vertex, height, low): the lowest vertex of a body along ±direction, and its height over the first one."""
+    gx, gx_low, gy, gy_low, gz, gz_low = direction_in_body(poses, p, low, at, direction, sign)
+    if tree != 0:
+        terms = view_f64(terms_at, PRODUCT_TERMS)
+        proven, vertex, height, height_low, _ = descend(tree, first, gx, gx_low, gy, gy_low, gz, gz_low, terms)
+        if proven:
+            return vertex, height, height_low
+    vertex, height, height_low, _ = lowest_of_all(coordinates, n, m, first, gx, gx_low, gy, gy_low, gz, gz_low)
+    return vertex, height, height_low

@@ -17,6 +17,10 @@ from collide.geometry.error_free import two_product, two_sum
 #: those of the bound itself, too, and the last summand products below the smallest normal double.
 _ROUNDING = 7.0 * 2.0**-53
 _TINY = 2.0**-1060
+#: Doubles that a product of vectors of double-doubles is the exact sum of.
+PRODUCT_TERMS = 24
+#: The error of a larger product is a double.
+_SMALLEST_PRODUCT = 2.0**-900
 
 
 @kernel
@@ -82,6 +86,44 @@ def exact_sign(ax, ay, az, bx, by, bz, gx, gy, gz):
     v, v_low = two_product(ey, gy)
     w, w_low = two_product(ez, gz)
     return _sign_of_long_sum(x, y, z, x_low, y_low, z_low, u, v, w, u_low, v_low, w_low)
+
+
+@kernel
+def exact_sign_of_pairs(ax, ax_low, ay, ay_low, az, az_low, gx, gx_low, gy, gy_low, gz, gz_low, terms):
+    """(certain, sign) of a·g, for two vectors of double-doubles. Not certain where products are too small to be exact.
+
+    terms : PRODUCT_TERMS doubles to work in.
+    """
+    certain = _set_products(ax, ax_low, gx, gx_low, terms, 0)
+    certain = _set_products(ay, ay_low, gy, gy_low, terms, 8) and certain
+    certain = _set_products(az, az_low, gz, gz_low, terms, 16) and certain
+    return certain, sign_of_terms(terms, PRODUCT_TERMS) if certain else 0
+
+
+@kernel
+def _set_products(a, a_low, g, g_low, terms, at):
+    """Put the eight doubles whose sum is a·g at ``at``; whether it is that exactly."""
+    certain = True
+    for k in range(4):
+        p = a if k < 2 else a_low
+        q = g if k % 2 == 0 else g_low
+        terms[at + 2 * k], terms[at + 2 * k + 1] = two_product(p, q)
+        certain = certain and (p == 0.0 or q == 0.0 or abs(terms[at + 2 * k]) > _SMALLEST_PRODUCT)
+    return certain
+
+
+@kernel
+def sign_of_terms(terms, n):
+    """Sign of the exact sum of n doubles, at most 2¹⁰; they are changed."""
+    while True:
+        total = terms[0]
+        rest = 0.0
+        for k in range(1, n):
+            total, terms[k - 1] = two_sum(total, terms[k])
+            rest += abs(terms[k - 1])
+        if abs(total) > 2.0 * rest or rest == 0.0:
+            return 1 if total > 0.0 else (-1 if total < 0.0 else 0)
+        terms[n - 1] = total
 
 
 @kernel
