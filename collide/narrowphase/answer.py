@@ -13,6 +13,7 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide._lanes import LANES
 from collide.geometry.double_double import add, bracket
 from collide.geometry.packing import POINTS
+from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import NUMBERS, POSE, RADIUS
 from collide.narrowphase.bounds import (
@@ -70,11 +71,11 @@ from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
 from collide.transforms import SMALLEST
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits of depths and
-# heights need: four points, a direction, low parts of two poses, ties.
+# heights need: four points, a direction, low parts of two poses, ties or the terms of a sum.
 _WEIGHTS = 5 * POINT
 _FINE = 64
 _NEAREST, _TIES = 10, 16
-_TIED = _TIES + 2 * (MOST_TIES + 1)
+_TIED = _TIES + max(MOST_TIES + 1, PRODUCT_TERMS)
 _OWN_DOUBLES, _OWN_INTEGERS = _FINE + 5 * FINE + 24, _TIED + ENTRY
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
 _NEAR_MISS = 2.0**-48

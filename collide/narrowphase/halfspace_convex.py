@@ -153,7 +153,7 @@ def polish_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     gy = poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz
     gz = poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz
     ties[0] = vertex
-    level, limit = tied_vertices(coords, count, m, tree_b, ties, 1, gx, gy, gz, error)
+    level, limit = tied_vertices(coords, count, m, tree_b, ties, gx, gy, gz, error)
     many = level > MOST_TIES
     least = math.inf
     least_low = 0.0

@@ -106,19 +106,15 @@ def _has_many_neighbours(tree, m, i, j, k):
 
 
 @kernel
-def tied_vertices(coordinates, n, m, tree, ties, own, gx, gy, gz, slack):
+def tied_vertices(coordinates, n, m, tree, ties, gx, gy, gz, slack):
     """(number of vertices whose product with g is at most the limit, the limit).
 
-    ties : its first ``own`` are known in; all out, unless there are more than MOST_TIES. The limit is ``slack`` above
-        the least of the first ones. Along hull edges where there is a support tree: the vertices of a hull below a
-        level hang together.
+    ties : the first is known in; all out, unless there are more than MOST_TIES. The limit is ``slack`` above the first.
+
+    Along hull edges where there is a support tree: the vertices of a hull below a level hang together.
     """
-    limit = math.inf
-    for k in range(own):
-        i = ties[k]
-        limit = min(limit, coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz)
-    limit += slack
-    count = own
+    limit = _product(coordinates, m, ties[0], gx, gy, gz) + slack
+    count = 1
     if tree != 0:
         starts, ring, corners = rings_of(tree)
         k = 0
@@ -134,7 +130,7 @@ def tied_vertices(coordinates, n, m, tree, ties, own, gx, gy, gz, slack):
     level = 0
     for i in range(n):
         level += 1 if coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz <= limit else 0
-    if level > own and level <= MOST_TIES:
+    if 1 < level <= MOST_TIES:
         for i in range(n):
             if coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz <= limit:
                 count = _with_tie(ties, count, i)
@@ -152,12 +148,12 @@ def _with_tie(ties, count, i):
 
 
 @kernel
-def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_at, scale):
+def settle_level(pair, low, ids, direction, terms_at, scale):
     """How far the least of A ⊖ B along a direction lies beyond the first of points that nearly are the least.
 
-    ids : vertex pairs of the points; only the first one is looked at.
+    ids : the first one's vertex pair.
     low : low parts of both poses, or no doubles where both are as given.
-    ties_at : workspace of PRODUCT_TERMS numbers.   scale : what heights are multiplied with, a power of two.
+    terms_at : workspace of PRODUCT_TERMS numbers.   scale : what heights are multiplied with, a power of two.
 
     Returns (excess, low, i, j): the least height is that of the first point plus the excess, ≤ 0, at vertices i, j. For
     the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `descent.py`.
@@ -165,8 +161,8 @@ def settle_level(pair, low, fine, first, spare, ids, n, direction, slack, ties_a
     neighbours; else O(n).
     """
     (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
-    i, excess, excess_low = _lowest(coords_a, n_a, m_a, tree_a, ids[0], poses, p, low, 0, direction, 1.0, ties_at)
-    j, more, more_low = _lowest(coords_b, n_b, m_b, tree_b, ids[1], poses, q, low, 12, direction, -1.0, ties_at)
+    i, excess, excess_low = _lowest(coords_a, n_a, m_a, tree_a, ids[0], poses, p, low, 0, direction, 1.0, terms_at)
+    j, more, more_low = _lowest(coords_b, n_b, m_b, tree_b, ids[1], poses, q, low, 12, direction, -1.0, terms_at)
     excess, excess_low = add(excess, excess_low, more, more_low)
     return excess * scale, excess_low * scale, i, j
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collide._jit import kernel, view_f64, view_i64, view_u8
 from collide._lanes import LANES, view_lanes
 from collide.geometry.double_double import bracket
+from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
 from collide.geometry.tables import ADDRESS, COUNT, INTS, NUMBERS, PADDED, POSE, RADIUS, TREE
 from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, is_composed, scale_of, write_low_parts
 from collide.narrowphase.gap import (
@@ -55,7 +56,7 @@ from collide.narrowphase.gap import (
     polish_gaps,
     unsure_of,
 )
-from collide.narrowphase.level import MOST_TIES, no_other_is_level, settle_level
+from collide.narrowphase.level import no_other_is_level, settle_level
 from collide.narrowphase.posed_pair import coordinates_of, posed_pair
 from collide.narrowphase.rows import (
     BEYOND,
@@ -82,16 +83,16 @@ _NEAR_MISS = 2.0**-47
 _ROW, _SHAPE_A, _POSE_A, _SHAPE_B, _POSE_B, _FLIP, _HOW, _IDS = range(8)
 _NOTE = _IDS + 6
 
-# Workspace in doubles: low parts and a feature of four points for one row; then numbers for eight: the feature, its
-# direction, the answer, the questions of each kind. In integers: how many wait of each kind, notes, vertex pairs, ties.
-_LOWS, _POINTS, _ACROSS = 0, 24, 24 + 4 * FINE
+# Workspace in doubles: low parts and a direction for one row; then numbers for eight: the feature, its direction, the
+# answer, the questions of each kind. In integers: how many wait of each kind, notes, vertex pairs, terms of a sum.
+_LOWS, _ACROSS = 0, 24
 _ALONE = _ACROSS + FINE
 _ROOMS = FEATURE + FINE + ANSWER
 WAITING_DOUBLES = _ALONE + LANES + LANES * (_ROOMS + KINDS * QUESTION)
 _NOTES = KINDS
 _FEATURE = _NOTES + KINDS * LANES * _NOTE
-_TIES = _FEATURE + 6
-WAITING_INTEGERS = _TIES + 2 * (MOST_TIES + 1)
+_TERMS = _FEATURE + 6
+WAITING_INTEGERS = _TERMS + PRODUCT_TERMS
 
 
 @kernel(inline=True)
@@ -236,8 +237,8 @@ def polish_waiting(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, 
         proven = answer[LANES * PROVEN] != 0.0
         if proven and (parts == 2 or not _are_alone(ints_at, note, view_i64(note_at + 8 * _IDS, 6), n, question, answer)):
             proven = _level(
-                ints_at, numbers_at, poses_at, note, view_i64(note_at + 8 * _IDS, 6), n, question, answer,
-                room_at + 8 * lane, across_at + 8 * lane, composed, doubles_at, integers_at,
+                ints_at, numbers_at, poses_at, note, view_i64(note_at + 8 * _IDS, 6), question, answer,
+                across_at + 8 * lane, composed, doubles_at, integers_at,
             )  # fmt: skip
         row_at = rows_at + ROW * note[_ROW]
         _write(view_f64(row_at, 12), view_u8(row_at, ROW), question, answer, note, proven, depths, limit)
@@ -267,7 +268,7 @@ def _is_alone(ints_at, shape, ids, n, body, own, gx, gy, gz, limit):
 
 @kernel
 def _level(
-    ints_at, numbers_at, poses_at, note, ids, n, question, answer, feature_at, across_at, composed, doubles_at, integers_at
+    ints_at, numbers_at, poses_at, note, ids, question, answer, across_at, composed, doubles_at, integers_at
 ):
     """Have what is level with the feature settled; whether the row is proven still. Its bracket is set anew."""
     sa = note[_SHAPE_A]
@@ -281,20 +282,15 @@ def _level(
     at_b, n_b = coordinates_of(ints, sb)
     pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
     low = view_f64(doubles_at + 8 * _LOWS, 24 if composed else 0)
-    points = view_f64(doubles_at + 8 * _POINTS, 4 * FINE)
     direction = view_f64(doubles_at + 8 * _ACROSS, FINE)
-    feature = view_f64(feature_at, LANES * FEATURE)
     across = view_f64(across_at, LANES * FINE)
     for k in range(FINE):
-        points[k] = feature[LANES * k]
         direction[k] = across[LANES * k]
     if composed:
         for k in range(24):
             low[k] = question[LANES * (LOW_A + k)]
     scale = question[LANES * SCALE]
-    excess, _, _, _ = settle_level(
-        pair, low, points, 0, 3, ids, n, direction, question[LANES * ERROR], integers_at + 8 * _TIES, scale
-    )
+    excess, _, _, _ = settle_level(pair, low, ids, direction, integers_at + 8 * _TERMS, scale)
     unsure = unsure_of(answer[LANES * SPREAD], excess, answer[LANES * LENGTH], question[LANES * SLOP], scale)
     low_end, middle, high_end = bracket(answer[LANES * GAP], answer[LANES * GAP_LOW], unsure / scale)
     answer[LANES * GAP_LOWER] = low_end

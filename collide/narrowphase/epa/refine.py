@@ -16,7 +16,6 @@ from collide.geometry.scan import least
 from collide.narrowphase.epa.surface import (
     FACET,
     MARKS,
-    POINTS,
     SEEN,
     SURE,
     TWIN,
@@ -111,36 +110,6 @@ def _set_distance(pair, low, surface, fine, distances, known, direction, f, unsu
     else:
         clearances[f] = min(distance, 0.0) - unsure
     return length, (2.0 * most - least_height) / length
-
-
-@kernel
-def _unevenness(pair, corners, direction):
-    """How far apart along a direction the vertices of A, or those of B, of three level pairs lie.
-
-    `settle_level` counts on finding all of them below its level. But a vertex of A may stand higher than another if that
-    of B stands as much lower.
-    """
-    (coords_a, _, m_a, _, _, p, coords_b, _, m_b, _, _, q, _, poses, _, _, _, _, _, _, _) = pair
-    dx = direction[0]
-    dy = direction[2]
-    dz = direction[4]
-    most = 0.0
-    for body in range(2):
-        coordinates = coords_a if body == 0 else coords_b
-        m = m_a if body == 0 else m_b
-        at = p if body == 0 else q
-        gx = poses[at] * dx + poses[at + 3] * dy + poses[at + 6] * dz
-        gy = poses[at + 1] * dx + poses[at + 4] * dy + poses[at + 7] * dz
-        gz = poses[at + 2] * dx + poses[at + 5] * dy + poses[at + 8] * dz
-        high = -math.inf
-        least_height = math.inf
-        for k in range(3):
-            i = corners[2 * k + body]
-            height = gx * coordinates[i] + gy * coordinates[m + i] + gz * coordinates[2 * m + i]
-            high = max(high, height)
-            least_height = min(least_height, height)
-        most = max(most, high - least_height)
-    return most / (abs(dx) + abs(dy) + abs(dz))
 
 
 @kernel
@@ -242,11 +211,11 @@ def _name_tied(surface, distance, f, count, tied):
 
 @kernel
 def refine(
-    pair, terms_at, doubles_at, integers_at, direction_at, corners_at, ties_at, tied, count, vertices, size, slop, error
+    pair, terms_at, doubles_at, integers_at, direction_at, corners_at, exact_at, tied, count, vertices, size, slop, error
 ):  # fmt: skip
     """Grow the surface that `epa` left until its nearest facet is final to the last digits.
 
-    direction_at, corners_at, ties_at : further workspace: FINE + 24 doubles, 6 integers and `settle_level`'s.
+    direction_at, corners_at, exact_at : further workspace: FINE + 24 doubles, 6 integers and `settle_level`'s.
     tied : an entry of `requests.py` out, where the depth is near rounding.
     count, vertices : as left.   size, slop, error : of the pair.
 
@@ -285,10 +254,7 @@ def refine(
         final = are_alone(pair, corners, 3, direction, error)
         i = j = -1
         if not final:
-            excess, _, i, j = settle_level(
-                pair, low, fine, facets[FACET * f], POINTS - 1, corners, 3, direction,
-                error + _unevenness(pair, corners, direction), ties_at, scale,
-            )  # fmt: skip
+            excess, _, i, j = settle_level(pair, low, corners, direction, exact_at, scale)
             beyond = -excess / length
             # Three heights make a level pair's; what is as good as a corner cannot be added, and widens the bracket.
             final = beyond <= max(_LEVEL * distance, 3.0 * unsure) or beyond <= spread
