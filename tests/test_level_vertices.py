@@ -187,7 +187,9 @@ def test_gaps_across_caps_of_thousands(turned):
         assert r.certified, what
 
 
-@pytest.mark.parametrize(("kind", "turned"), [("cylinder", False), ("cylinder", True), ("plate", False), ("pyramids", True)])
+@pytest.mark.parametrize(
+    ("kind", "turned"), [("cylinder", False), ("cylinder", True), ("plate", False), ("pyramids", True)]
+)
 def test_gaps_of_a_cap_and_what_stands_askew_over_it(kind, turned):
     """Where the cap is level to the last bit doubles find the feature, and double-doubles the last digits: integers are
     not asked. Of a cap that is a hull of roundings doubles do not find the facet."""
@@ -212,7 +214,10 @@ def test_gaps_of_composed_poses():
     for n in (40, 600):
         for tilt in TILTS[::2]:
             A, B = body("cylinder", n), body("frustum", n) * (1.0, 1.0, -1.0)
-            parts = [collide.Compound([(collide.ConvexHull(p), placed(np.eye(3), (0, 0, h)))]) for p, h in ((A, 1.0), (B, -0.5))]
+            parts = [
+                collide.Compound([(collide.ConvexHull(p), placed(np.eye(3), (0, 0, h)))])
+                for p, h in ((A, 1.0), (B, -0.5))
+            ]
             W, p = rotation(rng), rng.normal(size=3)
             X_WA = placed(W @ tilted(tilt, rng), p + W @ (0.2, 0.1, 0.25))
             X_WB = placed(W, p)
@@ -232,7 +237,7 @@ def _descend(tree_at, first, direction_at, terms_at, out_at):
     proven, vertex, out[0], out[1], looked = descend(
         tree_at, first, g[0], g[1], g[2], g[3], g[4], g[5], view_f64(terms_at, PRODUCT_TERMS)
     )
-    return (1 << 40) * looked + vertex if proven else -1 - looked
+    return (1 << 40) * int(looked) + int(vertex) if proven else -1 - int(looked)
 
 
 @entry("int64(int64, int64, int64, int64, int64)")
@@ -242,7 +247,7 @@ def _lowest_of_all(coordinates_at, n, first, direction_at, out_at):
     vertex, out[0], out[1], fine = lowest_of_all(
         view_f64(coordinates_at, 3 * n), n, n, first, g[0], g[1], g[2], g[3], g[4], g[5]
     )
-    return (1 << 40) * fine + vertex
+    return (1 << 40) * int(fine) + int(vertex)
 
 
 def directions(Q, rng):
@@ -315,7 +320,11 @@ def test_products_that_vanish_are_left_open():
     points = prism(400)
     points[200:, :2] *= 1.0 - 2.0**-30
     tree, out, terms = PlantedTree(points).tree, np.zeros(2), np.zeros(PRODUCT_TERMS)
-    for g in ([0.0, 0.0, 1e-290, 0.0, 1e-300, 0.0], [0.0, 0.0, 1e-310, 0.0, 0.0, 0.0], [1e-200, 1e-220, -1e-310, 0.0, 1.0, 0.0]):
+    for g in (
+        [0.0, 0.0, 1e-290, 0.0, 1e-300, 0.0],
+        [0.0, 0.0, 1e-310, 0.0, 0.0, 0.0],
+        [1e-200, 1e-220, -1e-310, 0.0, 1.0, 0.0],
+    ):
         direction = np.array(g)
         heights = exact_heights(points, direction, 0)
         code = _descend(tree.address, 0, address_of(direction), address_of(terms), address_of(out))
