@@ -211,6 +211,7 @@ class _Locator(_CacheLocator):
 
     def __init__(self, function: Callable):
         self._function = function
+        self._py_file = function.__code__.co_filename  # numba names it where a kernel cannot be kept
 
     def get_cache_path(self) -> str:
         return str(kernel_cache_folder())

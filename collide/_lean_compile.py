@@ -25,6 +25,7 @@ from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager
 from numba.core.cpu import CPUContext
+from numba.core.dispatcher import _DispatcherBase as Dispatcher
 from numba.core.targetconfig import TargetConfig
 from numba.core.types.functions import BaseFunction
 
@@ -34,37 +35,39 @@ _UNUSED_PASSES = {"InlineClosureLikes", "NopythonRewrites"}
 _OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
 
+#: Numba's own steps after lowering, of this numba: `_translated_once` exchanges them.
+_STEPS = [
+    (owner, name, vars(owner)[name])
+    for owner, name in [
+        (CPUCodeLibrary, "_optimize_final_module"), (CPUCodeLibrary, "_finalize_final_module"), (CPUContext, "get_executable"),
+    ]
+    if name in vars(owner)
+]  # fmt: skip
+
+
 @contextmanager
 def lean_compiling(function: Callable) -> Iterator[None]:
     """While the entry of this function is compiled."""
     # The lock first: another thread may have these parts replaced, and they must not be taken for numba's.
     with global_compiler_lock, ExitStack() as stack:
-        for owner, name, part in [*_translated_once(function.__qualname__), *_without_idle_work()]:
-            stack.enter_context(_replaced(owner, name, part))
-        stack.enter_context(_rarely_collecting())
+        _exchange(stack, [*_translated_once(function.__qualname__), *_without_idle_work()])
+        _collect_rarely(stack)
         yield
 
 
-@contextmanager
-def _replaced(owner: Any, name: str, part: Any) -> Iterator[None]:
-    """An attribute of one of numba's classes or modules exchanged for a while."""
-    own = vars(owner)[name]
-    setattr(owner, name, part)
-    try:
-        yield
-    finally:
-        setattr(owner, name, own)
+def _exchange(stack: ExitStack, parts: list[tuple[Any, str, Any]]) -> None:
+    """Attributes of numba's classes and modules exchanged until the stack ends."""
+    for owner, name, part in parts:
+        # First the way back: an interrupt may come between any two steps.
+        stack.callback(setattr, owner, name, vars(owner)[name])
+        setattr(owner, name, part)
 
 
-@contextmanager
-def _rarely_collecting() -> Iterator[None]:
+def _collect_rarely(stack: ExitStack) -> None:
     thresholds = gc.get_threshold()
     if 0 < thresholds[0] < _OBJECTS_BETWEEN_COLLECTIONS:  # 0: somebody has switched it off
+        stack.callback(gc.set_threshold, *thresholds)
         gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS, *thresholds[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*thresholds)
 
 
 def _translated_once(own: str) -> list[tuple[Any, str, Any]]:
@@ -73,10 +76,10 @@ def _translated_once(own: str) -> list[tuple[Any, str, Any]]:
     Numba does them for every callee as well, and once more for each caller on the way up. Kernels are reached
     through entries only, so that work is lost.
     """
-    if not all(hasattr(CPUCodeLibrary, name) for name in ("_optimize_final_module", "_finalize_final_module")):
+    if len(_STEPS) < 3 or "_compile_for_args" not in vars(Dispatcher):
         return []
-    optimise, finish = CPUCodeLibrary._optimize_final_module, CPUCodeLibrary._finalize_final_module
-    executable = CPUContext.get_executable
+    (_, _, optimise), (_, _, finish), (_, _, executable) = _STEPS
+    call = vars(Dispatcher)["_compile_for_args"]
 
     def optimise_entry(library):
         if library.name == own:
@@ -93,7 +96,14 @@ def _translated_once(own: str) -> list[tuple[Any, str, Any]]:
             return executable(context, library, fndesc, env)
         return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "not callable", 0, env, (library,))
 
+    def compile_for_call(dispatcher, *args, **kws):
+        """A call from Python, of a signal's handler or a finalizer, is none of this entry's."""
+        with ExitStack() as stack:
+            _exchange(stack, _STEPS)
+            return call(dispatcher, *args, **kws)
+
     return [
+        (Dispatcher, "_compile_for_args", compile_for_call),
         (CPUCodeLibrary, "_optimize_final_module", optimise_entry),
         (CPUCodeLibrary, "_finalize_final_module", finish_entry),
         (CPUContext, "get_executable", executable_of_entry),

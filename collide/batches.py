@@ -7,7 +7,7 @@ unions are taken apart into pairs of parts and put together again by `unions.py`
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from itertools import pairwise
 
@@ -44,7 +44,7 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
         return out
     pieces = iter(_pieces(n, workers, fewest))
 
-    def work(_worker: int) -> None:
+    def work() -> None:
         for part in pieces:  # a thread takes the next as it becomes free: pairs do not all cost the same
             one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
             X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
@@ -55,7 +55,18 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
                 _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
                 raise
 
-    list(_pool(workers).map(work, range(workers)))
+    at_work: list[Future] = []
+    try:
+        try:
+            at_work.extend(_pool(workers).submit(work) for _ in range(workers))
+        except RuntimeError:  # no more threads are to be had, or Python is ending: this one does what is left
+            work()
+        for one in at_work:
+            one.result()
+    finally:  # after an error as well nobody writes into the caller's axes any more
+        for _ in pieces:
+            pass
+        wait(at_work)
     return out
 
 

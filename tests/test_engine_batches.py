@@ -6,6 +6,7 @@ import gc
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -263,6 +264,35 @@ def test_axes_save_time_and_change_nothing(threads):
             assert np.array_equal(collide.collide(*pair, axes=axes, threads=threads), expected)
             assert np.array_equal(axes[expected], start[expected]), "axes of hits are left alone"
             assert np.array_equal(collide.collide(*pair, axes=axes, threads=threads), expected)
+
+
+def test_nobody_writes_axes_after_an_error():
+    """The first thread to fail was told of while the others went on."""
+    box, n = collide.Box((1, 1, 1)), 100_000
+    X_WB = np.tile(EYE, (n, 1, 1))
+    X_WB[:, 0, 3] = np.linspace(1.1, 3, n)
+    X_WB[0, 0, 0] = 2.0
+    axes = np.zeros((n, 3))
+    with pytest.raises(InvalidPose, match=r"X_WB\[0\]"):
+        collide.collide(box, box, EYE, X_WB, axes=axes, threads=2)
+    after = axes.copy()
+    time.sleep(0.3)
+    assert np.array_equal(axes, after)
+
+
+def test_threads_are_done_without_where_python_ends():
+    """Of a thread that outlives the main one, and at exit, no more can be started."""
+    code = (
+        "import atexit, threading, numpy as np, collide\n"
+        "box, X = collide.Box((1, 1, 1)), np.tile(np.eye(4), (5000, 1, 1))\n"
+        "ask = lambda: print(collide.collide(box, box, X, X, threads=2).all())\n"
+        "collide.collide(box, box, X, X)\n"
+        "atexit.register(ask)\n"
+        "def late():\n    threading.main_thread().join()\n    ask()\n"
+        "threading.Thread(target=late).start()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+    assert run.stdout == "True\nTrue\n", run.stderr[-2000:]
 
 
 def test_axes_that_come_back_part_the_bodies():

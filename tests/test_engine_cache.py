@@ -171,3 +171,46 @@ def test_compiling_leaves_numba_and_the_garbage_collector_as_they_were(tmp_path)
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert child.stdout == "as before\n", child.stderr[-3000:]
+
+
+#: Compiles an entry, and a function of somebody else's, while another entry is compiled: as a signal's handler would.
+NESTED = """
+import numba
+from numba.core.cpu import CPUContext
+from collide import _jit
+
+@_jit.entry("float64(float64)")
+def outer(x):
+    return 2.0 * x
+
+@_jit.entry("float64(float64)")
+def inner(x):
+    return 3.0 * x
+
+@numba.njit
+def somebody_elses(x):
+    return 5.0 * x
+
+went_on, meanwhile = CPUContext.post_lowering, []
+
+def interrupted(self, module, library):
+    CPUContext.post_lowering = went_on
+    meanwhile.extend([inner(1.0), somebody_elses(1.0)])
+    return went_on(self, module, library)
+
+CPUContext.post_lowering = interrupted
+assert outer(1.0) == 2.0
+assert meanwhile == [3.0, 5.0] == [inner(1.0), somebody_elses(1.0)], meanwhile
+print(_jit._Locator(outer._function)._py_file)
+"""
+
+
+def test_what_else_is_compiled_meanwhile_is_compiled_as_well(tmp_path):
+    script = tmp_path / "nested.py"
+    script.write_text(NESTED)
+    root = str(Path(collide.__file__).parent.parent)
+    child = subprocess.run(
+        [sys.executable, script], env={**os.environ, "COLLIDE_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": root},
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert child.stdout == f"{script}\n", child.stderr[-3000:]

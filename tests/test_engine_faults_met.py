@@ -328,3 +328,24 @@ sys.late = Late()
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout == b"None" or done.stdout.startswith(b"<built-in method collide_single "), done.stdout
+
+
+def test_points_of_pairs_beyond_the_limit_do_not_depend_on_what_was_asked_before():
+    """Parted by the first plane, they were weighed with what the pair before had left in the workspace."""
+    box = collide.Box((1, 1, 1))
+    union = collide.Compound([(box, pose(t=(0, 0, 0.1))), (collide.Sphere(0.3), EYE)])
+    bodies = [box, collide.Sphere(0.5), collide.Cylinder(0.3, 1), collide.ConvexHull(np.eye(4, 3), radius=0.1), union]
+    others = pose(t=(1.2, 0.3, 0.2)), pose(t=(-1.7, 0.3, 2)), pose(t=(0.1, 0.1, 0.2)), pose(t=(0.3, 2, -1.1))
+    for A in bodies:
+        for B in bodies:
+            seen = set()
+            for X in others:
+                collide.distance(box, union, EYE, X)
+                r = collide.distance(A, B, EYE, pose(t=(3, 0.2, 0.1)), max_distance=0.1)
+                assert r.beyond
+                seen.add(r.rows.tobytes())
+            assert len(seen) == 1, (A, B)
+            if collide.Cylinder in (type(A), type(B)):
+                continue
+            for point, body, X in ((r.point_a, A, EYE), (r.point_b, B, pose(t=(3, 0.2, 0.1)))):
+                assert collide.distance(body, collide.Sphere(1e-9), X, pose(t=point)).distance <= 1e-9

@@ -141,6 +141,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
             lower = -math.inf  # not proven
     if lower - error - radius > limit:
         _set_parting(weights, tx, ty, tz, lower / span)
+        weights[0] = 1.0
         return APART, 1, lower, 0.0, 0
     # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     n = 1
