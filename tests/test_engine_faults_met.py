@@ -349,3 +349,40 @@ def test_points_of_pairs_beyond_the_limit_do_not_depend_on_what_was_asked_before
                 continue
             for point, body, X in ((r.point_a, A, EYE), (r.point_b, B, pose(t=(3, 0.2, 0.1)))):
                 assert collide.distance(body, collide.Sphere(1e-9), X, pose(t=point)).distance <= 1e-9
+
+
+def test_overlaps_of_curved_bodies_without_depths_have_a_common_point():
+    """EPA stopped at its first surface, and the points were NaN; or beside it, and they were in neither body."""
+    rng = rng_of("common points of curved overlaps")
+    for number in range(200):
+        points = rng.normal(size=(12 if number % 4 < 2 else 100, 3))
+        A = collide.ConvexHull(points)
+        radius, length = 10.0 ** rng.uniform(-1.5, 0.5, 2)
+        X_WA = random_pose(rng, 1.0)
+        X_WB = X_WA.copy()
+        X_WB[:3, 3] += rng.normal(size=3) * rng.choice([0.0, 1e-9, 0.2])
+        if number % 2:
+            X_WB[:3, :3] = random_pose(rng, 1.0)[:3, :3]
+        r = collide.distance(A, collide.Cylinder(radius, length), X_WA, X_WB, signed=False)
+        told = f"{number}: {radius!r}, {length!r}, {X_WA.tolist()!r}, {X_WB.tolist()!r}"
+        if not r.hit:
+            continue
+        assert (r.point_a == r.point_b).all(), told
+        a = X_WA[:3, :3].T @ (r.point_a - X_WA[:3, 3])
+        assert naive.distance_to_body(r.point_a, A, X_WA) < 1e-12, f"{a} is not in the hull, {told}"
+        x, y, z = X_WB[:3, :3].T @ (r.point_b - X_WB[:3, 3])
+        assert max(math.hypot(x, y) - radius, abs(z) - length / 2) < 1e-12 * (radius + length + 2.0), told
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-20, 1e20])
+def test_a_needle_of_a_facet_does_not_turn_the_normal_of_a_depth(scale):
+    """Two boxes turned alike, of which one is tiny: a facet as thin as a rounding named a direction of its own."""
+    cube = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    rng = rng_of("needles of facets", scale)
+    for _ in range(40):
+        X = random_pose(rng, scale)
+        A = collide.ConvexHull(cube * scale, radius=float(rng.choice([0.0, 0.05])) * scale)
+        B = collide.ConvexHull(cube * scale * rng.choice([1e-6, 1e-3]))
+        r = collide.distance(A, B, X, X)
+        missed = np.abs(r.point_b - r.point_a - r.distance * r.normal).max()
+        assert missed < 1e-12 * max(2.0 * scale, float(np.abs(X[:3, 3]).max())), (missed, X.tolist(), A, B)

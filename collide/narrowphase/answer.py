@@ -27,7 +27,7 @@ from collide.narrowphase.bounds import (
 )
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa.expand import FLAT, epa, facet_of, height_over
-from collide.narrowphase.epa.foot import weigh_nearest
+from collide.narrowphase.epa.foot import weigh_nearest, weigh_origin
 from collide.narrowphase.epa.refine import refine
 from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.surface import FACET, number, workspace
@@ -201,6 +201,9 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
             _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
             _name_plane(spanning, view_i64(integers_at + 8 * _TIED, ENTRY))
         return depth, -depth, above, shallowest, deepest, nx, ny, nz, n, shown, rounds
+    if not depths and not boolean and surface > error and weigh_origin(workspace(epa_at, ids_at), count, points, ids, weights):
+        # A common point is wanted, and EPA stopped before it knew any way out.
+        return surface, -math.inf, -surface, shallowest, deepest, 0.0, 0.0, 1.0, 4, 4, rounds
     bound = -depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
     width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
     # The foot misses the surface by as much as doubles leave between that and the plane.
@@ -211,7 +214,11 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
             view_i64(integers_at + 8 * _TIED, ENTRY), count, vertices, size, slop, error,
         )  # fmt: skip
         if sound:
-            shallowest, depth, deepest, nx, ny, nz, facet = low, level, high, ux, uy, uz, nearest
+            shallowest = low
+            deepest = high
+            # A facet as thin as a rounding has no direction of its own; EPA's plane is then the better one.
+            if high <= depth + 2.0 * error:
+                depth, nx, ny, nz, facet = level, ux, uy, uz, nearest
     polytope = workspace(epa_at, ids_at)
     facet = number(facet)
     x = depth * nx

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel
+from collide.geometry.packing import POINTS
 from collide.narrowphase.grown_simplex import pick, with_newest
 from collide.narrowphase.minkowski import (
     POINT,
@@ -272,7 +273,13 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
 
 @kernel(inline=True)
 def _of_same_lists(pair):
-    """The squared cosine of that angle for a pair's support trees."""
+    """The squared cosine of that angle for a pair's support trees; 2, so that there is none, beside a curved core.
+
+    A curved core never repeats a point. Runs would converge towards what lies in one list, and again in the next: some
+    came to the last round.
+    """
+    if pair[3] != POINTS or pair[9] != POINTS:
+        return 2.0
     n = max(pair[1] if pair[17] != 0 else 64, pair[7] if pair[18] != 0 else 64)
     return 1.0 - _SAME_LISTS / n
 

@@ -279,7 +279,7 @@ def faces_in_sight(points, error):
 
 @kernel
 def weigh_enclosed(points, weights):
-    """Weights of the first four points at the origin, which lies among them: ratios of volumes."""
+    """Weights of the first four points at the origin, which lies among them: ratios of volumes; False if they are flat."""
     ax = points[0]
     ay = points[1]
     az = points[2]
@@ -296,7 +296,10 @@ def weigh_enclosed(points, weights):
     ny = fz * gx - fx * gz
     nz = fx * gy - fy * gx
     volume = ex * nx + ey * ny + ez * nz
+    if volume == 0.0:
+        return False
     weights[1] = max(-(ax * nx + ay * ny + az * nz) / volume, 0.0)
     weights[2] = max(-(ax * (gy * ez - gz * ey) + ay * (gz * ex - gx * ez) + az * (gx * ey - gy * ex)) / volume, 0.0)
     weights[3] = max(-(ax * (ey * fz - ez * fy) + ay * (ez * fx - ex * fz) + az * (ex * fy - ey * fx)) / volume, 0.0)
     weights[0] = max(1.0 - weights[1] - weights[2] - weights[3], 0.0)
+    return True

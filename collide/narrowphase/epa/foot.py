@@ -16,6 +16,7 @@ import math
 from collide._jit import kernel
 from collide.narrowphase.epa.surface import FACET, number
 from collide.narrowphase.minkowski import POINT
+from collide.narrowphase.simplex import weigh_enclosed
 
 
 @kernel
@@ -143,6 +144,38 @@ def weigh_nearest(surface, count, facet, points, ids, weights, with_ids, x, y, z
             if best <= enough:
                 break
     return best
+
+
+@kernel
+def weigh_origin(surface, count, points, ids, weights):
+    """A vertex and the facet across the origin from it become points 0 … 3, weighted for the origin among them."""
+    source, _, _, _, source_ids, facets, _, _, _ = surface
+    best = math.inf
+    chosen = -1
+    for turn in range(count + 1):
+        f = turn if turn < count else chosen
+        if f < 0:
+            break
+        for k in range(4):
+            v = 0 if k == 0 else number(facets[FACET * f + k - 1])
+            for j in range(POINT):
+                points[POINT * k + j] = source[POINT * v + j]
+            ids[2 * k] = source_ids[2 * v]
+            ids[2 * k + 1] = source_ids[2 * v + 1]
+        if facets[FACET * f] == 0 or facets[FACET * f + 1] == 0 or facets[FACET * f + 2] == 0:
+            continue
+        if not weigh_enclosed(points, weights):
+            continue
+        away = 0.0
+        for axis in range(3):
+            at = 0.0
+            for k in range(4):
+                at += weights[k] * points[POINT * k + axis]
+            away += abs(at)
+        if away < best:
+            best = away
+            chosen = f
+    return chosen >= 0
 
 
 @kernel(inline=True)
