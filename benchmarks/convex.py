@@ -6,7 +6,7 @@
 
 Tables: hulls of n points on a sphere, an ellipsoid 1:3:10, a pancake 1:50, and cylinders (two n/2-gons);
 "shapes", random pairs of hundreds of different hulls, whose data are in no cache; "single", one Python call
-a pair; "threads", two Python threads with half the batch each; "cgal", our boolean beside the times published
+a pair; "threads", large batches with `threads=2`; "cgal", our boolean beside the times published
 for CGAL's hull hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of
 touching, a third 5 to 50 % deep, shuffled into one batch; all engines get the same. Engines take turns in
 one run, and ratios are of medians. Ours is a batch call, coal and python-fcl are Python loops, each at
@@ -25,7 +25,6 @@ import re
 import statistics
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -70,7 +69,7 @@ TOUCHING = 1e-6
 # --- ours ---------------------------------------------------------------------------------------
 
 
-def ours(asked: Scene, table: str) -> dict:
+def ours(asked: Scene, table: str, threads: int = 1) -> dict:
     """question -> a function of no arguments that answers the whole scene."""
     from collide import collide, distance
 
@@ -90,9 +89,9 @@ def ours(asked: Scene, table: str) -> dict:
             "signed": lambda: [distance(A, B, eye, X) for X in poses],
         }
     return {
-        "boolean": lambda: collide(A, B, eye, X_WBs),
-        "signed": lambda: distance(A, B, eye, X_WBs),
-        "unsigned": lambda: distance(A, B, eye, X_WBs, signed=False),
+        "boolean": lambda: collide(A, B, eye, X_WBs, threads=threads),
+        "signed": lambda: distance(A, B, eye, X_WBs, threads=threads),
+        "unsigned": lambda: distance(A, B, eye, X_WBs, signed=False, threads=threads),
     }
 
 
@@ -166,24 +165,14 @@ def compared(table: str, n: int, asked: Scene, engines: list[str], repeats: int)
 
 
 def threaded(n: int, asked: Scene, repeats: int) -> list[dict]:
-    """One thread with all poses, two threads with half of them each."""
-    half = len(asked.which) // 2
-    whole = ours(asked, "threads")
-    halves = [ours(asked.only(np.arange(k, k + half)), "threads") for k in (0, half)]
-    pools = [ThreadPoolExecutor(1) for _ in halves]  # a pool of two could give both halves to one thread
+    """The same batch by one thread and by two."""
+    alone, together = ours(asked, "threads"), ours(asked, "threads", threads=2)
     times: dict[tuple[str, str, str], list[float]] = {}
-
-    def both(question: str) -> None:
-        for work in [pool.submit(part[question]) for pool, part in zip(pools, halves)]:
-            work.result()
-
     for _ in range(repeats + 1):
-        for question, task in whole.items():
-            one, two = seconds_of(task), seconds_of(lambda q=question: both(q))
+        for question, task in alone.items():
+            one, two = seconds_of(task), seconds_of(together[question])
             times.setdefault((question, "collide", "mix"), []).append(one / len(asked.which) * 1e6)
-            times.setdefault((question, "two threads", "mix"), []).append(two / (2 * half) * 1e6)
-    for pool in pools:
-        pool.shutdown()
+            times.setdefault((question, "two threads", "mix"), []).append(two / len(asked.which) * 1e6)
     return [row("threads", n, *key, warm) for key, (_, *warm) in times.items()]
 
 
@@ -280,10 +269,16 @@ def tell(text: str) -> None:
     print(text, flush=True)
 
 
+#: Poses of each class that two threads share: they pay in batches that take ten milliseconds.
+_FOR_THREADS = 20_000
+
+
 def measure(table: str, n: int, poses: int, repeats: int, engines: list[str]) -> list[dict]:
     kind = table if table in ("sphere", "ellipsoid", "cylinder", "pancake") else "sphere"
     # As many different hulls as fill a cache many times over and still are made in a minute.
     shapes = min(500, max(60, 500_000 // n)) if table == "shapes" else 2
+    if table == "threads":
+        poses = max(poses, _FOR_THREADS)
     count = max(10, min(poses, poses * 8192 // n))
     say(f"{table}, n = {n}: placing {count} poses of each class" + (f" of {shapes} shapes" if shapes > 2 else ""))
     asked = scene(kind, n, count, shapes)
