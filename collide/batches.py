@@ -30,10 +30,13 @@ def length_of(A, B, X_WA, X_WB) -> int:
     return max(lengths) if min(lengths) else 0
 
 
-def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None, depths=True) -> np.ndarray:
+def ask(
+    A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None, depths=True, close=None
+) -> np.ndarray:
     """bool[n], or a row a pose, of a batch in at most so many threads.
 
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
+    close : called with the rows of each piece when they are done, by the thread that did them.
     """
     n = length_of(A, B, X_WA, X_WB)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
@@ -41,6 +44,8 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
     workers = min(workers, n // fewest)
     if workers < 2:
         _answer_into(out, A, B, X_WA, X_WB, boolean, limit, check, axes, depths)
+        if close is not None:
+            close(out)
         return out
     pieces = iter(_pieces(n, workers, fewest))
 
@@ -51,6 +56,8 @@ def ask(A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int
             own = None if axes is None else axes[part]
             try:
                 _answer_into(out[part], one, other, X_WO, X_WT, boolean, limit, check, own, depths)
+                if close is not None:
+                    close(out[part])
             except InvalidPose:
                 _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
                 raise

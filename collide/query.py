@@ -12,7 +12,7 @@ from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
-from collide.results import UNDECIDED, PairResult
+from collide.results import PairResult
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
@@ -184,13 +184,15 @@ def distance(
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
     X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
     _prepare(A, B)
-    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed)
-    rows["b"] = 1
-    if not signed:
-        _forget_depths(rows)
-    endless = np.isneginf(rows["distance"])
-    if endless.any():
-        k = int(np.argmax(endless))
+    endless = []
+
+    def close(rows: np.ndarray) -> None:
+        if run.close(rows, depths=signed):
+            endless.append(True)
+
+    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed, close=close)
+    if endless:
+        k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
         raise UnsupportedQuery(
             f"distance of {type(_one(A, k)).__name__} and {type(_one(B, k)).__name__}{where}: their overlap has no "
@@ -210,22 +212,8 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
         walks.walk_body(shape, algorithm)
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
-    rows["b"] = 1
-    if not signed:
-        _forget_depths(rows)
+    run.close(rows, depths=signed)
     return PairResult(rows, single, (A, B, X_WA, X_WB))
-
-
-def _forget_depths(rows: np.ndarray) -> None:
-    """Overlaps become distance 0, in place."""
-    hits = rows["hit"]
-    middle = 0.5 * (rows["point_a"][hits] + rows["point_b"][hits])
-    rows["distance"][hits], rows["normal"][hits] = 0.0, 0.0
-    rows["point_a"][hits] = rows["point_b"][hits] = middle
-    rows["lower"] = np.maximum(rows["lower"], 0.0)
-    decided = rows["how"] != UNDECIDED
-    rows["upper"][hits & decided] = 0.0
-    rows["certified"][hits] = decided[hits]
 
 
 def check_distance(name: str, value) -> float:

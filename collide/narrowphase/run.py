@@ -12,6 +12,7 @@ from collide.errors import UnsupportedQuery
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
+from collide.narrowphase.closing import close_rows
 from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.decide_planes import decide_planes
 from collide.narrowphase.deepen import deepen_pairs
@@ -154,6 +155,11 @@ def run_poses(
             if boolean:
                 out[start:done] = rows["hit"]
     return True
+
+
+def close(rows: np.ndarray, *, depths: bool) -> bool:
+    """Finish rows of `distance` in place: `closing.close_rows`."""
+    return bool(close_rows(address_of(rows), len(rows), depths))
 
 
 class _Workspace:
