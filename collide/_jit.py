@@ -22,6 +22,7 @@ import hashlib
 import logging
 import os
 import pickle
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -339,4 +340,21 @@ def address_of(array: np.ndarray) -> int:
     """Address of a C-contiguous array's first element. The caller keeps the array alive."""
     if not array.flags.c_contiguous:
         raise ValueError("kernels read C-contiguous buffers")
-    return array.ctypes.data
+    return _data_of(array)
+
+
+def _data_of(array: np.ndarray) -> int:
+    """``array.ctypes.data``, in a fifth of its microsecond: batches of a few poses ask ten times."""
+    return ctypes.c_size_t.from_address(id(array) + object.__basicsize__).value
+
+
+def _is_where_data_stands() -> bool:
+    """Whether numpy's arrays begin as its headers say: an object's own words, then the data pointer."""
+    probes = [np.zeros(3), np.zeros((2, 4), dtype=np.uint8)[1], np.zeros(0)]
+    return all(_data_of(probe) == probe.ctypes.data for probe in probes)
+
+
+if sys.implementation.name != "cpython" or not _is_where_data_stands():
+
+    def _data_of(array: np.ndarray) -> int:  # type: ignore[no-redef]
+        return array.ctypes.data
