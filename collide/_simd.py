@@ -28,6 +28,17 @@ _NOWHERE = 1 << 62
 @intrinsic
 def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
     """(index, value) of the largest x·gx + y·gy + z·gz; described in `geometry/scan.py`."""
+    return _farthest(coordinates, _scan)
+
+
+@intrinsic
+def farthest_of_list(_context, coordinates, start, stride, count, gx, gy, gz):
+    """The same, fastest where the number of points is 9 to 48, and another one every time."""
+    return _farthest(coordinates, _scan_list)
+
+
+def _farthest(coordinates, scan):
+    """Signature and code of a scan of products."""
     if not (isinstance(coordinates, types.Array) and coordinates.ndim == 1 and coordinates.layout == "C"):
         raise TypingError("coordinates must be a contiguous one-dimensional view")
     if coordinates.dtype != types.float64:
@@ -37,7 +48,7 @@ def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
 
     def codegen(context, builder, signature, args):
         data = make_array(signature.args[0])(context, builder, args[0]).data
-        value, index = _scan(builder, _products(builder, data, *args[1:3], *args[4:]), args[3])
+        value, index = scan(builder, _products(builder, data, *args[1:3], *args[4:]), args[3])
         return context.make_tuple(builder, signature.return_type, [index, value])
 
     return signature, codegen
@@ -98,18 +109,30 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
 
 def _scan(builder: ir.IRBuilder, values, count):
     """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on."""
-    zero = ir.Constant(_I64, 0)
+    return _scan_by_count(builder, values, count, ((1, _scan_one), (4, _scan_few(4))))
+
+
+def _scan_list(builder: ir.IRBuilder, values, count):
+    """`_scan` with fewer branches: a count that changes from one call to the next is not predicted."""
+    return _scan_by_count(builder, values, count, ((6, _scan_few(6)),))
+
+
+def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
+    """A scan of up to so many blocks in each of several ways, and of more in a loop."""
     last = builder.sub(count, ir.Constant(_I64, LANES))
-    blocks = {name: builder.append_basic_block(name) for name in ("one", "more", "four", "many", "done")}
-    builder.cbranch(builder.icmp_signed("==", last, zero), blocks["one"], blocks["more"])
-    builder.position_at_end(blocks["more"])
-    builder.cbranch(builder.icmp_signed("<=", last, ir.Constant(_I64, 3 * LANES)), blocks["four"], blocks["many"])
+    done = builder.append_basic_block("done")
     found = []
-    for name, scan in (("one", _scan_one), ("four", _scan_four), ("many", _scan_many)):
-        builder.position_at_end(blocks[name])
+    for most, scan in (*ways, (None, _scan_many)):
+        following = None
+        if most is not None:
+            this, following = builder.append_basic_block("few"), builder.append_basic_block("more")
+            builder.cbranch(builder.icmp_signed("<=", last, ir.Constant(_I64, (most - 1) * LANES)), this, following)
+            builder.position_at_end(this)
         found.append((scan(builder, values, last), builder.block))
-        builder.branch(blocks["done"])
-    builder.position_at_end(blocks["done"])
+        builder.branch(done)
+        if following is not None:
+            builder.position_at_end(following)
+    builder.position_at_end(done)
     value, index = builder.phi(_F64), builder.phi(_I64)
     for (one_value, one_index), block in found:
         value.add_incoming(one_value, block)
@@ -124,21 +147,27 @@ def _scan_one(builder, values, _last):
     return largest, _first_holding(builder, numbers, largest)
 
 
-def _scan_four(builder, values, last):
-    """`_scan` of up to 32, in four blocks that may overlap: what is seen twice ties with itself."""
-    zero, one = (ir.Constant(_I64, LANES * blocks) for blocks in range(2))
-    second = builder.select(builder.icmp_signed("<", one, last), one, last)
-    third = builder.sub(last, one)
-    third = builder.select(builder.icmp_signed("<", third, zero), zero, third)
-    starts = (zero, second, third, last)
-    numbers = [values(start) for start in starts]
-    pairs = [_larger(builder, numbers[k], numbers[k + 1]) for k in (0, 2)]
-    largest = _largest(builder, _larger(builder, *pairs))
-    lowest = None
-    for start, block in zip(starts, numbers):
-        index = builder.add(start, _first_holding(builder, block, largest))
-        lowest = index if lowest is None else builder.select(builder.icmp_signed("<", index, lowest), index, lowest)
-    return largest, lowest
+def _scan_few(blocks):
+    """`_scan` of no more than so many blocks, which may overlap: what is seen twice ties with itself."""
+
+    def scan(builder, values, last):
+        def least(a, b):
+            return builder.select(builder.icmp_signed("<", b, a), b, a)
+
+        starts = [least(ir.Constant(_I64, LANES * k), last) for k in range(blocks)]
+        numbers = [values(start) for start in starts]
+        largest = _largest(builder, _in_pairs(numbers, lambda a, b: _larger(builder, a, b)))
+        places = [builder.add(start, _first_holding(builder, block, largest)) for start, block in zip(starts, numbers)]
+        return largest, _in_pairs(places, least)
+
+    return scan
+
+
+def _in_pairs(items, better):
+    """The best of a list, found as in a tournament."""
+    while len(items) > 1:
+        items = [better(*items[k : k + 2]) if k + 1 < len(items) else items[k] for k in range(0, len(items), 2)]
+    return items[0]
 
 
 def _scan_many(builder, values, last):

@@ -6,27 +6,32 @@ import numpy as np
 import pytest
 
 from collide._jit import address_of, entry, view_f64, view_i64
-from collide.geometry.scan import farthest, farthest_one_by_one
+from collide.geometry.scan import farthest, farthest_listed, farthest_one_by_one
 from collide.geometry.supports import support_vertex
 
 COUNTS = (*range(8, 140), *range(144, 513, 8), 511, 1024, 2047, 2048)
 
 
-def _scan_all(at_coordinates, size, start, stride, count, at_directions, n, vectors, at_index, at_value):
+WAYS = ("one by one", "vectors", "vectors for lists")
+
+
+def _scan_all(at_coordinates, size, start, stride, count, at_directions, n, way, at_index, at_value):
     coordinates = view_f64(at_coordinates, size)
     g = view_f64(at_directions, 3 * n)
     index = view_i64(at_index, n)
     value = view_f64(at_value, n)
     for i in range(n):
-        if vectors:
+        if way == 1:
             index[i], value[i] = farthest(coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2])
+        elif way == 2:
+            index[i], value[i] = farthest_listed(coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2])
         else:
             index[i], value[i] = farthest_one_by_one(
                 coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2]
             )
 
 
-scan_all = entry("void(int64,int64,int64,int64,int64,int64,int64,boolean,int64,int64)")(_scan_all)
+scan_all = entry("void(int64,int64,int64,int64,int64,int64,int64,int64,int64,int64)")(_scan_all)
 
 
 def _support(at_coordinates, n, m, gx, gy, gz):
@@ -36,13 +41,13 @@ def _support(at_coordinates, n, m, gx, gy, gz):
 support = entry("int64(int64,int64,int64,float64,float64,float64)")(_support)
 
 
-def scanned(coordinates, start, stride, count, directions, vectors=True):
+def scanned(coordinates, start, stride, count, directions, way=1):
     """(indices, values) for every direction."""
     assert start >= 0 and start + 2 * stride + count <= len(coordinates)
     index, value = np.empty(len(directions), dtype=np.int64), np.empty(len(directions))
     scan_all(
         address_of(coordinates), len(coordinates), start, stride, count, address_of(directions), len(directions),
-        vectors, address_of(index), address_of(value),
+        way, address_of(index), address_of(value),
     )  # fmt: skip
     return index, value
 
@@ -57,11 +62,10 @@ def expected(coordinates, start, stride, count, direction):
 
 
 def check(coordinates, start, stride, count, directions):
-    got = scanned(coordinates, start, stride, count, directions)
-    one_by_one = scanned(coordinates, start, stride, count, directions, vectors=False)
+    got = [scanned(coordinates, start, stride, count, directions, way) for way in range(len(WAYS))]
     for i, direction in enumerate(directions):
         want = expected(coordinates, start, stride, count, direction)
-        for name, (index, value) in (("vectors", got), ("one by one", one_by_one)):
+        for name, (index, value) in zip(WAYS, got):
             assert (index[i], value[i].tobytes()) == (want[0], np.float64(want[1]).tobytes()), (
                 f"{name}: ({index[i]}, {value[i]!r}), not {want}: coordinates = "
                 f"np.array({coordinates.tolist()}); start, stride, count = {start}, {stride}, {count}; g = {direction.tolist()}"

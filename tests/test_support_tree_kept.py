@@ -15,6 +15,7 @@ from collide.geometry.support_tree.build import LONGEST_LIST, build_support_tree
 from collide.geometry.support_tree.layout import SupportTree
 from collide.geometry.support_tree.query import COUNTERS, extreme_vertices
 from collide.geometry.support_tree.settle import LOOKED_AT, SCANNED, STEPS
+from collide.geometry.support_tree.spread import nested_order
 from collide.geometry.support_tree.validate import validate_support_tree
 
 pytest.importorskip("scipy.spatial")
@@ -59,8 +60,13 @@ def test_operations_grow_like_the_logarithm():
 def test_owners_of_long_lists_leave_the_coarse_subsets(monkeypatch):
     """What the degree alone does not show: here it is told to look at nothing."""
     monkeypatch.setattr(build, "HIGHEST_DEGREE", 10**9)
-    usual = build.mixed
-    monkeypatch.setattr(build, "mixed", lambda rows: np.where(rows < 4000, usual(rows), np.uint64(0)))  # apexes first
+    usual = build.nested_order
+
+    def apexes_first(vertices, normals, late, sizes):
+        ordered = usual(vertices, normals, late, sizes)
+        return ordered[np.argsort((ordered < 4000) | late[ordered], kind="stable")]
+
+    monkeypatch.setattr(build, "nested_order", apexes_first)
     points, facets = bipyramid(4000)
     tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
     assert np.diff(tree.nodes).max() <= LONGEST_LIST
@@ -68,6 +74,35 @@ def test_owners_of_long_lists_leave_the_coarse_subsets(monkeypatch):
     validate_support_tree(tree, samples=50)
     monkeypatch.setattr(build, "_ATTEMPTS", 1)
     assert np.diff(build_support_tree(points, np.arange(len(points)), facets, hull_of).nodes).max() > 2000
+
+
+@pytest.mark.parametrize("name", ["sphere", "pancake", "needle", "ellipsoid"])
+def test_no_list_is_much_longer_than_the_others(name):
+    """Of random subsets one in ten is longer than one and a half times the average."""
+    lengths = np.diff(made(name, large=True)[2].nodes)[1:]
+    assert np.quantile(lengths, 0.9) < 1.4 * lengths.mean() and lengths.max() < 2.5 * lengths.mean()
+
+
+def test_subsets_are_nested_and_late_vertices_come_last():
+    rng = np.random.default_rng(17)
+    vertices, normals = rng.permutation(5000)[:1000], rng.normal(size=(1000, 3))
+    normals[:50] = 0
+    late = rng.random(1000) < 0.3
+    ordered = nested_order(vertices, normals, late, [1000, 42, 3])
+    assert np.array_equal(np.sort(ordered), np.sort(vertices))
+    assert not np.isin(ordered[:42], vertices[late]).any()
+    assert np.isin(nested_order(vertices, normals, np.ones(1000, dtype=bool), [1000, 42]), vertices).all()
+    few = np.arange(1000) >= 20  # a subset larger than what is not late takes the first of the others
+    assert np.isin(vertices[:20], nested_order(vertices, normals, few, [1000, 42])[:42]).all()
+
+
+def test_neighbours_on_the_curve_are_neighbours_on_the_sphere():
+    rng = np.random.default_rng(18)
+    normals = rng.normal(size=(20_000, 3))
+    normals /= np.sqrt(np.square(normals).sum(axis=1))[:, None]
+    ordered = normals[nested_order(np.arange(20_000), normals, np.zeros(20_000, dtype=bool), [20_000])]
+    steps = np.sqrt(np.square(np.diff(ordered, axis=0)).sum(axis=1))
+    assert np.median(steps) < 1.5 * np.sqrt(4 * np.pi / 20_000) and (steps > 0.2).sum() < 20
 
 
 def test_a_vertex_of_many_neighbours_is_proven_by_few():
@@ -114,8 +149,8 @@ def changed(name, place, value):
 
 DAMAGES = {
     "version": changed("support_tree", 0, 99),
-    "depth too large": changed("support_tree", 2, 3),
-    "depth too small": changed("support_tree", 2, 1),
+    "depth too large": lambda arrays: changed("support_tree", 2, arrays["support_tree"][2] + 1)(arrays),
+    "depth too small": lambda arrays: changed("support_tree", 2, arrays["support_tree"][2] - 1)(arrays),
     "depth 0": changed("support_tree", 2, 0),
     "depth below 0": changed("support_tree", 2, -1),
     "a missing array": lambda arrays: arrays.pop("ring"),
@@ -161,7 +196,8 @@ def test_other_points_are_refused():
 
 
 def test_validation_sees_what_loading_cannot():
-    points, _, tree = made("sphere")
+    points, _, tree = made("ellipsoid")
+    assert tree.depth == 2
     arrays = tree.to_arrays()
     changed("ring", 0, (arrays["ring"][0] + 100) % len(points))(arrays)
     with pytest.raises(AssertionError):

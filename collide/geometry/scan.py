@@ -45,9 +45,11 @@ def count_level_one_by_one(coordinates, stride, count, gx, gy, gz, limit):
 
 
 if PLAIN_PYTHON:
-    farthest, least, count_level = farthest_one_by_one, least_one_by_one, count_level_one_by_one
+    farthest = farthest_listed = farthest_one_by_one
+    least, count_level = least_one_by_one, count_level_one_by_one
 else:
     from collide._simd import farthest_of_blocks as farthest
+    from collide._simd import farthest_of_list as farthest_listed
     from collide._simd import least_of_blocks as least
     from collide._simd import level_in_blocks as count_level
 
@@ -56,7 +58,10 @@ else:
 #: ``start + i`` of the view, its y ``stride`` later, its z 2·``stride`` later. The lowest index wins
 #: among equal values (−0 equals 0, and is given as 0), so copies that fill up a block never win over what they copy.
 #: Values must not be NaN. O(count).
+#: ``farthest_listed``: the same for lists of some 40 points whose lengths differ.
 #: ``least(numbers, count) -> index``: of the least of the first ``count`` numbers, 8 or more.
 #: ``count_level(coordinates, stride, count, gx, gy, gz, limit) -> found``: how many of the first ``count`` points, a
 #: multiple of 8, have a product at most the limit.
-__all__ = ["count_level", "count_level_one_by_one", "farthest", "farthest_one_by_one", "least", "least_one_by_one"]
+__all__ = [
+    "count_level", "count_level_one_by_one", "farthest", "farthest_listed", "farthest_one_by_one", "least", "least_one_by_one",
+]  # fmt: skip

@@ -7,6 +7,7 @@ is closest where this set is nearest the origin, overlaps where it contains the 
 from __future__ import annotations
 
 from collide._jit import kernel
+from collide.geometry.support_tree.query import two_extreme_vertices
 from collide.geometry.supports import settled_vertex, support
 
 #: Doubles stored a difference point: w, then a and b in W's axes from their own body's origin.
@@ -14,9 +15,15 @@ POINT = 9
 
 
 @kernel
+def listed_difference_point(pair, points, ids, k, dx, dy, dz, listed_a, listed_b):
+    """`inlined_difference_point` of whole bodies, called: a copy at every place where one is asked for took 8 s to compile."""
+    return inlined_difference_point(pair, points, ids, k, dx, dy, dz, False, listed_a, listed_b)
+
+
+@kernel(inline=True)
 def difference_point(pair, points, ids, k, dx, dy, dz):
-    """`inlined_difference_point`, called: a copy at every place where one is asked for took 8 s to compile."""
-    return inlined_difference_point(pair, points, ids, k, dx, dy, dz, False, -1, -1)
+    """The same by walks through whole support trees."""
+    return listed_difference_point(pair, points, ids, k, dx, dy, dz, -1, -1)
 
 
 @kernel(inline=True)
@@ -30,22 +37,30 @@ def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse, listed_a,
     listed_a, listed_b : lists to look in alone, or −1.
     """
     (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b, coarse_a, coarse_b) = pair
-    ia, ax, ay, az, listed_a = support(
-        kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, coarse_a if coarse else 0, listed_a,
-        poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
-        poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
-        poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
-    )  # fmt: skip
-    ib, bx, by, bz, listed_b = support(
-        kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, coarse_b if coarse else 0, listed_b,
-        -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
-        -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
-        -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
-    )  # fmt: skip
+    ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
+    fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
+    if tree_a != 0 and tree_b != 0 and not coarse:
+        ia, ax, ay, az, listed_a, ib, bx, by, bz, listed_b = two_extreme_vertices(
+            tree_a, listed_a, ex, ey, ez, tree_b, listed_b, fx, fy, fz
+        )
+    else:
+        one, other = (coarse_a, coarse_b) if coarse else (0, 0)
+        ia, ax, ay, az, listed_a = support(kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, one, listed_a, ex, ey, ez)
+        ib, bx, by, bz, listed_b = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, other, listed_b, fx, fy, fz)
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
     _place(pair, points, k, ax, ay, az, bx, by, bz)
     return listed_a, listed_b
+
+
+@kernel(inline=True)
+def _turned_back(poses, p, dx, dy, dz):
+    """A direction of the world in the axes of a body."""
+    return (
+        poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
+        poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
+        poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
+    )
 
 
 @kernel(inline=True)
@@ -86,19 +101,11 @@ def settle_point(pair, points, ids, k, dx, dy, dz):
     ia = ids[2 * k]
     ib = ids[2 * k + 1]
     if tree_a != 0:
-        ia = settled_vertex(
-            coords_a, n_a, m_a, tree_a, ia,
-            poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
-            poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
-            poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
-        )  # fmt: skip
+        ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
+        ia = settled_vertex(coords_a, n_a, m_a, tree_a, ia, ex, ey, ez)
     if tree_b != 0:
-        ib = settled_vertex(
-            coords_b, n_b, m_b, tree_b, ib,
-            -(poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz),
-            -(poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz),
-            -(poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz),
-        )  # fmt: skip
+        fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
+        ib = settled_vertex(coords_b, n_b, m_b, tree_b, ib, fx, fy, fz)
     if ia == ids[2 * k] and ib == ids[2 * k + 1]:
         return
     at = POINT * k

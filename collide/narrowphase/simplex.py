@@ -130,6 +130,12 @@ def nearest_in_simplex(points, n, weights, faces):
     return best
 
 
+@kernel
+def nearest_of_all(points, n, weights, faces):
+    """`nearest_in_simplex`, called: it is asked for at two places, and seldom."""
+    return nearest_in_simplex(points, n, weights, faces)
+
+
 @kernel(inline=True)
 def across_simplex(points, n, vx, vy, vz):
     """The direction v made orthogonal to the edge or face of the first n = 2 or 3 points.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
 #: so that an answer does not depend on what was asked before.
-FEWEST_POINTS = 384
+FEWEST_POINTS = 224
 
 
 class ConvexHull(Shape):

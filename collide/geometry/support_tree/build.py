@@ -1,8 +1,7 @@
-"""Makes a support tree from a hull: nested random subsets of its vertices, and candidate lists between them.
+"""Makes a support tree from a hull: nested subsets of its vertices, and candidate lists between them.
 
-Any subset of a hull's vertices is in convex position, so subsets need no geometry to choose: a fixed
-mixing function decides. What stands between two subsets is worked out by `lists.py`, from the edges of
-the hull of the finer one.
+Any subset of a hull's vertices is in convex position; `spread.py` chooses. What stands between two subsets
+is worked out by `lists.py`, from the edges of the hull of the finer one.
 """
 
 from __future__ import annotations
@@ -14,10 +13,12 @@ import numpy as np
 from collide._jit import address_of
 from collide.geometry.support_tree.layout import FEWEST, SupportTree, list_coordinates_of
 from collide.geometry.support_tree.lists import STACK, candidate_lists, order_rings
+from collide.geometry.support_tree.spread import nested_order
 
 #: Vertices to one of the next coarser subset: at the finest level, where lists decide the memory, and above.
-#: Measured on spheres: 32 is as fast as 16, since a list costs latency more than length, and takes 8 bytes less.
-FINE_RATIO, RATIO = 32, 16
+#: Measured on spheres, where lists of 24 have 37 entries: 32 makes gaps 5 to 10 % slower and takes 3 bytes less, 16
+#: is as fast and takes 5 more.
+FINE_RATIO, RATIO = 24, 16
 #: Scanned as a whole: a hull of at most so many vertices, and a subset.
 SMALL_HULL, LARGEST_SCAN = 160, 100
 #: A vertex with more neighbours stays out of coarse subsets: all its neighbours would be its candidates.
@@ -93,6 +94,11 @@ class Rings:
             self._leave_out(n, len(upper))
         self.normals = np.stack([normal, -normal]) / np.sqrt((normal * normal).sum())
 
+    def vertex_normals(self) -> np.ndarray:
+        """(n, 3) a direction in which each vertex is extreme: the sum of its facets' unit normals, 0 without facets."""
+        sums = np.concatenate([np.zeros((1, 3)), np.cumsum(self.normals[self.ring_facets], axis=0)])
+        return sums[self.starts[1:]] - sums[self.starts[:-1]]
+
     def _leave_out(self, point: int, n_upper: int) -> None:
         """Forget the last point, which closed a disc, and name the two sides as facets 0 and 1."""
         keep = self.ring != point
@@ -124,7 +130,7 @@ def build_support_tree(
     closed, triangulated, counter-clockwise from outside, without facets of no area. A flat hull has both
     sides, triangulated alike. Vertices may lie on an edge or a facet of the hull; they take no part in queries.
     hull_of : points (m, 3) in convex position → such facets, rows of what it was given. It is asked for the
-    hulls of random subsets, of h / ratio vertices and fewer; a vertex it leaves out costs speed only.
+    hulls of subsets, of h / ratio vertices and fewer; a vertex it leaves out costs speed only.
     ratio : vertices to one of the first coarser subset; memory goes down with it, time up.
 
     Raises ValueError where the surface is not closed. Expected O(h log h) without the hulls.
@@ -146,9 +152,9 @@ def build_support_tree(
     if corner.sum() >= 3:
         vertices, degree = vertices[corner], degree[corner]
     late = degree > HIGHEST_DEGREE
-    order = mixed(vertices)
+    normals, sizes = rings.vertex_normals()[vertices], subset_sizes(len(vertices), ratio)
     for attempt in range(_ATTEMPTS):
-        tree = _built(points, scaled, vertices[np.lexsort((order, late))], rings, hull_of, ratio)
+        tree = _built(points, scaled, nested_order(vertices, normals, late, sizes), sizes, rings, hull_of)
         long = _owners_of_long_lists(tree)
         if not len(long) or attempt == _ATTEMPTS - 1:
             return tree
@@ -162,14 +168,6 @@ def subset_sizes(h: int, ratio: int = FINE_RATIO) -> list[int]:
     while sizes[-1] > (SMALL_HULL if len(sizes) == 1 else LARGEST_SCAN):
         sizes.append(-(-sizes[-1] // (ratio if len(sizes) == 1 else RATIO)))
     return sizes
-
-
-def mixed(rows: np.ndarray) -> np.ndarray:
-    """Numbers that look random, one for each row number, always the same (Steele's splitmix64)."""
-    z = (rows.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return z ^ (z >> np.uint64(31))
 
 
 class _Growing:
@@ -200,9 +198,8 @@ class _Growing:
         self.depth += 1
 
 
-def _built(points, scaled, ordered, rings: Rings, hull_of, ratio) -> SupportTree:
+def _built(points, scaled, ordered, sizes, rings: Rings, hull_of) -> SupportTree:
     """The tree whose subsets are the first so many of ``ordered``; worked out on ``scaled`` points."""
-    sizes = subset_sizes(len(ordered), ratio)
     place = np.full(len(points), -1, dtype=np.int64)
     place[ordered] = np.arange(len(ordered))
     growing = _Growing(scaled)

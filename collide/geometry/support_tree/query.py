@@ -4,8 +4,8 @@ Every list holds the vertices of the next subset whose normal cones meet the nor
 owner, so the walk ends at the extreme vertex, up to the rounding of the products compared. The number
 of lists is logarithmic in the number of vertices, the length of a list does not depend on it.
 Nested subsets of a hull's vertices are Dobkin and Kirkpatrick's ("Fast detection of polyhedral
-intersection", 1983); random ones, with lists of all that a coarse answer leaves possible, are Clarkson's
-("A randomized algorithm for closest-point queries", 1988).
+intersection", 1983); lists of all that a coarse answer leaves possible are Clarkson's ("A randomized
+algorithm for closest-point queries", 1988).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
-from collide.geometry.scan import farthest
+from collide.geometry.scan import farthest_listed
 from collide.geometry.support_tree.layout import (
     AT_ENTRIES,
     AT_LIST_COORDINATES,
@@ -35,6 +35,15 @@ from collide.geometry.support_tree.settle import SCANNED, climb
 COUNTERS = 4
 
 
+@kernel(inline=True)
+def _scan(nodes, entries, coordinates, node, gx, gy, gz):
+    """(entry, where its x stands, length) of the best of node's list."""
+    begin = nodes[node]
+    count = nodes[node + 1] - begin
+    k, _ = farthest_listed(coordinates, 3 * begin, count, count, gx, gy, gz)
+    return entries[begin + k], 3 * begin + k, count
+
+
 @kernel
 def walk(nodes, entries, coordinates, listed, depth, gx, gy, gz, counters):
     """(entry, x, y, z, the list it stands in) that ``depth`` ≥ 1 scans from a list on lead to.
@@ -46,14 +55,20 @@ def walk(nodes, entries, coordinates, listed, depth, gx, gy, gz, counters):
     count = 0
     for _ in range(depth):
         listed = node
-        begin = nodes[node]
-        count = nodes[node + 1] - begin
-        k, _ = farthest(coordinates, 3 * begin, count, count, gx, gy, gz)
-        node = entries[begin + k]
-        at = 3 * begin + k
+        node, at, count = _scan(nodes, entries, coordinates, node, gx, gy, gz)
         if len(counters) > 0:
             counters[SCANNED] += count
     return node, coordinates[at], coordinates[at + count], coordinates[at + 2 * count], listed
+
+
+@kernel(inline=True)
+def _lists_of(tree_at, listed):
+    """(nodes, entries, coordinates, how many scans)."""
+    header = view_i64(tree_at, HEADER)
+    nodes = view_i32(header[AT_NODES], header[NODES] + 1)
+    entries = view_i32(header[AT_ENTRIES], header[ENTRIES])
+    coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES])
+    return nodes, entries, coordinates, header[DEPTH] if listed < 0 else 1
 
 
 @kernel
@@ -64,11 +79,32 @@ def extreme_vertex_listed(tree_at, listed, gx, gy, gz, counters):
         one scan often finds what the walk would; whether it has is for the caller to ask in the end.
     counters : (COUNTERS,) int64 that is added to, or empty.
     """
-    header = view_i64(tree_at, HEADER)
-    nodes = view_i32(header[AT_NODES], header[NODES] + 1)
-    entries = view_i32(header[AT_ENTRIES], header[ENTRIES])
-    coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES])
-    return walk(nodes, entries, coordinates, max(listed, 0), header[DEPTH] if listed < 0 else 1, gx, gy, gz, counters)
+    nodes, entries, coordinates, depth = _lists_of(tree_at, listed)
+    return walk(nodes, entries, coordinates, max(listed, 0), depth, gx, gy, gz, counters)
+
+
+@kernel(inline=True)
+def two_extreme_vertices(tree_a, listed_a, ax, ay, az, tree_b, listed_b, bx, by, bz):
+    """`extreme_vertex_listed` of two trees, a scan of one and a scan of the other in turns; nothing is counted.
+
+    A scan waits for the one before it more than it works: in turns, both walks take hardly longer than one.
+    """
+    nodes_a, entries_a, coordinates_a, depth_a = _lists_of(tree_a, listed_a)
+    nodes_b, entries_b, coordinates_b, depth_b = _lists_of(tree_b, listed_b)
+    node_a = max(listed_a, 0)
+    node_b = max(listed_b, 0)
+    at_a = at_b = count_a = count_b = 0
+    for level in range(max(depth_a, depth_b)):
+        if level < depth_a:
+            listed_a = node_a
+            node_a, at_a, count_a = _scan(nodes_a, entries_a, coordinates_a, node_a, ax, ay, az)
+        if level < depth_b:
+            listed_b = node_b
+            node_b, at_b, count_b = _scan(nodes_b, entries_b, coordinates_b, node_b, bx, by, bz)
+    return (
+        node_a, coordinates_a[at_a], coordinates_a[at_a + count_a], coordinates_a[at_a + 2 * count_a], listed_a,
+        node_b, coordinates_b[at_b], coordinates_b[at_b + count_b], coordinates_b[at_b + 2 * count_b], listed_b,
+    )  # fmt: skip
 
 
 @kernel
