@@ -109,7 +109,7 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
 
 def _scan(builder: ir.IRBuilder, values, count):
     """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on."""
-    return _scan_by_count(builder, values, count, ((1, _scan_one), (4, _scan_few(4))))
+    return _scan_by_count(builder, values, count, ((1, _scan_one), (4, _scan_few(4)), (8, _scan_few(8)), (16, _scan_few(16))))
 
 
 def _scan_list(builder: ir.IRBuilder, values, count):
@@ -148,17 +148,33 @@ def _scan_one(builder, values, _last):
 
 
 def _scan_few(blocks):
-    """`_scan` of no more than so many blocks, which may overlap: what is seen twice ties with itself."""
+    """`_scan` of no more than so many blocks, the last ones perhaps the same: what is seen twice ties with itself.
+
+    All products stay in registers; which of them is the largest is asked when that is known. Keeping its index beside
+    the largest so far takes half as long again.
+    """
 
     def scan(builder, values, last):
         def least(a, b):
             return builder.select(builder.icmp_signed("<", b, a), b, a)
 
-        starts = [least(ir.Constant(_I64, LANES * k), last) for k in range(blocks)]
-        numbers = [values(start) for start in starts]
+        def held(numbers):  # a bit a number
+            word = None
+            for k, block in enumerate(numbers):
+                bits = builder.zext(_holding(builder, block, largest), _I64)
+                bits = builder.shl(bits, ir.Constant(_I64, LANES * k)) if k else bits
+                word = bits if word is None else builder.or_(word, bits)
+            return word
+
+        numbers = [values(least(ir.Constant(_I64, LANES * k), last)) for k in range(blocks)]
         largest = _largest(builder, _in_pairs(numbers, lambda a, b: _larger(builder, a, b)))
-        places = [builder.add(start, _first_holding(builder, block, largest)) for start, block in zip(starts, numbers)]
-        return largest, _in_pairs(places, least)
+        place = builder.cttz(held(numbers[:8]), ir.Constant(ir.IntType(1), 0))
+        if blocks > 8:
+            behind = builder.cttz(held(numbers[8:]), ir.Constant(ir.IntType(1), 0))
+            first = builder.icmp_signed("<", place, ir.Constant(_I64, 8 * LANES))
+            place = builder.select(first, place, builder.add(behind, ir.Constant(_I64, 8 * LANES)))
+        lane = builder.and_(place, ir.Constant(_I64, LANES - 1))
+        return largest, builder.add(least(builder.sub(place, lane), last), lane)
 
     return scan
 
@@ -215,11 +231,13 @@ def _largest(builder, numbers):
 
 
 def _first_holding(builder, numbers, largest):
-    """The first of eight that equals the largest; beyond every index where none does."""
-    holds_it = builder.fcmp_ordered("==", numbers, _splat(builder, largest, _VALUES))
-    bits = builder.or_(builder.zext(builder.bitcast(holds_it, _I8), _I64), ir.Constant(_I64, _NOWHERE))
-    lane = builder.cttz(bits, ir.Constant(ir.IntType(1), 1))
-    return lane
+    """The first of eight that equals the largest."""
+    return builder.cttz(builder.zext(_holding(builder, numbers, largest), _I64), ir.Constant(ir.IntType(1), 0))
+
+
+def _holding(builder, numbers, largest):
+    """A bit of eight for each of the numbers that equals the largest."""
+    return builder.bitcast(builder.fcmp_ordered("==", numbers, _splat(builder, largest, _VALUES)), _I8)
 
 
 def _later(builder, best, found):
