@@ -1,12 +1,15 @@
 """Numba's compiler without the work that kernels have no use for: half the seconds of a first call.
 
-Everything here changes how long compiling takes, not what comes out of it, and only while an entry is
-compiled. Each step was measured on `answer_pairs` (226 kernels, 27 s with numba as it is but for the first):
+Everything here is done only while an entry is compiled, and all but the last changes how long compiling takes,
+not what comes out of it. Each step was measured on `answer_pairs` (226 kernels, 27 s with numba as it is but
+for the first):
 
 * optimise and translate the entry alone, with all it calls linked in (half of 40 s);
 * remember what type an operator gives for types of operands: 22,000 times of 22,600 the answer is known (5 s);
 * look for garbage rarely: hundreds of megabytes of syntax trees live to the end anyway (3 s);
-* leave out two passes for what kernels do not have, and numba's checks of its own passes (3 s).
+* leave out two passes for what kernels do not have, and numba's checks of its own passes (3 s);
+* do not let negative indices count from the end: no kernel has any, but wherever the compiler cannot know that, it
+  compares, adds and selects at every access (NUMBERS).
 
 Where a numba has no such part, that step is left out: slower, not wrong.
 """
@@ -20,7 +23,7 @@ from functools import lru_cache
 from typing import Any
 
 from numba import _dynfunc
-from numba.core import base, compiler
+from numba.core import base, compiler, types
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager
@@ -28,7 +31,10 @@ from numba.core.cpu import CPUContext
 from numba.core.dispatcher import _DispatcherBase as Dispatcher
 from numba.core.targetconfig import TargetConfig
 from numba.core.types.functions import BaseFunction
+from numba.np import arrayobj
 
+#: How the names of kernels begin, as numba writes them in machine code.
+_OF_COLLIDE = "_ZN7collide"
 #: Passes for functions within functions and for expressions of whole arrays, of which kernels have none.
 _UNUSED_PASSES = {"InlineClosureLikes", "NopythonRewrites"}
 #: New objects between two looks for garbage while an entry is compiled; Python's own 700 make it look 20,000 times.
@@ -119,6 +125,7 @@ def _without_idle_work() -> list[tuple[Any, str, Any]]:
         (base, "_has_loc", lru_cache(maxsize=None)),
         (TargetConfig, "values", _values_of_options),
         (PassManager, "_ENFORCING", lambda _own: False),
+        (arrayobj, "fix_integer_index", _without_counting_from_the_end),
         *((builder, name, _without_unused_passes) for name in pipelines),
     ]
     return [(owner, name, change(getattr(owner, name))) for owner, name, change in changed if name in vars(owner)]
@@ -137,6 +144,18 @@ def _remembering_types(call_type):
         return known[key][1]
 
     return remembered
+
+
+def _without_counting_from_the_end(fixed):
+    """Numba's index of an array, where an integer below 0 is one counted from the end: in kernels as it is."""
+
+    def index(context, builder, kind, value, size):
+        # By name: a function of numba's or of somebody else's, compiled meanwhile, may have such indices.
+        if not builder.function.name.startswith(_OF_COLLIDE):
+            return fixed(context, builder, kind, value, size)
+        return context.cast(builder, value, kind, types.intp if kind.signed else types.uintp)
+
+    return index
 
 
 def _values_of_options(_own):

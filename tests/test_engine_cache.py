@@ -10,11 +10,14 @@ import os
 import shutil
 import subprocess
 import sys
+import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import collide
+from collide._jit import PLAIN_PYTHON, address_of, entry, view_f64
 
 #: Asks for a bounding box: the smallest kernel, whose callee `support_vertex` stands in another file.
 CHILD = """
@@ -176,6 +179,7 @@ def test_compiling_leaves_numba_and_the_garbage_collector_as_they_were(tmp_path)
 #: Compiles an entry, and a function of somebody else's, while another entry is compiled: as a signal's handler would.
 NESTED = """
 import numba
+import numpy as np
 from numba.core.cpu import CPUContext
 from collide import _jit
 
@@ -188,21 +192,35 @@ def inner(x):
     return 3.0 * x
 
 @numba.njit
-def somebody_elses(x):
-    return 5.0 * x
+def somebody_elses(numbers, i):
+    return numbers[i]
 
 went_on, meanwhile = CPUContext.post_lowering, []
 
 def interrupted(self, module, library):
     CPUContext.post_lowering = went_on
-    meanwhile.extend([inner(1.0), somebody_elses(1.0)])
+    meanwhile.extend([inner(1.0), somebody_elses(np.array([1.0, 5.0]), -1)])
     return went_on(self, module, library)
 
 CPUContext.post_lowering = interrupted
 assert outer(1.0) == 2.0
-assert meanwhile == [3.0, 5.0] == [inner(1.0), somebody_elses(1.0)], meanwhile
+assert meanwhile == [3.0, 5.0] == [inner(1.0), somebody_elses(np.array([1.0, 5.0]), -1)], meanwhile
 print(_jit._Locator(outer._function)._py_file)
 """
+
+
+def _element(at, n, i):
+    return view_f64(at, n)[i]
+
+
+@pytest.mark.skipif(PLAIN_PYTHON, reason="Python counts from the end")
+@pytest.mark.parametrize("module, found", [("collide.errors", 4.0), ("json", 7.0)])
+def test_indices_of_kernels_do_not_count_from_the_end(module, found):
+    """They are used as they are: what lies before a view is read."""
+    element = types.FunctionType(_element.__code__, {**globals(), "__name__": module}, "element")
+    element.__module__, element.__qualname__ = module, "element"
+    numbers = np.arange(10.0)
+    assert entry("float64(int64, int64, int64)")(element)(address_of(numbers) + 40, 3, -1) == found
 
 
 def test_what_else_is_compiled_meanwhile_is_compiled_as_well(tmp_path):
