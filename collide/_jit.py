@@ -37,7 +37,7 @@ from numba.core.caching import FunctionCache, _CacheLocator
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-from collide._lean_compile import lean_compiling
+from collide._lean_compile import SELDOM, lean_compiling
 from collide.cache_folder import cache_folder
 
 log = logging.getLogger("collide")
@@ -49,14 +49,17 @@ _FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 _KERNEL_SOURCES = ("_jit.py", "_lanes.py", "_lean_compile.py", "_simd.py", "results.py", "geometry", "broadphase", "narrowphase")
 
 
-def kernel(function: Callable | None = None, *, inline: bool = False) -> Callable:
+def kernel(function: Callable | None = None, *, inline: bool = False, seldom: bool = False) -> Callable:
     """A function that other kernels call; compiled into its callers.
 
     inline : copy its code to where it is called. A call that hands over a pair's tuple of views moves
         some fifty words; functions called once or twice in the innermost loop save that.
+    seldom : it is called on few of the ways through its callers, which the compiler then makes fast at its expense.
     """
     if function is None:
-        return lambda wrapped: kernel(wrapped, inline=inline)
+        return lambda wrapped: kernel(wrapped, inline=inline, seldom=seldom)
+    if seldom:
+        SELDOM.add((function.__module__, function.__qualname__))
     dispatcher = numba.njit(function, **_FLAGS, forceinline=inline, no_cpython_wrapper=True, no_cfunc_wrapper=True)
     if not PLAIN_PYTHON:
         _compile_once_for_all_constants(dispatcher)

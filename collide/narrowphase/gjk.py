@@ -153,23 +153,25 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         _set_parting(weights, tx, ty, tz, lower / span)
         weights[0] = 1.0
         return APART, 1, lower, 0.0, 0
-    # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     n = 1
-    at_a = 0
-    at_b = 1
-    at_c = 2
-    at_d = 3
-    ax = points[0]
-    ay = points[1]
-    az = points[2]
-    bx = by = bz = 0.0
-    cx = cy = cz = 0.0
-    wa = 1.0
-    wb = 0.0
-    wc = 0.0
-    vx = ax
-    vy = ay
-    vz = az
+    weights[0] = 1.0
+    for axis in range(3):
+        weights[4 + axis] = points[axis]
+    tilt = _tilt(pair)
+    if tilt > 0.0 and not look:
+        height = -_height(points, 0, tx, ty, tz) / span  # of the plane through point 0 across t
+        square = points[0] * points[0] + points[1] * points[1] + points[2] * points[2]
+        shift = tilt * reach_of_both(pair)
+        if -_FAIR * tilt * shift < height < _FAR * math.sqrt(square) and square - height * height < shift * shift:
+            coarse = False
+            n = _surround(pair, points, ids, weights, tx / span, ty / span, tz / span, height, tilt, listed_a, listed_b)
+    # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
+    at_a, at_b, at_c, at_d = 0, 1, 2, 3
+    ax, ay, az = points[0], points[1], points[2]
+    bx, by, bz = points[POINT], points[POINT + 1], points[POINT + 2]
+    cx, cy, cz = points[2 * POINT], points[2 * POINT + 1], points[2 * POINT + 2]
+    wa, wb, wc = weights[0], weights[1], weights[2]
+    vx, vy, vz = weights[4], weights[5], weights[6]
     square = vx * vx + vy * vy + vz * vz
     status = NEAREST
     clearance = 0.0
@@ -178,19 +180,6 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     uy = -ty
     uz = -tz
     squared_cosine = _of_same_lists(pair)
-    tilt = _tilt(pair)
-    if tilt > 0.0 and not look:
-        height = -_height(points, 0, tx, ty, tz) / span  # of the plane through point 0 across t
-        shift = tilt * reach_of_both(pair)
-        if -_FAIR * tilt * shift < height < _FAR * math.sqrt(square) and square - height * height < shift * shift:
-            coarse = False
-            n = _surround(pair, points, ids, weights, tx / span, ty / span, tz / span, height, tilt, listed_a, listed_b)
-            ax, ay, az = points[0], points[1], points[2]
-            bx, by, bz = points[POINT], points[POINT + 1], points[POINT + 2]
-            cx, cy, cz = points[2 * POINT], points[2 * POINT + 1], points[2 * POINT + 2]
-            wa, wb, wc = weights[0], weights[1], weights[2]
-            vx, vy, vz = weights[4], weights[5], weights[6]
-            square = vx * vx + vy * vy + vz * vz
     used = 0
     while used < rounds:
         used += 1
@@ -300,7 +289,7 @@ def _tilt(pair):
     return _TILT / math.sqrt(n) if n > _FEW and pair[3] == POINTS and pair[9] == POINTS else 0.0
 
 
-@kernel
+@kernel(seldom=True)
 def _surround(pair, points, ids, weights, tx, ty, tz, height, tilt, listed_a, listed_b):
     """Add two points on either side of where the origin lies beside point 0; returns how many are kept.
 
@@ -377,7 +366,7 @@ def _repeated(ids, n, at_a, at_b, at_c, at_d):
     return n > 2 and ids[2 * at_c] == i and ids[2 * at_c + 1] == j
 
 
-@kernel
+@kernel(seldom=True)
 def _in_order(points, ids, n, at_a, at_b, at_c, at_d):
     """Bring the n points A, B, C to the front, and D behind them; returns where all of them stand then."""
     if at_a != 0:
