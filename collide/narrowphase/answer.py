@@ -53,6 +53,7 @@ from collide.narrowphase.rows import (
     VERTICES_A,
     VERTICES_B,
     write_vectors,
+    write_decision,
     write_verdict,
     write_vertices,
 )
@@ -240,14 +241,15 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
 
 @kernel(inline=True)
 def _swept(
-    pair, terms_at, shape_a, part_a, shape_b, part_b, row, words, marks, doubles_at, integers_at, boolean, depths, limit,
-    size, slop, error, exactly, flip, row_number,
+    pair, closed_form, terms_at, shape_a, part_a, shape_b, part_b, row, words, marks, doubles_at, integers_at, boolean, depths,
+    limit, size, slop, error, exactly, flip, row_number,
 ):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii.
 
+    closed_form : both cores are points or segments.
     Returns the kind of gap of a row that waits for its last digits and is finished then (`waiting.py`), or −1.
     """
-    (_, n_a, _, kind_a, _, p, _, n_b, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
+    (_, _, _, kind_a, _, p, _, _, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
     radius_a = numbers[NUMBERS * shape_a + RADIUS]
     radius_b = numbers[NUMBERS * shape_b + RADIUS]
     radius = radius_a + radius_b
@@ -260,7 +262,6 @@ def _swept(
     for axis in range(3):
         weights[7 + axis] = sign * row[NORMAL + axis]
     view_i64(integers_at + 8 * _TIED, 2)[1] = 0
-    closed_form = method(kind_a, n_a, kind_b, n_b) == CAPSULES
     if closed_form:
         depth, bound, above, nx, ny, nz = _segments(pair, points, ids, weights, error)
         n, vertices, rounds = 4, 4, 0
@@ -295,7 +296,10 @@ def _swept(
         rounding = 4.0 * 2.0**-53 * radius
         lower = max(lower, -deepest - radius - rounding)
         upper = min(upper, -shallowest - radius + rounding)
-    write_verdict(row, marks, distance, lower, upper, how, width, limit)
+    if boolean and decided:
+        write_decision(row, marks, distance, lower, upper, how, limit)
+    else:
+        write_verdict(row, marks, distance, lower, upper, how, width, limit)
     unfinished = marks[CERTIFIED] == 0 and (depth < -error or radius > 0.0) and (depths or upper > 0.0)
     if width == 0.0 and (not decided or unfinished or vague):
         marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
@@ -493,6 +497,6 @@ def _answer(
         )
         return -1
     return _swept(
-        pair, terms_at, sa, pair[5] // POSE, sb, pair[11] // POSE, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+        pair, how == CAPSULES, terms_at, sa, pair[5] // POSE, sb, pair[11] // POSE, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
         slop, ERROR * size + slop, known, flip, row_number,
     )  # fmt: skip

@@ -62,12 +62,9 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     status, n, lower, clearance, used = _approach(
         pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
     )
-    if status != ENCLOSED:
+    if status != ENCLOSED and status != APART:
         length = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
-        over = 1.0 / length if length > 0.0 else 0.0
-        for axis in range(3):
-            weights[7 + axis] = weights[4 + axis] * over
-        if status != APART and length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
+        if length - lower > 0.5 * error and not (touch_suffices and length + error <= radius):
             dx, dy, dz = across_simplex(points, n, weights[4], weights[5], weights[6])
             along = math.sqrt(dx * dx + dy * dy + dz * dz)
             if along > 0.0:
@@ -81,8 +78,7 @@ def gjk(pair, points, ids, weights, touch_suffices, radius, limit, error, rounds
                     weights[8] = dy / along
                     weights[9] = dz / along
         # Where no plane separates, the run is open whatever made it stop.
-        if status != APART:
-            status = NEAREST if lower > error or (touch_suffices and length + error <= radius) else MEETING
+        status = NEAREST if lower > error or (touch_suffices and length + error <= radius) else MEETING
     return status, n, lower, clearance, used
 
 
@@ -109,11 +105,15 @@ def _direction(pair, weights):
 
 
 @kernel(inline=True)
-def _set_parting(weights, tx, ty, tz, along):
-    """The nearest point, as far as a plane across the direction t tells."""
-    weights[4] = -tx * along
-    weights[5] = -ty * along
-    weights[6] = -tz * along
+def _set_parting(weights, tx, ty, tz, span, lower):
+    """The nearest point, as far as a plane across the direction t, ``span`` long, tells; and the unit axis."""
+    over = -1.0 / span
+    weights[7] = tx * over
+    weights[8] = ty * over
+    weights[9] = tz * over
+    weights[4] = weights[7] * lower
+    weights[5] = weights[8] * lower
+    weights[6] = weights[9] * lower
 
 
 @kernel(inline=True)
@@ -129,7 +129,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         reach = reach_of_both(pair)
         lower = largest * span - reach
         if touch_suffices and lower - error - radius > limit:
-            _set_parting(weights, tx, ty, tz, lower / span)
+            _set_parting(weights, tx, ty, tz, span, lower)
             return APART, 0, lower, 0.0, 0
         look = coarse and largest * span < _LIKELY * reach
     # Lists of the support trees in which the last vertices were found; −1 for a walk from above.
@@ -150,7 +150,7 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
         else:
             lower = -math.inf  # not proven
     if lower - error - radius > limit:
-        _set_parting(weights, tx, ty, tz, lower / span)
+        _set_parting(weights, tx, ty, tz, span, lower)
         weights[0] = 1.0
         return APART, 1, lower, 0.0, 0
     n = 1
@@ -279,6 +279,11 @@ def _approach(pair, points, ids, weights, touch_suffices, radius, limit, error, 
     weights[4] = vx
     weights[5] = vy
     weights[6] = vz
+    length = math.sqrt(vx * vx + vy * vy + vz * vz)
+    over = 1.0 / length if length > 0.0 else 0.0
+    weights[7] = vx * over
+    weights[8] = vy * over
+    weights[9] = vz * over
     return status, n, lower, 0.0, used
 
 

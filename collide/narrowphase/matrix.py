@@ -26,7 +26,7 @@ from collide.geometry.packing import HALFSPACE, POINTS
 CAPSULES, HALFSPACE_CONVEX, HALFSPACES, CONVEX = range(4)
 
 
-@kernel
+@kernel(inline=True)
 def method(kind_a, n_a, kind_b, n_b):
     """CAPSULES, HALFSPACE_CONVEX, HALFSPACES or CONVEX; a half-space stands first."""
     if kind_a == HALFSPACE:

@@ -51,6 +51,18 @@ def write_vertices(words, marks, ids, n, flip):
 
 
 @kernel(inline=True)
+def write_decision(row, marks, distance, lower, upper, how, limit):
+    """`write_verdict` where the sign is known and nothing more is promised."""
+    row[LOWER] = lower
+    row[UPPER] = upper if lower <= limit else math.inf
+    row[DISTANCE] = (min(max(distance, lower), upper) if lower <= limit else lower) + 0.0
+    marks[HOW] = how
+    marks[HIT] = 0 if lower > 0.0 else 1
+    marks[CERTIFIED] = 1
+    marks[BEYOND] = 1 if lower > limit else 0
+
+
+@kernel(inline=True)
 def write_verdict(row, marks, distance, lower, upper, how, width, limit):
     """The numbers and flags of a row; rounding must not put the distance outside its own bracket.
 
