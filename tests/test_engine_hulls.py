@@ -234,3 +234,17 @@ def _rows(arrays) -> np.ndarray:
     """Rows of the points that entries stand for, in a tree of two levels."""
     first = arrays["nodes"][1]
     return np.concatenate([arrays["owners"][arrays["entries"][:first]], arrays["entries"][first:]])
+
+
+@pytest.mark.parametrize("n", [128, 512, 4096])
+def test_balls_that_nearly_touch_take_few_rounds(n):
+    """Counted. GJK that begins with one point of A ⊖ B alone takes 7.7, 9.7 and 11.6 rounds on average."""
+    rng = np.random.default_rng(n)
+    A, B = (collide.ConvexHull(_ball(rng, n)) for _ in range(2))
+    X_WB = np.array([collide.pose(3 * _ball(rng, 1)[0], rpy=rng.uniform(-3, 3, 3)) for _ in range(200)])
+    for _ in range(3):  # the nearest features change on the way
+        apart = collide.distance(A, B, EYE, X_WB)
+        X_WB[:, :3, 3] -= (apart.distance - rng.uniform(1e-3, 1e-2, 200))[:, None] * apart.normal
+    near = collide.distance(A, B, EYE, X_WB)
+    assert near.certified.all() and ((0 < near.distance) & (near.distance < 0.02)).mean() > 0.9
+    assert (near.iterations & 0xFFFF).mean() < 6.5
