@@ -52,8 +52,8 @@ from collide.narrowphase.rows import (
     UPPER,
     VERTICES_A,
     VERTICES_B,
-    write_vectors,
     write_decision,
+    write_vectors,
     write_verdict,
     write_vertices,
 )
