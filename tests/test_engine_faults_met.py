@@ -386,3 +386,12 @@ def test_a_needle_of_a_facet_does_not_turn_the_normal_of_a_depth(scale):
         r = collide.distance(A, B, X, X)
         missed = np.abs(r.point_b - r.point_a - r.distance * r.normal).max()
         assert missed < 1e-12 * max(2.0 * scale, float(np.abs(X[:3, 3]).max())), (missed, X.tolist(), A, B)
+
+
+def test_a_depth_whose_first_surface_rounding_spoils():
+    """Two prisms of 1,000 corners, 6.4e-17 deep: no surface that begins with the axes of the world could be closed."""
+    from collide.scenes.families import generate
+
+    r = collide.distance(*generate("cyl1000", 10, 105)[1].shapes())
+    assert r.certified and r.lower <= r.distance <= r.upper < 0
+    assert abs(r.distance + 6.449941917895806e-17) < 1e-27

@@ -84,6 +84,8 @@ _NEAR_MISS = 2.0**-48
 _WELL_INSIDE = 2.0**-10
 #: So many vertices of two cores are worth a better seed for EPA than GJK's.
 _MANY = 48
+#: EPA begins so often at most, of many vertices.
+_STARTS = 4
 #: Workspace of one thread: behind EPA's what waits for its last digits; the requests to the exact stage stand last.
 _WAITING_DOUBLES_AT, _WAITING_INTEGERS_AT = _OWN_DOUBLES + EPA_DOUBLES, _OWN_INTEGERS + EPA_INTEGERS
 REQUESTS_AT = _WAITING_INTEGERS_AT + WAITING_INTEGERS
@@ -190,26 +192,29 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
     many = depths and not curved and pair[1] + pair[7] > _MANY
     epa_at = doubles_at + 8 * _OWN_DOUBLES
     ids_at = integers_at + 8 * _OWN_INTEGERS
-    outcome, depth, surface, nx, ny, nz, facet, vertices, count = epa(
-        pair, points, ids, status == ENCLOSED, roomy, many, epa_at, ids_at, not depths, size, error, tolerance
-    )
-    rounds += 65536 * max(vertices - 4, 0)
     shallowest = -math.inf
     deepest = math.inf
-    if outcome == FLAT:
-        shown = n
-        if vertices == 3 and not curved:  # what spans it: for the exact stage, which may prove it flat
-            _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
-            _name_plane(spanning, view_i64(integers_at + 8 * _TIED, ENTRY))
-        return depth, -depth, above, shallowest, deepest, nx, ny, nz, n, shown, rounds
-    if not depths and not boolean and surface > error and weigh_origin(workspace(epa_at, ids_at), count, points, ids, weights):
-        # A common point is wanted, and EPA stopped before it knew any way out.
-        return surface, -math.inf, -surface, shallowest, deepest, 0.0, 0.0, 1.0, 4, 4, rounds
-    bound = -depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
-    width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
-    # The foot misses the surface by as much as doubles leave between that and the plane.
-    settled = surface > error and width <= PROMISE_DEPTH * (depth + radius) and depth - surface <= _NEAR_MISS * size
-    if exactly and depths and not settled:
+    for again in range(_STARTS):  # where rounding has spoilt a surface, one that begins elsewhere is often sound
+        outcome, depth, surface, nx, ny, nz, facet, vertices, count = epa(
+            pair, points, ids, status == ENCLOSED and again == 0, roomy, many, again, epa_at, ids_at, not depths, size, error,
+            tolerance,
+        )
+        rounds += 65536 * max(vertices - 4, 0)
+        if outcome == FLAT:
+            shown = n
+            if vertices == 3 and not curved:  # what spans it: for the exact stage, which may prove it flat
+                _, _, _, _, spanning, _, _, _, _ = workspace(epa_at, ids_at)
+                _name_plane(spanning, view_i64(integers_at + 8 * _TIED, ENTRY))
+            return depth, -depth, above, shallowest, deepest, nx, ny, nz, n, shown, rounds
+        if not depths and not boolean and surface > error and weigh_origin(workspace(epa_at, ids_at), count, points, ids, weights):
+            # A common point is wanted, and EPA stopped before it knew any way out.
+            return surface, -math.inf, -surface, shallowest, deepest, 0.0, 0.0, 1.0, 4, 4, rounds
+        bound = -depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
+        width = (depth - surface + 2.0 * error) * (1.0 + 2.0**-40)
+        # The foot misses the surface by as much as doubles leave between that and the plane.
+        settled = surface > error and width <= PROMISE_DEPTH * (depth + radius) and depth - surface <= _NEAR_MISS * size
+        if not exactly or not depths or settled:
+            break
         sound, low, level, high, ux, uy, uz, nearest, count = refine(
             pair, terms_at, epa_at, ids_at, doubles_at + 8 * _FINE, integers_at + 8 * _NEAREST, integers_at + 8 * _TIES,
             view_i64(integers_at + 8 * _TIED, ENTRY), count, vertices, size, slop, error,
@@ -220,6 +225,8 @@ def _cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, lim
             # A facet as thin as a rounding has no direction of its own; EPA's plane is then the better one.
             if high <= depth + 2.0 * error:
                 depth, nx, ny, nz, facet = level, ux, uy, uz, nearest
+        if sound or not many:  # of few vertices all planes are looked at instead (`deepen.py`)
+            break
     polytope = workspace(epa_at, ids_at)
     facet = number(facet)
     x = depth * nx

@@ -73,12 +73,13 @@ def _surface_clearance(clearances, count, error):
 
 @kernel(inline=True)
 def epa(
-    pair, simplex, simplex_ids, enclosed, roomy, many, doubles_at, integers_at, overlap_suffices, size, error, tolerance
+    pair, simplex, simplex_ids, enclosed, roomy, many, again, doubles_at, integers_at, overlap_suffices, size, error, tolerance
 ):  # fmt: skip
     """Expand until the nearest facet of A ⊖ B is known.
 
     simplex, simplex_ids : four points of A ⊖ B, which are ``enclosed`` if the origin is proven to lie among them, and
         ``roomy`` if it does so clear of rounding by far.   many : of vertices, so that rounds cost more than supports.
+    again : how often it has begun elsewhere.
     overlap_suffices : stop once the origin is proven inside (a boolean is asked).
     size, error : of the pair, as in `bounds.py`.   tolerance : stop once the bracket is this narrow.
 
@@ -103,7 +104,7 @@ def epa(
         ids[2 * k + 1] = simplex_ids[2 * k + 1]
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
     if not (enclosed and ((many and capped_tetrahedron(pair, points, ids, size)) or roomy)):
-        rank, nx, ny, nz = extremal_tetrahedron(pair, points, ids, error)
+        rank, nx, ny, nz = extremal_tetrahedron(pair, points, ids, error, again)
     if rank < 3:
         up = _extent(pair, points, ids, nx, ny, nz)
         down = _extent(pair, points, ids, -nx, -ny, -nz)

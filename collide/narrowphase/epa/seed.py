@@ -24,19 +24,27 @@ _SPACIOUS = 2.0**-16
 
 
 @kernel
-def extremal_tetrahedron(pair, points, ids, error):
-    """Points 0..3 become an extremal tetrahedron; returns (rank found, n) with n across what is flat."""
+def extremal_tetrahedron(pair, points, ids, error, again):
+    """Points 0..3 become an extremal tetrahedron; returns (rank found, n) with n across what is flat.
+
+    again : 0 for the axes of the world, else other ones, so that another tetrahedron is found.
+    """
     spare = EPA_VERTICES
     least = math.inf
     most = -math.inf
     # The farthest pair among extremes of the axes, by the axis of greatest width.
     for axis in range(3):
-        d0 = 1.0 if axis == 0 else 0.0
-        d1 = 1.0 if axis == 1 else 0.0
-        d2 = 1.0 if axis == 2 else 0.0
+        askew = 0.375 * again
+        d0 = 1.0 if axis == 0 else askew
+        d1 = 1.0 if axis == 1 else askew
+        d2 = 1.0 if axis == 2 else askew
         difference_point(pair, points, ids, spare, d0, d1, d2)
         difference_point(pair, points, ids, spare + 1, -d0, -d1, -d2)
-        width = points[POINT * spare + axis] - points[POINT * (spare + 1) + axis]
+        one = POINT * spare
+        other = POINT * (spare + 1)
+        width = d0 * (points[one] - points[other])
+        width += d1 * (points[one + 1] - points[other + 1])
+        width += d2 * (points[one + 2] - points[other + 2])
         if width > most:
             most = width
             copy_point(points, ids, spare, 0)
