@@ -155,6 +155,12 @@ if PLAIN_PYTHON:
         buffer = (ctypes.c_double * (LANES * int(n))).from_address(int(address))
         return _Rows(np.frombuffer(buffer).reshape(n, LANES))
 
+    def transpose_eight(addresses_at, target_at):
+        addresses = (ctypes.c_int64 * LANES).from_address(int(addresses_at))
+        rows = [np.frombuffer((ctypes.c_double * LANES).from_address(at)) for at in addresses]
+        target = (ctypes.c_double * (LANES * LANES)).from_address(int(target_at))
+        np.frombuffer(target).reshape(LANES, LANES)[:] = np.stack(rows, axis=1)
+
     def select(condition, a, b):
         if isinstance(condition, np.ndarray):
             return np.where(condition, a, b).view(_Eight)
@@ -187,6 +193,34 @@ else:
             return result._getvalue()
 
         return array(types.int64, types.int64), codegen
+
+    @intrinsic
+    def transpose_eight(_context, addresses_at, target_at):
+        """Number j of the eight doubles at the k-th address becomes lane k of the j-th Lanes at the target."""
+
+        def codegen(context, builder, _signature, args):
+            addresses, target = args
+            words = builder.inttoptr(addresses, _I64.as_pointer())
+            rows = []
+            for k in range(LANES):
+                at = builder.load(builder.gep(words, [ir.Constant(_I64, k)]))
+                rows.append(builder.load(builder.inttoptr(at, _VALUES.as_pointer()), align=8))
+            # Blocks of 1, 2 and 4 are exchanged across the diagonal.
+            for half in (1, 2, 4):
+                pairs = [k for k in range(LANES) if not k & half]
+                for k in pairs:
+                    first, second = rows[k], rows[k + half]
+                    low = [j if not j & half else j - half + LANES for j in range(LANES)]
+                    high = [j + half if not j & half else j + LANES for j in range(LANES)]
+                    for place, order in ((k, low), (k + half, high)):
+                        order = ir.Constant(ir.VectorType(ir.IntType(32), LANES), order)
+                        rows[place] = builder.shuffle_vector(first, second, order)
+            out = builder.inttoptr(target, _VALUES.as_pointer())
+            for k in range(LANES):
+                builder.store(rows[k], builder.gep(out, [ir.Constant(_I64, k)]), align=8)
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.int64), codegen
 
     @intrinsic
     def select(_context, condition, a, b):

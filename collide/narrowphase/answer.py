@@ -38,6 +38,7 @@ from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_w
 from collide.narrowphase.level import MOST_TIES
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.minkowski import POINT
+from collide.narrowphase.portals import look_through_portals
 from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import ENTRY, REQUESTS, add_request
 from collide.narrowphase.rows import (
@@ -459,8 +460,15 @@ def answer_pairs(
     nobody_waits(waiting_at)
     # Whoever still waits when all pairs have had their turn is seen to then, kind by kind.
     most = 1 if stop_at_hit else LANES
+    if boolean and not stop_at_hit:
+        look_through_portals(
+            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at,
+            doubles_at + 8 * _WAITING_DOUBLES_AT, waiting_at,
+        )  # fmt: skip
     for turn in range(n_pairs if boolean else n_pairs + KINDS):
         kind = turn - n_pairs
+        if boolean and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
+            continue
         if turn < n_pairs:
             kind = _answer(
                 ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1], turn, boolean,
