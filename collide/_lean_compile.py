@@ -23,7 +23,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 from numba import _dynfunc
@@ -212,7 +212,7 @@ def _variables_of(_statement, value) -> list:
     return found
 
 
-@lru_cache(maxsize=None)
+@cache
 def _kind_of(part: type) -> type | None:
     for kind in (ir.Var, ir.Inst, dict):
         if issubclass(part, kind):

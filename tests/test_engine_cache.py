@@ -186,7 +186,7 @@ def _statements(function):
 def test_variables_of_statements_are_those_numba_finds():
     from numba.core import ir
 
-    statements = [statement for function in (_statements, moved_pose) for statement in _statements(function)]
+    statements = [statement for function in (moved_pose, _doubled) for statement in _statements(function)]
     assert len(statements) > 100
     for statement in statements:
         own = _lean_compile._variables_of(statement, vars(statement))

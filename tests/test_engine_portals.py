@@ -53,7 +53,7 @@ def asked(n: int, *words) -> list[Case]:
         if k % 13 == 12:
             box = collide.Box((1.0, 0.5, 0.25))
             t = rng.choice([-1.0, 1.0], 3) * [1.0, 0.5, 0.25] * (rng.integers(3) != np.arange(3))
-            cases.append(Case(box, box, pose(t=(0.5, 2.0, 1.0)), pose(t=t + [0.5, 2.0, 1.0])))
+            cases.append(Case(box, box, pose(t=(0.5, 2.0, 1.0)), pose(t=t + np.array([0.5, 2.0, 1.0]))))
         else:
             cases.append(naive.with_gap(case, GAPS[k % 13]))
     return cases
