@@ -7,8 +7,8 @@ for the first):
 * optimise and translate the entry alone, with all it calls linked in (half of 40 s);
 * remember what type an operator gives for types of operands: 22,000 times of 22,600 the answer is known (5 s);
 * look for garbage rarely: hundreds of megabytes of syntax trees live to the end anyway (3 s);
-* ask LLVM once how large a type is, which takes a module of its own; import numba's registries once; find the variables
-  of statements in one list; tell nobody of 150,000 events to which nobody listens (together 1.3 s);
+* ask LLVM once how large a type is, which takes a module of its own; find the variables of statements in one list;
+  tell nobody of 150,000 events to which nobody listens (together 1 s);
 * leave out two passes for what kernels do not have, and numba's checks of its own passes (3 s);
 * do not let negative indices count from the end: no kernel has any, but wherever the compiler could not know that, it
   compared, added and selected at every access (kernels 3 to 9 % faster);
@@ -133,7 +133,6 @@ def _without_idle_work() -> list[tuple[Any, str, Any]]:
         (TargetConfig, "values", _values_of_options),
         (PassManager, "_ENFORCING", lambda _own: False),
         (base.BaseContext, "get_abi_sizeof", _remembering_sizes),
-        (CPUContext, "load_additional_registries", _once),
         (ir.Inst, "_rec_list_vars", lambda _own: _variables_of),
         (arrayobj, "fix_integer_index", _without_counting_from_the_end),
         (base.BaseContext, "declare_function", _with_seldom_called),
@@ -180,18 +179,6 @@ def _remembering_sizes(size_of):
         return known[key]
 
     return remembered
-
-
-def _once(load):
-    """Numba's import of its own registries; what is registered meanwhile it finds without."""
-    loaded = set()
-
-    def load_once(self):
-        if id(self) not in loaded:
-            load(self)
-            loaded.add(id(self))
-
-    return load_once
 
 
 def _variables_of(_statement, value) -> list:

@@ -12,10 +12,10 @@
     C  capsule_capsule.py    closed form (a sphere is a point, a capsule a segment, each swept)
     H  halfspace_convex.py   closed form, one support query
     P  halfspaces.py         two planes
-    G  gjk.py, and epa.py where the cores overlap
+    G  gjk.py, and epa.py where the cores overlap; booleans of small hulls go through portals.py first
 
 Every set may be swept by a ball. Bodies of several sets are unions: `collide.unions` combines the
-rows. A triangle mesh will be a further row and column, answered over its own box-tree.
+rows. Triangle meshes are answered over their box-trees (`collide.meshes`), their triangles one by one.
 """
 
 from __future__ import annotations
