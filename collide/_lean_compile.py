@@ -170,7 +170,7 @@ def _remembering_types(call_type):
 
 def _remembering_sizes(size_of):
     """The bytes of a type of LLVM's, asked once."""
-    known: dict[tuple[int, str], int] = {}
+    known = {}
 
     def remembered(self, kind):
         key = id(self), str(kind)
@@ -187,7 +187,7 @@ def _variables_of(_statement, value) -> list:
     waiting = [value]
     while waiting:
         part = waiting.pop()
-        kind = _kind_of(type(part))
+        kind = _kind_of(part.__class__)
         if kind is ir.Var:
             found.append(part)
         elif kind is ir.Inst:
@@ -200,7 +200,7 @@ def _variables_of(_statement, value) -> list:
 
 
 @cache
-def _kind_of(part: type) -> type | None:
+def _kind_of(part: Any) -> type | None:
     for kind in (ir.Var, ir.Inst, dict):
         if issubclass(part, kind):
             return kind
