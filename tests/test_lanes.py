@@ -12,7 +12,7 @@ import pytest
 
 import collide
 from collide._jit import address_of, entry, kernel, view_f64
-from collide._lanes import LANES, any_of, root_of, select, view_lanes
+from collide._lanes import LANES, any_of, root_of, select, transpose_eight, view_lanes
 from collide.geometry import double_double
 from collide.geometry.error_free import dekker_product, two_product, two_sum
 from collide.narrowphase import fine, gap
@@ -88,6 +88,22 @@ def _eight_at_once(x_at, y_at, n):
 def _one_by_one(x_at, y_at, n):
     for k in range(n):
         _everything(view_f64(x_at + 8 * IN * k, IN), view_f64(y_at + 8 * OUT * k, OUT))
+
+
+@entry("void(int64, int64)")
+def _transpose(addresses_at, target_at):
+    transpose_eight(addresses_at, target_at)
+
+
+def test_eight_rows_from_anywhere_become_lanes():
+    numbers = np.random.default_rng(12).normal(size=1000)
+    for first in (0, 1, 3, 8, 100):
+        places = np.array([first + 7 * k for k in (5, 0, 99, 3, 3, 42, 17, 120)])
+        addresses, target = address_of(numbers) + 8 * places, np.zeros((LANES + 1, LANES))
+        _transpose(address_of(addresses), address_of(target) + 8)
+        found = target.ravel()[1 : 1 + LANES * LANES].reshape(LANES, LANES)
+        assert np.array_equal(found, np.stack([numbers[place : place + LANES] for place in places], axis=1))
+        assert target.ravel()[0] == 0.0 and not target.ravel()[1 + LANES * LANES :].any()
 
 
 def _numbers() -> np.ndarray:
