@@ -6,9 +6,9 @@
 
 Tables: hulls of n points on a sphere, an ellipsoid 1:3:10, a pancake 1:50, and cylinders (two n/2-gons);
 "shapes", random pairs of hundreds of different hulls, whose data are in no cache; "single", one Python call
-a pair; "threads", large batches with `threads=2`, and plain arithmetic in two threads (two cores shared with others are less
-than two); "cgal", our boolean beside the times published for CGAL's hull hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of
-touching, a third 5 to 50 % deep, shuffled into one batch; all engines get the same. Engines take turns in
+a pair; "threads", large batches with `threads=2`, and plain arithmetic in two threads, µs in all (two cores
+shared with others are less than two); "cgal", our boolean beside the times published for CGAL's hull
+hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of touching, a third 5 to 50 % deep, shuffled into one batch; all engines get the same. Engines take turns in
 one run, and ratios are of medians. Ours is a batch call, coal and python-fcl are Python loops, each at
 its best: objects and transforms are ready beforehand, and booleans want no contacts. Our times by class
 are of batches a third as long, which spread the cost of a call over fewer pairs.
@@ -179,16 +179,18 @@ def threaded(n: int, asked: Scene, repeats: int) -> list[dict]:
     """The same batch by one thread and by two."""
     alone, together = ours(asked, "threads"), ours(asked, "threads", threads=2)
     times: dict[tuple[str, str, str], list[float]] = {}
-    pool = ThreadPoolExecutor(2)
-    for _ in range(repeats + 1):
-        for question, task in alone.items():
-            one, two = seconds_of(task), seconds_of(together[question])
-            times.setdefault((question, "collide", "mix"), []).append(one / len(asked.which) * 1e6)
-            times.setdefault((question, "two threads", "mix"), []).append(two / len(asked.which) * 1e6)
-        # What two threads of nothing but arithmetic gain: cores that are shared with others give less than two.
-        one, two = seconds_of(lambda: arithmetic(2)), seconds_of(lambda: list(pool.map(arithmetic, (1, 1))))
-        times.setdefault(("arithmetic", "collide", "mix"), []).append(one * 1e6)
-        times.setdefault(("arithmetic", "two threads", "mix"), []).append(two * 1e6)
+
+    def note(question: str, one: float, two: float, count: int) -> None:
+        times.setdefault((question, "collide", "mix"), []).append(one / count * 1e6)
+        times.setdefault((question, "two threads", "mix"), []).append(two / count * 1e6)
+
+    with ThreadPoolExecutor(2) as pool:
+        for _ in range(repeats + 1):
+            for question, task in alone.items():
+                note(question, seconds_of(task), seconds_of(together[question]), len(asked.which))
+            # What two threads of nothing but arithmetic gain: cores that are shared with others give less than two.
+            shared = seconds_of(lambda: list(pool.map(arithmetic, (1, 1))))
+            note("arithmetic", seconds_of(lambda: arithmetic(2)), shared, 1)
     return [row("threads", n, *key, warm) for key, (_, *warm) in times.items()]
 
 

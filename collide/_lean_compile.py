@@ -62,8 +62,7 @@ def lean_compiling(function: Callable) -> Iterator[None]:
     """While the entry of this function is compiled."""
     # The lock first: another thread may have these parts replaced, and they must not be taken for numba's.
     with global_compiler_lock, ExitStack() as stack:
-        _exchange(stack, [*_translated_once(function.__qualname__), *_without_idle_work()])
-        _exchange(stack, _silent_events())
+        _exchange(stack, [*_translated_once(function.__qualname__), *_without_idle_work(), *_silent_events()])
         _collect_rarely(stack)
         yield
 
@@ -175,8 +174,8 @@ def _remembering_sizes(size_of):
     def remembered(self, kind):
         key = id(self), str(kind)
         if key not in known:
-            known[key] = size_of(self, kind)
-        return known[key]
+            known[key] = self, size_of(self, kind)  # as above
+        return known[key][1]
 
     return remembered
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide._jit import entry, kernel, view_f64, view_i64, view_u8
 from collide._lanes import LANES
 from collide.geometry.double_double import add, bracket
 from collide.geometry.packing import POINTS
@@ -46,8 +46,7 @@ from collide.narrowphase.rows import (
     NORMAL,
     ROW,
     UPPER,
-    VERTICES_A,
-    VERTICES_B,
+    open_row,
     write_decision,
     write_vectors,
     write_verdict,
@@ -296,13 +295,8 @@ def _answer(
     doubles_at, integers_at,
 ):  # fmt: skip
     """Answer one pair; returns the kind of gap if the row waits for its last digits, else −1."""
-    row = view_f64(rows_at + ROW * row_number, 12)
-    words = view_i32(rows_at + ROW * row_number, ROW // 4)
-    marks = view_u8(rows_at + ROW * row_number, ROW)
+    row, words, marks = open_row(rows_at + ROW * row_number)
     pair, _, numbers, sa, sb, flip, size, slop, known = pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb)
-    for k in range(4):
-        words[VERTICES_A + k] = -1
-        words[VERTICES_B + k] = -1
     how = method(pair[3], pair[1], pair[9], pair[7])
     if 0.0 < size < SMALLEST:
         marks[HOW] = REFUSED

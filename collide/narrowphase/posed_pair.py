@@ -126,8 +126,13 @@ def reach_of_both(pair):
     Of a pair whose size is known (`size_and_slop`).
     """
     (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
-    reach_a = numbers[at_a - PARAMS + REACH] * poses[p + POSE_STRETCH]
-    return reach_a + numbers[at_b - PARAMS + REACH] * poses[q + POSE_STRETCH]
+    return sum_of_reaches(numbers, at_a - PARAMS, at_b - PARAMS, poses, p, q)
+
+
+@kernel(inline=True)
+def sum_of_reaches(numbers, at_a, at_b, poses, p, q):
+    """The same by where both shapes' numbers and both poses begin."""
+    return numbers[at_a + REACH] * poses[p + POSE_STRETCH] + numbers[at_b + REACH] * poses[q + POSE_STRETCH]
 
 
 @kernel(inline=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide._jit import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.results import PAIR_DTYPE, UNDECIDED
 
@@ -21,6 +21,16 @@ BODY_B = _at("b", 4)
 VERTICES_A, VERTICES_B, ITERATIONS = _at("vertices_a", 4), _at("vertices_b", 4), _at("iterations", 4)
 COUNT, HOW, EXACT_ROUNDS, HIT = _at("count", 1), _at("how", 1), _at("exact", 1), _at("hit", 1)
 CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
+
+
+@kernel(inline=True)
+def open_row(row_at):
+    """A row's doubles, words and bytes; it names no vertices so far."""
+    words = view_i32(row_at, ROW // 4)
+    for k in range(4):
+        words[VERTICES_A + k] = -1
+        words[VERTICES_B + k] = -1
+    return view_f64(row_at, 12), words, view_u8(row_at, ROW)
 
 
 @kernel(inline=True)

@@ -33,8 +33,8 @@ def extremal_tetrahedron(pair, points, ids, error, again):
     least = math.inf
     most = -math.inf
     # The farthest pair among extremes of the axes, by the axis of greatest width.
+    askew = 0.375 * again
     for axis in range(3):
-        askew = 0.375 * again
         d0 = 1.0 if axis == 0 else askew
         d1 = 1.0 if axis == 1 else askew
         d2 = 1.0 if axis == 2 else askew
