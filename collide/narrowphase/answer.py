@@ -23,7 +23,6 @@ from collide.narrowphase.cores import (
     TIED,
     TIES,
     WEIGHTS,
-    combined,
     convex_cores,
     name_plane,
     segments,
@@ -32,12 +31,12 @@ from collide.narrowphase.epa.surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height, reach_of_plane
 from collide.narrowphase.matrix import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
-from collide.narrowphase.minkowski import POINT
-from collide.narrowphase.portals import look_through_portals
+from collide.narrowphase.minkowski import POINT, combined
 from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import ENTRY, REQUESTS, add_request
 from collide.narrowphase.rows import (
     CERTIFIED,
+    COUNT,
     DISTANCE,
     HIT,
     HOW,
@@ -46,12 +45,15 @@ from collide.narrowphase.rows import (
     NORMAL,
     ROW,
     UPPER,
-    open_row,
+    VERTICES_A,
+    VERTICES_B,
+    view_row,
     write_decision,
     write_vectors,
     write_verdict,
     write_vertices,
 )
+from collide.narrowphase.small_hulls import answer_small_hulls
 from collide.narrowphase.waiting import (
     KINDS,
     WAITING_DOUBLES,
@@ -74,11 +76,11 @@ DOUBLES, INTEGERS = _WAITING_DOUBLES_AT + WAITING_DOUBLES, REQUESTS_AT + REQUEST
 @kernel(inline=True)
 def _swept(
     pair, closed_form, terms_at, shape_a, part_a, shape_b, part_b, row, words, marks, doubles_at, integers_at, boolean, depths,
-    limit, size, slop, error, exactly, flip, row_number,
+    limit, size, slop, error, exactly, flip, row_number, given,
 ):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii.
 
-    closed_form : both cores are points or segments.
+    closed_form : both cores are points or segments.   given : as `gjk` has it.
     Returns the kind of gap of a row that waits for its last digits and is finished then (`waiting.py`), or −1.
     """
     (_, _, _, kind_a, _, p, _, _, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
@@ -102,7 +104,7 @@ def _swept(
     else:
         depth, bound, above, shallowest, deepest, nx, ny, nz, n, vertices, rounds = convex_cores(
             pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved,
-            exactly and not curved,
+            exactly and not curved, given,
         )  # fmt: skip
     lower = bound - error - radius
     upper = above + error - radius
@@ -263,21 +265,22 @@ def answer_pairs(
     view_i64(integers_at + 8 * REQUESTS_AT, 1)[0] = 0
     waiting_at = integers_at + 8 * _WAITING_INTEGERS_AT
     waiting = view_i64(waiting_at, KINDS)
-    nobody_waits(waiting_at)
     # Whoever still waits when all pairs have had their turn is seen to then, kind by kind.
     most = 1 if stop_at_hit else LANES
-    if boolean and not stop_at_hit:
-        look_through_portals(
-            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at,
+    begun = 0
+    if not depths and not stop_at_hit:
+        begun = answer_small_hulls(
+            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at,
             doubles_at + 8 * _WAITING_DOUBLES_AT, waiting_at,
         )  # fmt: skip
+    nobody_waits(waiting_at)
     for turn in range(n_pairs if boolean else n_pairs + KINDS):
         kind = turn - n_pairs
-        if boolean and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
+        if begun > 0 and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
             continue
         if turn < n_pairs:
             kind = _answer(
-                ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1], turn, boolean,
+                ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1], turn, begun > 0, boolean,
                 depths, limit, rows_at, doubles_at, integers_at,
             )  # fmt: skip
         if kind >= 0 and waiting[kind] >= (most if turn < n_pairs else 1):
@@ -290,14 +293,32 @@ def answer_pairs(
 
 
 @kernel(inline=True)
+def _take_vertices(words, marks, ids, begun):
+    """Have the last three ids name what a row names to begin with, and the row nothing; returns how many there are."""
+    given = int(marks[COUNT]) if begun else 0
+    for k in range(4):
+        if k < 3 and given > 0:
+            ids[2 * k + 4] = words[VERTICES_A + k]
+            ids[2 * k + 5] = words[VERTICES_B + k]
+        words[VERTICES_A + k] = -1
+        words[VERTICES_B + k] = -1
+    marks[COUNT] = 0
+    return given
+
+
+@kernel(inline=True)
 def _answer(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, row_number, boolean, depths, limit, rows_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pa, pb, row_number, begun, boolean, depths, limit, rows_at,
     doubles_at, integers_at,
 ):  # fmt: skip
-    """Answer one pair; returns the kind of gap if the row waits for its last digits, else −1."""
-    row, words, marks = open_row(rows_at + ROW * row_number)
+    """Answer one pair; returns the kind of gap if the row waits for its last digits, else −1.
+
+    begun : the row may name vertices to begin with. To look costs 1 to 2 % of a gap: rows are seldom in the cache.
+    """
+    row, words, marks = view_row(rows_at + ROW * row_number)
     pair, _, numbers, sa, sb, flip, size, slop, known = pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb)
     how = method(pair[3], pair[1], pair[9], pair[7])
+    given = _take_vertices(words, marks, view_i64(integers_at, 10), begun)
     if 0.0 < size < SMALLEST:
         marks[HOW] = REFUSED
         return -1
@@ -314,5 +335,5 @@ def _answer(
         return -1
     return _swept(
         pair, how == CAPSULES, terms_at, sa, pair[5] // POSE, sb, pair[11] // POSE, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
-        slop, ERROR * size + slop, known, flip, row_number,
+        slop, ERROR * size + slop, known, flip, row_number, given,
     )  # fmt: skip

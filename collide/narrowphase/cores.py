@@ -19,7 +19,7 @@ from collide.narrowphase.epa.surface import FACET, number, workspace
 from collide.narrowphase.fine import FINE
 from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.level import MOST_TIES
-from collide.narrowphase.minkowski import POINT
+from collide.narrowphase.minkowski import POINT, combined
 from collide.narrowphase.requests import ENTRY
 from collide.narrowphase.simplex import face_weights, weigh_enclosed
 
@@ -109,8 +109,8 @@ def _miss(points, weights, x, y, z):
 
 
 @kernel(inline=True)
-def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved, exactly):
-    """Two convex cores by GJK, and by EPA where they overlap.
+def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radius, limit, size, slop, error, curved, exactly, given):
+    """Two convex cores by GJK, and by EPA where they overlap; arguments as `gjk` has them.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radiu
     points = view_f64(doubles_at, 5 * POINT)
     weights = view_f64(doubles_at + 8 * WEIGHTS, 10)
     ids = view_i64(integers_at, 10)
-    status, n, bound, clearance, rounds = gjk(pair, points, ids, weights, boolean, radius, limit, error, GJK_ROUNDS)
+    status, n, bound, clearance, rounds = gjk(pair, points, ids, weights, given, boolean, radius, limit, error, GJK_ROUNDS)
     core = math.sqrt(weights[4] * weights[4] + weights[5] * weights[5] + weights[6] * weights[6])
     if status == NEAREST or status == APART:
         return -core, bound, core, -math.inf, math.inf, -weights[7], -weights[8], -weights[9], n, n, rounds
@@ -201,12 +201,3 @@ def name_plane(ids, tied):
     tied[1] = 1
     for k in range(6):
         tied[2 + k] = ids[k]
-
-
-@kernel(inline=True)
-def combined(points, weights, n, j):
-    """Coordinate j of the weighted sum of n stored points."""
-    total = 0.0
-    for k in range(n):
-        total += weights[k] * points[POINT * k + j]
-    return total

@@ -12,7 +12,7 @@
     C  capsule_capsule.py    closed form (a sphere is a point, a capsule a segment, each swept)
     H  halfspace_convex.py   closed form, one support query
     P  halfspaces.py         two planes
-    G  gjk.py, and epa.py where the cores overlap; booleans of small hulls go through portals.py first
+    G  gjk.py, and epa.py where the cores overlap; small hulls go through small_hulls.py first, unless depths are wanted
 
 Every set may be swept by a ball. Bodies of several sets are unions: `collide.unions` combines the
 rows. Triangle meshes are answered over their box-trees (`collide.meshes`), their triangles one by one.

@@ -144,3 +144,12 @@ def copy_point(points, ids, source, target):
         points[POINT * target + j] = points[POINT * source + j]
     ids[2 * target] = ids[2 * source]
     ids[2 * target + 1] = ids[2 * source + 1]
+
+
+@kernel(inline=True)
+def combined(points, weights, n, j):
+    """Coordinate j of the weighted sum of n stored points."""
+    total = 0.0
+    for k in range(n):
+        total += weights[k] * points[POINT * k + j]
+    return total

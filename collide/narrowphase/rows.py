@@ -25,12 +25,18 @@ CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
 
 @kernel(inline=True)
 def open_row(row_at):
-    """A row's doubles, words and bytes; it names no vertices so far."""
-    words = view_i32(row_at, ROW // 4)
+    """`view_row`, and the row names no vertices."""
+    row, words, marks = view_row(row_at)
     for k in range(4):
         words[VERTICES_A + k] = -1
         words[VERTICES_B + k] = -1
-    return view_f64(row_at, 12), words, view_u8(row_at, ROW)
+    return row, words, marks
+
+
+@kernel(inline=True)
+def view_row(row_at):
+    """A row's doubles, words and bytes."""
+    return view_f64(row_at, 12), view_i32(row_at, ROW // 4), view_u8(row_at, ROW)
 
 
 @kernel(inline=True)
