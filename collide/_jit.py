@@ -88,9 +88,9 @@ class Entry:
     Compiled at its first call for the one signature given, or read from the disk cache.
     """
 
-    def __init__(self, function: Callable, signature: str, nogil: bool = True):
+    def __init__(self, function: Callable, signature: str, nogil: bool = True, hasty: bool = False):
         self.__doc__, self.name = function.__doc__, function.__name__
-        self._flags = {**_FLAGS, "nogil": nogil}
+        self._flags, self._hasty = {**_FLAGS, "nogil": nogil}, hasty
         self._function, self._signature = function, signature
         self._ready: Callable | None = function if PLAIN_PYTHON else None
         self._lock = threading.Lock()
@@ -140,7 +140,7 @@ class Entry:
         """Compiled for its signature, or read from the disk cache."""
         dispatcher = numba.njit(self._function, **self._flags)
         dispatcher._cache = _KernelCache.of(self._function)
-        with lean_compiling(self._function):
+        with lean_compiling(self._function, self._hasty):
             dispatcher.compile(self._signature)
         dispatcher.disable_compile()
         return dispatcher
@@ -167,13 +167,14 @@ class Entry:
             self._ready = dispatcher
 
 
-def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
+def entry(signature: str, *, nogil: bool = True, hasty: bool = False) -> Callable[[Callable], Entry]:
     """Decorator: a kernel called from Python, with its numba signature.
 
     nogil : let other Python threads run meanwhile. A kernel of a microsecond that shares one
         workspace among all threads keeps the lock instead.
+    hasty : compile it sooner, to run 1 to 2 % slower: for what is seldom called.
     """
-    return lambda function: Entry(function, signature, nogil)
+    return lambda function: Entry(function, signature, nogil, hasty)
 
 
 #: Seconds each entry took to become callable in this process, by compiling or by loading.

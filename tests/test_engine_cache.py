@@ -134,7 +134,7 @@ from collide import _jit
 def parts():
     return [
         (owner.__name__, name, vars(owner)[name])
-        for owner, name, _ in lean._translated_once("x") + lean._without_idle_work() + lean._silent_events()
+        for owner, name, _ in lean._translated_once("x", True) + lean._without_idle_work() + lean._silent_events()
     ]
 
 @_jit.kernel
@@ -206,6 +206,26 @@ def test_who_listens_to_numba_hears_of_kernels(monkeypatch, tmp_path):
 
 def _doubled(x):
     return 2.0 * x
+
+
+@pytest.mark.skipif(PLAIN_PYTHON, reason="nothing is compiled")
+def test_hasty_entries_give_the_same_bits(monkeypatch, tmp_path):
+    small, make_smaller = [], _lean_compile._make_smaller
+    monkeypatch.setattr(_lean_compile, "_make_smaller", lambda *given: small.append(1) or make_smaller(*given))
+    found = []
+    for hasty in (False, True):
+        monkeypatch.setenv("COLLIDE_CACHE_DIR", str(tmp_path / str(hasty)))
+        wave = entry("float64(float64, int64)", hasty=hasty)(_wave)
+        found.append([wave(0.1 * k, k).hex() for k in range(60)])
+        assert bool(small) == (hasty and _lean_compile._CAN_CHOOSE)
+    assert found[0] == found[1] and len(set(found[0])) > 50
+
+
+def _wave(x, n):
+    total = 0.0
+    for k in range(n):
+        total = x - total * total / 3.0 if total < 1.0 else total / (k + x)
+    return total
 
 
 #: Compiles an entry, and a function of somebody else's, while another entry is compiled: as a signal's handler would.

@@ -74,7 +74,7 @@ COMPILERS = {
 #: The files that make code, and what they need for it: everything else goes through them.
 COMPILER_PACKAGES = {
     "collide/_jit.py": {"numba"},
-    "collide/_lean_compile.py": {"numba"},
+    "collide/_lean_compile.py": {"numba", "llvmlite"},
     "collide/_simd.py": {"numba", "llvmlite"},
     "collide/_lanes.py": {"numba", "llvmlite"},
 }

@@ -116,7 +116,7 @@ def _points_miss(row, size):
     return miss > _NEAR_MISS * reach
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)", hasty=True)
 def decide_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,

@@ -21,7 +21,7 @@ from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, 
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)", hasty=True)
 def decide_planes(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):

@@ -18,7 +18,7 @@ from collide.narrowphase.rows import LOWER, ROW, UPPER, write_verdict
 from collide.results import EXACT
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)", hasty=True)
 def deepen_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, open_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
 ):
