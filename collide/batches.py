@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
@@ -31,17 +30,21 @@ def length_of(A, B, X_WA, X_WB) -> int:
 
 
 def ask(
-    A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None, depths=True, close=None
+    A, B, X_WA, X_WB, boolean: bool, limit: float, check: bool, threads: int, axes=None, depths=True, close=None, kept=()
 ) -> np.ndarray:
     """bool[n], or a row a pose, of a batch in at most so many threads.
 
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
     close : called with the rows of each piece when they are done, by the thread that did them.
+    kept : two arrays like X_WA and X_WB, to become copies of them.
     """
     n = length_of(A, B, X_WA, X_WB)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
     workers, fewest = _workers(threads), _FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD
     workers = min(workers, n // fewest)
+    for X, copy in zip((X_WA, X_WB), kept):
+        if workers < 2 or len(X) == 1:
+            copy[:] = X
     if workers < 2:
         _answer_into(out, A, B, X_WA, X_WB, boolean, limit, check, axes, depths)
         if close is not None:
@@ -54,6 +57,9 @@ def ask(
             one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
             X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
             own = None if axes is None else axes[part]
+            for X, copy in zip((X_WO, X_WT), kept):
+                if len(copy) > 1:
+                    copy[part] = X
             try:
                 _answer_into(out[part], one, other, X_WO, X_WT, boolean, limit, check, own, depths)
                 if close is not None:
@@ -65,9 +71,10 @@ def ask(
     at_work: list[Future] = []
     try:
         try:
-            at_work.extend(_pool(workers).submit(work) for _ in range(workers))
+            at_work.extend(_pool(workers - 1).submit(work) for _ in range(workers - 1))
         except RuntimeError:  # no more threads are to be had, or Python is ending: this one does what is left
-            work()
+            pass
+        work()
         for one in at_work:
             one.result()
     finally:  # after an error as well nobody writes into the caller's axes any more
@@ -78,16 +85,24 @@ def ask(
 
 
 def _pieces(n: int, workers: int, fewest: int) -> list[slice]:
-    """What is handed out of a batch at a time: some pieces a thread, none smaller than pays."""
-    many = max(workers, min(_PIECES_A_THREAD * workers, n // fewest))
-    bounds = np.linspace(0, n, many + 1).astype(int).tolist()
-    return [slice(*ends) for ends in pairwise(bounds)]
+    """What is handed out of a batch at a time: ever smaller shares of what is left, none smaller than pays.
+
+    A piece costs some 30 µs beside its answers. Large ones first, there are few; small ones last, no thread waits long for
+    the others, though a core may be somebody else's now and then.
+    """
+    pieces, done = [], 0
+    while done < n:
+        left = n - done
+        most = max(left // fewest, 1)  # so many pieces can be made of it
+        share = -(-left // most) if most <= workers else max(left // (2 * workers), fewest)
+        pieces.append(slice(done, done + share))
+        done += share
+    return pieces
 
 
 #: A thread is handed at least so many poses: below, handing over takes longer than answering.
 _FEWEST_A_THREAD = 2000
 _FEWEST_OF_MESHES = 16
-_PIECES_A_THREAD = 8
 
 
 @lru_cache(maxsize=4)

@@ -182,7 +182,7 @@ def distance(
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = X_WA.copy(), X_WB.copy()  # a certificate worked out later is one for these poses
+    kept = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
     _prepare(A, B)
     endless = []
 
@@ -190,7 +190,7 @@ def distance(
         if run.close(rows, depths=signed):
             endless.append(True)
 
-    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed, close=close)
+    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed, close=close, kept=kept)
     if endless:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
@@ -198,7 +198,7 @@ def distance(
             f"distance of {type(_one(A, k)).__name__} and {type(_one(B, k)).__name__}{where}: their overlap has no "
             "end, so no translation of finite length separates them; collide() still answers"
         )
-    return PairResult(rows, single, (_held(A), _held(B), X_WA, X_WB))
+    return PairResult(rows, single, (_held(A), _held(B), *kept))
 
 
 def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:

@@ -346,3 +346,25 @@ def test_a_fork_while_a_tree_grows_does_not_hang():
     )
     run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
+
+
+@pytest.mark.parametrize("workers", (2, 3, 8))
+def test_pieces_of_a_batch_are_all_of_it_and_none_too_small(workers):
+    for n in (2 * workers, 2 * workers + 1, 97, 4096):
+        pieces = batches._pieces(n, workers, 2)
+        assert [k for piece in pieces for k in range(n)[piece]] == list(range(n))
+        lengths = [piece.stop - piece.start for piece in pieces]
+        assert len(lengths) >= workers and min(lengths) >= 2
+        assert max(lengths) <= -(-n // workers) and sum(lengths[-workers:]) <= max(n // 4, 4 * workers)
+
+
+def test_poses_of_a_batch_in_threads_are_kept_for_its_certificates():
+    rng = np.random.default_rng(13)
+    box = collide.Box((1.0, 1.0, 1.0))
+    X_WB = np.stack([collide.pose(rng.uniform(-1.5, 1.5, 3), rpy=rng.uniform(-3.0, 3.0, 3)) for _ in range(4500)])
+    given = X_WB.copy()
+    found = collide.distance(box, box, EYE, given, threads=2)
+    given[:] = 7.0
+    assert np.array_equal(found.question[3], X_WB) and np.array_equal(found.question[2], EYE[None])
+    for k in (0, 2100, 4499):
+        collide.verify(*found[k].question, found[k])
