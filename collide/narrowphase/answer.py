@@ -154,6 +154,8 @@ def _swept(
     bx = combined(points, weights, n, 6)
     by = combined(points, weights, n, 7)
     bz = combined(points, weights, n, 8)
+    if not (boolean or depths) and bound == -math.inf:
+        radius_a = radius_b = 0.0  # a point of both cores is one of both bodies
     # On curved cores the last facet still has a width: what the two points miss of depth·n is shared between them.
     missing = 0.5 if curved and not boolean else 0.0
     ox = missing * (ax - bx - pair[14] - depth * nx)

@@ -21,7 +21,7 @@ from collide.narrowphase.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.level import MOST_TIES
 from collide.narrowphase.minkowski import POINT, combined
 from collide.narrowphase.requests import ENTRY
-from collide.narrowphase.simplex import face_weights, weigh_enclosed
+from collide.narrowphase.simplex import face_weights, nearest_of_all, weigh_enclosed
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits of depths and
 # heights need: four points, a direction, low parts of two poses, ties or the terms of a sum.
@@ -132,8 +132,8 @@ def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radiu
     above = -clearance if status == ENCLOSED else core
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if not depths and (above + error < radius or exactly):
-        if status == ENCLOSED and not boolean:
-            weigh_enclosed(points, weights)
+        if status == ENCLOSED and not boolean and not weigh_enclosed(points, weights):
+            nearest_of_all(points, 4, weights, 15)
         return -above, -math.inf, above, -math.inf, math.inf, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     roomy = status == ENCLOSED and clearance > ROOMY * size

@@ -20,6 +20,7 @@ from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE, touch_e
 from collide.narrowphase.exact.workspace import INTEGERS as HULL_DIGITS
 from collide.narrowphase.exact_plane import INTEGERS as PLANE_DIGITS
 from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, fine_points, scale_of, write_low_parts
+from collide.narrowphase.minkowski import POINT, combined, place_vertices
 from collide.narrowphase.posed_pair import pair_of
 from collide.narrowphase.requests import REQUESTS, find_request
 from collide.narrowphase.rows import (
@@ -39,6 +40,7 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
+from collide.narrowphase.simplex import weigh_enclosed
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: Digits of workspace; 24 integers for ids follow them, and doubles for planes.
@@ -106,6 +108,35 @@ def _set_points(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, 
 
 
 @kernel
+def _set_common_point(row, pair, ids, n, room_at, flip):
+    """The point of both bodies at which n ≤ 4 points of A ⊖ B, among which the origin lies, are weighed to 0.
+
+    Those found in doubles belong to a simplex that proved nothing. Of bodies with radii it is a point of both cores.
+    """
+    points = view_f64(room_at, 4 * POINT)
+    weights = view_f64(room_at + 8 * 4 * POINT, 4)
+    for k in range(n):
+        place_vertices(pair, points, ids, k, ids[2 * k], ids[2 * k + 1])
+    if n < 4 or not weigh_enclosed(points, weights):
+        weigh_corners(points, POINT, n, weights, 0.0, 0.0, 0.0)
+    poses = pair[13]
+    for axis in range(3):
+        a = combined(points, weights, n, 3 + axis) + poses[pair[5] + 9 + axis]
+        b = combined(points, weights, n, 6 + axis) + poses[pair[11] + 9 + axis]
+        row[POINT_A + axis] = b if flip else a
+        row[POINT_B + axis] = a if flip else b
+
+
+@kernel
+def _parted(row, size):
+    """Whether the two points of a common one lie apart by more than rounding."""
+    miss = 0.0
+    for axis in range(3):
+        miss += abs(row[POINT_B + axis] - row[POINT_A + axis])
+    return miss > _NEAR_MISS * size
+
+
+@kernel
 def _points_miss(row, size):
     """Whether the witness points are not what the distance and the normal say, by more than rounding."""
     miss = 0.0
@@ -116,14 +147,14 @@ def _points_miss(row, size):
     return miss > _NEAR_MISS * reach
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64)", hasty=True)
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)", hasty=True)
 def decide_pairs(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
 ):  # fmt: skip
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it leaves to `decide_planes.py`.
 
-    Arguments as there; terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
+    Arguments as there (depths: of overlaps that doubles have found, points are left alone); terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
     workspace of WORKSPACE. What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
@@ -208,6 +239,8 @@ def decide_pairs(
                 row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, row[DISTANCE],
                 flip,
             )  # fmt: skip
+        if not (boolean or depths) and verdict == TOUCHING and not apart and _parted(row, size):
+            _set_common_point(row, pair, ids, shown, digits_at, flip)
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0
             marks[HOW] = EXACT

@@ -95,7 +95,7 @@ def _finish(
         terms = address_of(poses.terms), len(poses.terms)
         digits = address_of(_of_thread.space.digits)
         planes = decide_pairs(
-            *tables, len(rows), boolean, limit, address_of(rows), *terms,
+            *tables, len(rows), boolean, depths, limit, address_of(rows), *terms,
             _of_thread.space.addresses[1] + 8 * REQUESTS_AT, digits,
         )  # fmt: skip
         if planes:
