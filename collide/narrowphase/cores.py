@@ -132,8 +132,10 @@ def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radiu
     above = -clearance if status == ENCLOSED else core
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if not depths and (above + error < radius or exactly):
-        if status == ENCLOSED and not boolean and not weigh_enclosed(points, weights):
-            nearest_of_all(points, 4, weights, 15)
+        if status == ENCLOSED and not boolean:
+            miss, extent = weigh_enclosed(points, weights)
+            if not miss <= _NEAR_MISS * extent:
+                nearest_of_all(points, 4, weights, 15)
         return -above, -math.inf, above, -math.inf, math.inf, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     roomy = status == ENCLOSED and clearance > ROOMY * size

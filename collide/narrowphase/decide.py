@@ -117,7 +117,8 @@ def _set_common_point(row, pair, ids, n, room_at, flip):
     weights = view_f64(room_at + 8 * 4 * POINT, 4)
     for k in range(n):
         place_vertices(pair, points, ids, k, ids[2 * k], ids[2 * k + 1])
-    if n < 4 or not weigh_enclosed(points, weights):
+    miss, extent = weigh_enclosed(points, weights) if n == 4 else (math.inf, 0.0)
+    if not miss <= _NEAR_MISS * extent:
         weigh_corners(points, POINT, n, weights, 0.0, 0.0, 0.0)
     poses = pair[13]
     for axis in range(3):
@@ -128,21 +129,12 @@ def _set_common_point(row, pair, ids, n, room_at, flip):
 
 
 @kernel
-def _parted(row, size):
-    """Whether the two points of a common one lie apart by more than rounding."""
-    miss = 0.0
-    for axis in range(3):
-        miss += abs(row[POINT_B + axis] - row[POINT_A + axis])
-    return miss > _NEAR_MISS * size
-
-
-@kernel
-def _points_miss(row, size):
-    """Whether the witness points are not what the distance and the normal say, by more than rounding."""
+def _points_miss(row, size, distance):
+    """Whether the witness points are not what this distance and the normal say, by more than rounding."""
     miss = 0.0
     reach = size
     for axis in range(3):
-        miss += abs(row[POINT_B + axis] - row[POINT_A + axis] - row[DISTANCE] * row[NORMAL + axis])
+        miss += abs(row[POINT_B + axis] - row[POINT_A + axis] - distance * row[NORMAL + axis])
         reach = max(reach, abs(row[POINT_A + axis]), abs(row[POINT_B + axis]))
     return miss > _NEAR_MISS * reach
 
@@ -154,7 +146,7 @@ def decide_pairs(
 ):  # fmt: skip
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it leaves to `decide_planes.py`.
 
-    Arguments as there (depths: of overlaps that doubles have found, points are left alone); terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
+    Arguments as there; without depths bodies that meet get a point of both; terms, n_terms : of the `PoseTable`; requests : what `answer_pairs` left; digits : int64
     workspace of WORKSPACE. What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
@@ -234,12 +226,12 @@ def decide_pairs(
             )  # fmt: skip
         width = math.inf if boolean else 0.0
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
-        if proven and not apart and SMALLEST_FINE < size < LARGEST_FINE and _points_miss(row, size):
+        if proven and not apart and SMALLEST_FINE < size < LARGEST_FINE and _points_miss(row, size, row[DISTANCE]):
             _set_points(
                 row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, row[DISTANCE],
                 flip,
             )  # fmt: skip
-        if not (boolean or depths) and verdict == TOUCHING and not apart and _parted(row, size):
+        if not (boolean or depths) and verdict == TOUCHING and not apart and _points_miss(row, size, 0.0):
             _set_common_point(row, pair, ids, shown, digits_at, flip)
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0

@@ -43,7 +43,10 @@ ROOM = VERTICES + 6 * MOST
 @kernel
 def refine(room, corners, limit):
     """Poses, vertices and errors of eight pairs are there; become known: unit directions of planes that part
-    bodies, with their heights (0 where there is none), or clearances (−1 where there is none)."""
+    bodies, with their heights (0 where there is none), or clearances (−1 where there is none); and the last portals.
+
+    limit : planes must leave out the origin by more; infinite if portals are to go on to the last.
+    """
     margin = room[ERROR_OF] + limit
     open_, apart = _begin(room, corners, margin)
     hit = portal = room[ERROR_OF] < 0.0

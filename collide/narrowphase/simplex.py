@@ -292,7 +292,10 @@ def weigh_enclosed(points, weights):
     """Weights of the first four points at the origin, which lies among them: ratios of volumes.
 
     In a thin tetrahedron they are off by rounding over its height. What the weighted point misses the origin by is
-    therefore weighed again. False where that does not help, in one as thin as rounding: then all of it is near its faces.
+    therefore weighed again. In one as thin as rounding that does not help: but then all of it is near its faces.
+
+    Returns what the weighted point misses the origin by in the end (infinite if the four are flat), and the
+    tetrahedron's size.
     """
     ax = points[0]
     ay = points[1]
@@ -307,9 +310,9 @@ def weigh_enclosed(points, weights):
     gy = points[3 * POINT + 1] - ay
     gz = points[3 * POINT + 2] - az
     volume = ex * (fy * gz - fz * gy) + ey * (fz * gx - fx * gz) + ez * (fx * gy - fy * gx)
-    if volume == 0.0:
-        return False
     size = max(abs(ex), abs(ey), abs(ez), abs(fx), abs(fy), abs(fz), abs(gx), abs(gy), abs(gz))
+    if volume == 0.0:
+        return math.inf, size
     p = q = r = 0.0
     x = -ax
     y = -ay
@@ -335,4 +338,4 @@ def weigh_enclosed(points, weights):
     x = ax + (weights[1] * ex + weights[2] * fx + weights[3] * gx)
     y = ay + (weights[1] * ey + weights[2] * fy + weights[3] * gy)
     z = az + (weights[1] * ez + weights[2] * fz + weights[3] * gz)
-    return abs(x) + abs(y) + abs(z) <= 8.0 * _MISSED * size
+    return abs(x) + abs(y) + abs(z), size

@@ -224,7 +224,7 @@ def _write_portal(found, notes, k, corners, clearance, row_at, limit):
     flip = notes[_FLIP + k] != 0
     first = POINT_B if flip else POINT_A
     second = POINT_A if flip else POINT_B
-    pose = view_f64(notes[_AT_POSE_A + k] - 64, POSE)
+    pose = view_f64(notes[_AT_POSE_A + k] - 64, POSE)  # both halves have been taken, and the address moved on
     apart = 0.0
     for axis in range(3):
         mean = found[LANES * (MEAN_A + axis) + k]

@@ -164,14 +164,7 @@ def weigh_origin(surface, count, points, ids, weights):
             ids[2 * k + 1] = source_ids[2 * v + 1]
         if facets[FACET * f] == 0 or facets[FACET * f + 1] == 0 or facets[FACET * f + 2] == 0:
             continue
-        if not weigh_enclosed(points, weights):
-            continue
-        away = 0.0
-        for axis in range(3):
-            at = 0.0
-            for k in range(4):
-                at += weights[k] * points[POINT * k + axis]
-            away += abs(at)
+        away, _ = weigh_enclosed(points, weights)
         if away < best:
             best = away
             chosen = f
