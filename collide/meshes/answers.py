@@ -13,7 +13,7 @@ import numpy as np
 
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.bodies import Body, body_of, has_facets, hull_of, is_halfspace
+from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace
 from collide.meshes.curved import APART, curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
@@ -24,8 +24,6 @@ from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipp
 from collide.shapes.base import Shape
 from collide.shapes.mesh import Mesh
 
-#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
-_FAR = 1e20
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
 
@@ -107,7 +105,7 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
         apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
         sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
-    if limit > _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent)):
+    if limit > farthest_told(A, B):
         for k in left[found.facets[:, 0] < 0].tolist():
             rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
     rows["hit"], rows["hit"][left] = True, ~apart

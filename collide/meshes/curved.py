@@ -15,10 +15,10 @@ import numpy as np
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
 from collide.geometry.packing import POINTS
-from collide.meshes.bodies import Body, hull_of
+from collide.meshes.bodies import Body, farthest_told, hull_of
 from collide.meshes.enclosures import Enclosure
 from collide.meshes.facet_rows import Posed, facet_rows
-from collide.meshes.hits import core_hits
+from collide.meshes.hits import core_hits, holds_points
 from collide.meshes.near_facets import Facets, near_facets
 from collide.meshes.way_out import way_out
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
@@ -136,14 +136,13 @@ def curved_rows(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, *, limit: float
 
 
 def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: float) -> np.ndarray:
-    """Rows of bodies that are known to be apart."""
-    n = len(PA.X)
-    rows = np.zeros(n, dtype=PAIR_DTYPE)
-    found = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf))
-    seen = np.flatnonzero(found.facets[:, 0] >= 0)
+    """Rows of bodies that are known to be apart; only what is no farther than ``farthest`` [m] is looked for."""
+    rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
+    facets = _facets_to_begin_with(A, E, PA, PB, farthest)
+    seen = np.flatnonzero(facets >= 0)
     if len(seen):
-        rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), found.facets[seen, 0])
-    for k in np.flatnonzero(found.facets[:, 0] < 0).tolist():
+        rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), facets[seen])
+    for k in np.flatnonzero(facets < 0).tolist():
         rows[k] = _far(A, E, PA, PB, k, farthest)
     rows["vertices_a"] = rows["vertices_b"] = -1
     rows["hit"] = False
@@ -151,6 +150,23 @@ def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: f
     rows["beyond"], rows["certified"] = beyond, rows["certified"] | beyond
     rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
     return rows
+
+
+def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float) -> np.ndarray:
+    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``farthest``.
+
+    The polytope around the shape tells, by its surface: what comes nearer to the shape than the limit either comes as
+    near to that surface, or lies inside it. So a part of the mesh that is wholly inside, however far from the surface,
+    is not beyond the limit; one point of every part says whether there is one.
+    """
+    facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf)).facets[:, 0].copy()
+    unseen = np.flatnonzero(facets < 0)
+    if len(unseen) and farthest < math.inf:
+        enclosed = unseen[holds_points(E.outer, A.points, PB.X[unseen], PA.X[unseen])]
+        if len(enclosed):
+            nearest = surface_distances(A.tree, E.outer.tree, PA.X[enclosed], PB.X[enclosed]).facets[:, 0]
+            facets[enclosed] = np.maximum(nearest, 0)  # any facet will do to begin with
+    return facets
 
 
 def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) -> np.ndarray:
@@ -205,7 +221,7 @@ def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
 
 def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
     """The row of bodies that are out of sight: beyond the limit, or farther than boxes in floats can tell."""
-    if limit < math.inf:
+    if limit <= farthest_told(A, E.outer):
         return _unseen(A, E, PA, PB, k, limit)
     hulls = ask(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], False, limit, False, 1)
     row = hulls[0]

@@ -48,6 +48,13 @@ def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> Hits:
     return Hits(core, inside)
 
 
+def holds_points(body: Body, points: np.ndarray, X_WO: np.ndarray, X_WP: np.ndarray) -> np.ndarray:
+    """(n,) bool, exactly: whether the solid at X_WO (n, 4, 4) holds one of the points (k, 3) of a frame at X_WP."""
+    held = np.zeros(len(X_WO), dtype=bool)
+    _mark_inside(body, points, X_WO, X_WP, np.arange(len(X_WO)), held, np.full((len(X_WO), 3), np.nan))
+    return held
+
+
 def _mark_inside(body: Body, points, X_WO, X_WP, left, core, inside) -> None:
     """Mark poses ``left`` at which one of the points (k, 3) of the other body lies in the solid."""
     for begin in range(0, len(points), max(1, _CHUNK // len(left))):
