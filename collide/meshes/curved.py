@@ -22,6 +22,7 @@ from collide.meshes.hits import core_hits, holds_points
 from collide.meshes.near_facets import Facets, near_facets
 from collide.meshes.way_out import way_out
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.inside import OUTSIDE
 from collide.narrowphase.triangles.queries import points_in_solid, surface_distances
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
@@ -207,19 +208,11 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
     none = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
     out["distance"][none] = np.maximum(out["upper"][none], 5e-324)
     out["upper"] = np.maximum(out["upper"], out["distance"])
-    _lay_points(out, np.flatnonzero(out["distance"] != rows["distance"][best]))
+    lay_points_apart(out, np.flatnonzero(out["distance"] != rows["distance"][best]))
     promise = PROMISE_STORED if E.packed.kind == POINTS else PROMISE_CURVED
     out["certified"] = certified | (out["upper"] - out["lower"] <= promise * _size(A, E, PA, PB))
     out["how"][out["how"] == UNDECIDED] = EXACT  # the polytope around it is apart from the mesh
     return out
-
-
-def _lay_points(rows: np.ndarray, moved: np.ndarray) -> None:
-    """Lay the points of rows whose distance was moved as far apart, through their middle, in place."""
-    gap = rows["distance"][moved, None] * rows["normal"][moved]
-    missing = 0.5 * (gap - (rows["point_b"][moved] - rows["point_a"][moved]))
-    rows["point_a"][moved] -= missing
-    rows["point_b"][moved] += missing
 
 
 def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:

@@ -17,6 +17,7 @@ from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.decide_planes import decide_planes
 from collide.narrowphase.deepen import deepen_pairs
 from collide.narrowphase.halfspaces import settle
+from collide.narrowphase.other_searches import settle_by_other_searches
 from collide.narrowphase.poses import (
     ANSWERED,
     BAD_POSE,
@@ -105,28 +106,11 @@ def _finish(
             if shallow.any():
                 deepen_pairs(*tables, address_of(shallow), len(rows), limit, address_of(rows), *terms, digits)
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
-        if not depths and not distrust_doubles:
-            _settle_by_depths(rows, pairs, tables[:2], poses, shape_of, limit)
-
-
-def _settle_by_depths(rows, pairs, shapes_at, poses: PoseTable, shape_of, limit: float) -> None:
-    """Settle in place what a search for the sign alone left open and one for the depth proves.
-
-    Integers settle polytopes. Of curved shapes and rounded corners the depth's search looks at more planes, and proves gaps
-    some units of rounding smaller: without this a boolean could be True where `distance` proves a gap.
-    """
-    left = np.flatnonzero(rows["how"] == UNDECIDED)
-    if not len(left):
-        return
-    asked, todo = np.zeros(len(left), dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[left])
-    answer_pairs(
-        *shapes_at, address_of(poses.rows), address_of(poses.terms), address_of(shape_of), address_of(todo), len(todo),
-        False, True, False, limit, address_of(asked), *_of_thread.space.addresses,
-    )  # fmt: skip
-    proven = asked["how"] != UNDECIDED
-    apart = proven & ~asked["hit"]
-    rows[left[apart]] = asked[apart]
-    rows["how"][left[proven]] = asked["how"][proven]
+        if not distrust_doubles:
+            shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+            settle_by_other_searches(
+                rows, pairs, shapes_and_poses, _of_thread.space.addresses, boolean=boolean, depths=depths, limit=limit
+            )
 
 
 def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:

@@ -282,7 +282,7 @@ def _direction_between(P, W, XA, XB, near, marks, T):
     """The unit vector from A to B along which the nearest triangles are apart; zeros where none can be told.
 
     The line between the nearest points, unless rounding has turned it: of points nearer than `_TURNED` errors it is compared
-    with the normals and edges of both triangles, and the widest slab tells. The points are then laid along that, through
+    with the normals and edges of both triangles, and the widest slab tells, one of these where rounding is between. The points are then laid along that, through
     their middle: how far this moves them is how far they were from being the nearest.
     """
     x = near[_POINTS + 3] - near[_POINTS]
@@ -305,7 +305,7 @@ def _direction_between(P, W, XA, XB, near, marks, T):
     if size > 0.0:
         width = slab(T, x, y, z)
     widest, nx, ny, nz = widest_slab(T)
-    if widest <= width:
+    if widest <= width - 4.0 * near[_WORLD_ERROR]:
         return x, y, z
     for axis in range(3):
         half = 0.5 * near[_BEST] * (nx if axis == 0 else (ny if axis == 1 else nz))
