@@ -19,11 +19,14 @@ from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
 from collide.meshes.hits import apart_nearby, core_hits, hits, swept_apart
 from collide.meshes.way_out import way_out
+from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
 from collide.shapes.mesh import Mesh
 
+#: Facets nearer than this share of the pair's size tell its direction badly.
+_NEAR = 2.0**-24
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
 
@@ -128,6 +131,7 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     normal = np.where(unseen[:, None], _unit(across - start), found.normal)
     lost = (normal == 0.0).all(axis=1)
     normal[lost] = _unit((across - start)[lost])
+    turned = _of_hulls(A, B, X_WA, X_WB, found, normal)
     rows["normal"] = normal + 0.0
     rows["lower"] = np.maximum(_down(found.lower - radius) if radius else found.lower, 0.0)
     rows["upper"] = np.maximum(_up(found.upper - radius) if radius else found.upper, 0.0)
@@ -136,6 +140,7 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     none = rows["distance"] == 0.0
     rows["distance"][none] = rows["upper"][none]
     rows["point_a"], rows["point_b"] = found.point_a + A.radius * normal, found.point_b - B.radius * normal
+    lay_points_apart(rows, turned)
     rows["part_a"], rows["part_b"] = np.maximum(found.facets[:, 0], 0), np.maximum(found.facets[:, 1], 0)
     beyond = unseen | (rows["lower"] > limit)
     rows["beyond"] = beyond
@@ -150,6 +155,22 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
         rows["point_a"][unseen], rows["point_b"][unseen] = middle - half, middle + half
     rows["exact"] = np.minimum(found.counters[:, 2], 255)
     return rows
+
+
+def _of_hulls(A: Body, B: Body, X_WA, X_WB, found, normal: np.ndarray) -> np.ndarray:
+    """Numbers of the rows whose ``normal`` becomes, in place, that of the hulls.
+
+    Of a pair of facets that all but touch rounding leaves many directions, and the pair found may be one around the corner of
+    two faces that lie on each other. Hulls that are as far apart, as far as is proven, know the bodies' own direction.
+    """
+    near = np.flatnonzero((found.facets[:, 0] >= 0) & (found.distance <= _NEAR * _size(A, B, X_WA, X_WB)))
+    if not len(near):
+        return near
+    hulls = ask(hull_of(A), hull_of(B), X_WA[near], X_WB[near], False, math.inf, False, 1)
+    as_far = hulls["upper"] + A.radius + B.radius >= found.lower[near]
+    near, hulls = near[as_far], hulls[as_far]
+    normal[near] = hulls["normal"]
+    return near
 
 
 def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:

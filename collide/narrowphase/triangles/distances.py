@@ -281,9 +281,9 @@ def _near_leaves(P, W, run_a, run_b, XA, XB, placing, near, T, new, of_a, corner
 def _direction_between(P, W, XA, XB, near, marks, T):
     """The unit vector from A to B along which the nearest triangles are apart; zeros where none can be told.
 
-    The line between the nearest points, unless rounding has turned it: of points nearer than `_TURNED` errors it is compared
-    with the normals and edges of both triangles, and the widest slab tells, one of these where rounding is between. The points are then laid along that, through
-    their middle: how far this moves them is how far they were from being the nearest.
+    The line between the nearest points, unless rounding has turned it. Points nearer than `_TURNED` errors are compared with
+    the normals and edges of both triangles, and the widest slab tells; within rounding, one of these. The points are then
+    laid along that, through their middle: how far this moves them is how far they were from being the nearest.
     """
     x = near[_POINTS + 3] - near[_POINTS]
     y = near[_POINTS + 4] - near[_POINTS + 1]
