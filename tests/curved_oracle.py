@@ -291,7 +291,7 @@ def search_union(a: Body, b: Body, *, enough=_ZERO, guesses=()):
             break
         if one_low > 0:
             _cull(bounds, a, b, np.array([float(x / norm(n)) for x in n]))
-    if low > 0 and high > 0 and (any(b.holds(p) for p in a.shells) or any(a.holds(p) for p in b.shells)):
+    if low > 0 and high > enough and (any(b.holds(p) for p in a.shells) or any(a.holds(p) for p in b.shells)):
         high = -low  # a body, or a part of it, is inside, and no shorter way leads through the surface around it
     if high <= 0 or low <= 0:
         low, best_n = max(((_hull_gap(a, b, n), n) for n in _ways(best_n, guesses)), key=lambda pair: pair[0])

@@ -152,7 +152,7 @@ def judge_points(asked: Asked) -> Iterator[Failure]:
         return
     for name, shape, X in (("point_a", asked.case.A, asked.case.X_WA), ("point_b", asked.case.B, asked.case.X_WB)):
         away = curved_oracle.away_from(shape, X, getattr(r, name))
-        allowed = POINTS * asked.coordinates + (r.upper - r.lower)
+        allowed = (POINTS if r.certified else 1e-10) * asked.coordinates + (1 if r.certified else 4) * (r.upper - r.lower)
         if not away <= allowed:
             sure = "certified " if r.certified else "uncertified "
             yield asked.failed(f"{sure}points lie on their bodies", f"{name} is off by {away:.3g}, allowed {allowed:.3g}")
@@ -215,11 +215,6 @@ def judge_ladder(asked: Asked) -> Iterator[Failure]:
         ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\nC.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB{', signed=False' if meshed else ''})"
         found = f"{int(wrong.sum())} of {RUNGS}: collide {hits[k]}, distance in [{rows['lower'][k]!r}, {rows['upper'][k]!r}]"
         yield asked.failed("collide == distance.hit", found, ask)
-    undecided_apart = ~hits & (rows["how"] == UNDECIDED)
-    if undecided_apart.any():
-        k = int(np.argmax(undecided_apart))
-        ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\nC.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB)"
-        yield asked.failed("what distance leaves open is a hit of collide", f"bracket [{rows['lower'][k]!r}, {rows['upper'][k]!r}]", ask)
 
 
 def judge_unsigned(asked: Asked) -> Iterator[Failure]:
@@ -284,7 +279,8 @@ def judge_world(asked: Asked) -> Iterator[Failure]:
     for limit in limits(asked, np.random.default_rng([8, asked.case.number])):
         rows, ask = world.distances(limit).rows, text + f"w.distances({limit!r}).rows"
         if not len(rows) and asked.truth.upper < Decimal(limit):
-            yield asked.failed("World.distances holds all pairs within", f"limit {limit!r}: no row", ask)
+            sure = "" if asked.r.upper <= limit else ", those too whose bracket reaches beyond the limit"
+            yield asked.failed(f"World.distances holds all pairs within{sure}", f"limit {limit!r}: no row", ask)
         if len(rows) and asked.truth.lower > Decimal(limit) and rows["lower"][0] > limit:
             yield asked.failed("World.distances holds pairs within alone", f"limit {limit!r}: a row", ask)
         if len(rows):
@@ -302,7 +298,7 @@ def judge_contacts(asked: Asked) -> Iterator[Failure]:
         told = f"{len(rows)} rows, margin {margin!r}"
         if not len(rows) and (truth.upper < Decimal(margin) or asked.hit):
             yield asked.failed("contacts within the margin", told, ask)
-        if len(rows) and truth.lower > Decimal(margin):
+        if len(rows) and r.lower > margin and truth.lower > Decimal(margin):
             yield asked.failed("no contacts beyond the margin", f"{told}, least {rows['distance'].min()!r}", ask)
         for found in _contact_failures(asked, rows):
             yield asked.failed(*found, ask)
@@ -356,7 +352,7 @@ def judge(case: Case, engine: Engine | None = None, judges=JUDGES) -> Judged:
     for judge_one in judges:
         try:
             failures += judge_one(asked)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 whatever it is, it is a failure
             failures.append((f"no exception in {judge_one.__name__}", f"{type(error).__name__}: {error}", question(case)))
     width = asked.truth.upper - asked.truth.lower
     return Judged(failures, asked.hit, width <= 2 * max(Decimal(asked.r.upper) - Decimal(asked.r.lower), Decimal(1e-15 * asked.S)))

@@ -317,6 +317,6 @@ def widest(case: Case, d: float) -> Decimal | None:
         return Decimal(2.0**-26 * S)
     if "HPolytope" in names or (d < 0 and united):
         return Decimal(2.0**-40 * S)
-    if "Mesh" in names and "Halfspace" not in names:
+    if "Mesh" in names and ("Halfspace" not in names or any(isinstance(s, collide.Compound) for s in (case.A, case.B))):
         return Decimal(2.0**-43 * S)
     return Decimal(abs(d)) * (Decimal(2) ** -50 if d >= 0 else Decimal("1e-12"))
