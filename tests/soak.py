@@ -53,8 +53,8 @@ class Tally:
     def summary(self) -> str:
         total, failed = sum(self.pairs.values()), sum(self.failed.values())
         lines = [
-            f"{failed}/{total} pairs failed: {self.truths[False]} apart, {self.truths[True]} hits, {self.truths[None]} open; "
-            f"the oracle was as sharp as the engine in {self.told}",
+            (f"{failed}/{total} pairs failed: {self.truths[False]} apart, {self.truths[True]} hits, {self.truths[None]} open; "
+            f"the oracle was as sharp as the engine in {self.told}"),
             "",
             *(f"{self.failed[kinds]:6d}/{count:<6d} {kinds[0]} | {kinds[1]}" for kinds, count in sorted(self.pairs.items())),
             "",
