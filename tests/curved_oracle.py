@@ -22,6 +22,7 @@ from __future__ import annotations
 import itertools
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -138,6 +139,7 @@ def core_points(shape, kind: str) -> list[Vector]:
     raise TypeError(f"no oracle for {kind}")
 
 
+@lru_cache(maxsize=256)
 def _corners_of(normals, offsets) -> list[Vector]:
     """Points where three planes of {x : normals·x ≤ offsets} meet and no half-space is left, in fractions."""
     rows = [[Fraction(x) for x in (*n, c)] for n, c in zip(normals, offsets)]

@@ -36,7 +36,7 @@ class Case(NamedTuple):
 def draw(seed: int, number: int, ratio: float, kinds: tuple[str, ...] = KINDS) -> Case:
     """Case ``number``: the same whenever it is asked for."""
     random = np.random.default_rng([seed, number])
-    which = random.choice(kinds), random.choice(kinds)
+    which = str(random.choice(kinds)), str(random.choice(kinds))
     both = 10.0 ** (random.uniform(-3, 3) if random.uniform() < 0.5 else 0.0)
     sizes = [both, both * ratio ** -random.uniform()]
     random.shuffle(sizes)
@@ -56,7 +56,7 @@ def draw(seed: int, number: int, ratio: float, kinds: tuple[str, ...] = KINDS) -
     else:
         far = {"equal origins": 0.0, "inside": 0.3 * random.uniform(), "anywhere": 4.0 * random.uniform()}[poses]
         X_WB[:3, 3] = X_WA[:3, 3] + far * max(sizes) * _unit(random)
-    return Case(number, which, poses, A, B, X_WA, X_WB)  # type: ignore[arg-type]
+    return Case(number, which, poses, A, B, X_WA, X_WB)
 
 
 # --- poses --------------------------------------------------------------------------------------
