@@ -17,7 +17,7 @@ from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull
 from collide.meshes.curved import APART, curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
-from collide.meshes.hits import apart_nearby, core_hits, hits, swept_apart
+from collide.meshes.hits import apart_nearby, core_hits, hits, hull_gaps, swept_apart
 from collide.meshes.way_out import way_out
 from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.queries import surface_distances
@@ -26,7 +26,7 @@ from collide.shapes.base import Shape
 from collide.shapes.mesh import Mesh
 
 #: Facets nearer than this share of the pair's size tell its direction badly.
-_NEAR = 2.0**-24
+NEAR = 2.0**-24
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
 
@@ -104,10 +104,15 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
     out_of_sight = math.nextafter(math.nextafter(limit, math.inf) + radius, math.inf)
     found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], out_of_sight)
     apart, sure = swept_apart(A, B, found)
+    gaps = np.zeros(len(left))
     if not sure.all():
         apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
         sure |= apart
+        gaps[~sure] = hull_gaps(hull_of(A), hull_of(B), X_WA[left[~sure]], X_WB[left[~sure]])
+        apart |= gaps > 0.0
+        sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
+    _raise_lower(rows, left[gaps > 0.0], gaps[gaps > 0.0], limit)
     if limit > farthest_told(A, B):
         for k in left[found.facets[:, 0] < 0].tolist():
             rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
@@ -118,6 +123,18 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
         point, step = _common(A, B, X_WA[k], X_WB[k], inside[k], rows[k], found, at)
         _overlap(A, B, X_WA[k], X_WB[k], rows, k, point, step, depths)
     return rows
+
+
+def _raise_lower(rows: np.ndarray, at: np.ndarray, lower: np.ndarray, limit: float) -> None:
+    """Let rows know of a better lower bound of their gaps, in place."""
+    row = rows[at]
+    row["lower"] = np.maximum(row["lower"], lower)
+    row["beyond"] |= row["lower"] > limit
+    row["upper"] = np.where(row["beyond"], math.inf, np.maximum(row["upper"], row["lower"]))
+    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(row["distance"], row["lower"], row["upper"]))
+    row["certified"] |= row["beyond"]
+    lay_points_apart(row, np.arange(len(row)))
+    rows[at] = row
 
 
 def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
@@ -163,7 +180,7 @@ def _of_hulls(A: Body, B: Body, X_WA, X_WB, found, normal: np.ndarray) -> np.nda
     Of a pair of facets that all but touch rounding leaves many directions, and the pair found may be one around the corner of
     two faces that lie on each other. Hulls that are as far apart, as far as is proven, know the bodies' own direction.
     """
-    near = np.flatnonzero((found.facets[:, 0] >= 0) & (found.distance <= _NEAR * _size(A, B, X_WA, X_WB)))
+    near = np.flatnonzero((found.facets[:, 0] >= 0) & (found.distance <= NEAR * _size(A, B, X_WA, X_WB)))
     if not len(near):
         return near
     hulls = ask(hull_of(A), hull_of(B), X_WA[near], X_WB[near], False, math.inf, False, 1)

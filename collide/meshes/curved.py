@@ -18,7 +18,7 @@ from collide.geometry.packing import POINTS
 from collide.meshes.bodies import Body, farthest_told, hull_of
 from collide.meshes.enclosures import Enclosure
 from collide.meshes.facet_rows import Posed, facet_rows
-from collide.meshes.hits import core_hits, holds_points
+from collide.meshes.hits import core_hits, holds_points, hull_gaps
 from collide.meshes.near_facets import Facets, near_facets
 from collide.meshes.way_out import way_out
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
@@ -57,6 +57,7 @@ def decide(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed) -> Decided:
     if len(left):
         where = points_in_solid(A.tree, X_WA.X[left], E.outer.points[0], X_WB.X[left])  # refuses poses that are none
         _by_facets(A, E, X_WA, X_WB, left, done)
+        _by_hulls(A, E, X_WA, X_WB, left[done.state[left] == OPEN], done)
         if A.solid:
             free = (done.state[left] == APART) & (where != OUTSIDE)
             done.state[left[free]], done.how[left[free]] = HIT, EXACT
@@ -93,6 +94,13 @@ def _by_facets(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray
             unsure[p] |= not sure
     done.state[left] = np.where(hit, HIT, np.where(unsure, OPEN, APART))
     done.how[left], done.place[left] = how, place
+
+
+def _by_hulls(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray, done: Decided) -> None:
+    """What no facet decides the hull may: its corners are all in sight at once."""
+    PA, PB = X_WA.of(left), X_WB.of(left)
+    gaps = hull_gaps(hull_of(A), hull_of(E.outer), PA.X, PB.X)
+    done.state[left[gaps > 1.001 * (PA.slop + PB.slop)]] = APART
 
 
 def _rounds(near: Facets, wanted):
