@@ -128,7 +128,7 @@ def _report(args) -> int:
         _write_json(report.to_dict(), args.json)
     if args.json != "-" and not args.quiet:
         width, whole_names = terminal.output_width(sys.stdout)
-        terminal.write(terminal.render(report, everything=args.all, width=width, whole_names=whole_names))
+        terminal.write(terminal.render(report, everything=args.all, proofs=args.all, width=width, whole_names=whole_names))
     return FREE
 
 

@@ -40,7 +40,7 @@ def fake_scene(*rows):
             answers[answers["hit"] | (answers["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
         ),
-        stats=stats,
+        stats=stats, names=dict(names),
     )
     bodies = [
         SimpleNamespace(name=n, shape=Sphere(0.1), X_WB=np.eye(4), static=False, source="", approximation=None) for n in names.values()
@@ -91,7 +91,7 @@ def test_check_prints_one_line_a_pair(scene, capsys):
     cli.main(["check", "x.yaml"])
     out, err = capsys.readouterr()
     assert out == "collision\ta\tb\t-0.01\ntouching\ta\tc\t0.0\n"
-    assert err == "collide: 1 collision, 1 touching within rounding, all 3 pairs answered\n"
+    assert err == "collide: 1 collision, 1 touching, all 3 pairs answered\n"
 
 
 def test_quiet_says_nothing(scene, capsys):
@@ -130,7 +130,7 @@ def test_json_alone_on_standard_output(scene, capsys, command):
     scene(HIT)
     cli.main([command, "x.yaml", "--json", "-"])
     data = json.loads(capsys.readouterr().out)
-    assert data["schema"] == "collide-report/2" and data["colliding"][0]["depth"] == 0.01
+    assert data["schema"] == "collide-report/3" and data["colliding"][0]["depth"] == 0.01
 
 
 def test_json_beside_the_table(scene, capsys, tmp_path):
