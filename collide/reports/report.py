@@ -31,6 +31,7 @@ UNANSWERED = "cannot be answered"
 class Report:
     """What `make` found: plain data, and the classes of pairs, which become plain data when they are looked at.
 
+    bodies : their names, in the order of the scene.
     geometry, trajectory : what `geometry.of_scene` and `trajectory.follow` gave, where it was asked for.
     """
 
@@ -50,6 +51,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     versions: dict[str, str | None] = field(default_factory=dict)
+    bodies: list[str] = field(default_factory=list)
     geometry: dict | None = None
     trajectory: dict | None = None
 
@@ -157,6 +159,7 @@ def make(
         work=_work(stats),
         notes=[str(note) for note in scene.notes],
         versions=versions(),
+        bodies=[body.name for body in scene.bodies],
     )
     report.seconds = _seconds(scene, stats, begun, tested, started)
     return report

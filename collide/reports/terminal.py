@@ -41,6 +41,11 @@ def render(
     return lines + missing_columns(list(dropped), width)
 
 
+def rule(title: str, width: int) -> str:
+    """A line across the page that begins a part of it."""
+    return f"── {title} ".ljust(min(width, PIPE_WIDTH), "─")[: max(width, len(title) + 4)]
+
+
 def _role(role: str, style: str) -> str:
     return style if role == "title" and style != "plain" else role
 
