@@ -212,10 +212,12 @@ def _make(args, **limits) -> list:
     ignore = [_pair(scenes[0][1], words) for words in args.ignore]
     _watch_compiler(progress)
     from collide.reports import report, states
-    from collide.reports.trajectory import follow
+    from collide.reports.trajectory import at_start, follow
 
     made = []
     for label, scene in scenes:
+        if trajectory is not None:
+            scene = at_start(scene, trajectory)
         one = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
         if trajectory is not None:
             tested = report.without(scene, ignore)

@@ -83,6 +83,14 @@ def _corners(scene, trajectory) -> tuple[dict[str, np.ndarray], list[str]]:
     return {name: np.array(found) for name, found in rows.items()}, list(notes)
 
 
+def at_start(scene, trajectory):
+    """The scene at the first waypoint."""
+    try:
+        return scene.with_state(trajectory.waypoints[0])
+    except InvalidArgument as error:
+        raise SceneError(str(error), path=trajectory.source, element="waypoint 0") from None
+
+
 def follow(
     scene, trajectory, *, clearance: float = 0.0, min_depth: float = 0.0, resolution: float = RESOLUTION, progress=None
 ) -> dict:
@@ -220,8 +228,9 @@ class _Watch:
         }  # fmt: skip
 
     def _listed(self, name: str) -> list[dict]:
-        """Pairs of one class: collisions in the order they begin, others the nearest first."""
-        kept = self.worst[name].values()
+        """Pairs that are in this class at worst: collisions in the order they begin, others the nearest first."""
+        worse = [self.worst[other] for other in classes.NAMES[: classes.NAMES.index(name)]]
+        kept = [one for pair, one in self.worst[name].items() if not any(pair in other for other in worse)]
         by_start = name in (classes.COLLIDING, classes.SHALLOW)
         ordered = sorted(kept, key=lambda one: (one["first"] if by_start else 0.0, one["event"]["order"]))
         return [
@@ -266,16 +275,17 @@ def verdict(found: dict) -> str:
     if first is not None:
         others = len(found["colliding"]) - 1
         more = f"; {count(others, 'more pair collides', 'more pairs collide')} along it" if others else ""
-        return f"first collision at {place(first['at'])} of the path: {first['a']} and {first['b']}{more}"
+        return f"first collision at {place(first['at'], ' of the path')}: {first['a']} and {first['b']}{more}"
     near = "nothing near" if least is None else (
-        f"least clearance {brief_length(max(0.0, least['distance']))} at {place(least['at'])}: {least['a']} and {least['b']}"
+        f"least clearance {brief_length(max(0.0, least['distance']))} at {place(least['at'], ' of it')}: "
+        f"{least['a']} and {least['b']}"
     )  # fmt: skip
     return f"no collision at {count(found['samples'], 'sample')} of the path; {near}"
 
 
-def place(at: dict) -> str:
+def place(at: dict, of: str = "") -> str:
     """Where on the path: its share, and the time where there is one."""
     time = "" if at["time"] is None else f" ({at['time']:.3g} s)"
-    return f"{100 * at['share']:.3g} %{time}"
+    return f"{100 * at['share']:.3g} %{of}{time}"
 
 

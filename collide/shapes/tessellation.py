@@ -197,10 +197,10 @@ def _ellipsoid(shape: Ellipsoid, tolerance: float | None) -> Tessellation:
 def _ball(radius: float, tolerance: float | None) -> Tessellation:
     """A ball by an icosahedron whose facets are cut into small ones and pushed outwards."""
     part = _part(radius, tolerance)
-    cuts = 1
+    cuts = 2  # even ones: the axes are among the directions then, and a swept box keeps its flat sides
     while (found := _geodesic(cuts))[2] > part:
         # the deviation falls with the square of the cuts
-        cuts = max(cuts + 1, math.floor(cuts * math.sqrt(found[2] / part)))
+        cuts = max(cuts + 2, 2 * math.floor(0.5 * cuts * math.sqrt(found[2] / part)))
         _refuse_more_than(10 * cuts * cuts + 2)
     directions, faces, off = found
     return Tessellation(radius * directions, faces, radius * off)
