@@ -253,7 +253,9 @@ def _pair(scene, words: str) -> tuple[str, str]:
 
     wrong = b if a in names else a
     near = difflib.get_close_matches(wrong, sorted(names), 3, 0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else "collide report lists them with --all"
+    known = [body.name for body in scene.bodies]
+    listed = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
+    hint = f"did you mean {' or '.join(near)}?" if near else f"it has {listed}"
     raise InvalidArgument(f"--ignore: scene {scene.name} has no body {wrong!r}; {hint}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,10 @@ class Pair:
     def decided(self) -> bool:
         """Whether the sign is proven."""
         return self.how != proofs.UNDECIDED_NAME
+
+
+#: Names of the fields, in their order.
+FIELDS = tuple(field.name for field in fields(Pair))
 
 
 class Fold(NamedTuple):
@@ -91,21 +95,25 @@ class Pairs(Sequence):
 
     def dicts(self) -> Iterator[dict]:
         """Each pair as plain data for JSON, one after the other."""
-        return (dict(vars(pair)) for pair in self)
+        for start in range(0, len(self._order), _CHUNK):
+            yield from (dict(zip(FIELDS, values)) for values in self._values(self._order[start : start + _CHUNK]))
 
     def _made(self, chosen: np.ndarray) -> list[Pair]:
-        rows = self._rows[chosen]
-        fields = ("a", "b", "distance", "lower", "upper", "hit", "normal", "point_a", "point_b", "part_a", "part_b", "how")
-        columns = [_plain(rows[field]) for field in (*fields, "certified")]
-        return [self._pair(*values) for values in zip(*columns)]
+        return [Pair(*values) for values in self._values(chosen)]
 
-    def _pair(self, a, b, distance, lower, upper, hit, normal, point_a, point_b, part_a, part_b, how, certified) -> Pair:
-        names = self._names[a], self._names[b]
-        distance = _finite(distance)
-        return Pair(
-            *names, distance, None if not hit or distance is None else max(0.0, -distance),
-            _finite(lower), _finite(upper), normal, point_a, point_b, part_a, part_b, proofs.name_of(how), certified,
-            [name for name in names if name in self._approximated],
+    def _values(self, chosen: np.ndarray) -> Iterator[tuple]:
+        """The fields of `Pair`, row by row."""
+        rows = self._rows[chosen]
+        distance, lower, upper = (_finite(rows[name]) for name in ("distance", "lower", "upper"))
+        depth = [
+            max(0.0, -d) if hit and d is not None else None for hit, d in zip(rows["hit"].tolist(), distance)
+        ]  # fmt: skip
+        a, b = ([self._names[k] for k in rows[side].tolist()] for side in ("a", "b"))
+        approximated = [[name for name in pair if name in self._approximated] for pair in zip(a, b)]
+        return zip(
+            a, b, distance, depth, lower, upper, *(_plain(rows[name]) for name in ("normal", "point_a", "point_b")),
+            rows["part_a"].tolist(), rows["part_b"].tolist(), map(proofs.name_of, rows["how"].tolist()),
+            rows["certified"].tolist(), approximated,
         )  # fmt: skip
 
     # --- many at once ---------------------------------------------------------------------------
@@ -154,9 +162,9 @@ def _ranks(names: Mapping[int, str]) -> np.ndarray:
 
 def _plain(column: np.ndarray) -> list:
     """Python's own numbers; −0.0 is 0.0."""
-    return (column + 0.0).tolist() if column.dtype.kind == "f" else column.tolist()
+    return (column + 0.0).tolist()
 
 
-def _finite(value: float) -> float | None:
-    """None where a number is infinite: an unbounded depth or bracket."""
-    return value if math.isfinite(value) else None
+def _finite(column: np.ndarray) -> list[float | None]:
+    """The same, None where a number is infinite: an unbounded depth or bracket."""
+    return [number if math.isfinite(number) else None for number in _plain(column)]
