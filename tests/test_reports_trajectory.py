@@ -173,7 +173,7 @@ def test_what_is_wrong_with_a_file_is_named(tmp_path, name, text, words):
 
 
 def test_unknown_joints_are_told_with_their_waypoint():
-    with pytest.raises(SceneError, match="waypoint 1.*unknown joint 'swing'.*slide, lift"):
+    with pytest.raises(SceneError, match=r"waypoint 1.*unknown joint 'swing'.*slide, lift"):
         follow(slider_scene(), Trajectory("plan.csv", [{"slide": 0}, {"swing": 1}]))
 
 

@@ -48,7 +48,8 @@ class Finding(NamedTuple):
 class Check:
     """The findings in one state, and whether they fail the check.
 
-    label : of the state, "" where none was asked for.   failing : findings that count as collisions.
+    label : of the state, "" where none was asked for.   failing : findings that count as collisions; ``findings``
+        begins with them.
     """
 
     label: str
@@ -110,9 +111,8 @@ def check(report: Report, label: str, *, touching_counts: bool, known: Baseline 
             deeper = found.depth > before + tolerance
             found = found._replace(what=DEEPER if deeper else KNOWN, before=before)
             counts = deeper
-        made.findings.append(found)
-        if counts:
-            made.failing.append(found)
+        (made.failing if counts else made.findings).append(found)
+    made.findings[:0] = made.failing
     gone = [entry for entry in left.values() if entry.what == COLLISION or touching_counts]
     made.findings += [entry._replace(what=GONE) for entry in gone]
     return made
