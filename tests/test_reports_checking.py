@@ -226,16 +226,16 @@ def test_folding_tells_every_pair_once(seed):
     found = report.make(Scene("many", [SceneBody(f"b{k}", Sphere(1.0), pose(rng.uniform(-2.2, 2.2, 3))) for k in range(25)])).colliding
     assert len(found) > 60
     folds, more = found.folded(4, 1000)
-    assert more == 0 and sum(fold.count for fold in folds) == len(found)
+    assert more == 0 and sum(fold.size for fold in folds) == len(found)
     left, k = list(found), 0
     while left:
         first = left[0]
         counts = [sum(body in (pair.a, pair.b) for pair in left) for body in (first.a, first.b)]
         body = first.b if counts[1] > counts[0] else first.a
         told = [pair for pair in left if body in (pair.a, pair.b)] if max(counts) > 4 else [first]
-        assert (folds[k].pair, folds[k].count) == (first, len(told))
+        assert (folds[k].pair, folds[k].size) == (first, len(told))
         left, k = [pair for pair in left if pair not in told], k + 1
-    assert found.folded(4, 3)[1] == len(found) - sum(fold.count for fold in folds[:3])
+    assert found.folded(4, 3)[1] == len(found) - sum(fold.size for fold in folds[:3])
 
 
 def test_contacts_meshes_and_notes_take_a_line_each():

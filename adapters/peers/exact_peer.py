@@ -46,10 +46,11 @@ class ExactPeer(PairwisePeer):
             yield from super().parts(body)
             return
         for part, poses in _placed(body.shape, ()):
-            points, radius = self.build(part)
-            for X in poses:
-                points = _moved(points, X)
-            yield (points, radius), body.X_WB
+            built = corners(part)
+            if built is None:
+                raise UnsupportedQuery(str(self.refuses(part)))
+            points, radius = built
+            yield (_moved(points, poses), radius), body.X_WB
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:
         from collide.adapters.peers import exact
@@ -103,8 +104,10 @@ def _placed(shape: Shape, poses: tuple) -> Iterator[tuple[Shape, tuple]]:
         yield shape, poses
 
 
-def _moved(points, X: np.ndarray) -> list[list[Fraction]]:
-    """Points (n, 3) under a pose (4, 4), without any rounding."""
-    rows = [[Fraction(float(x)) for x in row] for row in X[:3]]
-    given = [[x if isinstance(x, Fraction) else Fraction(float(x)) for x in point] for point in points]
-    return [[sum((a * x for a, x in zip(row, point)), row[3]) for row in rows] for point in given]
+def _moved(points: np.ndarray, poses: tuple) -> list[list[Fraction]]:
+    """Points (n, 3) under poses (4, 4), one after the other, without any rounding."""
+    moved = [[Fraction(float(x)) for x in point] for point in points]
+    for X in poses:
+        rows = [[Fraction(float(x)) for x in row] for row in X[:3]]
+        moved = [[sum((a * x for a, x in zip(row, point)), row[3]) for row in rows] for point in moved]
+    return moved

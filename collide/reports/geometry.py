@@ -17,7 +17,8 @@ def of_scene(scene) -> dict:
     """
     size = 2.0 * _extent(scene)
     rows: dict[int, int] = {}
-    shapes, bodies = [], []
+    shapes: list[dict] = []
+    bodies: list[dict] = []
     for body in scene.bodies:
         if id(body.shape) not in rows:
             rows[id(body.shape)] = len(shapes)

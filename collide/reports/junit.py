@@ -63,7 +63,8 @@ def _told(check: Check) -> dict[str, list[Finding]]:
 
 
 def _unanswered(check: Check) -> dict[str, list[str]]:
-    failing, found = _failing(check), {}
+    failing = _failing(check)
+    found: dict[str, list[str]] = {}
     for entry in check.unanswered:
         for body, other in ((entry["a"], entry["b"]), (entry["b"], entry["a"])):
             if body not in failing:

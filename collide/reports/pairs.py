@@ -53,7 +53,7 @@ class Fold(NamedTuple):
 
     pair: Pair
     body: str
-    count: int
+    size: int
 
 
 class Pairs(Sequence):

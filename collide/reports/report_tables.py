@@ -60,8 +60,8 @@ def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: 
         (Column(f"at x y z [{unit}]", "label", 1), on_a),
         (Column("normal A→B", "label", 2), directions([pair.normal for pair in shown])),
     ]
-    if any(fold.count > 1 for fold in folds):
-        columns.insert(2, (Column("and", "label"), [f"+{fold.count - 1}" if fold.count > 1 else "" for fold in folds]))
+    if any(fold.size > 1 for fold in folds):
+        columns.insert(2, (Column("and", "label"), [f"+{fold.size - 1}" if fold.size > 1 else "" for fold in folds]))
     if measure == "within":
         columns.append((Column("exactly", "label", 3), [_verdict(pair) for pair in shown]))
     elif proofs:
@@ -77,7 +77,7 @@ def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: 
 
 def _fold_notes(folds: list[Fold]) -> list[str]:
     """What the rows stand for that tell several pairs."""
-    told = [f"{fold.body} with {fold.count - 1} more" for fold in folds if fold.count > 1]
+    told = [f"{fold.body} with {fold.size - 1} more" for fold in folds if fold.size > 1]
     if not told:
         return []
     rest = f", … ({len(told) - _NAMED} more such)" if len(told) > _NAMED else ""

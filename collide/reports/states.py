@@ -36,7 +36,7 @@ def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
 
 def render(made: list[Stated], *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
     """The page of one report, or a table of the states and the page of each, as `terminal.render` gives it."""
-    shown = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
+    shown: dict[str, Any] = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
     if len(made) == 1:
         return _page(made[0].report, **shown)
     style = "colliding" if any(one.report.colliding for one in made) else "free"

@@ -7,6 +7,7 @@ counter-clockwise seen from outside; no point of the shape is farther from it th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -147,7 +148,8 @@ def _swept(points: np.ndarray, radius: float, tolerance: float | None) -> Tessel
         k, d = np.nonzero(heights >= heights.max(axis=0) - 2 * reach * edge)
         made.append(corners[k] + radius * some[d])
         _refuse_more_than(sum(map(len, made)))
-    return Tessellation(*_hull(np.unique(np.concatenate(made), axis=0)), ball.deviation)
+    vertices, faces = _hull(np.unique(np.concatenate(made), axis=0))
+    return Tessellation(vertices, faces, ball.deviation)
 
 
 # --- curved shapes -------------------------------------------------------------------------------
@@ -269,7 +271,7 @@ def _refuse_more_than(vertices: float) -> None:
         )
 
 
-_KINDS = {
+_KINDS: dict[type[Shape], Callable[..., Tessellation]] = {
     Box: _box,
     Sphere: lambda shape, tolerance: _ball(shape.radius, tolerance),
     Capsule: lambda shape, tolerance: _swept(

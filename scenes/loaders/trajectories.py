@@ -49,8 +49,8 @@ def read_trajectory(path) -> Trajectory:
     rows = _read_csv(path) if path.suffix.lower() in (".csv", ".tsv", ".txt") else _rows(read_document(path), path, "")
     if not rows:
         raise SceneError(f"holds no waypoint; a trajectory is {FORMS}", path=path)
-    times = [row.pop(_TIME, None) for row in rows]
-    if any(time is None for time in times):
+    times = [row.pop(_TIME) for row in rows if _TIME in row]
+    if len(times) < len(rows):
         return Trajectory(str(path), rows)
     for k, (before, after) in enumerate(pairwise(times)):
         if after < before:
