@@ -479,7 +479,7 @@ def _is_scene(place: str) -> bool:
     try:
         with open(place, encoding="utf-8") as file:
             data = json.load(file)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return isinstance(data, dict) and ("collide" in data or "robot_model_name" in data)
 

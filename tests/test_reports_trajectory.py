@@ -161,6 +161,8 @@ def test_yaml_as_moveit_prints_it(tmp_path):
     [
         ("x.csv", "", "no waypoint"), ("x.csv", "slide\n", "no waypoint"), ("x.csv", "slide,slide\n0,1\n", "every column once"),
         ("x.csv", "slide,lift\n0\n", "row 1.*1 values.*2 columns"), ("x.csv", "slide\nfar\n", "row 1 \"slide\".*'far'"),
+        ("x.csv", "time,slide\nnan,0\n", "row 1 \"time\".*finite"), ("x.csv", "slide\ninf\n", "finite"),
+        ("x.json", json.dumps({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}), "several degrees of freedom"),
         ("x.csv", "time,slide\n1,0\n0,1\n", "times must rise"), ("x.json", "[]", "no waypoint"), ("x.json", '{"a": 3}', "no trajectory"),
         ("x.json", '{"joint_names": ["a"], "points": [{"positions": [1, 2]}]}', r"points\[0\].positions.*each of the 1"),
         ("x.json", '{"a": [1, 2], "b": [1]}', "no trajectory"), ("x.json", '[{"a": "b"}]', r"\[0\].*number"), ("x.json", "3", "must be a mapping"),
@@ -175,6 +177,11 @@ def test_what_is_wrong_with_a_file_is_named(tmp_path, name, text, words):
 def test_unknown_joints_are_told_with_their_waypoint():
     with pytest.raises(SceneError, match=r"waypoint 1.*unknown joint 'swing'.*slide, lift"):
         follow(slider_scene(), Trajectory("plan.csv", [{"slide": 0}, {"swing": 1}]))
+
+
+def test_paths_without_end_are_refused():
+    with pytest.raises(InvalidArgument, match="more than 1000000 samples"):
+        follow(slider_scene(), moving(0, 1e9))
 
 
 def test_a_scene_without_a_robot_cannot_follow():

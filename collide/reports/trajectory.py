@@ -18,6 +18,8 @@ from collide.reports.progress import silent
 
 #: Largest change of a joint [rad] or [m] between two samples, unless another is asked for.
 RESOLUTION = 0.02
+#: Longer paths are refused: values in another unit, mostly.
+MOST_SAMPLES = 1_000_000
 #: Samples whose poses are worked out at a time.
 _CHUNK = 256
 
@@ -48,6 +50,11 @@ def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
         raise InvalidArgument(f"resolution must be above 0 [rad or m], got {resolution!r}")
     corners, notes = _corners(scene, trajectory)
     steps = np.max([np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) for q in corners.values()], axis=0)
+    if not steps.sum() / resolution <= MOST_SAMPLES:
+        raise InvalidArgument(
+            f"resolution: the path is {steps.sum():g} rad or m long, more than {MOST_SAMPLES} samples of {resolution:g}: "
+            "give a larger one (--resolution)"
+        )
     counts = np.maximum(1, np.ceil(steps / resolution)).astype(int)
     # sample k lies ``part`` of the way from waypoint ``first`` to the next
     first = np.append(np.repeat(np.arange(len(counts)), counts), len(counts))

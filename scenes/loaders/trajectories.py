@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -81,9 +82,12 @@ def _read_csv(path: Path) -> list[dict[str, float]]:
 
 def _number(text: str, path: Path, element: str) -> float:
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        raise SceneError(f"must be a number, got {text!r}", path=path, element=element) from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise SceneError(f"must be a finite number, got {text!r}", path=path, element=element)
+    return value
 
 
 def _timed(values: dict[str, float]) -> dict[str, float]:
@@ -97,6 +101,9 @@ def _rows(data: Any, path: Path, element: str) -> list[dict[str, float]]:
     if isinstance(data, list):
         return [row for k, entry in enumerate(data) for row in _entry(entry, path, f"{element}[{k}]")]
     fields = Fields(data, path, element)
+    several = fields.get("multi_dof_joint_trajectory")
+    if isinstance(several, Mapping) and several.get("points"):
+        fields.fail("joints of several degrees of freedom are not read: give their values by column", "multi_dof_joint_trajectory")
     for key in ("trajectory", "joint_trajectory", "waypoints"):
         if key in fields:
             return _rows(data[key], path, fields.place(key))
@@ -107,7 +114,7 @@ def _rows(data: Any, path: Path, element: str) -> list[dict[str, float]]:
 
 def _entry(entry: Any, path: Path, element: str) -> list[dict[str, float]]:
     """One entry of a list: a waypoint, or a trajectory of its own."""
-    if isinstance(entry, Mapping) and not {"joint_trajectory", "points"} & entry.keys():
+    if isinstance(entry, Mapping) and not {"joint_trajectory", "points", "multi_dof_joint_trajectory"} & entry.keys():
         timed = next((key for key in TIMES if key in entry), None)
         values = state_of({key: value for key, value in entry.items() if key != timed}, path, element)
         return [values if timed is None else {_TIME: _seconds(Fields(entry, path, element), timed), **values}]
