@@ -11,6 +11,7 @@ imports what it needs.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -280,11 +281,12 @@ def _load(args, progress: Callable) -> list:
         options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
         given = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
         words = args.state or []
-        if not words or (len(words) == 1 and not {",", "="} & set(words[0])):
+        if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
             return [("", load(*args.scenes, state=words[0] if words else None, **given))]
         from collide.scenes.loaders.state_words import in_states
 
-        return in_states(load(*args.scenes, state=None, **given), words)
+        found = in_states(load(*args.scenes, state=None, **given), words)
+        return found if len(found) > 1 else [("", found[0][1])]
 
 
 def _compare(args) -> int:

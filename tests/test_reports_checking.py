@@ -245,7 +245,7 @@ def test_contacts_meshes_and_notes_take_a_line_each():
     scene.notes += ["joint a is outside its limits", "joint b is too"]
     lines = text_of(terminal.render(report.make(scene), width=120))
     assert any(line.strip().startswith("touching  ") and "20 pairs, gap or overlap at most 0.000 mm" in line for line in lines)
-    assert any("2 as they are" in line and "1 has no inside, a surface only: sheet" in line for line in lines)
+    assert any("2 as they are" in line and "sheet is a surface of 3 facets without an inside" in line for line in lines)
     assert any("2: joint a is outside its limits; …" in line for line in lines)
     assert len(lines) < 12 and not any("HOW EACH" in line or line.startswith("TIME") for line in lines)
 

@@ -209,7 +209,7 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
 
 @pytest.mark.parametrize(
     "word, complaint",
-    [("0.1", "1 joint values given.*2 joints: slide, lift"), ("1,2,3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
+    [("0.1", "1 joint value given.*2 joints: slide, lift"), ("1,2,3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
      ("swing=1", "unknown joint 'swing'"), ("away", "unknown state 'away'; it has home, hit"), ("home,away", "unknown state 'away'"),
      ("slide=nan", "finite")],
 )  # fmt: skip
@@ -267,6 +267,8 @@ def test_states_have_a_line_and_a_page_each(command):
     status, out, _ = command("report", "rail.yaml", "--state", "home", "--state", "-0.5,0", "--state", "slide=0.6")
     assert status == 0 and out.startswith("collisions in 3 of 3 states: home, -0.5,0, slide=0.6\n")
     assert "── STATE -0.5,0 ──" in out
+    assert command("report", "rail.yaml", "--state", "-0.5,0")[1].startswith("1 collision, ")
+    assert "1 joint value given" in command("report", "rail.yaml", "--state", "-0.5")[2]
     status, out, err = command("check", "rail.yaml", "--state", "home,hit", "--ignore", "floor,crate")
     assert status == 1 and out.startswith("collision\tpost\tslider\t-0.") and out.endswith("\thit\n")
     assert "collide: home: no collision" in err

@@ -164,14 +164,16 @@ def _and_more(named: list[str], more: bool) -> str:
 
 
 def _mesh_line(report: Report) -> str:
-    surfaces = [entry["body"] for entry in report.meshes if not entry["solid"]]
+    surfaces = [entry for entry in report.meshes if not entry["solid"]]
     if not report.meshes:
         return ""
     what = f"{len(report.meshes)} as they are, triangle by triangle"
     if not surfaces:
         return f"{what}; all are solid"
-    names = _and_more(list(dict.fromkeys(surfaces))[:_NAMED], len(set(surfaces)) > _NAMED)
-    return f"{what}; {len(surfaces)} {'has' if len(surfaces) == 1 else 'have'} no inside, a surface only: {names}"
+    if len(surfaces) == 1:
+        return f"{what}; {surfaces[0]['body']} is a {surfaces[0]['what']}"
+    bodies = list(dict.fromkeys(entry["body"] for entry in surfaces))
+    return f"{what}; {len(surfaces)} have no inside, a surface only: {_and_more(bodies[:_NAMED], len(bodies) > _NAMED)}"
 
 
 def _approximation_line(report: Report) -> str:
