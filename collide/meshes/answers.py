@@ -14,10 +14,10 @@ import numpy as np
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
 from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace
-from collide.meshes.curved import APART, curved_rows, decide
+from collide.meshes.curved import curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
-from collide.meshes.hits import apart_nearby, core_hits, hits, hull_gaps, swept_apart
+from collide.meshes.hits import APART, HIT, apart_nearby, core_hits, states, swept_apart
 from collide.meshes.way_out import way_out
 from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.queries import surface_distances
@@ -31,16 +31,16 @@ NEAR = 2.0**-24
 PROMISE = 2.0**-43
 
 
-def mesh_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool for poses (n, 4, 4): whether two shapes, a mesh among them, share a point. Raises UnsupportedQuery."""
+def mesh_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) APART, HIT or OPEN for poses (n, 4, 4) of two shapes, a mesh among them. Raises UnsupportedQuery."""
     if is_halfspace(A) or is_halfspace(B):
-        return ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1)
+        return np.where(ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1), HIT, APART)
     if not has_facets(A):
-        return mesh_hits(B, A, X_WB, X_WA)
+        return mesh_states(B, A, X_WB, X_WA)
     if not has_facets(B):
-        return decide(body_of(A), enclosure_of(B), given(X_WA), given(X_WB)).state != APART
+        return decide(body_of(A), enclosure_of(B), given(X_WA), given(X_WB)).state
     one, other = body_of(A), body_of(B)
-    return hits(one, other, X_WA, X_WB) if one.key <= other.key else hits(other, one, X_WB, X_WA)
+    return states(one, other, X_WA, X_WB) if one.key <= other.key else states(other, one, X_WB, X_WA)
 
 
 def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
@@ -104,15 +104,10 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
     out_of_sight = math.nextafter(math.nextafter(limit, math.inf) + radius, math.inf)
     found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], out_of_sight)
     apart, sure = swept_apart(A, B, found)
-    gaps = np.zeros(len(left))
     if not sure.all():
         apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
         sure |= apart
-        gaps[~sure] = hull_gaps(hull_of(A), hull_of(B), X_WA[left[~sure]], X_WB[left[~sure]])
-        apart |= gaps > 0.0
-        sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
-    _raise_lower(rows, left[gaps > 0.0], gaps[gaps > 0.0], limit)
     if limit > farthest_told(A, B):
         for k in left[found.facets[:, 0] < 0].tolist():
             rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
@@ -123,18 +118,6 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
         point, step = _common(A, B, X_WA[k], X_WB[k], inside[k], rows[k], found, at)
         _overlap(A, B, X_WA[k], X_WB[k], rows, k, point, step, depths)
     return rows
-
-
-def _raise_lower(rows: np.ndarray, at: np.ndarray, lower: np.ndarray, limit: float) -> None:
-    """Let rows know of a better lower bound of their gaps, in place."""
-    row = rows[at]
-    row["lower"] = np.maximum(row["lower"], lower)
-    row["beyond"] |= row["lower"] > limit
-    row["upper"] = np.where(row["beyond"], math.inf, np.maximum(row["upper"], row["lower"]))
-    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(row["distance"], row["lower"], row["upper"]))
-    row["certified"] |= row["beyond"]
-    lay_points_apart(row, np.arange(len(row)))
-    rows[at] = row
 
 
 def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:

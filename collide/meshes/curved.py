@@ -18,7 +18,7 @@ from collide.geometry.packing import POINTS
 from collide.meshes.bodies import Body, farthest_told, hull_of
 from collide.meshes.enclosures import Enclosure
 from collide.meshes.facet_rows import Posed, facet_rows
-from collide.meshes.hits import core_hits, holds_points, hull_gaps
+from collide.meshes.hits import APART, HIT, OPEN, core_hits, holds_points
 from collide.meshes.near_facets import Facets, near_facets
 from collide.meshes.way_out import way_out
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
@@ -27,8 +27,6 @@ from collide.narrowphase.triangles.inside import OUTSIDE
 from collide.narrowphase.triangles.queries import points_in_solid, surface_distances
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 
-#: What is known of a pose.
-APART, HIT, OPEN = range(3)
 #: Facets of a pose that are asked about together: so many first, then so many times more.
 _FIRST, _MORE = 8, 4
 
@@ -57,7 +55,6 @@ def decide(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed) -> Decided:
     if len(left):
         where = points_in_solid(A.tree, X_WA.X[left], E.outer.points[0], X_WB.X[left])  # refuses poses that are none
         _by_facets(A, E, X_WA, X_WB, left, done)
-        _by_hulls(A, E, X_WA, X_WB, left[done.state[left] == OPEN], done)
         if A.solid:
             free = (done.state[left] == APART) & (where != OUTSIDE)
             done.state[left[free]], done.how[left[free]] = HIT, EXACT
@@ -94,13 +91,6 @@ def _by_facets(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray
             unsure[p] |= not sure
     done.state[left] = np.where(hit, HIT, np.where(unsure, OPEN, APART))
     done.how[left], done.place[left] = how, place
-
-
-def _by_hulls(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray, done: Decided) -> None:
-    """What no facet decides the hull may: its corners are all in sight at once."""
-    PA, PB = X_WA.of(left), X_WB.of(left)
-    gaps = hull_gaps(hull_of(A), hull_of(E.outer), PA.X, PB.X)
-    done.state[left[gaps > 1.001 * (PA.slop + PB.slop)]] = APART
 
 
 def _rounds(near: Facets, wanted):
@@ -179,18 +169,21 @@ def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest:
 
 
 def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) -> np.ndarray:
-    """Rows of the nearest facets; ``facets`` (n,) are numbers of near ones."""
+    """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
+
+    Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need not.
+    """
     n = len(PA.X)
     order = np.empty(len(A.tree.ids), dtype=np.int64)
     order[A.tree.ids] = np.arange(len(order))
     first = order[facets]
     poses, places = [np.arange(n)], [first]
-    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf)]
+    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf, depths=False)]
     upper = asked[0]["upper"].copy()
     near = near_facets(A.tree, E.packed, PA, PB, asked[0]["normal"], upper)
     for some in _rounds(near, lambda facets: (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])):
         pose, place = near.pose[some], near.place[some]
-        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf)  # whatever the batch
+        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=False)  # whatever the batch
         poses.append(pose)
         places.append(place)
         asked.append(rows)

@@ -6,13 +6,11 @@ All signs are exact, but for swept balls that touch within the bracket of a dist
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from collide.batches import ask
-from collide.meshes.bodies import Body, hull_of
+from collide.meshes.bodies import Body
 from collide.narrowphase.triangles.inside import OUTSIDE
 from collide.narrowphase.triangles.queries import (
     FARTHER,
@@ -21,8 +19,9 @@ from collide.narrowphase.triangles.queries import (
     surface_distances,
     surfaces_meet,
 )
-from collide.shapes.base import Shape
 
+#: What is known of a pose.
+APART, HIT, OPEN = range(3)
 #: As many points and poses are looked at in one go.
 _CHUNK = 1 << 16
 #: Below so many points and poses, asking takes no longer than leaving out those far away.
@@ -98,31 +97,24 @@ def swept_apart(A: Body, B: Body, found: SurfaceDistances) -> tuple[np.ndarray, 
     return apart, apart | (found.upper <= radius) | found.meets
 
 
-def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether the bodies share a point; what rounding leaves open, swept balls only, is a hit."""
-    answer = core_hits(A, B, X_WA, X_WB).core
+def states(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) APART, HIT or OPEN: whether the bodies share a point; rounding leaves open swept balls only."""
+    answer = np.where(core_hits(A, B, X_WA, X_WB).core, HIT, APART)
     radius = A.radius + B.radius
-    left = np.flatnonzero(~answer)
+    left = np.flatnonzero(answer == APART)
     if radius > 0.0 and len(left):
         found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], radius * FARTHER)
         apart, sure = swept_apart(A, B, found)
         if not sure.all():
             more = surface_distances(A.tree, B.tree, X_WA[left[~sure]], X_WB[left[~sure]])
-            apart[~sure], known = swept_apart(A, B, more)
-            still = np.flatnonzero(~sure)[~known]
-            apart[still] = hull_gaps(hull_of(A), hull_of(B), X_WA[left[still]], X_WB[left[still]]) > 0.0
-        answer[left] = ~apart
+            apart[~sure], sure[~sure] = swept_apart(A, B, more)
+        answer[left] = np.where(apart, APART, np.where(sure, HIT, OPEN))
     return answer
 
 
-def hull_gaps(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) proven lower bounds of the gaps of two convex shapes that hold the bodies [m]; ≤ 0 where these may meet.
-
-    For what facets leave open: the convex engine has integers for its last digits.
-    """
-    if not len(X_WA):
-        return np.zeros(0)
-    return ask(A, B, np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB), False, math.inf, False, 1, depths=False)["lower"]
+def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: False only where the bodies are proven apart."""
+    return states(A, B, X_WA, X_WB) != APART
 
 
 def apart_nearby(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from collide.geometry.mesh_tree.layout import REACH
 from collide.meshes.answers import NEAR, PROMISE
 from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
-from collide.meshes.curved import APART, HIT
+from collide.meshes.hits import APART, HIT
 from collide.meshes.pair_queries import pair_states
 from collide.meshes.union_parts import is_union
 from collide.narrowphase import run
