@@ -194,7 +194,8 @@ def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) ->
 
 def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper) -> np.ndarray:
     """One row a pose from those of its facets."""
-    order = np.lexsort((place, rows["distance"], pose))
+    # The nearest by its upper bound and the width of its bracket: where that is wide the distance is a guess, and so are points.
+    order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
     best = order[np.flatnonzero(np.diff(pose[order], prepend=-1))]
     out = np.zeros(len(best), dtype=PAIR_DTYPE)
     for name in FIELDS:  # padding stays 0
