@@ -1,26 +1,26 @@
 """Batches: from shapes and poses as checked by `query.py` to rows, in as many threads as asked for.
 
-Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py` as they are;
-unions are taken apart into pairs of parts and put together again by `unions.py`.
+Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py`, unions through
+`unions.py`, and what has a mesh through `meshes/`.
 """
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import ShapeTable, pose_table
+from collide.geometry.tables import ShapeTable
 from collide.narrowphase import run
 from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
-from collide.unions import Union, combine
+from collide.unions import UnionPair, UnionTable, run_unions
 
 
 def length_of(A, B, X_WA, X_WB) -> int:
@@ -131,43 +131,74 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
     n = len(out)
     if n == 0:
         return
+    wanted = {"boolean": boolean, "limit": limit, "depths": depths}
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
         table, which = _table(A, B, n)
-        wanted = {"boolean": boolean, "limit": limit, "axes": axes, "depths": depths}
-        if run.run_poses(out, table, which, X_WA, X_WB, check=check, **wanted):
-            return
+        answer = partial(run.run_poses, out, table, which, X_WA, X_WB, axes=axes, **wanted)
+    elif isinstance(A, Shape) and isinstance(B, Shape) and not (A.meshed or B.meshed):
+        answer = partial(run_unions, out, _unions(A, B), None, X_WA, X_WB, **wanted)
+    else:
+        _refuse_poses(X_WA, X_WB, check)
+        X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+        one_pair = isinstance(A, Shape) and isinstance(B, Shape)
+        (_meshed if one_pair else _pair_by_pair)(out, A, B, X_WA, X_WB, **wanted)
+        return
+    if not answer(check=check):
         _refuse_poses(X_WA, X_WB, check)
         out.fill(0)  # it is a pose after all, on the brink of the tolerance
-        if not run.run_poses(out, table, which, X_WA, X_WB, check=False, **wanted):
+        if not answer(check=False):
             raise AssertionError("a pose that is none")
-        return
-    _refuse_poses(X_WA, X_WB, check)
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        out[:] = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
-    else:
-        _pair_by_pair(out, A, B, X_WA, X_WB, boolean, limit, depths)
 
 
-def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -> None:
-    """The same for shapes that differ from pose to pose, poses (n, 4, 4): each distinct pair of them is one batch."""
+def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, **wanted) -> None:
+    """The same for meshes, and for shapes that differ from pose to pose; checked poses (n, 4, 4).
+
+    Convex sets and unions go through their kernels together, each distinct pair with a mesh is a batch.
+    """
     n = len(out)
     (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    plain_a, plain_b = (np.array([is_plain(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
-    keys = which_a * len(shapes_b) + which_b
-    if not run.distrust_doubles:
-        plain = plain_a[which_a] & plain_b[which_b]
-        some = np.flatnonzero(plain)
+    plain, meshed = (
+        [np.array([is_one(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b)]
+        for is_one in (is_plain, lambda shape: shape.meshed)
+    )
+    with_mesh = meshed[0][which_a] | meshed[1][which_b]
+    all_plain = plain[0][which_a] & plain[1][which_b] & (not run.distrust_doubles)
+
+    def answer_some(some: np.ndarray, answer) -> None:
         if len(some):
-            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
             rows = np.zeros_like(out, shape=len(some))
-            _answer_into(rows, *sides, X_WA[some], X_WB[some], boolean, limit, False, None, depths)
+            answer(rows, some, X_WA[some], X_WB[some])
             out[some] = rows
-        keys[plain] = -1
+
+    def sets(rows, some, *poses):
+        sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
+        table, which = _table(*sides, len(some))
+        run.run_poses(rows, table, which, *poses, check=False, **wanted)
+
+    def unions(rows, some, *poses):
+        table = UnionTable([shape.bounding_parts() for shape in (*shapes_a, *shapes_b)])
+        which = np.stack([which_a[some], len(shapes_a) + which_b[some]], axis=1)
+        run_unions(rows, table, which, *poses, check=False, **wanted)
+
+    answer_some(np.flatnonzero(all_plain), sets)
+    answer_some(np.flatnonzero(~all_plain & ~with_mesh), unions)
+    keys = np.where(with_mesh, which_a * len(shapes_b) + which_b, -1)
     for key in np.unique(keys[keys >= 0]).tolist():
-        some = np.flatnonzero(keys == key)
-        one, other = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
-        out[some] = _parts(one, other, X_WA[some], X_WB[some], boolean=boolean, limit=limit, depths=depths)
+        pair = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
+        answer_some(np.flatnonzero(keys == key), lambda rows, _, *poses, pair=pair: _meshed(rows, *pair, *poses, **wanted))
+
+
+def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool) -> None:
+    """Rows of two bodies of which one has a mesh, poses (n, 4, 4)."""
+    from collide.meshes.pair_queries import pair_hits, pair_rows
+
+    rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
+
+
+def _unions(A: Shape, B: Shape) -> UnionTable:
+    """Both bodies laid out, which prepared pairs are already."""
+    prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+    return prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.parts(), B.parts()])
 
 
 def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
@@ -221,40 +252,3 @@ def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     for column, side in enumerate((A, B)):
         which[:, column] = row_of(side) if isinstance(side, Shape) else [row_of(shape) for shape in side]
     return ShapeTable(packed), which
-
-
-def _parts(
-    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float, depths: bool
-) -> np.ndarray:
-    """bool[n], or one row a pose: every part of A against every part of B, combined."""
-    if A.meshed or B.meshed:
-        from collide.meshes.pair_queries import pair_hits, pair_rows
-
-        return pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
-    parts_a, parts_b = A.parts(), B.parts()
-    parts = [*parts_a, *parts_b]
-    n, many = len(X_WA), len(parts_a) * len(parts_b)
-    X_WBs = np.concatenate([np.concatenate([X_WA] * len(parts_a)), np.concatenate([X_WB] * len(parts_b))])
-    X_BPs = np.repeat(np.array([X for _, X in parts]), n, axis=0)
-    poses = pose_table(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
-    # Part k stands at rows k·n … k·n + n − 1 of the pose table; pairs of one pose stand together.
-    which = np.arange(n)[:, None, None] + n * np.zeros((1, len(parts_a), len(parts_b)), dtype=np.int64)
-    first = which + n * np.arange(len(parts_a))[None, :, None]
-    second = which + n * (len(parts_a) + np.arange(len(parts_b)))[None, None, :]
-    table = ShapeTable([packed for packed, _ in parts])
-    pairs = np.stack([first.ravel(), second.ravel()], axis=1)
-    rows = run.run_pairs(table, poses, np.repeat(np.arange(len(parts)), n), pairs, boolean=boolean, limit=limit)
-    if many == 1:
-        return rows["hit"] if boolean else rows
-    rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
-
-    def sides(k: int) -> tuple[Union, Union]:
-        own = poses.rows.reshape(len(parts), n, -1)[:, k]
-        return (
-            Union([packed for packed, _ in parts_a], own[: len(parts_a)]),
-            Union([packed for packed, _ in parts_b], own[len(parts_a) :]),
-        )
-
-    if boolean:
-        return np.logical_or.reduce(rows["hit"].reshape(n, many), axis=1)
-    return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)

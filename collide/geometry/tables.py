@@ -28,7 +28,7 @@ TERMS = 7
 
 #: Rounding of a part's world pose when it is a product of two: at most 4u of its terms an entry, so
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
-_PRODUCT_SLOP = 16 * 2.0**-53
+PRODUCT_SLOP = 16 * 2.0**-53
 
 
 class ShapeTable:
@@ -118,7 +118,7 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
     stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
     parts = reach[own] + np.abs(X[:, :3, 3]).sum(axis=1)
-    rows[own, POSE_SLOP] = _PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
+    rows[own, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
     terms, exact = _terms(R, p, X)
     rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
     return PoseTable(rows, np.ascontiguousarray(terms[exact]))
@@ -143,7 +143,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             else:
                 left, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
                 high, low = _two_products(left, factor)
-                exact &= ((np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
+                exact &= ((np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
             sum_, other = total + high, total
             back = sum_ - other
             lost = (other - (sum_ - back)) + (high - back)
@@ -152,7 +152,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
         out[:, :3, j] = total
     stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
     parts = reach + np.abs(X_BP[:3, 3]).sum()
-    slop = _PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
+    slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
     return out, np.where(exact, 0.0, slop)
 
 
@@ -176,7 +176,7 @@ def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.
             left = R[:, :, j, None] if target is rotation else R[:, :, j]
             high, low = _two_products(left, factor)
             target[..., 2 * j], target[..., 2 * j + 1] = high, low
-            safe = (np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
+            safe = (np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
             exact &= safe.reshape(k, -1).all(axis=1)
     return terms, exact
 
@@ -191,5 +191,5 @@ def _two_products(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 #: Products larger than this have low parts that are doubles.
-_SAFE_PRODUCT = 2.0**-900
+SAFE_PRODUCT = 2.0**-900
 _NO_TERMS = np.zeros((0, 12, TERMS))
