@@ -15,12 +15,13 @@ import numpy as np
 from collide.errors import InvalidArgument, InvalidPose
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable
+from collide.geometry.union_table import UnionTable
 from collide.narrowphase import run
 from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
-from collide.unions import UnionPair, UnionTable, run_unions
+from collide.unions import UnionPair, run_unions
 
 
 def length_of(A, B, X_WA, X_WB) -> int:
@@ -176,8 +177,11 @@ def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, **wanted) -> None:
         run.run_poses(rows, table, which, *poses, check=False, **wanted)
 
     def unions(rows, some, *poses):
-        table = UnionTable([shape.bounding_parts() for shape in (*shapes_a, *shapes_b)])
-        which = np.stack([which_a[some], len(shapes_a) + which_b[some]], axis=1)
+        if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+            table, which = A.shape_set.unions, np.stack([A.rows[some], B.rows[some]], axis=1)
+        else:
+            table = UnionTable([shape.laid_out() for shape in (*shapes_a, *shapes_b)])
+            which = np.stack([which_a[some], len(shapes_a) + which_b[some]], axis=1)
         run_unions(rows, table, which, *poses, check=False, **wanted)
 
     answer_some(np.flatnonzero(all_plain), sets)
@@ -198,7 +202,7 @@ def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, 
 def _unions(A: Shape, B: Shape) -> UnionTable:
     """Both bodies laid out, which prepared pairs are already."""
     prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
-    return prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.parts(), B.parts()])
+    return prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])
 
 
 def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:

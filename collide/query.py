@@ -301,7 +301,7 @@ def _prepare(A, B) -> None:
     elif is_plain(A) and is_plain(B):
         pair = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
     else:
-        pair = UnionPair(A, B)
+        pair = UnionPair(A.laid_out(), B.laid_out())
     if pair is None:
         return
     while len(prepared) >= _PARTNERS:

@@ -1,35 +1,20 @@
-"""Bodies that are unions of convex parts, laid out for the kernels of `narrowphase/union_poses.py`, and asked about.
+"""Bodies that are unions of convex parts: questions to the kernels of `narrowphase/union_poses.py`.
 
 How one answer is made of those of the parts is told in `narrowphase/union_rows.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from threading import local
 
 import numpy as np
 
 from collide._jit import address_of
-from collide.geometry.packing import HALFSPACE, POINTS, PackedConvex
 from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
+from collide.geometry.union_table import BALL_IN_WORLD, LaidOut, UnionTable
 from collide.narrowphase import run
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
 from collide.narrowphase.array_objects import built_in, object_words
-from collide.narrowphase.parts import (
-    BALL,
-    BALL_IN_WORLD,
-    BODY,
-    BODY_BALL,
-    BODY_CENTRE,
-    BODY_REACH,
-    BODY_SWEPT,
-    CENTRE,
-    MEASURE,
-    PART,
-    SWEPT,
-    TURNED,
-)
 from collide.narrowphase.single_unions import collide_single_union, distance_single_union
 from collide.narrowphase.union_poses import (
     ASKED,
@@ -45,70 +30,6 @@ from collide.narrowphase.union_poses import (
 )
 from collide.narrowphase.union_rows import SCORE, combine_rows
 from collide.results import PAIR_DTYPE
-from collide.shapes.base import IDENTITY, Shape
-
-Parts = Sequence[tuple[PackedConvex, np.ndarray]]
-
-
-class UnionTable:
-    """Bodies, each a run of convex parts with poses of their own, as kernels read them.
-
-    bodies : the parts of each, as `Shape.parts` gives them.
-    """
-
-    def __init__(self, bodies: Sequence[Parts]):
-        self.counts = np.array([len(parts) for parts in bodies], dtype=np.int64)
-        self.first = np.cumsum(self.counts) - self.counts
-        self.table = ShapeTable([packed for parts in bodies for packed, _ in parts])
-        laid_out = [_lay_out(parts) for parts in bodies]
-        self._parts = np.concatenate([parts for parts, _ in laid_out])
-        self._balls = np.array([ball for _, ball in laid_out])
-        self._bodies = np.ascontiguousarray(np.stack([self.first, self.counts], axis=1))
-        #: Rows of parts that any two of these bodies take.
-        self.most = 2 * int(self.counts.max())
-        self.addresses = *self.table.addresses, *map(address_of, (self._parts, self._bodies, self._balls))
-
-    def plant(self, which: np.ndarray | None) -> None:
-        """Have the support trees of these bodies; of bodies 0 and 1 without."""
-        used = [0, 1] if which is None else np.unique(which).tolist()
-        self.table.plant(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))
-
-
-def _lay_out(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
-    """(PART doubles a part, BODY doubles of the whole): see `narrowphase/parts.py`."""
-    rows = np.zeros((len(parts), PART))
-    for row, (packed, X) in zip(rows, parts):
-        row[:9], row[9:12] = X[:3, :3].ravel(), X[:3, 3]
-        row[TURNED] = X is not IDENTITY and (X != IDENTITY).any()
-        row[MEASURE] = packed.reach + np.abs(X[:3, 3]).sum()
-        centre, radius = _ball_of(packed)
-        row[CENTRE : CENTRE + 3] = X[:3, :3] @ centre + X[:3, 3]
-        # A matrix that passes for a rotation may lengthen a little; no vector by more than its largest entries, summed.
-        row[BALL] = radius * max(1.0, float(np.sqrt(np.abs(X[:3, :3].T @ X[:3, :3]).sum(axis=1).max()))) * _OUTWARD
-        row[SWEPT] = packed.radius
-    centres, radii = rows[:, CENTRE : CENTRE + 3], rows[:, BALL]
-    body = np.zeros(BODY)
-    body[BODY_CENTRE : BODY_CENTRE + 3] = middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
-    body[BODY_BALL] = (np.sqrt(np.square(centres - middle).sum(axis=1)) + radii).max() * _OUTWARD
-    body[BODY_SWEPT] = rows[:, SWEPT].max()
-    reaches = np.sqrt(np.square(centres).sum(axis=1)) + radii + rows[:, SWEPT]
-    body[BODY_REACH] = reaches[np.isfinite(reaches)].max(initial=0.0)
-    return rows, body
-
-
-#: Radii of balls are rounded up by more than a dozen roundings.
-_OUTWARD = 1 + 2.0**-45
-
-
-def _ball_of(packed: PackedConvex) -> tuple[np.ndarray, float]:
-    """A ball that holds the core of a convex set, and what is described by it: (centre, radius)."""
-    if packed.kind == HALFSPACE:
-        return np.zeros(3), np.inf
-    if packed.kind != POINTS:
-        return np.zeros(3), packed.reach + packed.slop
-    centre = 0.5 * (packed.points.min(axis=0) + packed.points.max(axis=0))
-    return centre, float(np.sqrt(np.square(packed.points - centre).sum(axis=1).max())) + packed.slop
-
 
 # --- workspaces ---------------------------------------------------------------------------------
 
@@ -210,8 +131,8 @@ class UnionPair:
     #: One for all single calls: their kernels keep Python's lock.
     _space: _SingleSpace | None = None
 
-    def __init__(self, A: Shape, B: Shape):
-        self.unions = UnionTable([A.parts(), B.parts()])
+    def __init__(self, A: LaidOut, B: LaidOut):
+        self.unions = UnionTable([A, B])
         self.unions.plant(None)
         self.collide = self._distance = _long_way
         if self.unions.counts.prod() > _MOST_AT_ONCE:

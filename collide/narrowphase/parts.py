@@ -11,22 +11,11 @@ import math
 from collide._jit import kernel, view_f64
 from collide.geometry.error_free import two_product
 from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PRODUCT_SLOP, SAFE_PRODUCT, TERMS
-
-# Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest its
-# core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept over it.
-TURNED, MEASURE, CENTRE, BALL, SWEPT = 12, 13, 14, 17, 18
-PART = 19
-# Doubles of a body: such a ball for all of it, the largest radius swept, and how far its bounded parts reach.
-BODY_CENTRE, BODY_BALL, BODY_SWEPT, BODY_REACH = 0, 3, 4, 5
-BODY = 6
-# Integers of a body: its first part, and how many there are.
-FIRST, COUNT = 0, 1
+from collide.geometry.union_table import MEASURE, TURNED
 
 #: Balls apart by more than this share of the bodies' sizes and distance hold parts that are apart: their centres and
 #: radii are good to 2⁻⁴⁵ of it, with all that rounding and slops of poses may add.
 BALL_MARGIN = 2.0**-40
-#: Doubles of a ball in the world: its centre, from where body A stands, and its radius.
-BALL_IN_WORLD = 4
 
 
 @kernel

@@ -16,21 +16,9 @@ import math
 
 from collide._jit import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.tables import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS, TERMS
+from collide.geometry.union_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, COUNT, FIRST, PART
 from collide.narrowphase.answer import SIGNATURE
-from collide.narrowphase.parts import (
-    BALL_IN_WORLD,
-    BALL_MARGIN,
-    BODY,
-    BODY_REACH,
-    CENTRE,
-    COUNT,
-    FIRST,
-    PART,
-    gap_of_balls,
-    place_ball,
-    place_part,
-    write_terms,
-)
+from collide.narrowphase.parts import BALL_MARGIN, gap_of_balls, place_ball, place_part, write_terms
 from collide.narrowphase.poses import set_pose
 from collide.narrowphase.requests import ROWS_TOGETHER
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
