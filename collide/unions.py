@@ -10,7 +10,7 @@ from threading import local
 import numpy as np
 
 from collide._jit import address_of
-from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
+from collide.geometry.tables import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.geometry.union_table import BALL_IN_WORLD, LaidOut, UnionTable
 from collide.narrowphase import run
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
@@ -42,7 +42,7 @@ class _Workspace:
 
     def __init__(self, room: int):
         self.room = room
-        self.poses = PoseTable(np.zeros((2 * BLOCK + room, POSE)), np.zeros((2 * BLOCK + room, 12, TERMS)))
+        self.poses = PoseTable(np.zeros((2 * BLOCK + room, POSE)), np.zeros((2 * BLOCK + room, TERM_ROW)))
         self.shape_of = np.zeros(2 * BLOCK + room, dtype=np.int64)
         self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
         self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)

@@ -25,6 +25,9 @@ POSE = 15
 POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
 #: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
 TERMS = 7
+#: A row of them: the terms of the 12 entries, then what each entry is more than the row of the pose says (12).
+LOW_PARTS = 12 * TERMS
+TERM_ROW = LOW_PARTS + 12
 
 #: Rounding of a part's world pose when it is a product of two: at most 4u of its terms an entry, so
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
@@ -65,8 +68,8 @@ class PoseTable(NamedTuple):
     """Posed parts as the kernels read them.
 
     rows : (k, POSE).
-    terms : (c, 12, TERMS) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
-        the sum of TERMS doubles. What the row holds is that sum, rounded.
+    terms : (c, TERM_ROW) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
+        the sum of TERMS doubles. What the row holds is that sum, rounded; low parts are the rest, rounded.
     """
 
     rows: np.ndarray
@@ -87,7 +90,8 @@ class PoseTable(NamedTuple):
         row = self.rows[part]
         if row[POSE_TERMS] < 0.0:
             return [Fraction(v) for v in row[:12].tolist()]
-        return [sum(map(Fraction, entry), Fraction(0)) for entry in self.terms[int(row[POSE_TERMS])].tolist()]
+        terms = self.terms[int(row[POSE_TERMS]), :LOW_PARTS].reshape(12, TERMS)
+        return [sum(map(Fraction, entry), Fraction(0)) for entry in terms.tolist()]
 
 
 def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTable:
@@ -107,12 +111,12 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     identity = np.eye(4)
     own = (X_BP != identity).any(axis=(1, 2))
     if not own.any():
-        return PoseTable(rows, _NO_TERMS)
+        return PoseTable(rows, NO_TERMS)
     unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
     rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
     own = np.flatnonzero(own & ~unmoved)
     if not len(own):
-        return PoseTable(rows, _NO_TERMS)
+        return PoseTable(rows, NO_TERMS)
     R, p, X = R_WB[own], p_WB[own], X_BP[own]
     rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
     rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
@@ -121,7 +125,18 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     rows[own, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
     terms, exact = _terms(R, p, X)
     rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
-    return PoseTable(rows, np.ascontiguousarray(terms[exact]))
+    terms, rounded = terms[exact], rows[own[exact], :12]
+    return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
+
+
+def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:
+    """(k, 12) what sums of terms (k, 12, TERMS) are more than these, in twice the precision."""
+    total, rest = np.zeros_like(rounded), np.zeros_like(rounded)
+    for j in range(TERMS):
+        before, total = total, total + terms[:, :, j]
+        other = total - before
+        rest += (before - (total - other)) + (terms[:, :, j] - other)
+    return rest + (total - rounded)
 
 
 def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -192,4 +207,4 @@ def _two_products(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 #: Products larger than this have low parts that are doubles.
 SAFE_PRODUCT = 2.0**-900
-_NO_TERMS = np.zeros((0, 12, TERMS))
+NO_TERMS = np.zeros((0, TERM_ROW))

@@ -9,8 +9,17 @@ from __future__ import annotations
 import math
 
 from collide._jit import kernel, view_f64
-from collide.geometry.error_free import two_product
-from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PRODUCT_SLOP, SAFE_PRODUCT, TERMS
+from collide.geometry.error_free import two_product, two_sum
+from collide.geometry.tables import (
+    LOW_PARTS,
+    POSE,
+    POSE_SLOP,
+    POSE_STRETCH,
+    POSE_TERMS,
+    PRODUCT_SLOP,
+    SAFE_PRODUCT,
+    TERMS,
+)
 from collide.geometry.union_table import MEASURE, TURNED
 
 #: Balls apart by more than this share of the bodies' sizes and distance hold parts that are apart: their centres and
@@ -22,7 +31,8 @@ BALL_MARGIN = 2.0**-40
 def place_part(poses, at, body, parts, part, terms_at):
     """Row ``at`` becomes where a part stands; rows are numbers of doubles, ``part`` likewise in ``parts``.
 
-    body : the row of the body's pose, its stretch known.   terms_at : 0, or where the exact terms of that row go.
+    body : the row of the body's pose, its stretch known.   terms_at : 0, or where the row's terms go: their low parts are
+        written.
     """
     poses[at + POSE_SLOP] = 0.0
     poses[at + POSE_TERMS] = -1.0
@@ -36,35 +46,53 @@ def place_part(poses, at, body, parts, part, terms_at):
         for k in range(12):
             poses[at + k] = parts[part + k]
         return
-    exact = True
+    low = view_f64(terms_at + 8 * LOW_PARTS, 12 if terms_at != 0 else 0)
+    least = math.inf
     stretch = 1.0
     shift = 0.0
     for i in range(3):
         r = body + 3 * i
-        x = poses[r]
-        y = poses[r + 1]
-        z = poses[r + 2]
-        stretch = max(stretch, abs(x) + abs(y) + abs(z))
-        shift = max(shift, abs(poses[body + 9 + i]))
+        t = poses[body + 9 + i]
+        stretch = max(stretch, abs(poses[r]) + abs(poses[r + 1]) + abs(poses[r + 2]))
+        shift = max(shift, abs(t))
         for j in range(4):
             first = part + (j if j < 3 else 9)
             step = 3 if j < 3 else 1
-            u = parts[first]
-            v = parts[first + step]
-            w = parts[first + 2 * step]
-            a = x * u
-            b = y * v
-            c = z * w
-            exact = exact and _is_safe(a, x, u) and _is_safe(b, y, v) and _is_safe(c, z, w)
-            if j < 3:
-                poses[at + 3 * i + j] = a + b + c
-            else:
-                poses[at + 9 + i] = a + b + c + poses[body + 9 + i]
+            a, a_low = two_product(poses[r], parts[first])
+            b, b_low = two_product(poses[r + 1], parts[first + step])
+            c, c_low = two_product(poses[r + 2], parts[first + 2 * step])
+            least = min(least, abs(a), abs(b), abs(c))
+            entry = a + b + c if j < 3 else a + b + c + t
+            to = 3 * i + j if j < 3 else 9 + i
+            poses[at + to] = entry
+            if terms_at != 0:
+                total, rest = two_sum(0.0 + a, a_low)
+                total, e = two_sum(total, b)
+                total, f = two_sum(total, b_low)
+                rest = (rest + e) + f
+                total, e = two_sum(total, c)
+                total, f = two_sum(total, c_low)
+                rest = (rest + e) + f
+                if j == 3:
+                    total, e = two_sum(total, t)
+                    rest += e
+                low[to] = rest + (total - entry)
     poses[at + POSE_SLOP] = PRODUCT_SLOP * (stretch * parts[part + MEASURE] + shift)
-    if exact:
+    if least > SAFE_PRODUCT or _are_safe(poses, body, parts, part):
         poses[at + POSE_TERMS] = float(at // POSE)
-        if terms_at != 0:
-            write_terms(poses, body, parts, part, terms_at)
+
+
+@kernel
+def _are_safe(poses, body, parts, part):
+    """Whether low parts of all products are doubles, or 0."""
+    for i in range(3):
+        for j in range(4):
+            for k in range(3):
+                left = poses[body + 3 * i + k]
+                factor = parts[part + (3 * k + j if j < 3 else 9 + k)]
+                if not (abs(left * factor) > SAFE_PRODUCT or left == 0.0 or factor == 0.0):
+                    return False
+    return True
 
 
 @kernel(inline=True)
@@ -78,16 +106,10 @@ def _is_identity(poses, p):
     return True
 
 
-@kernel(inline=True)
-def _is_safe(product, a, b):
-    """Whether the low part of a product is a double."""
-    return abs(product) > SAFE_PRODUCT or a == 0.0 or b == 0.0
-
-
 @kernel
 def write_terms(poses, body, parts, part, terms_at):
     """TERMS doubles that add up to each entry of the product of a body's pose and a part's."""
-    terms = view_f64(terms_at, 12 * TERMS)
+    terms = view_f64(terms_at, LOW_PARTS)
     for i in range(3):
         r = body + 3 * i
         for j in range(4):

@@ -9,7 +9,7 @@ import numpy as np
 
 from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
-from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
+from collide.geometry.tables import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
 from collide.narrowphase.closing import close_rows
@@ -179,7 +179,7 @@ class _Workspace:
         self.doubles = np.zeros(DOUBLES)
         self.integers = np.zeros(INTEGERS, dtype=np.int64)
         self.digits = np.zeros(WORKSPACE, dtype=np.int64)
-        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), np.zeros((0, 12, TERMS)))
+        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), NO_TERMS)
         self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
         self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
         self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)

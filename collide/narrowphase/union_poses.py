@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 from collide._jit import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
-from collide.geometry.tables import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS, TERMS
-from collide.geometry.union_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, COUNT, FIRST, PART
+from collide.geometry.tables import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW
+from collide.geometry.union_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, COUNT, FIRST, PART, TURNED
 from collide.narrowphase.answer import SIGNATURE
 from collide.narrowphase.parts import BALL_MARGIN, gap_of_balls, place_ball, place_part, write_terms
 from collide.narrowphase.poses import set_pose
@@ -89,6 +89,11 @@ def _lay_out(header, which_at, XA_at, step_a, XB_at, step_b, n, check):
         slots[slot + _PARTS_OF + 1] = slots[_PARTS_OF + 1] if once_b else 2 * BLOCK + used + wanted_a
         slots[slot + _IS_HIT] = 0
         used += wanted_a + wanted_b
+        for body in range(2):
+            first, count, _, own = _parts_of(header, slot, body)
+            if count == 1 and view_f64(header[PARTS_AT], PART * (first + 1))[PART * first + TURNED] == 0.0:
+                slots[slot + _PARTS_OF + body] = own  # the part stands where the body does
+                shape_of[own] = first
         if not once_a:
             good = set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
         if not once_b:
@@ -111,7 +116,7 @@ def _parts_of(header, slot, body):
 
 @kernel
 def _row_of_part(header, slot, body, k, exactly):
-    """Row of poses of part k of a body, placed when first asked for; exactly: with terms that add up to its pose."""
+    """Row of poses of part k of a body, placed when first asked for; exactly: with low parts."""
     first, _, rows, own = _parts_of(header, slot, body)
     row = rows + k
     shape_of = view_i64(header[SHAPE_OF_AT], row + 1)
@@ -126,7 +131,7 @@ def _row_of_part(header, slot, body, k, exactly):
 
 @kernel(inline=True)
 def _terms_of(header, row):
-    return header[TERMS_AT] + 8 * 12 * TERMS * row
+    return header[TERMS_AT] + 8 * TERM_ROW * row
 
 
 # --- balls --------------------------------------------------------------------------------------
@@ -177,7 +182,7 @@ def _nearest_pair(header, slot, boolean):
     """The pair of parts whose balls are nearest; −1 of booleans where no balls meet."""
     _, count_a, _, _ = _parts_of(header, slot, 0)
     _, count_b, _, _ = _parts_of(header, slot, 1)
-    if count_a * count_b == 1:
+    if count_a * count_b == 1 and not boolean:
         return 0
     margin = BALL_MARGIN * _place_whole(header, slot)
     balls = view_f64(header[BALLS_AT], (2 + count_a + count_b) * BALL_IN_WORLD)
@@ -303,7 +308,7 @@ def _answer_list(header, listed, boolean, depths, limit):
 
 @kernel
 def _write_terms_of_list(header, listed):
-    """Have the exact terms of all poses on the list: booleans do without them until integers are to decide."""
+    """Have the exact terms of all poses on the list, which nobody needs until integers are to decide."""
     pairs = view_i64(header[PAIRS_AT], 2 * LIST)
     owners = view_i64(header[OWNERS_AT], 2 * LIST)
     for k in range(2 * listed):
@@ -416,6 +421,5 @@ def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean,
         header[LISTED] = listed
         header[ASKED] += listed
         if listed > 0 and (_answer_list(header, listed, boolean, depths, limit) or every):
-            if boolean:
-                _write_terms_of_list(header, listed)
+            _write_terms_of_list(header, listed)
             return OPEN
