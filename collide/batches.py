@@ -134,10 +134,9 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
         return
     wanted = {"boolean": boolean, "limit": limit, "depths": depths}
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
-        table, which = _table(A, B, n)
-        answer = partial(run.run_poses, out, table, which, X_WA, X_WB, axes=axes, **wanted)
-    elif isinstance(A, Shape) and isinstance(B, Shape) and not (A.meshed or B.meshed):
-        answer = partial(run_unions, out, _unions(A, B), None, X_WA, X_WB, **wanted)
+        answer = partial(run.run_poses, out, *_table(A, B, n), X_WA, X_WB, axes=axes, **wanted)
+    elif not (_any_meshed(A) or _any_meshed(B)):
+        answer = partial(run_unions, out, *_union_table(A, B, n), X_WA, X_WB, **wanted)
     else:
         _refuse_poses(X_WA, X_WB, check)
         X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
@@ -152,44 +151,20 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
 
 
 def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, **wanted) -> None:
-    """The same for meshes, and for shapes that differ from pose to pose; checked poses (n, 4, 4).
-
-    Convex sets and unions go through their kernels together, each distinct pair with a mesh is a batch.
-    """
+    """The same for shapes of which some are meshes, checked poses (n, 4, 4): each distinct pair with a mesh is one batch."""
     n = len(out)
     (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    plain, meshed = (
-        [np.array([is_one(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b)]
-        for is_one in (is_plain, lambda shape: shape.meshed)
-    )
-    with_mesh = meshed[0][which_a] | meshed[1][which_b]
-    all_plain = plain[0][which_a] & plain[1][which_b] & (not run.distrust_doubles)
-
-    def answer_some(some: np.ndarray, answer) -> None:
-        if len(some):
-            rows = np.zeros_like(out, shape=len(some))
-            answer(rows, some, X_WA[some], X_WB[some])
-            out[some] = rows
-
-    def sets(rows, some, *poses):
-        sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
-        table, which = _table(*sides, len(some))
-        run.run_poses(rows, table, which, *poses, check=False, **wanted)
-
-    def unions(rows, some, *poses):
-        if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
-            table, which = A.shape_set.unions, np.stack([A.rows[some], B.rows[some]], axis=1)
+    meshed_a, meshed_b = (np.array([shape.meshed for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
+    keys = np.where(meshed_a[which_a] | meshed_b[which_b], which_a * len(shapes_b) + which_b, -1)
+    for key in np.unique(keys).tolist():
+        some = np.flatnonzero(keys == key)
+        rows = np.zeros_like(out, shape=len(some))
+        if key < 0:
+            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
+            _answer_into(rows, *sides, X_WA[some], X_WB[some], check=False, **wanted)
         else:
-            table = UnionTable([shape.laid_out() for shape in (*shapes_a, *shapes_b)])
-            which = np.stack([which_a[some], len(shapes_a) + which_b[some]], axis=1)
-        run_unions(rows, table, which, *poses, check=False, **wanted)
-
-    answer_some(np.flatnonzero(all_plain), sets)
-    answer_some(np.flatnonzero(~all_plain & ~with_mesh), unions)
-    keys = np.where(with_mesh, which_a * len(shapes_b) + which_b, -1)
-    for key in np.unique(keys[keys >= 0]).tolist():
-        pair = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
-        answer_some(np.flatnonzero(keys == key), lambda rows, _, *poses, pair=pair: _meshed(rows, *pair, *poses, **wanted))
+            _meshed(rows, shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)], X_WA[some], X_WB[some], **wanted)
+        out[some] = rows
 
 
 def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool) -> None:
@@ -197,12 +172,6 @@ def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, 
     from collide.meshes.pair_queries import pair_hits, pair_rows
 
     rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
-
-
-def _unions(A: Shape, B: Shape) -> UnionTable:
-    """Both bodies laid out, which prepared pairs are already."""
-    prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
-    return prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])
 
 
 def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
@@ -225,7 +194,7 @@ def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
 
 def _any_meshed(side) -> bool:
     if isinstance(side, Picked):
-        return side.shape_set.meshed
+        return side.shape_set.meshed and any(side.shape_set.shapes[k].meshed for k in np.unique(side.rows).tolist())
     return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
 
 
@@ -256,3 +225,15 @@ def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     for column, side in enumerate((A, B)):
         which[:, column] = row_of(side) if isinstance(side, Shape) else [row_of(shape) for shape in side]
     return ShapeTable(packed), which
+
+
+def _union_table(A, B, n: int) -> tuple[UnionTable, np.ndarray | None]:
+    """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+        return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None
+    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+        return A.shape_set.unions, np.stack([A.rows, B.rows], axis=1)
+    (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
+    table = UnionTable([shape.laid_out() for shape in (*shapes_a, *shapes_b)])
+    return table, np.stack([which_a, len(shapes_a) + which_b], axis=1)

@@ -24,7 +24,6 @@ from collide.narrowphase.union_poses import (
     HEADER,
     LIST,
     LISTED,
-    POSES_AT,
     SLOTS,
     answer_unions,
 )
@@ -33,6 +32,8 @@ from collide.results import PAIR_DTYPE
 
 # --- workspaces ---------------------------------------------------------------------------------
 
+#: How far things have come to begin with.
+_AT_THE_START = (0,) * (HEADER - DONE)
 #: Rows of parts of a block of poses, unless one pose takes more.
 _ROOM = 4096
 
@@ -53,10 +54,7 @@ class _Workspace:
 
     def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
         """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        header = np.zeros(HEADER, dtype=np.int64)
-        header[:POSES_AT] = answer_pairs.address, *table.addresses
-        header[POSES_AT:DONE] = *self._addresses, *scratch, self.room
-        return header
+        return np.array((answer_pairs.address, *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
 
 
 class _SingleSpace(_Workspace):

@@ -56,6 +56,11 @@ class ShapeTable:
         self.addresses = address_of(self.ints), address_of(self.numbers)
         self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
 
+    @property
+    def planted(self) -> bool:
+        """Whether no support tree is still to be made."""
+        return not self._without_tree
+
     def plant(self, rows: np.ndarray) -> None:
         """Have the support trees of these rows, so far as their shapes are large enough for one."""
         if self._without_tree:

@@ -88,5 +88,7 @@ class UnionTable:
 
     def plant(self, which: np.ndarray | None) -> None:
         """Have the support trees of these bodies; of bodies 0 and 1 without."""
+        if self.table.planted:
+            return
         used = [0, 1] if which is None else np.unique(which).tolist()
         self.table.plant(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))

@@ -22,7 +22,15 @@ from collide.narrowphase.parts import BALL_MARGIN, gap_of_balls, place_ball, pla
 from collide.narrowphase.poses import set_pose
 from collide.narrowphase.requests import ROWS_TOGETHER
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
-from collide.narrowphase.union_rows import SCORE, add_row, begin_score, close_score, find_way_out, first_upper_of
+from collide.narrowphase.union_rows import (
+    SCORE,
+    add_row,
+    begin_score,
+    close_score,
+    copy_row,
+    find_way_out,
+    first_upper_of,
+)
 from collide.results import REFUSED, UNDECIDED
 
 answer_at = native_call(SIGNATURE)
@@ -114,6 +122,16 @@ def _parts_of(header, slot, body):
     return bodies[2 * number + FIRST], bodies[2 * number + COUNT], slots[slot + _PARTS_OF + body], slots[slot + _OWN + body]
 
 
+@kernel(inline=True)
+def _pairs_of(header, slot):
+    """How many pairs of parts two bodies make."""
+    slots = view_i64(header[SLOTS_AT], SLOTS)
+    a = slots[slot + _BODIES]
+    b = slots[slot + _BODIES + 1]
+    bodies = view_i64(header[BODIES_AT], 2 * (max(a, b) + 1))
+    return bodies[2 * a + COUNT] * bodies[2 * b + COUNT]
+
+
 @kernel
 def _row_of_part(header, slot, body, k, exactly):
     """Row of poses of part k of a body, placed when first asked for; exactly: with low parts."""
@@ -180,14 +198,17 @@ def _place_balls(header, slot):
 @kernel
 def _nearest_pair(header, slot, boolean):
     """The pair of parts whose balls are nearest; −1 of booleans where no balls meet."""
-    _, count_a, _, _ = _parts_of(header, slot, 0)
-    _, count_b, _, _ = _parts_of(header, slot, 1)
-    if count_a * count_b == 1 and not boolean:
+    pairs = _pairs_of(header, slot)
+    if pairs == 1 and not boolean:
         return 0
     margin = BALL_MARGIN * _place_whole(header, slot)
-    balls = view_f64(header[BALLS_AT], (2 + count_a + count_b) * BALL_IN_WORLD)
+    balls = view_f64(header[BALLS_AT], (2 + header[ROOM]) * BALL_IN_WORLD)
     if boolean and gap_of_balls(balls, 0, BALL_IN_WORLD) > margin:
         return -1
+    if pairs == 1:
+        return 0
+    _, count_a, _, _ = _parts_of(header, slot, 0)
+    _, count_b, _, _ = _parts_of(header, slot, 1)
     _place_balls(header, slot)
     least = math.inf
     nearest = -1
@@ -239,25 +260,27 @@ def _list_others(header, boolean, depths, every):
     """List the other pairs of parts that have a say, from SLOT and PAIR on, until the list is full; returns how many."""
     slots = view_i64(header[SLOTS_AT], SLOTS)
     listed = 0
+    scores = view_f64(header[SCORES_AT], SCORE * BLOCK)
     while header[SLOT] < header[POSES] and listed < LIST:
         k = header[SLOT]
-        _, count_a, _, _ = _parts_of(header, _SLOT * k, 0)
-        _, count_b, _, _ = _parts_of(header, _SLOT * k, 1)
-        met = not boolean and not depths and first_upper_of(view_f64(header[SCORES_AT], SCORE * BLOCK), SCORE * k) <= 0.0
-        settled = met or slots[_SLOT * k + _ASKED_FIRST] < 0 or slots[_SLOT * k + _IS_HIT] != 0
-        if count_a * count_b > 1 and not settled:
-            listed = _list_others_of(header, k, count_a, count_b, boolean, every, listed)
+        slot = _SLOT * k
+        pairs = _pairs_of(header, slot)
+        met = not boolean and not depths and first_upper_of(scores, SCORE * k) <= 0.0
+        if pairs > 1 and not met and slots[slot + _ASKED_FIRST] >= 0 and slots[slot + _IS_HIT] == 0:
+            listed = _list_others_of(header, k, boolean, every, listed)
         else:
-            header[PAIR] = count_a * count_b
-        if header[PAIR] == count_a * count_b:
+            header[PAIR] = pairs
+        if header[PAIR] == pairs:
             header[PAIR] = 0
             header[SLOT] = k + 1
     return listed
 
 
 @kernel
-def _list_others_of(header, k, count_a, count_b, boolean, every, listed):
+def _list_others_of(header, k, boolean, every, listed):
     """The same of one pose, from PAIR on; PAIR becomes the one to go on with."""
+    _, count_a, _, _ = _parts_of(header, _SLOT * k, 0)
+    _, count_b, _, _ = _parts_of(header, _SLOT * k, 1)
     size = _place_whole(header, _SLOT * k)
     _place_balls(header, _SLOT * k)
     balls = view_f64(header[BALLS_AT], (2 + count_a + count_b) * BALL_IN_WORLD)
@@ -338,12 +361,16 @@ def _take_rows(header, boolean, out_at):
             if view_u8(row_at, ROW)[HIT] != 0:
                 slots[_SLOT * k + _IS_HIT] = 1
             continue
+        out = out_at + ROW * (header[DONE] + k)
+        if _pairs_of(header, _SLOT * k) == 1:
+            copy_row(row_at, out)
+            continue
         _, count_b, _, _ = _parts_of(header, _SLOT * k, 1)
         pair = owners[2 * listed + 1]
         words = view_i32(row_at, ROW // 4)
         words[PART_A] = pair // count_b
         words[PART_B] = pair % count_b
-        add_row(scores, SCORE * k, row_at, pair, out_at + ROW * (header[DONE] + k))
+        add_row(scores, SCORE * k, row_at, pair, out)
     header[LISTED] = 0
 
 
@@ -356,11 +383,13 @@ def _close_block(header, boolean, depths, out_at):
         if boolean:
             view_u8(out_at + header[DONE] + k, 1)[0] = slots[_SLOT * k + _IS_HIT]
             continue
+        if _pairs_of(header, _SLOT * k) == 1:
+            continue
         row_at = out_at + ROW * (header[DONE] + k)
         overlap = close_score(scores, SCORE * k, row_at)
         first_a, count_a, rows_a, _ = _parts_of(header, _SLOT * k, 0)
         first_b, count_b, rows_b, _ = _parts_of(header, _SLOT * k, 1)
-        if not (overlap and depths and count_a * count_b > 1):
+        if not (overlap and depths):
             continue
         for part in range(count_a):
             _row_of_part(header, _SLOT * k, 0, part, False)

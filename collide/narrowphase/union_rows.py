@@ -76,6 +76,14 @@ def first_upper_of(score, at):
     return score[at + _FIRST_UPPER]
 
 
+@kernel(inline=True)
+def copy_row(row_at, out_at):
+    given = view_i64(row_at, ROW // 8)
+    out = view_i64(out_at, ROW // 8)
+    for k in range(ROW // 8):
+        out[k] = given[k]
+
+
 @kernel
 def add_row(score, at, row_at, place, out_at):
     """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of the first place."""
@@ -89,10 +97,7 @@ def add_row(score, at, row_at, place, out_at):
     if nearest < 0.0 or distance < score[at + _LEAST] or (distance == score[at + _LEAST] and place < nearest):
         score[at + _LEAST] = distance
         score[at + _NEAREST] = float(place)
-        given = view_i64(row_at, ROW // 8)
-        out = view_i64(out_at, ROW // 8)
-        for k in range(ROW // 8):
-            out[k] = given[k]
+        copy_row(row_at, out_at)
     if nearest < 0.0:
         score[at + _FIRST_UPPER] = upper
     score[at + _LOWER] = min(score[at + _LOWER], lower)
