@@ -11,6 +11,7 @@ are asked in turn, and the medians of their times compared: a ratio of 1 is the 
 from __future__ import annotations
 
 import csv
+import gc
 import itertools
 import statistics
 import sys
@@ -44,11 +45,13 @@ def compound(rng, parts: int) -> collide.Compound:
 def compared(whole, parts, poses: int) -> list[str]:
     """[µs a pose of the compound, of its parts, their ratio], asked in turn."""
     times: tuple[list[float], list[float]] = ([], [])
+    gc.disable()  # as `timeit` does: collections would fall to whoever makes more results
     for _ in range(REPEATS + 1):
         for question, taken in zip((whole, parts), times):
             started = time.perf_counter()
             question()
             taken.append((time.perf_counter() - started) / poses * 1e6)
+    gc.enable()
     one, other = (statistics.median(taken[1:]) for taken in times)
     return [f"{one:.3f}", f"{other:.3f}", f"{one / other:.2f}"]
 
