@@ -24,7 +24,7 @@ import numpy as np
 import collide
 
 ROOT = Path(__file__).resolve().parents[1]
-REPEATS = 9
+REPEATS = 15
 SPREAD = {"near": 0.8, "far": 3.0}
 QUESTIONS = {
     "collide": collide.collide,
