@@ -1,26 +1,27 @@
 """Batches: from shapes and poses as checked by `query.py` to rows, in as many threads as asked for.
 
-Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py` as they are;
-unions are taken apart into pairs of parts and put together again by `unions.py`.
+Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py`, unions through
+`unions.py`, and what has a mesh through `meshes/`.
 """
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import ShapeTable, pose_table
+from collide.geometry.tables import ShapeTable
+from collide.geometry.union_table import UnionTable
 from collide.narrowphase import run
 from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
-from collide.unions import Union, combine
+from collide.unions import UnionPair, run_unions
 
 
 def length_of(A, B, X_WA, X_WB) -> int:
@@ -131,43 +132,46 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
     n = len(out)
     if n == 0:
         return
+    wanted = {"boolean": boolean, "limit": limit, "depths": depths}
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
-        table, which = _table(A, B, n)
-        wanted = {"boolean": boolean, "limit": limit, "axes": axes, "depths": depths}
-        if run.run_poses(out, table, which, X_WA, X_WB, check=check, **wanted):
-            return
+        answer = partial(run.run_poses, out, *_table(A, B, n), X_WA, X_WB, axes=axes, **wanted)
+    elif not (_any_meshed(A) or _any_meshed(B)):
+        answer = partial(run_unions, out, *_union_table(A, B, n), X_WA, X_WB, **wanted)
+    else:
+        _refuse_poses(X_WA, X_WB, check)
+        X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+        one_pair = isinstance(A, Shape) and isinstance(B, Shape)
+        (_meshed if one_pair else _pair_by_pair)(out, A, B, X_WA, X_WB, **wanted)
+        return
+    if not answer(check=check):
         _refuse_poses(X_WA, X_WB, check)
         out.fill(0)  # it is a pose after all, on the brink of the tolerance
-        if not run.run_poses(out, table, which, X_WA, X_WB, check=False, **wanted):
+        if not answer(check=False):
             raise AssertionError("a pose that is none")
-        return
-    _refuse_poses(X_WA, X_WB, check)
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        out[:] = _parts(A, B, X_WA, X_WB, boolean=boolean, limit=limit, depths=depths)
-    else:
-        _pair_by_pair(out, A, B, X_WA, X_WB, boolean, limit, depths)
 
 
-def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float, depths: bool) -> None:
-    """The same for shapes that differ from pose to pose, poses (n, 4, 4): each distinct pair of them is one batch."""
+def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, **wanted) -> None:
+    """The same for shapes of which some are meshes, checked poses (n, 4, 4): each distinct pair with a mesh is one batch."""
     n = len(out)
     (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    plain_a, plain_b = (np.array([is_plain(shape) for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
-    keys = which_a * len(shapes_b) + which_b
-    if not run.distrust_doubles:
-        plain = plain_a[which_a] & plain_b[which_b]
-        some = np.flatnonzero(plain)
-        if len(some):
-            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
-            rows = np.zeros_like(out, shape=len(some))
-            _answer_into(rows, *sides, X_WA[some], X_WB[some], boolean, limit, False, None, depths)
-            out[some] = rows
-        keys[plain] = -1
-    for key in np.unique(keys[keys >= 0]).tolist():
+    meshed_a, meshed_b = (np.array([shape.meshed for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
+    keys = np.where(meshed_a[which_a] | meshed_b[which_b], which_a * len(shapes_b) + which_b, -1)
+    for key in np.unique(keys).tolist():
         some = np.flatnonzero(keys == key)
-        one, other = shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)]
-        out[some] = _parts(one, other, X_WA[some], X_WB[some], boolean=boolean, limit=limit, depths=depths)
+        rows = np.zeros_like(out, shape=len(some))
+        if key < 0:
+            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
+            _answer_into(rows, *sides, X_WA[some], X_WB[some], check=False, **wanted)
+        else:
+            _meshed(rows, shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)], X_WA[some], X_WB[some], **wanted)
+        out[some] = rows
+
+
+def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool) -> None:
+    """Rows of two bodies of which one has a mesh, poses (n, 4, 4)."""
+    from collide.meshes.pair_queries import pair_hits, pair_rows
+
+    rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
 
 
 def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
@@ -190,7 +194,7 @@ def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
 
 def _any_meshed(side) -> bool:
     if isinstance(side, Picked):
-        return side.shape_set.meshed
+        return side.shape_set.meshed and any(side.shape_set.shapes[k].meshed for k in np.unique(side.rows).tolist())
     return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
 
 
@@ -223,38 +227,13 @@ def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
     return ShapeTable(packed), which
 
 
-def _parts(
-    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, boolean: bool, limit: float, depths: bool
-) -> np.ndarray:
-    """bool[n], or one row a pose: every part of A against every part of B, combined."""
-    if A.meshed or B.meshed:
-        from collide.meshes.pair_queries import pair_hits, pair_rows
-
-        return pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
-    parts_a, parts_b = A.parts(), B.parts()
-    parts = [*parts_a, *parts_b]
-    n, many = len(X_WA), len(parts_a) * len(parts_b)
-    X_WBs = np.concatenate([np.concatenate([X_WA] * len(parts_a)), np.concatenate([X_WB] * len(parts_b))])
-    X_BPs = np.repeat(np.array([X for _, X in parts]), n, axis=0)
-    poses = pose_table(X_WBs, X_BPs, np.repeat([packed.reach for packed, _ in parts], n))
-    # Part k stands at rows k·n … k·n + n − 1 of the pose table; pairs of one pose stand together.
-    which = np.arange(n)[:, None, None] + n * np.zeros((1, len(parts_a), len(parts_b)), dtype=np.int64)
-    first = which + n * np.arange(len(parts_a))[None, :, None]
-    second = which + n * (len(parts_a) + np.arange(len(parts_b)))[None, None, :]
-    table = ShapeTable([packed for packed, _ in parts])
-    pairs = np.stack([first.ravel(), second.ravel()], axis=1)
-    rows = run.run_pairs(table, poses, np.repeat(np.arange(len(parts)), n), pairs, boolean=boolean, limit=limit)
-    if many == 1:
-        return rows["hit"] if boolean else rows
-    rows["part_a"], rows["part_b"] = first.ravel() // max(n, 1), second.ravel() // max(n, 1) - len(parts_a)
-
-    def sides(k: int) -> tuple[Union, Union]:
-        own = poses.rows.reshape(len(parts), n, -1)[:, k]
-        return (
-            Union([packed for packed, _ in parts_a], own[: len(parts_a)]),
-            Union([packed for packed, _ in parts_b], own[len(parts_a) :]),
-        )
-
-    if boolean:
-        return np.logical_or.reduce(rows["hit"].reshape(n, many), axis=1)
-    return combine(rows, np.arange(0, n * many, many), np.ones(n, dtype=bool), sides)
+def _union_table(A, B, n: int) -> tuple[UnionTable, np.ndarray | None]:
+    """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+        return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None
+    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+        return A.shape_set.unions, np.stack([A.rows, B.rows], axis=1)
+    (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
+    table = UnionTable([shape.laid_out() for shape in (*shapes_a, *shapes_b)])
+    return table, np.stack([which_a, len(shapes_a) + which_b], axis=1)

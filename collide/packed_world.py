@@ -11,7 +11,7 @@ from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
-from collide.unions import Union, combine
+from collide.unions import combine
 
 
 class PackedWorld:
@@ -119,19 +119,12 @@ class PackedWorld:
         answered = len(starts)
         if boolean:
             return rows, len(rows), answered
-        plural = self._plural(rows["a"][starts]) | self._plural(rows["b"][starts])
-        combined = combine(rows, starts, plural, lambda k: self._sides(candidates[owner[starts[k]]]))
-        return combined, len(rows), answered
+        spans = np.hstack([self._spans(rows["a"][starts]), self._spans(rows["b"][starts])])
+        return combine(rows, starts, spans, self._table, self._poses, self._shape_of), len(rows), answered
 
-    def _plural(self, bodies: np.ndarray) -> np.ndarray:
-        return np.diff(self._first)[bodies] > 1
-
-    def _sides(self, pair: np.ndarray) -> tuple[Union, Union]:
-        a, b = (self._union(int(body)) for body in pair)
-        return a, b
-
-    def _union(self, body: int) -> Union:
-        return Union(self._parts[body], self._poses.rows[self._first[body] : self._first[body + 1]])
+    def _spans(self, bodies: np.ndarray) -> np.ndarray:
+        """(k, 2): first part and number of parts of bodies."""
+        return np.stack([self._first[bodies], np.diff(self._first)[bodies]], axis=1)
 
     def _part_pairs(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parts whose boxes come within margin, and the candidate each belongs to.
@@ -185,15 +178,16 @@ class PackedWorld:
         pairs = np.stack(
             [np.tile(np.arange(len(own)), len(others)), np.repeat(others + len(own), len(own))], axis=1
         )
-        rows = run_pairs(
-            table, poses.followed_by(self._poses), shape_of, pairs, boolean=False, limit=limit
-        )
+        poses = poses.followed_by(self._poses)
+        rows = run_pairs(table, poses, shape_of, pairs, boolean=False, limit=limit)
         rows["b"] = self._body_of[pairs[:, 1] - len(own)]
         rows["part_a"] = pairs[:, 0]
         rows["part_b"] = pairs[:, 1] - len(own) - self._first[rows["b"]]
         starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
-        plural = self._plural(bodies) | (len(own) > 1)
-        return combine(rows, starts, plural, lambda k: (Union(packed, poses.rows), self._union(int(bodies[k]))))
+        theirs = self._spans(bodies)
+        theirs[:, 0] += len(own)
+        spans = np.hstack([np.tile([0, len(own)], (len(starts), 1)), theirs])
+        return combine(rows, starts, spans, table, poses, shape_of)
 
 
 def _distinct(flat: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:

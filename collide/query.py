@@ -16,6 +16,7 @@ from collide.results import PairResult
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
+from collide.unions import UnionPair
 
 
 def collide(
@@ -175,8 +176,7 @@ def distance(
         return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
     if limit == math.inf and threads == 1:
         try:
-            pair = A._prepared[B._serial]
-            rows = pair.distance(X_WA, X_WB) if signed or pair.only_gaps else None
+            rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
         except (AttributeError, KeyError, TypeError):
@@ -287,8 +287,6 @@ def _prepare(A, B) -> None:
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         return
     meshed = A.meshed or B.meshed
-    if not meshed and not (is_plain(A) and is_plain(B)):
-        return
     if not run.single_calls_are_safe():
         return
     if not hasattr(A, "_prepared"):
@@ -298,7 +296,12 @@ def _prepare(A, B) -> None:
     prepared, serial = A._prepared, B._serial
     if serial in prepared:
         return
-    pair = _meshed_pair(A, B) if meshed else run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    if meshed:
+        pair = _meshed_pair(A, B)
+    elif is_plain(A) and is_plain(B):
+        pair = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    else:
+        pair = UnionPair(A.laid_out(), B.laid_out())
     if pair is None:
         return
     while len(prepared) >= _PARTNERS:

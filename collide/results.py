@@ -10,7 +10,8 @@ certified       the sign is proven and the bracket keeps the promise of `narrowp
 beyond          the pair is farther apart than the query's max_distance; `distance` and `lower` are
                 then a proven lower bound ≥ max_distance, and `upper` is infinite
 how             which argument decided: an index into `HOW`
-iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis
+iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis; of unions those of all
+                pairs of parts that were asked
 exact           rounds of the exact stage, 0 where doubles decided
 distance        signed [m]: the gap, or minus the depth
 lower, upper    lower ≤ true signed distance ≤ upper, proven against rounding [m]

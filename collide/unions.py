@@ -1,105 +1,176 @@
-"""Bodies that are unions of convex sets: one answer from the answers of their parts.
+"""Bodies that are unions of convex parts: questions to the kernels of `narrowphase/union_poses.py`.
 
-Apart, the distance of two unions is the least one of their parts. Overlapping, the smallest
-separating translation has no such formula; what is reported is a translation that separates the
-hulls of both bodies along the best of the parts' normals, which is a proven upper bound, beside
-the proven lower bound that each overlapping pair of parts must come apart.
+How one answer is made of those of the parts is told in `narrowphase/union_rows.py`.
 """
 
 from __future__ import annotations
 
-import math
+from threading import local
 
 import numpy as np
 
-from collide.geometry.extents import extent_of_row
-from collide.geometry.packing import HALFSPACE, POINTS, PackedConvex
-from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
+from collide._jit import address_of
+from collide.geometry.tables import POSE, TERM_ROW, PoseTable, ShapeTable
+from collide.geometry.union_table import BALL_IN_WORLD, LaidOut, UnionTable
+from collide.narrowphase import run
+from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
+from collide.narrowphase.array_objects import built_in, object_words
+from collide.narrowphase.single_unions import collide_single_union, distance_single_union
+from collide.narrowphase.union_poses import (
+    ASKED,
+    BAD_POSE,
+    BLOCK,
+    DONE,
+    HEADER,
+    LIST,
+    LISTED,
+    SLOTS,
+    answer_unions,
+)
+from collide.narrowphase.union_rows import SCORE, combine_rows
 from collide.results import PAIR_DTYPE
 
-#: Normals of overlapping parts that are tried as the way out of a union, deepest first.
-_NORMALS_TRIED = 8
+# --- workspaces ---------------------------------------------------------------------------------
+
+#: How far things have come to begin with.
+_AT_THE_START = (0,) * (HEADER - DONE)
+#: Rows of parts of a block of poses, unless one pose takes more.
+_ROOM = 4096
 
 
-class Union:
-    """The convex parts of one posed body: shapes, and their rows of a pose table."""
+class _Workspace:
+    """Scratch memory of the kernels, with room for so many rows of parts."""
 
-    def __init__(self, packed: list[PackedConvex], poses: np.ndarray):
-        self.packed, self.poses = packed, poses
+    def __init__(self, room: int):
+        self.room = room
+        self.poses = PoseTable(np.zeros((2 * BLOCK + room, POSE)), np.zeros((2 * BLOCK + room, TERM_ROW)))
+        self.shape_of = np.zeros(2 * BLOCK + room, dtype=np.int64)
+        self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
+        self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
+        self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
+        self.balls = np.zeros((2 + room, BALL_IN_WORLD))
+        buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, self.scores, self.slots, self.balls
+        self._addresses = tuple(map(address_of, buffers))
 
-    def extent(self, n: np.ndarray) -> tuple[float, float]:
-        """(support value of the whole body along unit n, its error), both in the world."""
-        value, size = -math.inf, 0.0
-        for packed, row in zip(self.packed, self.poses):
-            value = max(value, extent_of_row(packed, row, n))
-            size = max(size, 2 * packed.reach + packed.radius + float(np.abs(row[9:12]).sum()))
-        slop = max(p.slop for p in self.packed) + float(self.poses[:, 12].max())
-        return value, ERROR * size + slop
+    def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
+        """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
+        return np.array((answer_pairs.address, *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
 
 
-def combine(rows: np.ndarray, starts: np.ndarray, plural: np.ndarray, sides) -> np.ndarray:
-    """One row a body pair from rows of part pairs.
+class _SingleSpace(_Workspace):
+    """The same for single calls, which have nothing else."""
 
-    Parameters
-    ----------
-    rows : PAIR_DTYPE, the part pairs of a body pair standing together.
-    starts : first row of each body pair.
-    plural : bool, whether a body of the pair has several parts. Parts too far apart may have been
-        left out of ``rows``, but they still bar the way out.
-    sides : callable k → (Union A, Union B) of body pair k; asked only where unions overlap.
+    def __init__(self, room: int):
+        super().__init__(room)
+        self.byte = np.zeros(1, dtype=np.uint8)
+        self._own = np.zeros(DOUBLES), np.zeros(INTEGERS, dtype=np.int64)
+        self.scratch = address_of(self._own[0]), address_of(self._own[1])
+
+
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks; `asked` counts its pairs of parts."""
+
+    space: _Workspace | None = None
+    asked = 0
+
+    def space_for(self, table: UnionTable) -> _Workspace:
+        if self.space is None or self.space.room < table.most:
+            self.space = _Workspace(max(table.most, _ROOM))
+        return self.space
+
+
+of_thread = _OfThread()
+
+
+# --- questions ----------------------------------------------------------------------------------
+
+
+def run_unions(
+    out: np.ndarray,
+    table: UnionTable,
+    which: np.ndarray | None,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    check: bool,
+    depths: bool,
+) -> bool:
+    """Answer two bodies at n pairs of poses; False where a pose is no pose. Arguments as in `run.run_poses`.
+
+    which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
     """
-    if not plural.any():
+    table.plant(which)
+    space = of_thread.space_for(table)
+    header = space.header_of(table, run.scratch())
+    while True:
+        said = answer_unions(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), len(out), boolean, depths and not boolean, limit, check,
+            run.distrust_doubles, address_of(out),
+        )  # fmt: skip
+        if not said or said == BAD_POSE:
+            of_thread.asked += int(header[ASKED])
+            return not said
+        listed = int(header[LISTED])
+        run.settle_open(
+            space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean, limit=limit,
+            depths=depths and not boolean,
+        )  # fmt: skip
+
+
+class UnionPair:
+    """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has them.
+
+    collide : a built-in function of two poses; None where it leaves the answer to the long way.
+    """
+
+    #: One for all single calls: their kernels keep Python's lock.
+    _space: _SingleSpace | None = None
+
+    def __init__(self, A: LaidOut, B: LaidOut):
+        self.unions = UnionTable([A, B])
+        self.unions.plant(None)
+        self.collide = self._distance = _long_way
+        if self.unions.counts.prod() > _MOST_AT_ONCE:
+            return
+        if UnionPair._space is None or UnionPair._space.room < self.unions.most:
+            UnionPair._space = _SingleSpace(self.unions.most)
+        self._held = space = UnionPair._space  # pairs made before have a smaller one
+        header = space.header_of(self.unions, space.scratch)
+        words = np.array([*object_words(), answer_unions.address, address_of(space.byte), *header.tolist()])
+        self.collide, self._distance = built_in(collide_single_union, words), built_in(distance_single_union, words)
+
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        said = self._distance(X_WA, X_WB, rows) if depths else self._distance(X_WA, X_WB, rows, None)
+        return None if said is None else rows
+
+
+#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
+_MOST_AT_ONCE = 1024
+
+
+def _long_way(*_) -> None:
+    return None
+
+
+def combine(rows: np.ndarray, starts: np.ndarray, spans: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of) -> np.ndarray:
+    """One row a pair of bodies from rows of pairs of parts.
+
+    rows : PAIR_DTYPE, those of a pair of bodies standing together.   starts : first row of each pair of bodies.
+    spans : (k, 4) int64: first part and number of parts of A, and of B. Parts too far apart may have been left out of
+        ``rows``, but they still bar the way out.
+    table, poses, shape_of : as in `run.run_pairs`.
+    """
+    if (spans[:, 1::2] == 1).all():
         return rows
-    ends = np.append(starts[1:], len(rows))
     out = np.zeros(len(starts), dtype=PAIR_DTYPE)  # padding too: equal answers are equal bytes
-    for k, (start, end) in enumerate(zip(starts, ends)):
-        group = rows[start:end]
-        out[k] = _nearest(group, lambda k=k: sides(k)) if plural[k] else group[0]
+    ends, spans, score = np.append(starts, len(rows)), np.ascontiguousarray(spans), np.zeros(SCORE)
+    combine_rows(
+        address_of(rows), address_of(ends), address_of(spans), len(starts), *table.addresses, address_of(poses.rows),
+        address_of(shape_of), address_of(score), address_of(out),
+    )  # fmt: skip
     return out
-
-
-def _nearest(group: np.ndarray, sides) -> np.ndarray:
-    """The row of the nearest pair of parts, its bracket widened to hold for the unions."""
-    row = group[np.argmin(group["distance"])].copy()
-    row["lower"], row["upper"] = group["lower"].min(), group["upper"].min()
-    row["hit"] = group["hit"].any()
-    rivals = group[group["lower"] <= row["upper"]]
-    row["certified"] = bool(rivals["certified"].all())
-    row["iterations"] = min(int((group["iterations"] & 0xFFFF).sum()), 0xFFFF) | (
-        min(int((group["iterations"] >> 16).sum()), 0x7FFF) << 16
-    )
-    if row["upper"] < 0.0:
-        promised = _way_out(row, group, *sides())
-        row["certified"] = row["certified"] and float(row["upper"] - row["lower"]) <= promised
-    return row
-
-
-def _way_out(row: np.ndarray, group: np.ndarray, A: Union, B: Union) -> float:
-    """Replace distance, lower and normal by the best translation that separates both unions.
-
-    Returns the width of bracket that is promised for bodies of this size. Against one half-space the deepest part already tells it: there is one way out for all.
-    """
-    if any(len(body.packed) == 1 and body.packed[0].kind == HALFSPACE for body in (A, B)):
-        return math.inf
-    hits = group[group["upper"] < 0.0]
-    best, error = math.inf, 0.0
-    for k in np.argsort(hits["distance"], kind="stable")[:_NORMALS_TRIED]:
-        n = hits["normal"][k]
-        reach_a, error_a = A.extent(n)
-        reach_b, error_b = B.extent(-n)
-        depth, error = reach_a + reach_b, error_a + error_b
-        if depth + error < best:
-            best = depth + error
-            row["normal"], row["point_a"], row["point_b"] = n, hits["point_a"][k], hits["point_b"][k]
-            row["part_a"], row["part_b"] = hits["part_a"][k], hits["part_b"][k]
-            row["distance"], row["lower"] = min(-depth, row["upper"]), -depth - error
-    if math.isinf(best):
-        row["distance"] = row["lower"] = -math.inf
-    else:
-        # The points of the deepest parts fit that normal's own depth: keep their middle.
-        middle, half = 0.5 * (row["point_a"] + row["point_b"]), 0.5 * row["distance"] * row["normal"]
-        row["point_a"], row["point_b"] = middle - half, middle + half
-    curved = any(packed.kind != POINTS for body in (A, B) for packed in body.packed)
-    return (PROMISE_CURVED if curved else PROMISE_STORED) / ERROR * error
-
-

@@ -7,14 +7,35 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import naive
 import numpy as np
 import pytest
+from naive import Case, random_pose, rng_of
 
 import collide
-from collide.geometry.tables import POSE_TERMS, pose_table
-from collide.results import EXACT, SWEPT, UNDECIDED
+from collide import batches, query, unions
+from collide._jit import address_of, entry, view_f64
+from collide.geometry.tables import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
+from collide.geometry.union_table import PART, lay_out
+from collide.narrowphase import run
+from collide.narrowphase.parts import place_part, write_terms
+from collide.results import EXACT, SWEPT, UNDECIDED, flipped
 
 CASES = 60
+
+
+def _gap(*asked, **named):
+    return collide.distance(*asked, signed=False, **named)
+
+
+@entry("int64(int64, int64, int64)")
+def placed(poses_at, parts_at, terms_at):
+    """Row 1 of poses becomes where part 0 of a body at row 0 stands, with all its terms."""
+    poses = view_f64(poses_at, 2 * POSE)
+    parts = view_f64(parts_at, PART)
+    place_part(poses, POSE, 0, parts, 0, terms_at + 8 * TERM_ROW)
+    write_terms(poses, 0, parts, 0, terms_at + 8 * TERM_ROW)
+    return 0
 
 
 def _pose(rng) -> np.ndarray:
@@ -109,3 +130,176 @@ def test_rows_of_a_world_carry_certificates():
         collide.verify(*r.question, r)
     with pytest.raises(IndexError):
         rows.pair(len(rows))
+
+
+# --- what a compound costs, counted, and what it must not cost: bits ------------------------------
+
+
+def _row_of_boxes(parts: int) -> collide.Compound:
+    """Boxes side by side with gaps as wide as themselves."""
+    return collide.Compound([(collide.Box((1, 1, 1)), collide.pose((2.0 * k, 0, 0))) for k in range(parts)])
+
+
+def _asked(question) -> int:
+    """How many pairs of parts a batch asks the narrowphase about."""
+    before = unions.of_thread.asked
+    question()
+    return unions.of_thread.asked - before
+
+
+@pytest.mark.parametrize("ask", [collide.collide, collide.distance, _gap])
+def test_parts_far_away_are_not_asked(ask):
+    A, B = _row_of_boxes(64), collide.Compound([(collide.Box((0.2, 0.2, 0.2)), collide.pose((0, 0, 0.1 * k))) for k in range(2)])
+    rng = np.random.default_rng(8)
+    X = np.array([collide.pose((2.0 * rng.integers(64), 0.0, rng.uniform(-1.5, 0.2))) for _ in range(200)])
+    turned = np.array([collide.pose(rpy=(0.1, 0.2, 0.3))])
+    X = turned @ X
+    hits = collide.collide(A, B, turned, X)
+    assert 20 < hits.sum() < 180
+    count = _asked(lambda: ask(A, B, turned, X))
+    assert 100 < count <= 8 * len(X), f"{count} of {64 * 2 * len(X)} pairs of parts"
+
+
+def test_booleans_of_bodies_far_apart_ask_nothing():
+    A = _row_of_boxes(16)
+    X = np.array([collide.pose((0, 0, 40 + k)) for k in range(50)])
+    assert not collide.collide(A, A, np.eye(4), X).any()
+    assert _asked(lambda: collide.collide(A, A, np.eye(4), X)) == 0
+    assert _asked(lambda: collide.distance(A, A, np.eye(4), X)) >= len(X)
+
+
+def test_gaps_alone_stop_at_the_first_overlap():
+    """Boxes in one place: with depths each has a say, without them one is enough."""
+    A = collide.Compound([(collide.Box((1, 1, 1)), collide.pose((0.01 * k, 0, 0))) for k in range(12)])
+    X = np.array([collide.pose((0.1, 0.1, 0.1 * k), rpy=(0.1, 0.2, 0.3)) for k in range(5)])
+    assert _asked(lambda: collide.distance(A, collide.Box((1, 1, 1)), np.eye(4), X)) == 12 * len(X)
+    assert _asked(lambda: collide.distance(A, collide.Box((1, 1, 1)), np.eye(4), X, signed=False)) == len(X)
+
+
+def _pairs_of_unions():
+    """(A, B, X_WA, X_WB): unions of all kinds of parts, some nested, some in one place."""
+    rng = rng_of("costs")
+    kinds = [kind for kind in naive.KINDS if kind not in ("Halfspace", "Compound")]
+    for case in range(24):
+        made = []
+        for _ in range(2):
+            parts = []
+            for kind in rng.choice(kinds, int(rng.integers(1, 6))):
+                part = naive.one_of_each(rng)[kind]
+                if rng.random() < 0.2:
+                    part = collide.Compound([(part, random_pose(rng, 0.3))])
+                parts.append((part, random_pose(rng, 0.8) if rng.random() < 0.8 else np.eye(4)))
+            made.append(collide.Compound(parts))
+        A, B = made if case % 3 else (made[0], naive.one_of_each(rng)[kinds[case // 3]])
+        spread = (0.6, 1.5, 4.0)[case % 4 % 3]
+        yield A, B, *(np.array([random_pose(rng, spread) for _ in range(40)]) for _ in range(2))
+
+
+def test_unions_have_the_same_bits_single_batched_swapped_in_threads_lists_and_sets(monkeypatch):
+    monkeypatch.setattr(batches, "_FEWEST_A_THREAD", 8)
+    hits = []
+    for A, B, X_WA, X_WB in _pairs_of_unions():
+        n = len(X_WA)
+        library = collide.ShapeSet([B, collide.Sphere(1), A])
+        for question in (collide.distance, _gap):
+            rows = question(A, B, X_WA, X_WB).rows
+            hits.extend(rows["hit"])
+            assert (collide.collide(A, B, X_WA, X_WB) == rows["hit"]).all()
+            for k in range(n):
+                with naive.reproducible(Case(A, B, X_WA[k], X_WB[k])):
+                    question(A, B, X_WA[k], X_WB[k])  # prepared by now
+                    assert question(A, B, X_WA[k], X_WB[k]).rows.tobytes() == rows[k].tobytes()
+                    assert collide.collide(A, B, X_WA[k], X_WB[k]) == rows["hit"][k]
+            others = {
+                "threads": question(A, B, X_WA, X_WB, threads=3).rows,
+                "list": question([A] * n, B, X_WA, X_WB).rows,
+                "set": question(library[np.full(n, 2)], library[np.zeros(n, dtype=int)], X_WA, X_WB).rows,
+                "mixed list": question([A, collide.Box((1, 1, 1))] * (n // 2), B, X_WA, X_WB).rows[::2],
+            }
+            for name, found in others.items():
+                assert not naive.same_bits(found, rows[:: n // len(found)]), (name, A, B)
+            swapped = flipped(question(B, A, X_WB, X_WA).rows)
+            for field in ("distance", "lower", "upper", "hit", "certified", "how"):
+                assert (swapped[field] == rows[field]).all(), (field, A, B)
+    assert 0.2 < np.mean(hits) < 0.8
+
+
+def test_parts_left_out_have_no_say():
+    """Every pair of parts asked on its own, as unions were once: the same gaps, the same ends of brackets."""
+    compared = 0
+    for A, B, X_WA, X_WB in _pairs_of_unions():
+        found = collide.distance(A, B, X_WA, X_WB).rows
+        every = np.array([_rows_of_part(*one, *other, X_WA, X_WB) for one in A.parts() for other in B.parts()])
+        least = every["distance"].min(axis=0)
+        apart = ~found["hit"]
+        assert (found["distance"][apart] == least[apart]).all() and (found["lower"][apart] == every["lower"].min(axis=0)[apart]).all()
+        assert (found["upper"] == every["upper"].min(axis=0)).all()
+        assert (found["hit"] == every["hit"].any(axis=0)).all()
+        compared += apart.sum()
+    assert compared > 200
+
+
+def _rows_of_part(one, X, other, Y, X_WA, X_WB) -> np.ndarray:
+    """The rows of two parts by themselves, with poses multiplied out by the table."""
+    n = len(X_WA)
+    poses = pose_table(
+        np.concatenate([X_WA, X_WB]), np.concatenate([np.tile(X, (n, 1, 1)), np.tile(Y, (n, 1, 1))]),
+        np.repeat([one.reach, other.reach], n),
+    )  # fmt: skip
+    pairs = np.stack([np.arange(n), n + np.arange(n)], axis=1)
+    return run.run_pairs(ShapeTable([one, other]), poses, np.repeat([0, 1], n), pairs, boolean=False, limit=np.inf)
+
+
+def test_poses_of_parts_are_those_of_the_pose_table():
+    """Bit by bit, low parts too: a part placed in the kernel of unions and one of a World."""
+    rng = np.random.default_rng(9)
+    part = collide.Box((0.3, 0.4, 0.5))
+    made = 0
+    for k in range(60):
+        X_WB, X_BP = (random_pose(rng, 10.0 ** rng.integers(-6, 6)) for _ in range(2))
+        X_WB = np.eye(4) if k == 0 else X_WB
+        X_BP = np.eye(4) if k == 1 else X_BP
+        if k == 2:
+            X_BP[0, 1], X_WB[1, 0] = 1e-170, 1e-170
+        expected = pose_table(X_WB[None], X_BP[None], np.array([part.parts()[0][0].reach]))
+        body = pose_table(X_WB[None], np.eye(4)[None], np.zeros(1)).rows
+        poses, terms = np.zeros((2, POSE)), np.zeros((2, TERM_ROW))
+        poses[0], poses[0, POSE_STRETCH] = body[0], 1.0
+        laid_out = lay_out(((part.parts()[0][0], X_BP),)).parts
+        placed(address_of(poses), address_of(laid_out), address_of(terms))
+        assert poses[1, :POSE_TERMS].tobytes() == expected.rows[0, :POSE_TERMS].tobytes(), (k, X_WB, X_BP)
+        assert (poses[1, POSE_TERMS] >= 0) == (expected.rows[0, POSE_TERMS] >= 0), (k, X_WB, X_BP)
+        if len(expected.terms):
+            assert (terms[1] == expected.terms[0]).all(), (k, X_WB, X_BP)
+            made += 1
+    assert made == 57
+
+
+def test_a_single_union_is_one_call(monkeypatch):
+    """Once prepared, nothing of Python is between the call and the kernel's answer."""
+    if not run.single_calls_are_safe():
+        pytest.skip("single calls go the long way here")
+    A, B = _row_of_boxes(4), collide.Box((1, 1, 1))
+    X, Y = np.eye(4), collide.pose((0.2, 0.3, 0.4), rpy=(0.1, 0.2, 0.3))
+    before = [collide.collide(A, B, X, Y), collide.distance(A, B, X, Y), collide.distance(A, B, X, Y, signed=False)]
+
+    def refuse(*_, **__):
+        raise AssertionError("the long way")
+
+    monkeypatch.setattr(query, "ask", refuse)
+    after = [collide.collide(A, B, X, Y), collide.distance(A, B, X, Y), collide.distance(A, B, X, Y, signed=False)]
+    assert before[0] == after[0] and all(r.rows.tobytes() == s.rows.tobytes() for r, s in zip(before[1:], after[1:]))
+    with pytest.raises(AssertionError, match="the long way"):
+        collide.distance(A, B, X, Y.astype(np.float32))
+
+
+def test_more_pairs_of_parts_than_a_list_holds():
+    """Poses whose pairs of parts take several lists, beside ones that take none: as one by one."""
+    rng = np.random.default_rng(10)
+    A = collide.Compound([(collide.Box(rng.uniform(0.5, 1, 3)), random_pose(rng, 0.3)) for _ in range(24)])
+    X = np.array([random_pose(rng, 0.3 if k % 2 else 30.0) for k in range(6)])
+    rows = collide.distance(A, A, np.eye(4), X).rows
+    assert _asked(lambda: collide.distance(A, A, np.eye(4), X)) > 256
+    for k in range(6):
+        assert collide.distance(A, A, np.eye(4), X[k : k + 1]).rows.tobytes() == rows[k].tobytes()
+        assert collide.collide(A, A, np.eye(4), X[k]) == rows["hit"][k] == bool(k % 2)

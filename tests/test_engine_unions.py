@@ -221,3 +221,42 @@ def test_halfspaces_inside_a_compound():
     r = collide.distance(corridor, ball, np.eye(4), pose(t=(3, 4, 0.25)))
     assert not r.hit and r.distance == pytest.approx(0.25, abs=1e-14)
     assert collide.collide(corridor, ball, np.eye(4), pose(t=(3, 4, 0.75)))
+
+
+def test_gaps_alone_of_overlapping_unions_name_a_point_of_both():
+    """Both points in one place, which lies in a part of either body: the parts that are named."""
+    rng = rng_of("common points of unions")
+    hits = []
+    for _ in range(20):
+        A, B = (
+            collide.Compound([(collide.Box(rng.uniform(0.2, 1, 3)), random_pose(rng, 0.5)) for _ in range(4)]) for _ in range(2)
+        )
+        X_WA, X_WB = (np.array([random_pose(rng, 0.6) for _ in range(20)]) for _ in range(2))
+        rows = collide.distance(A, B, X_WA, X_WB, signed=False).rows
+        hits.extend(rows["hit"])
+        for row, X, Y in zip(rows, X_WA, X_WB):
+            if not row["hit"]:
+                continue
+            assert row["distance"] == row["lower"] == row["upper"] == 0.0 and (row["point_a"] == row["point_b"]).all()
+            for union, X_WC, part in ((A, X, row["part_a"]), (B, Y, row["part_b"])):
+                box, X_CP = union.items[part]
+                inside = np.linalg.inv(X_WC @ X_CP) @ np.append(row["point_a"], 1.0)
+                assert (np.abs(inside[:3]) <= 0.5 * np.array(box.size) + 1e-12).all(), (A, B, X, Y)
+    assert 0.2 < naive.share(hits) < 0.95
+
+
+def test_a_union_of_more_parts_than_a_block_has_room_for():
+    """5,000 balls, of which one or two are near: the least of their distances, which formulas tell."""
+    rng = rng_of("many parts")
+    centres = rng.uniform(-1, 1, (5000, 3))
+    cloud = collide.Compound([(collide.Sphere(0.001), pose(t=c)) for c in centres])
+    where = rng.uniform(-1, 1, (30, 3))
+    X = np.array([pose(t=t) for t in where])
+    rows = collide.distance(cloud, collide.Sphere(0.03), np.eye(4), X).rows
+    apart = np.linalg.norm(centres[None] - where[:, None], axis=2)
+    assert (rows["hit"] == (apart.min(axis=1) <= 0.031)).all()
+    free = ~rows["hit"]  # among the others, a way out of the whole cloud is long
+    assert np.abs(rows["distance"] - (apart.min(axis=1) - 0.031))[free].max() < 1e-14
+    assert (rows["part_a"] == apart.argmin(axis=1))[free].all()
+    assert (collide.collide(cloud, collide.Sphere(0.03), np.eye(4), X) == rows["hit"]).all()
+    assert 3 <= free.sum() <= 27

@@ -11,13 +11,7 @@ from collide.geometry.packing import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINT
 
 def extent_of(packed: PackedConvex, X: np.ndarray, n: np.ndarray) -> float:
     """Support value of a convex set at a pose (4, 4) along unit n of the world."""
-    row = np.concatenate([X[:3, :3].ravel(), X[:3, 3]])
-    return extent_of_row(packed, row, n)
-
-
-def extent_of_row(packed: PackedConvex, row: np.ndarray, n: np.ndarray) -> float:
-    """The same at a row of a pose table."""
-    R, t = row[:9].reshape(3, 3), row[9:12]
+    R, t = np.ascontiguousarray(X[:3, :3]), np.ascontiguousarray(X[:3, 3])
     g = R.T @ n
     p = packed.params
     if packed.kind == POINTS:

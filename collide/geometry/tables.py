@@ -25,10 +25,13 @@ POSE = 15
 POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
 #: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
 TERMS = 7
+#: A row of them: the terms of the 12 entries, then what each entry is more than the row of the pose says (12).
+LOW_PARTS = 12 * TERMS
+TERM_ROW = LOW_PARTS + 12
 
 #: Rounding of a part's world pose when it is a product of two: at most 4u of its terms an entry, so
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
-_PRODUCT_SLOP = 16 * 2.0**-53
+PRODUCT_SLOP = 16 * 2.0**-53
 
 
 class ShapeTable:
@@ -53,6 +56,11 @@ class ShapeTable:
         self.addresses = address_of(self.ints), address_of(self.numbers)
         self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
 
+    @property
+    def planted(self) -> bool:
+        """Whether no support tree is still to be made."""
+        return not self._without_tree
+
     def plant(self, rows: np.ndarray) -> None:
         """Have the support trees of these rows, so far as their shapes are large enough for one."""
         if self._without_tree:
@@ -65,8 +73,8 @@ class PoseTable(NamedTuple):
     """Posed parts as the kernels read them.
 
     rows : (k, POSE).
-    terms : (c, 12, TERMS) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
-        the sum of TERMS doubles. What the row holds is that sum, rounded.
+    terms : (c, TERM_ROW) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
+        the sum of TERMS doubles. What the row holds is that sum, rounded; low parts are the rest, rounded.
     """
 
     rows: np.ndarray
@@ -87,7 +95,8 @@ class PoseTable(NamedTuple):
         row = self.rows[part]
         if row[POSE_TERMS] < 0.0:
             return [Fraction(v) for v in row[:12].tolist()]
-        return [sum(map(Fraction, entry), Fraction(0)) for entry in self.terms[int(row[POSE_TERMS])].tolist()]
+        terms = self.terms[int(row[POSE_TERMS]), :LOW_PARTS].reshape(12, TERMS)
+        return [sum(map(Fraction, entry), Fraction(0)) for entry in terms.tolist()]
 
 
 def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTable:
@@ -107,21 +116,32 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     identity = np.eye(4)
     own = (X_BP != identity).any(axis=(1, 2))
     if not own.any():
-        return PoseTable(rows, _NO_TERMS)
+        return PoseTable(rows, NO_TERMS)
     unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
     rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
     own = np.flatnonzero(own & ~unmoved)
     if not len(own):
-        return PoseTable(rows, _NO_TERMS)
+        return PoseTable(rows, NO_TERMS)
     R, p, X = R_WB[own], p_WB[own], X_BP[own]
     rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
     rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
     stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
     parts = reach[own] + np.abs(X[:, :3, 3]).sum(axis=1)
-    rows[own, POSE_SLOP] = _PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
+    rows[own, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
     terms, exact = _terms(R, p, X)
     rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
-    return PoseTable(rows, np.ascontiguousarray(terms[exact]))
+    terms, rounded = terms[exact], rows[own[exact], :12]
+    return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
+
+
+def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:
+    """(k, 12) what sums of terms (k, 12, TERMS) are more than these, in twice the precision."""
+    total, rest = np.zeros_like(rounded), np.zeros_like(rounded)
+    for j in range(TERMS):
+        before, total = total, total + terms[:, :, j]
+        other = total - before
+        rest += (before - (total - other)) + (terms[:, :, j] - other)
+    return rest + (total - rounded)
 
 
 def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +163,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             else:
                 left, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
                 high, low = _two_products(left, factor)
-                exact &= ((np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
+                exact &= ((np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
             sum_, other = total + high, total
             back = sum_ - other
             lost = (other - (sum_ - back)) + (high - back)
@@ -152,7 +172,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
         out[:, :3, j] = total
     stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
     parts = reach + np.abs(X_BP[:3, 3]).sum()
-    slop = _PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
+    slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
     return out, np.where(exact, 0.0, slop)
 
 
@@ -176,7 +196,7 @@ def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.
             left = R[:, :, j, None] if target is rotation else R[:, :, j]
             high, low = _two_products(left, factor)
             target[..., 2 * j], target[..., 2 * j + 1] = high, low
-            safe = (np.abs(high) > _SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
+            safe = (np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
             exact &= safe.reshape(k, -1).all(axis=1)
     return terms, exact
 
@@ -191,5 +211,5 @@ def _two_products(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 #: Products larger than this have low parts that are doubles.
-_SAFE_PRODUCT = 2.0**-900
-_NO_TERMS = np.zeros((0, 12, TERMS))
+SAFE_PRODUCT = 2.0**-900
+NO_TERMS = np.zeros((0, TERM_ROW))

@@ -13,7 +13,7 @@ import numpy as np
 from collide.geometry.facet_table import FacetTable
 from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, TERMS, PoseTable
+from collide.geometry.tables import NO_TERMS, POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PoseTable
 from collide.narrowphase.run import run_pairs
 
 
@@ -49,7 +49,4 @@ def facet_rows(
     rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
     shape_of = np.concatenate([own.ravel(), np.full(len(which), len(corners))]).astype(np.int64)
     pairs = np.stack([np.arange(len(pose)), len(pose) + again.ravel()], axis=1)
-    return run_pairs(table, PoseTable(rows, _NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit, depths=depths)  # type: ignore[arg-type]
-
-
-_NO_TERMS = np.zeros((0, 12, TERMS))
+    return run_pairs(table, PoseTable(rows, NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit, depths=depths)  # type: ignore[arg-type]

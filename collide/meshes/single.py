@@ -35,16 +35,13 @@ class PreparedPair:
     collide : as `run.SinglePair` has it.
     """
 
-    #: Overlaps are left to the long way.
-    only_gaps = True
-
     def __init__(self, one: Body, other: Body, sides: tuple[Side, Side], exchanged: bool):
         self._pair = SingleMeshPair(*sides, exchanged, one.radius + other.radius)
         self.collide = self._pair.collide
         self._exchanged, self._radii = exchanged, (one.radius, other.radius)
         self._reaches = sum(float(body.tree.numbers[REACH : REACH + 3].sum()) + body.radius for body in (one, other))
 
-    def distance(self, X_WA, X_WB) -> np.ndarray | None:
+    def distance(self, X_WA, X_WB, _depths: bool) -> np.ndarray | None:
         """The row of one gap, bit by bit that of a batch (`answers.mesh_rows`); None of overlaps, and of what a batch
         says better. Numpy takes ten times as long over arrays of one as this does."""
         found = self._pair.near(X_WA, X_WB)

@@ -33,13 +33,13 @@ def close_rows(rows_at, n, depths):
         row = view_f64(at, 12)
         view_i32(at, ROW // 4)[BODY_B] = 1
         if not depths:
-            _forget_depth(row, view_u8(at, ROW))
+            forget_depth(row, view_u8(at, ROW))
         endless = endless or row[DISTANCE] == -math.inf
     return endless
 
 
 @kernel(inline=True)
-def _forget_depth(row, marks):
+def forget_depth(row, marks):
     """An overlap becomes distance 0 at a point of both bodies; its bracket is 0, too, unless the sign is open."""
     if not row[LOWER] > 0.0:
         row[LOWER] = 0.0

@@ -11,7 +11,7 @@ from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
-from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
+from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.epa.foot import weigh_corners
 from collide.narrowphase.exact.all_planes import ROOM
@@ -150,7 +150,7 @@ def decide_pairs(
     workspace of WORKSPACE. What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
-    terms = view_f64(terms_at, 12 * TERMS * n_terms)
+    terms = view_f64(terms_at, TERM_ROW * n_terms)
     digits = view_i64(digits_at, DIGITS)
     ids = view_i64(digits_at + 8 * DIGITS, 16)
     requests = view_i64(requests_at, REQUESTS)

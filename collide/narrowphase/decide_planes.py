@@ -10,7 +10,7 @@ import math
 from collide._jit import entry, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.double_double import bracket
 from collide.geometry.packing import HALFSPACE, POINTS
-from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
+from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.decide import DIGITS
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE
@@ -27,7 +27,7 @@ def decide_planes(
 ):
     """Settle the undecided rows of half-spaces against hulls, in place; returns how many. Arguments as in `decide_pairs`."""
     pairs = view_i64(pairs_at, 2 * n_pairs)
-    terms = view_f64(terms_at, 12 * TERMS * n_terms)
+    terms = view_f64(terms_at, TERM_ROW * n_terms)
     digits = view_i64(digits_at, DIGITS)
     ids = view_i64(digits_at + 8 * DIGITS, 2)
     settled = 0

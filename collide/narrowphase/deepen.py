@@ -9,7 +9,7 @@ from collide._jit import entry, view_f64, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import POINTS
-from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERMS
+from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.decide import DIGITS, set_normal
 from collide.narrowphase.exact.all_planes import depth_by_all_planes
@@ -29,7 +29,7 @@ def deepen_pairs(
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     wanted = view_u8(open_at, n_pairs)
-    terms = view_f64(terms_at, 12 * TERMS * n_terms)
+    terms = view_f64(terms_at, TERM_ROW * n_terms)
     digits = view_i64(digits_at, DIGITS)
     corners = view_i64(digits_at + 8 * (DIGITS + 16), 8)
     found = 0

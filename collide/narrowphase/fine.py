@@ -18,7 +18,7 @@ from collide._jit import kernel, view_f64
 from collide._lanes import any_of, root_of, select
 from collide.geometry.double_double import cross, multiply, product_of_vectors, square_root, subtract
 from collide.geometry.error_free import two_product, two_sum
-from collide.geometry.tables import POSE_SLOP, POSE_TERMS, TERMS
+from collide.geometry.tables import LOW_PARTS, POSE_SLOP, POSE_TERMS, TERM_ROW
 
 #: Doubles stored a point: three double-doubles.
 FINE = 6
@@ -51,17 +51,9 @@ def scale_of(size):
 @kernel
 def low_parts(poses, p, terms, low, at):
     """What the twelve entries of a pose are more than the row says, into low[at:]; for a pose as given, zeros."""
-    row = int(poses[p + POSE_TERMS])
+    at_terms = TERM_ROW * int(poses[p + POSE_TERMS]) + LOW_PARTS
     for k in range(12):
-        total = poses[p + k]
-        rest = 0.0
-        if row >= 0:
-            total = 0.0
-            for i in range(TERMS):
-                total, e = two_sum(total, terms[TERMS * (12 * row + k) + i])
-                rest += e
-            rest += total - poses[p + k]
-        low[at + k] = rest
+        low[at + k] = terms[at_terms + k] if at_terms >= 0 else 0.0
 
 
 @kernel(inline=True)
@@ -246,7 +238,7 @@ def _write_low_parts(pair, terms_at, low_at):
     poses = pair[13]
     rows = int(max(poses[pair[5] + POSE_TERMS], poses[pair[11] + POSE_TERMS])) + 1
     low = view_f64(low_at, 24)
-    terms = view_f64(terms_at, 12 * TERMS * rows)
+    terms = view_f64(terms_at, TERM_ROW * rows)
     low_parts(poses, pair[5], terms, low, 0)
     low_parts(poses, pair[11], terms, low, 12)
     return 24

@@ -18,6 +18,7 @@ ROW = PAIR_DTYPE.itemsize
 DISTANCE, LOWER, UPPER = _at("distance", 8), _at("lower", 8), _at("upper", 8)
 NORMAL, POINT_A, POINT_B = _at("normal", 8), _at("point_a", 8), _at("point_b", 8)
 BODY_B = _at("b", 4)
+PART_A, PART_B = _at("part_a", 4), _at("part_b", 4)
 VERTICES_A, VERTICES_B, ITERATIONS = _at("vertices_a", 4), _at("vertices_b", 4), _at("iterations", 4)
 COUNT, HOW, EXACT_ROUNDS, HIT = _at("count", 1), _at("how", 1), _at("exact", 1), _at("hit", 1)
 CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)

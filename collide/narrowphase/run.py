@@ -9,7 +9,7 @@ import numpy as np
 
 from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
-from collide.geometry.tables import POSE, TERMS, PoseTable, ShapeTable
+from collide.geometry.tables import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
 from collide.narrowphase.closing import close_rows
@@ -165,6 +165,16 @@ def run_poses(
     return True
 
 
+def scratch() -> tuple[int, int]:
+    """Addresses of this thread's workspace, doubles and integers, as `answer_pairs` takes them."""
+    return _of_thread.space.addresses
+
+
+def settle_open(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool) -> None:
+    """Settle in place what doubles left open of rows that `answer_pairs` has just made with this thread's workspace."""
+    _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
+
+
 def close(rows: np.ndarray, *, depths: bool) -> bool:
     """Finish rows of `distance` in place: `closing.close_rows`."""
     return bool(close_rows(address_of(rows), len(rows), depths))
@@ -177,7 +187,7 @@ class _Workspace:
         self.doubles = np.zeros(DOUBLES)
         self.integers = np.zeros(INTEGERS, dtype=np.int64)
         self.digits = np.zeros(WORKSPACE, dtype=np.int64)
-        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), np.zeros((0, 12, TERMS)))
+        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), NO_TERMS)
         self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
         self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
         self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)
@@ -218,8 +228,6 @@ class SinglePair:
 
     #: One for all single calls: their kernels keep Python's lock.
     _space: _Workspace | None = None
-    #: `distance` works depths out as well.
-    only_gaps = False
 
     def __init__(self, table: ShapeTable):
         if SinglePair._space is None:
@@ -229,7 +237,8 @@ class SinglePair:
         header = np.array([*object_words(), *SinglePair._space.header_of(table).tolist()])
         self.collide, self._distance = built_in(collide_single, header), built_in(distance_single, header)
 
-    def distance(self, X_WA, X_WB) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`; None where more than doubles, or an error, is called for."""
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        return None if self._distance(X_WA, X_WB, rows) is None else rows
+        said = self._distance(X_WA, X_WB, rows) if depths else self._distance(X_WA, X_WB, rows, None)
+        return None if said is None else rows

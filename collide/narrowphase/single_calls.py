@@ -7,6 +7,7 @@ import math
 from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.tables import POSE
 from collide.narrowphase.array_objects import OBJECT_WORDS, answered, data_at, matrix_at
+from collide.narrowphase.closing import forget_depth
 from collide.narrowphase.poses import (
     BLOCK,
     CORE,
@@ -31,7 +32,7 @@ SINGLE_HEADER = OBJECT_WORDS + HEADER
 
 
 @kernel
-def _single(header_at, A_object, B_object, boolean, row_at):
+def _single(header_at, A_object, B_object, boolean, depths, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for."""
     XA_at = matrix_at(A_object, view_i64(header_at, OBJECT_WORDS))
     XB_at = matrix_at(B_object, view_i64(header_at, OBJECT_WORDS))
@@ -47,7 +48,7 @@ def _single(header_at, A_object, B_object, boolean, row_at):
         header[CORE],
         (
             header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
-            not boolean, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
+            depths, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip
     marks = view_u8(row_at, ROW)
@@ -70,23 +71,24 @@ def collide_single(header_object, arguments_at, count):
         for k in range(ROW // 8):
             row[k] = 0
         arguments = view_i64(arguments_at, 2)
-        said = _single(header_at, arguments[0], arguments[1], True, rows_at)
+        said = _single(header_at, arguments[0], arguments[1], True, False, rows_at)
     return answered(view_i64(header_at, OBJECT_WORDS), said)
 
 
 @entry("int64(int64, int64, int64)", nogil=False)
 def distance_single(header_object, arguments_at, count):
-    """`array_objects.built_in` of two poses and an array of ROW zero bytes, which becomes their row; returns as there.
-
-    None, too, where the depth has no end.
+    """`array_objects.built_in` of two poses, an array of ROW zero bytes, which becomes their row, and, where gaps are all
+    that is wanted, anything; returns as there. None, too, where the depth has no end.
     """
     header_at = data_at(header_object)
     said = -1
-    if count == 3:
+    if count >= 3:
         arguments = view_i64(arguments_at, 3)
         row_at = data_at(arguments[2])
-        said = _single(header_at, arguments[0], arguments[1], False, row_at)
+        said = _single(header_at, arguments[0], arguments[1], False, count == 3, row_at)
         view_i32(row_at, ROW // 4)[BODY_B] = 1
+        if count > 3 and said >= 0:
+            forget_depth(view_f64(row_at, 12), view_u8(row_at, ROW))
         if view_f64(row_at, 1 + DISTANCE)[DISTANCE] == -math.inf:
             said = -1
     return answered(view_i64(header_at, OBJECT_WORDS), said)

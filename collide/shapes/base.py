@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from collide.errors import InvalidShape
 from collide.geometry.packing import PackedConvex
 from collide.transforms import LARGEST, SMALLEST
+
+if TYPE_CHECKING:
+    from collide.geometry.union_table import LaidOut
 
 
 class Shape:
@@ -18,7 +21,7 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_bounds", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
+    __slots__ = ("__weakref__", "_bounds", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -32,6 +35,8 @@ class Shape:
     _topology: Any
     #: Its parts, as unions with meshes ask about them (`meshes/union_parts.py`).
     _union: Any
+    #: Its parts in the rows that kernels of unions read.
+    _laid_out: LaidOut
     #: What `bounding_parts` gives, where that is not `parts`.
     _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
 
@@ -80,6 +85,14 @@ class Shape:
     def bounding_parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
         """Convex sets that hold this: its parts, or something larger and simpler. Boxes are made of them."""
         return self.parts()
+
+    def laid_out(self) -> LaidOut:
+        """Its bounding parts as kernels of unions read them, kept like these."""
+        if not hasattr(self, "_laid_out"):
+            from collide.geometry.union_table import lay_out
+
+            self._store(_laid_out=lay_out(self.bounding_parts()))
+        return self._laid_out
 
     def _pack(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
         raise TypeError(f"{type(self).__name__} cannot be asked about: derive it from Shape and define _pack")

@@ -13,6 +13,7 @@ from collide.shapes.base import Shape, is_plain
 
 if TYPE_CHECKING:
     from collide.geometry.tables import ShapeTable
+    from collide.geometry.union_table import UnionTable
 
 
 class ShapeSet:
@@ -68,6 +69,13 @@ class ShapeSet:
         from collide.geometry.tables import ShapeTable
 
         return ShapeTable([shape.bounding_parts()[0][0] for shape in self.shapes])
+
+    @cached_property
+    def unions(self) -> UnionTable:
+        """The same with all parts of each shape, a body a shape."""
+        from collide.geometry.union_table import UnionTable
+
+        return UnionTable([shape.laid_out() for shape in self.shapes])
 
 
 class Picked(Sequence):

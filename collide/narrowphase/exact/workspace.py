@@ -15,7 +15,7 @@ from collide.geometry.digits import (
     grid_of,
     lowest_bit,
 )
-from collide.geometry.tables import POSE_TERMS, TERMS
+from collide.geometry.tables import POSE_TERMS, TERM_ROW, TERMS
 
 #: Most digits of one coordinate: 2^1664 between the largest and the smallest bit of a pair, which is
 #: every double there is as long as the bodies are smaller than 2^500 m. The shorter factor of any
@@ -78,7 +78,7 @@ def exact_pose(poses, p, terms):
     """(numbers, where, k): entry j of the pose is exactly the sum of numbers[where + k·j …], k of them."""
     if poses[p + POSE_TERMS] < 0.0:
         return poses, p, 1
-    return terms, 12 * TERMS * int(poses[p + POSE_TERMS]), TERMS
+    return terms, TERM_ROW * int(poses[p + POSE_TERMS]), TERMS
 
 
 @kernel

@@ -1,0 +1,52 @@
+"""Single `distance(signed=False)`: one call of a kernel, the bits of a batch."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import naive
+import numpy as np
+import pytest
+from naive import Case, random_pose, rng_of
+
+import collide
+from collide import query
+from collide.narrowphase import run
+
+
+def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
+    """Of all kinds of shapes, apart, overlapping and touching; most take the one call."""
+    rng = rng_of("single gaps")
+    kinds = [kind for kind in naive.KINDS if kind != "Halfspace"]
+    hits, long_way = [], []
+    ask = query.ask
+    monkeypatch.setattr(query, "ask", lambda *given, **named: (long_way.append(1), ask(*given, **named))[1])
+    for kind_a, kind_b in combinations_with_replacement(kinds, 2):
+        A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
+        X, Y = (np.array([random_pose(rng, 0.8) for _ in range(12)]) for _ in range(2))
+        rows = collide.distance(A, B, X, Y, signed=False).rows
+        for k in range(len(X)):
+            with naive.reproducible(Case(A, B, X[k], Y[k])):
+                single = collide.distance(A, B, X[k], Y[k], signed=False)
+                assert single.rows.tobytes() == rows[k].tobytes()
+                assert single.question[2].tobytes() == X[k].tobytes()
+        hits.extend(rows["hit"])
+    box = collide.Box((1, 1, 1))
+    for t in ((1, 0.25, 0.125), (1 + 2**-52, 0.25, 0.125), (1 - 2**-53, 0, 0)):  # the exact stage
+        X = collide.pose(t)
+        rows = collide.distance(box, box, np.eye(4), X[None], signed=False).rows
+        assert collide.distance(box, box, np.eye(4), X, signed=False).rows.tobytes() == rows.tobytes()
+    assert 0.2 < naive.share(hits) < 0.9
+    if run.single_calls_are_safe():
+        batches = len(list(combinations_with_replacement(kinds, 2))) + 3
+        assert len(long_way) - batches < 0.02 * len(hits), "single gaps go the long way"
+
+
+def test_single_gaps_of_what_has_no_depth():
+    """Half-spaces that overlap without end are at distance 0: only their depth is refused."""
+    floor, wall = collide.Halfspace((0, 0, 1), 0.0), collide.Halfspace((1, 0, 0), 0.0)
+    for _ in range(2):  # the second time prepared
+        r = collide.distance(floor, wall, np.eye(4), np.eye(4), signed=False)
+        assert r.hit and r.distance == 0.0 and (r.normal == 0.0).all()
+        with pytest.raises(collide.errors.UnsupportedQuery, match="no end"):
+            collide.distance(floor, wall, np.eye(4), np.eye(4))
