@@ -51,7 +51,7 @@ def combine(rows: np.ndarray, starts: np.ndarray, plural: np.ndarray, sides) -> 
     if not plural.any():
         return rows
     ends = np.append(starts[1:], len(rows))
-    out = np.zeros(len(starts), dtype=PAIR_DTYPE)  # padding too: equal answers are equal bytes
+    out = np.zeros(len(starts), dtype=PAIR_DTYPE)
     for k, (start, end) in enumerate(zip(starts, ends)):
         group = rows[start:end]
         out[k] = _nearest(group, lambda k=k: sides(k)) if plural[k] else group[0]

@@ -26,7 +26,8 @@ FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "coll
 ROOMS = {
     "errors": set(),
     "cache_folder": set(),
-    "_jit": {"cache_folder", "_lean_compile"},
+    "_jit": {"cache_folder", "_kernel_cache", "_lean_compile"},
+    "_kernel_cache": {"cache_folder"},
     "_lanes": set(),
     "_lean_compile": set(),
     "_simd": set(),
@@ -74,6 +75,7 @@ COMPILERS = {
 #: The files that make code, and what they need for it: everything else goes through them.
 COMPILER_PACKAGES = {
     "collide/_jit.py": {"numba"},
+    "collide/_kernel_cache.py": {"numba", "llvmlite"},
     "collide/_lean_compile.py": {"numba", "llvmlite"},
     "collide/_simd.py": {"numba", "llvmlite"},
     "collide/_lanes.py": {"numba", "llvmlite"},
