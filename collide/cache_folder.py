@@ -88,7 +88,7 @@ def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
             continue
         try:
             found = os.lstat(at / part)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return
         if stat.S_ISLNK(found.st_mode):
             yield at / part, found, False

@@ -80,6 +80,6 @@ class Picked(Sequence):
         return len(self.rows)
 
     def __getitem__(self, k):
-        if isinstance(k, slice):
+        if isinstance(k, (slice, np.ndarray)):
             return Picked(self.shape_set, self.rows[k])
         return self.shape_set.shapes[self.rows[k]]
