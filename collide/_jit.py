@@ -1,4 +1,5 @@
-"""The one way to compile a kernel. But for `_simd.py`, `_lanes.py` and `_lean_compile.py`, nothing else imports numba.
+"""The one way to compile a kernel. But for `_simd.py`, `_lanes.py`, `_lean_compile.py` and
+`_kernel_cache.py`, nothing else imports numba.
 
 Rules, each measured or forced by a bug met:
 
@@ -9,8 +10,8 @@ Rules, each measured or forced by a bug met:
 * no reference counting: kernels take addresses and make views with `view_f64` and its siblings.
   Array arguments cost more than the geometry of a box pair. The caller keeps every buffer alive
   for the length of the call;
-* the disk cache is keyed to a hash of all kernel sources. Numba's own key does not see an edit
-  in an imported callee, and a stale kernel answers wrongly.
+* the disk cache (`_kernel_cache.py`) is keyed to a hash of all kernel sources. Numba's own key does not
+  see an edit in an imported callee, and a stale kernel answers wrongly.
 
 ``NUMBA_DISABLE_JIT=1`` runs the same source as plain Python, for coverage and for debugging.
 """
@@ -19,28 +20,23 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import logging
-import os
-import pickle
 import sys
-import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 
 import numba
 import numpy as np
 from numba.core import types
-from numba.core.caching import FunctionCache, _CacheLocator
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-from collide._lean_compile import SELDOM, lean_compiling
+from collide._kernel_cache import kernel_cache
+from collide._lean_compile import SELDOM, compiled_lean
 from collide.cache_folder import cache_folder
-
-log = logging.getLogger("collide")
 
 PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
 _FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -93,7 +89,6 @@ class Entry:
         self._flags, self._hasty = {**_FLAGS, "nogil": nogil}, hasty
         self._function, self._signature = function, signature
         self._ready: Callable | None = function if PLAIN_PYTHON else None
-        self._lock = threading.Lock()
         self._address = 0
 
     def __call__(self, *args):
@@ -139,30 +134,19 @@ class Entry:
     def _compiled(self) -> Callable:
         """Compiled for its signature, or read from the disk cache."""
         dispatcher = numba.njit(self._function, **self._flags)
-        dispatcher._cache = _KernelCache.of(self._function)
-        with lean_compiling(self._function, self._hasty):
-            dispatcher.compile(self._signature)
+        dispatcher._cache = kernel_cache(self._function, kernel_cache_folder())
+        compiled_lean(self._function, self._hasty, lambda: dispatcher.compile(self._signature))
         dispatcher.disable_compile()
         return dispatcher
 
-    def _forget(self, error: Exception) -> None:
-        """Remove what the disk cache has of this kernel, since it cannot be read."""
-        place = kernel_cache_folder()
-        log.warning("a compiled kernel in %s is damaged (%s: %s); it is compiled anew", place, type(error).__name__, error)
-        for file in place.glob(f"*{self._function.__name__}-*"):
-            file.unlink(missing_ok=True)
-
     def _compile(self) -> None:
-        with self._lock:
+        # Numba's own lock and no other: of two, one thread could hold the first and another the second.
+        with global_compiler_lock:
             if self._ready is not None:
                 return
             started = time.perf_counter()
             with on_compile(self.name):
-                try:
-                    dispatcher = self._compiled()
-                except (EOFError, pickle.UnpicklingError, OSError, ValueError) as error:
-                    self._forget(error)
-                    dispatcher = self._compiled()
+                dispatcher = self._compiled()
             seconds[self.name] = time.perf_counter() - started
             self._ready = dispatcher
 
@@ -209,58 +193,6 @@ def source_hash() -> str:
 def kernel_cache_folder() -> Path:
     """Where compiled kernels of these very sources are kept."""
     return cache_folder("kernels", source_hash())
-
-
-class _Locator(_CacheLocator):
-    """Tells numba's cache to live in our folder, for our kernels only."""
-
-    def __init__(self, function: Callable):
-        self._function = function
-        self._py_file = function.__code__.co_filename  # numba names it where a kernel cannot be kept
-
-    def get_cache_path(self) -> str:
-        return str(kernel_cache_folder())
-
-    def get_source_stamp(self):
-        return source_hash()
-
-    def get_disambiguator(self) -> str:
-        return str(self._function.__code__.co_firstlineno)
-
-    def ensure_cache_path(self) -> None:
-        folder = self.get_cache_path()
-        os.makedirs(folder, exist_ok=True)
-        probe = os.path.join(folder, f".writable-{os.getpid()}-{threading.get_ident()}")
-        with open(probe, "wb"):
-            pass
-        os.unlink(probe)
-
-    @classmethod
-    def from_function(cls, py_func, py_file):
-        return cls(py_func)
-
-
-class _KernelCache(FunctionCache):
-    class _impl_class(FunctionCache._impl_class):
-        _locator_classes = [_Locator]
-
-    @classmethod
-    def of(cls, function: Callable):
-        """A cache for this kernel, or numba's null cache where the folder cannot be written."""
-        try:
-            _Locator(function).ensure_cache_path()
-            return cls(function)
-        except (OSError, RuntimeError) as error:
-            _say_once(
-                f"compiled kernels cannot be kept in {kernel_cache_folder()} ({error}); they are compiled "
-                "again in every process. Set COLLIDE_CACHE_DIR to a folder that can be written."
-            )
-            return numba.core.caching.NullCache()
-
-
-@cache
-def _say_once(message: str) -> None:
-    log.warning(message)
 
 
 # --- views on buffers ---------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import nullcontext
 from functools import cache, lru_cache
 from typing import Any
 
@@ -65,28 +65,49 @@ _STEPS = [
 _CAN_CHOOSE = hasattr(CPUCodegen, "_pass_builder") and hasattr(llvmlite.binding, "create_new_function_pass_manager")
 
 
-@contextmanager
-def lean_compiling(function: Callable, hasty: bool = False) -> Iterator[None]:
-    """While the entry of this function is compiled.   hasty : at some expense of its speed."""
+#: Numba's own parts while an entry is compiled and others stand in their places.
+_numbas_own: list[tuple[Any, str, Any]] = []
+
+
+def compiled_lean(function: Callable, hasty: bool, compile_it: Callable[[], Any]) -> Any:
+    """What ``compile_it`` gives, called while the entry of this function is compiled, or read from the disk cache.
+
+    hasty : at some expense of its speed.
+    """
+    global _numbas_own
     # The lock first: another thread may have these parts replaced, and they must not be taken for numba's.
-    with global_compiler_lock, ExitStack() as stack:
-        _exchange(stack, [*_translated_once(function.__qualname__, hasty), *_without_idle_work(), *_silent_events()])
-        _collect_rarely(stack)
-        yield
+    with global_compiler_lock:
+        parts = [*_translated_once(function.__qualname__, hasty), *_without_idle_work(), *_silent_events()]
+        there, back = _exchange(parts)
+        before, thresholds = _numbas_own, gc.get_threshold()
+        # Of an entry compiled amid another one, by a signal's handler, numba's are those before the outer one.
+        own = before or [(owner, name, vars(owner)[name]) for owner, name, _ in parts]
+        try:
+            _numbas_own = own
+            any(there)
+            _collect_rarely(thresholds)
+            return compile_it()
+        finally:
+            _numbas_own = before
+            try:
+                any(back)
+            finally:
+                gc.set_threshold(*thresholds)
 
 
-def _exchange(stack: ExitStack, parts: list[tuple[Any, str, Any]]) -> None:
-    """Attributes of numba's classes and modules exchanged until the stack ends."""
-    for owner, name, part in parts:
-        # First the way back: an interrupt may come between any two steps.
-        stack.callback(setattr, owner, name, vars(owner)[name])
-        setattr(owner, name, part)
+def _exchange(parts: list[tuple[Any, str, Any]]) -> tuple[Iterator[None], Iterator[None]]:
+    """(attributes of numba's classes and modules become others when this is run down, they become what they are now).
+
+    For who holds the compiler's lock: whoever comes without it would take these parts for numba's own, and put them back
+    for good. To run one down, `any` will do: one call, in which no Python runs and no interrupt comes.
+    """
+    owners, names, others = [owner for owner, _, _ in parts], [name for _, name, _ in parts], [part for _, _, part in parts]
+    own = [vars(owner)[name] for owner, name in zip(owners, names)]
+    return map(setattr, owners, names, others), map(setattr, owners, names, own)
 
 
-def _collect_rarely(stack: ExitStack) -> None:
-    thresholds = gc.get_threshold()
+def _collect_rarely(thresholds: tuple) -> None:
     if 0 < thresholds[0] < _OBJECTS_BETWEEN_COLLECTIONS:  # 0: somebody has switched it off
-        stack.callback(gc.set_threshold, *thresholds)
         gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS, *thresholds[1:])
 
 
@@ -115,10 +136,16 @@ def _translated_once(own: str, hasty: bool) -> list[tuple[Any, str, Any]]:
         return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "not callable", 0, env, (library,))
 
     def compile_for_call(dispatcher, *args, **kws):
-        """A call from Python, of a signal's handler or a finalizer, is none of this entry's."""
-        with ExitStack() as stack:
-            _exchange(stack, _STEPS)
+        """A call from Python is none of this entry's: of another thread, which is to wait for the compiler's lock as ever
+        and finds numba as it was; or in this one, of a signal's handler or a finalizer."""
+        if not global_compiler_lock.is_locked():  # by this thread, that is
             return call(dispatcher, *args, **kws)
+        there, back = _exchange(_numbas_own)
+        try:
+            any(there)
+            return call(dispatcher, *args, **kws)
+        finally:
+            any(back)
 
     return [
         (Dispatcher, "_compile_for_args", compile_for_call),

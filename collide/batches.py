@@ -1,27 +1,25 @@
 """Batches: from shapes and poses as checked by `query.py` to rows, in as many threads as asked for.
 
-Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py`, unions through
-`unions.py`, and what has a mesh through `meshes/`.
+Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py` as they are;
+unions are taken apart into pairs of parts and put together again by `unions.py`.
 """
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
-from collide.errors import InvalidArgument, InvalidPose
-from collide.geometry.packing import PackedConvex
+from collide.errors import InvalidPose
 from collide.geometry.tables import ShapeTable
 from collide.geometry.union_table import UnionTable
 from collide.narrowphase import run
 from collide.results import PAIR_DTYPE
 from collide.shapes.base import Shape, is_plain
-from collide.shapes.shape_set import Picked
+from collide.shapes.shape_set import Picked, ShapeSet
 from collide.transforms import as_poses
 from collide.unions import UnionPair, run_unions
+from collide.workers import check_threads, pieces_of, share, share_if_it_helps
 
 
 def length_of(A, B, X_WA, X_WB) -> int:
@@ -39,87 +37,83 @@ def ask(
     close : called with the rows of each piece when they are done, by the thread that did them.
     kept : two arrays like X_WA and X_WB, to become copies of them.
     """
-    n = length_of(A, B, X_WA, X_WB)
+    workers, n = check_threads(threads), length_of(A, B, X_WA, X_WB)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
-    workers, fewest = _workers(threads), _FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD
-    workers = min(workers, n // fewest)
     for X, copy in zip((X_WA, X_WB), kept):
-        if workers < 2 or len(X) == 1:
+        if len(X) == 1:
             copy[:] = X
-    if workers < 2:
-        _answer_into(out, A, B, X_WA, X_WB, boolean, limit, check, axes, depths)
-        if close is not None:
-            close(out)
+    if n == 0:
         return out
-    pieces = iter(_pieces(n, workers, fewest))
+    A, B = _of_one_set(A, B, n)
 
-    def work() -> None:
-        for part in pieces:  # a thread takes the next as it becomes free: pairs do not all cost the same
-            one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
-            X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
-            own = None if axes is None else axes[part]
-            for X, copy in zip((X_WO, X_WT), kept):
-                if len(copy) > 1:
-                    copy[part] = X
-            try:
-                _answer_into(out[part], one, other, X_WO, X_WT, boolean, limit, check, own, depths)
-                if close is not None:
-                    close(out[part])
-            except InvalidPose:
-                _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
-                raise
-
-    at_work: list[Future] = []
-    try:
+    def work(part: slice | np.ndarray) -> None:
+        one, other = (S if isinstance(S, Shape) else S[part] for S in (A, B))
+        X_WO, X_WT = (X if len(X) == 1 else X[part] for X in (X_WA, X_WB))
+        own = None if axes is None else axes[part]
+        for X, copy in zip((X_WO, X_WT), kept):
+            if len(copy) > 1:
+                copy[part] = X
+        rows = out[part] if isinstance(part, slice) else np.zeros_like(out, shape=len(part))
         try:
-            at_work.extend(_pool(workers - 1).submit(work) for _ in range(workers - 1))
-        except RuntimeError:  # no more threads are to be had, or Python is ending: this one does what is left
-            pass
-        work()
-        for one in at_work:
-            one.result()
-    finally:  # after an error as well nobody writes into the caller's axes any more
-        for _ in pieces:
-            pass
-        wait(at_work)
+            _answer_into(rows, one, other, X_WO, X_WT, boolean, limit, check, own, depths)
+        except InvalidPose:
+            _refuse_poses(X_WA, X_WB, check)  # named by its place in the whole batch
+            raise
+        if close is not None:
+            close(rows)
+        if not isinstance(part, slice):
+            out[part] = rows
+
+    if not (_any_meshed(A) or _any_meshed(B)):
+        workers = min(workers, n // _FEWEST)
+        if workers < 2:
+            work(slice(0, n))
+        else:
+            share(pieces_of(n, workers, _FEWEST), work, workers)
+    elif workers < 2:
+        work(slice(0, n))
+    else:  # from 1 µs to 1 ms a pose, with Python's lock or without
+        order = _together(A, B)
+        share_if_it_helps(n, work if order is None else lambda part: work(order[part]), workers)
     return out
 
 
-def _pieces(n: int, workers: int, fewest: int) -> list[slice]:
-    """What is handed out of a batch at a time: ever smaller shares of what is left, none smaller than pays.
-
-    A piece costs some 30 µs beside its answers. Large ones first, there are few; small ones last, no thread waits long for
-    the others, though a core may be somebody else's now and then.
-    """
-    pieces, done = [], 0
-    while done < n:
-        left = n - done
-        most = max(left // fewest, 1)  # so many pieces can be made of it
-        share = -(-left // most) if most <= workers else max(left // (2 * workers), fewest)
-        pieces.append(slice(done, done + share))
-        done += share
-    return pieces
-
-
 #: A thread is handed at least so many poses: below, handing over takes longer than answering.
-_FEWEST_A_THREAD = 2000
-_FEWEST_OF_MESHES = 16
+_FEWEST = 2000
 
 
-@lru_cache(maxsize=4)
-def _pool(workers: int) -> ThreadPoolExecutor:
-    """Threads are kept, and their workspaces with them."""
-    return ThreadPoolExecutor(workers, thread_name_prefix="collide")
+def _together(A, B) -> np.ndarray | None:
+    """(n,) numbers of the poses, those of the same two shapes one after another, since each pair is asked about at once;
+    None where they are all of one pair."""
+    return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 
-if hasattr(os, "register_at_fork"):  # a forked child has none of its parent's threads
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+def _of_one_set(A, B, n: int):
+    """The shapes as they are, or where one side is a sequence, both as picked from one set."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        return A, B
+    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+        return A, B
+    numbers: dict[int, int] = {}
+    shapes: list[Shape] = []
 
+    def number(shape: Shape) -> int:
+        if id(shape) not in numbers:  # held by the list as long as this dictionary lives
+            numbers[id(shape)] = len(shapes)
+            shapes.append(shape)
+        return numbers[id(shape)]
 
-def _workers(threads) -> int:
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
-    return int(threads)
+    def rows(side) -> np.ndarray:
+        if isinstance(side, Shape):
+            return np.full(n, number(side))
+        if isinstance(side, Picked):
+            used, which = np.unique(side.rows, return_inverse=True)
+            return np.array([number(side.shape_set.shapes[k]) for k in used.tolist()], dtype=np.int64)[which.ravel()]
+        return np.fromiter(map(number, side), dtype=np.int64, count=n)
+
+    both = rows(A), rows(B)
+    shape_set = ShapeSet(shapes)
+    return Picked(shape_set, both[0]), Picked(shape_set, both[1])
 
 
 def _refuse_poses(X_WA, X_WB, check: bool) -> None:
@@ -134,14 +128,13 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
         return
     wanted = {"boolean": boolean, "limit": limit, "depths": depths}
     if _all_plain(A) and _all_plain(B) and not run.distrust_doubles:
-        answer = partial(run.run_poses, out, *_table(A, B, n), X_WA, X_WB, axes=axes, **wanted)
+        answer = partial(run.run_poses, out, *_table(A, B), X_WA, X_WB, axes=axes, **wanted)
     elif not (_any_meshed(A) or _any_meshed(B)):
-        answer = partial(run_unions, out, *_union_table(A, B, n), X_WA, X_WB, **wanted)
+        answer = partial(run_unions, out, *_union_table(A, B), X_WA, X_WB, **wanted)
     else:
         _refuse_poses(X_WA, X_WB, check)
         X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-        one_pair = isinstance(A, Shape) and isinstance(B, Shape)
-        (_meshed if one_pair else _pair_by_pair)(out, A, B, X_WA, X_WB, **wanted)
+        (_pair_by_pair if isinstance(A, Picked) else _meshed)(out, A, B, X_WA, X_WB, **wanted)
         return
     if not answer(check=check):
         _refuse_poses(X_WA, X_WB, check)
@@ -150,20 +143,18 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
             raise AssertionError("a pose that is none")
 
 
-def _pair_by_pair(out: np.ndarray, A, B, X_WA, X_WB, **wanted) -> None:
+def _pair_by_pair(out: np.ndarray, A: Picked, B: Picked, X_WA, X_WB, **wanted) -> None:
     """The same for shapes of which some are meshes, checked poses (n, 4, 4): each distinct pair with a mesh is one batch."""
-    n = len(out)
-    (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    meshed_a, meshed_b = (np.array([shape.meshed for shape in shapes], dtype=bool) for shapes in (shapes_a, shapes_b))
-    keys = np.where(meshed_a[which_a] | meshed_b[which_b], which_a * len(shapes_b) + which_b, -1)
+    shapes = A.shape_set
+    keys = np.where(shapes.meshed[A.rows] | shapes.meshed[B.rows], A.rows * len(shapes) + B.rows, -1)
     for key in np.unique(keys).tolist():
         some = np.flatnonzero(keys == key)
         rows = np.zeros_like(out, shape=len(some))
         if key < 0:
-            sides = [shapes_a[k] for k in which_a[some]], [shapes_b[k] for k in which_b[some]]
-            _answer_into(rows, *sides, X_WA[some], X_WB[some], check=False, **wanted)
+            _answer_into(rows, A[some], B[some], X_WA[some], X_WB[some], check=False, **wanted)
         else:
-            _meshed(rows, shapes_a[key // len(shapes_b)], shapes_b[key % len(shapes_b)], X_WA[some], X_WB[some], **wanted)
+            one, other = shapes.shapes[key // len(shapes)], shapes.shapes[key % len(shapes)]
+            _meshed(rows, one, other, X_WA[some], X_WB[some], **wanted)
         out[some] = rows
 
 
@@ -174,66 +165,25 @@ def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, 
     rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
 
 
-def _numbered(side, n: int) -> tuple[list[Shape], np.ndarray]:
-    """(distinct shapes, (n,) which of them stands at each pose)."""
-    if isinstance(side, Shape):
-        return [side], np.zeros(n, dtype=np.int64)
-    if isinstance(side, Picked):
-        used, which = np.unique(side.rows, return_inverse=True)
-        return [side.shape_set.shapes[k] for k in used.tolist()], which.ravel()
-    numbers: dict[int, int] = {}
-    shapes: list[Shape] = []
-    which = np.empty(n, dtype=np.int64)
-    for k, shape in enumerate(side):
-        if id(shape) not in numbers:  # held by the caller as long as this dictionary lives
-            numbers[id(shape)] = len(shapes)
-            shapes.append(shape)
-        which[k] = numbers[id(shape)]
-    return shapes, which
-
-
 def _any_meshed(side) -> bool:
-    if isinstance(side, Picked):
-        return side.shape_set.meshed and any(side.shape_set.shapes[k].meshed for k in np.unique(side.rows).tolist())
-    return side.meshed if isinstance(side, Shape) else any(shape.meshed for shape in side)
+    return bool(side.shape_set.meshed[side.rows].any()) if isinstance(side, Picked) else side.meshed
 
 
 def _all_plain(side) -> bool:
-    if isinstance(side, Picked):
-        return bool(side.shape_set.plain[side.rows].all())
-    return is_plain(side) if isinstance(side, Shape) else all(is_plain(shape) for shape in side)
+    return bool(side.shape_set.plain[side.rows].all()) if isinstance(side, Picked) else is_plain(side)
 
 
-def _table(A, B, n: int) -> tuple[ShapeTable, np.ndarray | None]:
+def _table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
-        return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
-    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+    if isinstance(A, Picked):
         return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)
-    rows: dict[int, int] = {}
-    packed: list[PackedConvex] = []
-
-    def row_of(shape: Shape) -> int:
-        one = shape.parts()[0][0]
-        if id(one) not in rows:  # held by packed as long as this dictionary lives
-            rows[id(one)] = len(packed)
-            packed.append(one)
-        return rows[id(one)]
-
-    which = np.empty((n, 2), dtype=np.int64)
-    for column, side in enumerate((A, B)):
-        which[:, column] = row_of(side) if isinstance(side, Shape) else [row_of(shape) for shape in side]
-    return ShapeTable(packed), which
+    prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+    return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
 
 
-def _union_table(A, B, n: int) -> tuple[UnionTable, np.ndarray | None]:
+def _union_table(A, B) -> tuple[UnionTable, np.ndarray | None]:
     """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
-        return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None
-    if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
+    if isinstance(A, Picked):
         return A.shape_set.unions, np.stack([A.rows, B.rows], axis=1)
-    (shapes_a, which_a), (shapes_b, which_b) = _numbered(A, n), _numbered(B, n)
-    table = UnionTable([shape.laid_out() for shape in (*shapes_a, *shapes_b)])
-    return table, np.stack([which_a, len(shapes_a) + which_b], axis=1)
+    prepared = getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None

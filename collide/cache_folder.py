@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+#: Whether files have owners and modes that say who may write them. On Windows they say nothing: there a user's folders
+#: are the user's by their access lists.
+TRUST = hasattr(os, "geteuid")
+#: As many links as the system itself follows.
+_MOST_LINKS = 40
 
 
 def cache_folder(*parts: str) -> Path:
@@ -24,3 +32,72 @@ def cache_folder(*parts: str) -> Path:
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
     return base.joinpath("collide", *parts)
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder and those above it that are missing, for nobody but this user."""
+    if not folder.is_dir():
+        make_private(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def why_distrusted(folder: Path) -> str | None:
+    """Who else may decide what a folder holds: "… may be written by others", or None where nobody may.
+
+    Looked at is every folder and link on the way: each must belong to this user, or to the owner of the machine, and be
+    writable to nobody else. Of a folder with the sticky bit, like /tmp, everyone may fill it and only owners move what is
+    in it, so it may stand on the way, but not be the folder itself. What does not exist yet is passed over.
+    """
+    if not TRUST:
+        return None
+    owners = {0, os.geteuid(), os.stat("/").st_uid}  # who has the root folder has all there is
+    for place, found, is_last in _way_to(folder):
+        if found.st_uid not in owners:
+            return f"{place} belongs to another user (id {found.st_uid})"
+        shared = _others_may_write(found) and (is_last or not found.st_mode & stat.S_ISVTX)
+        if shared and not stat.S_ISLNK(found.st_mode):  # of a link the mode says nothing
+            return f"{place} may be written by others (mode {stat.S_IMODE(found.st_mode):o})"
+    return None
+
+
+def _others_may_write(found: os.stat_result) -> bool:
+    return bool(found.st_mode & stat.S_IWOTH) or (bool(found.st_mode & stat.S_IWGRP) and not _is_own_group(found.st_gid))
+
+
+def _is_own_group(group: int) -> bool:
+    """Whether a group is this user alone, as many systems make one for each user."""
+    import grp
+    import pwd
+
+    try:
+        name, found = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
+    except KeyError:
+        return False
+    return found.gr_name == name and set(found.gr_mem) <= {name}
+
+
+def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
+    """(folder or link, what it is, whether it is the end) from the root to a folder, as far as they exist."""
+    waiting = list(reversed((Path.cwd() / folder).parts))
+    at, links = Path(waiting.pop()), 0
+    yield at, os.lstat(at), not waiting
+    while waiting:
+        part = waiting.pop()
+        if part == "..":
+            at = at.parent
+            continue
+        try:
+            found = os.lstat(at / part)
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        if stat.S_ISLNK(found.st_mode):
+            yield at / part, found, False
+            links += 1
+            if links > _MOST_LINKS:
+                raise OSError(f"{folder}: too many links")
+            target = Path(os.readlink(at / part))
+            waiting += reversed(target.parts[1:] if target.is_absolute() else target.parts)
+            at = Path(target.anchor) if target.is_absolute() else at
+        else:
+            at = at / part
+            yield at, found, not waiting

@@ -8,7 +8,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.errors import UnsupportedQuery
 from collide.geometry.boxes import boxes_of
 from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import ShapeTable, pose_table
+from collide.geometry.tables import POSE_TERMS, ShapeTable, pose_table
 from collide.narrowphase.run import run_pairs
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.unions import combine
@@ -17,11 +17,12 @@ from collide.unions import combine
 class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
-    static, group, mask : (n,) int64.   allowed : {(i, j): reason}, i < j.
+    ids : (n,) int32 of the bodies.   static, group, mask : (n,) int64.   allowed : {(i, j): reason}, i < j.
     """
 
     def __init__(self, bodies, allowed: dict):
         self.allowed = allowed
+        self.ids = np.array([body.id for body in bodies], dtype=np.int32)
         self.static = np.array([body.static for body in bodies], dtype=np.int64)
         self.group = np.array([body.group for body in bodies], dtype=np.int64)
         self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
@@ -29,31 +30,49 @@ class PackedWorld:
         self._shapes = [body.shape for body in bodies]
         self._ready: dict = {}  # pairs with a mesh, made ready for booleans
         self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
+        self._any_meshed = bool(self._meshed.any())
         parts = [shape.bounding_parts() for shape in self._shapes]
         self._parts = [[packed for packed, _ in own] for own in parts]
-        counts = np.array([len(own) for own in parts], dtype=np.int64)
+        self._counts = counts = np.array([len(own) for own in parts], dtype=np.int64)
+        self._all_of_one_part = bool((counts == 1).all())
         self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self._body_of = np.repeat(np.arange(len(bodies)), counts)
         self._X_BP = np.array([X for own in parts for _, X in own]).reshape(-1, 4, 4)
         flat = [packed for own in self._parts for packed in own]
         self._reach = np.array([packed.reach for packed in flat])
         self._shape_of, self._table = _distinct(flat)
-        self._tree: BoxTree | None = None
-        self.move(np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4))
-
-    def move(self, X_WBs: np.ndarray) -> None:
-        """Take new poses (n, 4, 4) of all bodies, and refit the tree."""
-        self._X_WBs = X_WBs
-        self._poses = pose_table(X_WBs[self._body_of], self._X_BP, self._reach)
+        self._X_WBs = np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4)
+        self._poses = pose_table(self._X_WBs[self._body_of], self._X_BP, self._reach)
         self._part_boxes = boxes_of(self._table, self._poses.rows, self._shape_of)
-        if len(X_WBs):
-            starts = self._first[:-1]
-            low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
-            boxes = np.hstack([low, np.maximum.reduceat(self._part_boxes[:, 3:], starts)])
-            if self._tree is None:
-                self._tree = BoxTree(boxes)
-            else:
-                self._tree.refit(boxes)
+        self._tree = BoxTree(self._body_boxes()) if len(bodies) else None
+
+    def _body_boxes(self) -> np.ndarray:
+        """(n, 6) boxes around the parts of each body."""
+        if self._all_of_one_part:
+            return self._part_boxes
+        starts = self._first[:-1]
+        low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
+        return np.hstack([low, np.maximum.reduceat(self._part_boxes[:, 3:], starts)])
+
+    def move(self, bodies: np.ndarray, X_WBs: np.ndarray) -> None:
+        """Take new poses (k, 4, 4) of bodies (k,), by their positions, and refit the tree. What stays is not looked at."""
+        self._X_WBs[bodies] = X_WBs
+        parts = bodies
+        if not self._all_of_one_part:
+            parts = np.concatenate([np.arange(self._first[b], self._first[b + 1]) for b in bodies.tolist()])
+        moved = pose_table(self._X_WBs[self._body_of[parts]], self._X_BP[parts], self._reach[parts])
+        before = self._poses.rows[parts, POSE_TERMS]
+        own = before >= 0.0
+        if np.array_equal(own, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
+            if own.any():
+                self._poses.terms[before[own].astype(np.int64)] = moved.terms
+                moved.rows[own, POSE_TERMS] = before[own]
+            self._poses.rows[parts] = moved.rows
+        else:
+            self._poses = pose_table(self._X_WBs[self._body_of], self._X_BP, self._reach)
+        self._part_boxes[parts] = boxes_of(self._table, moved.rows, self._shape_of[parts])
+        assert self._tree is not None
+        self._tree.refit(self._body_boxes())
 
     def candidates(self, margin: float) -> np.ndarray:
         """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin."""
@@ -67,8 +86,11 @@ class PackedWorld:
         return pairs[self._keys[at] != keys]
 
     def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
-        """(rows, convex pairs answered, body pairs answered, of them with a mesh); fields a and b are positions."""
-        if not self._meshed.any():
+        """(rows, convex pairs answered, body pairs answered, of them with a mesh); fields a and b are positions.
+
+        boolean : rows tell no more than ``hit``, ``how`` and ``iterations``, in no order.
+        """
+        if not self._any_meshed:
             return *self._convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit), 0
         meshed = self._meshed[candidates].any(axis=1)
         rows, convex_pairs, answered = self._convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
@@ -78,7 +100,7 @@ class PackedWorld:
             if stop_at_hit and found[-1]["hit"]:
                 break
         rows = np.concatenate([rows, *found])
-        return rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found), len(found)
+        return rows if boolean else rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found), len(found)
 
     def refused(self, candidates: np.ndarray, limit: float) -> list[tuple[int, int, str]]:
         """(position, position, reason) of candidates for which `answer` raises UnsupportedQuery: pairs with a mesh."""
@@ -112,26 +134,27 @@ class PackedWorld:
             self._table, self._poses, self._shape_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
         )
         pairs, owner = pairs[: len(rows)], owner[: len(rows)]
+        if boolean:
+            return rows, len(rows), int(np.count_nonzero(owner[1:] != owner[:-1])) + min(len(owner), 1)
         rows["a"], rows["b"] = candidates[owner, 0], candidates[owner, 1]
         rows["part_a"] = pairs[:, 0] - self._first[rows["a"]]
         rows["part_b"] = pairs[:, 1] - self._first[rows["b"]]
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
-        answered = len(starts)
-        if boolean:
-            return rows, len(rows), answered
         spans = np.hstack([self._spans(rows["a"][starts]), self._spans(rows["b"][starts])])
-        return combine(rows, starts, spans, self._table, self._poses, self._shape_of), len(rows), answered
+        return combine(rows, starts, spans, self._table, self._poses, self._shape_of), len(rows), len(starts)
 
     def _spans(self, bodies: np.ndarray) -> np.ndarray:
         """(k, 2): first part and number of parts of bodies."""
-        return np.stack([self._first[bodies], np.diff(self._first)[bodies]], axis=1)
+        return np.stack([self._first[bodies], self._counts[bodies]], axis=1)
 
     def _part_pairs(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of parts whose boxes come within margin, and the candidate each belongs to.
 
         A candidate keeps at least its first pair of parts, so that every pair asked has a row.
         """
-        counts = np.diff(self._first)
+        if self._all_of_one_part:
+            return candidates, np.arange(len(candidates))
+        counts = self._counts
         many = counts[candidates[:, 0]] * counts[candidates[:, 1]]
         owner = np.repeat(np.arange(len(candidates)), many)
         within = np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)

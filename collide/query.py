@@ -17,6 +17,7 @@ from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
 from collide.unions import UnionPair
+from collide.workers import check_threads
 
 
 def collide(
@@ -58,7 +59,7 @@ def collide(
         return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
-    if threads != 1:
+    if threads.__class__ is not int or threads != 1:
         return _batched(A, B, X_WA, X_WB, check_poses, threads)
     try:
         hit = A._prepared[B._serial].collide(X_WA, X_WB)
@@ -79,7 +80,7 @@ def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
 def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algorithm):
     if not _is_named(algorithm, "barba-langerman"):
         raise InvalidArgument(f'algorithm must be "gjk" or "barba-langerman", got {algorithm!r}')
-    if axes is not None or threads != 1:
+    if axes is not None or check_threads(threads) != 1:
         raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
     found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
     return bool(found.hit[0]) if _is_single(X_WA) and _is_single(X_WB) else found.hit
@@ -174,7 +175,7 @@ def distance(
     limit = check_distance("max_distance", max_distance)
     if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
-    if limit == math.inf and threads == 1:
+    if limit == math.inf and threads.__class__ is int and threads == 1:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
@@ -204,7 +205,7 @@ def distance(
 def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
     if not _is_named(algorithm, "dobkin-kirkpatrick"):
         raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
-    if limit != math.inf or threads != 1:
+    if limit != math.inf or check_threads(threads) != 1:
         raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')
     from collide import walks
 

@@ -53,11 +53,11 @@ PAIR_DTYPE = np.dtype(
         ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3),
         ("a", "i4"), ("b", "i4"), ("part_a", "i4"), ("part_b", "i4"),
         ("vertices_a", "i4", 4), ("vertices_b", "i4", 4),
-        ("iterations", "i4"),
-        ("count", "u1"), ("how", "u1"), ("exact", "u1"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
+        ("iterations", "i4"), ("count", "<i4"), ("how", "<i4"),  # kernels write the lowest byte of these two
+        ("exact", "u1"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
     ],
     align=True,
-)
+)  # so wide that no byte is padding: numpy leaves padding as it finds it, and equal answers are to be equal bytes
 
 #: Names of the fields of a row.
 FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()

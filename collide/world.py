@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import operator
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -39,6 +41,12 @@ class Body:
     group: int
     mask: int
 
+    def __post_init__(self) -> None:
+        self.X_WB.flags.writeable = False  # of a copy as well
+
+    def __reduce__(self):
+        return Body, (self.id, self.name, self.shape, self.X_WB, self.static, self.group, self.mask)
+
 
 class World:
     """Bodies that may touch, and the questions one asks of them.
@@ -61,8 +69,16 @@ class World:
         self._allowed: dict[tuple[int, int], str] = {}
         self._next = 0
         self._packed: PackedWorld | None = None
-        self._moved = False
+        self._moved: set[int] = set()
         self._stats: dict = {}
+        self._asked: _Asked | None = None
+
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle takes along: bodies, names and what is allowed. The rest is made again."""
+        return {
+            "_bodies": dict(self._bodies), "_ids": dict(self._ids), "_allowed": dict(self._allowed), "_next": self._next,
+            "_packed": None, "_moved": set(), "_stats": copy.deepcopy(self.stats), "_asked": None,
+        }  # fmt: skip
 
     # --- bodies ---------------------------------------------------------------------------------
 
@@ -85,7 +101,7 @@ class World:
             raise InvalidArgument(f"World.add: name must be a non-empty string, got {name!r}")
         if name in self._ids:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
-        body = Body(identity, name, shape, X_WB, bool(static), _bits("group", group), _bits("mask", mask))
+        body = Body(identity, name, shape, X_WB, _flag("static", static), _bits("group", group), _bits("mask", mask))
         self._bodies[identity], self._ids[name] = body, identity
         self._next += 1
         self._packed = None
@@ -114,7 +130,7 @@ class World:
     def _move(self, identity: int, X_WB: np.ndarray) -> None:
         body = self._bodies[identity]
         self._bodies[identity] = Body(identity, body.name, body.shape, X_WB, body.static, body.group, body.mask)
-        self._moved = True
+        self._moved.add(identity)
 
     def allow(self, a, b=None, *, reason: str = "allowed") -> None:
         """Never test a pair: ``allow("link3", "link4")``; or many, by a symmetric boolean matrix over
@@ -150,9 +166,11 @@ class World:
             known = ", ".join(sorted(self._ids)[:12]) or "none"
             raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
         try:
-            identity = int(body)
-        except (TypeError, ValueError):
-            raise UnknownBody(f"a body is named by its id or its name, got {body!r}") from None
+            if isinstance(body, (bool, np.bool_)):
+                raise TypeError
+            identity = operator.index(body)
+        except TypeError:
+            raise UnknownBody(f"a body is named by its id, an integer, or its name, got {body!r}") from None
         if identity not in self._bodies:
             raise UnknownBody(f"no body has id {identity}; it may have been removed")
         return identity
@@ -178,12 +196,11 @@ class World:
 
     def collides(self) -> bool:
         """Whether any tested pair hits; stops at the first that does."""
-        rows, _ = self._ask(0.0, boolean=True, stop_at_hit=True)
-        return bool(rows["hit"].any())
+        return bool(self._ask(0.0, boolean=True)["hit"].any())
 
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
-        rows, _ = self._ask(0.0)
+        rows = self._ask(0.0)
         return WorldResult(rows[rows["hit"]], dict(self._bodies))
 
     def distances(self, max_distance: float = math.inf) -> WorldResult:
@@ -193,7 +210,7 @@ class World:
         Two half-spaces that meet have distance −inf.
         """
         limit = check_distance("World.distances: max_distance", max_distance)
-        rows, _ = self._ask(limit)
+        rows = self._ask(limit)
         return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8) -> WorldContacts:
@@ -239,8 +256,7 @@ class World:
         X_WS = _one_pose(X_WS, "World.query: X_WS")
         rows = self._pack().against(shape, X_WS, limit)
         rows = rows[_within(rows, limit)]
-        ids = np.array([*self._bodies, -1], dtype=np.int32)
-        rows["b"] = ids[rows["b"]]
+        rows["b"] = self._pack().ids[rows["b"]]
         rows["a"] = -1
         return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)})
 
@@ -257,26 +273,30 @@ class World:
         answered), convex_pairs (of their parts), mesh_pairs (of bodies, one a mesh or with one), hits, undecided, how {argument: pairs},
         gjk_iterations, epa_iterations, seconds {compile, pack, broadphase, narrowphase}.
         """
+        if self._asked is not None:
+            self._stats, self._asked = self._asked.stats(), None
         return self._stats
 
-    def _ask(self, limit: float, *, boolean: bool = False, stop_at_hit: bool = False):
+    def _ask(self, limit: float, *, boolean: bool = False) -> np.ndarray:
+        """Rows of all tested pairs within the limit; of a boolean, rows up to the first hit, without names of bodies."""
         compiling = sum(_jit.seconds.values())
         started = time.perf_counter()
         packed = self._pack()
         ready = time.perf_counter()
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
-        rows, *answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        rows, *answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=boolean)
         ended = time.perf_counter()
         compiled = sum(_jit.seconds.values()) - compiling
         seconds = {
             "compile": compiled, "pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled,
         }  # fmt: skip
         self._take_compilation_out(seconds, compiled)
-        self._stats = self._summary(packed, candidates, rows, answered, seconds)
-        ids = np.array(list(self._bodies), dtype=np.int32)
-        rows["a"], rows["b"] = ids[rows["a"]], ids[rows["b"]]
-        return rows, packed
+        columns = rows["hit"].copy(), rows["how"].copy(), rows["iterations"].copy()
+        self._asked = _Asked(packed, len(candidates), *columns, answered, seconds)
+        if not boolean:
+            rows["a"], rows["b"] = packed.ids[rows["a"]], packed.ids[rows["b"]]
+        return rows
 
     @staticmethod
     def _take_compilation_out(seconds: dict, compiled: float) -> None:
@@ -286,30 +306,45 @@ class World:
             seconds[stage] -= own
             compiled -= own
 
-    def _summary(self, packed, candidates, rows, answered: list[int], seconds: dict) -> dict:
-        n = len(self._bodies)
-        skipped = count_skipped(packed.static, packed.group, packed.mask, packed.allowed)
-        pairs = n * (n - 1) // 2
-        skipped[CULLED] = pairs - sum(skipped.values()) - len(candidates)
-        iterations = rows["iterations"]
-        return {
-            "bodies": n, "static": int(packed.static.sum()), "pairs": pairs, "skipped": skipped,
-            "narrowphase": answered[1], "convex_pairs": answered[0], "mesh_pairs": answered[2], "hits": int(rows["hit"].sum()),
-            "undecided": int((rows["how"] == UNDECIDED).sum()),
-            "how": dict(Counter(HOW[how] for how in rows["how"])),
-            "gjk_iterations": int((iterations & 0xFFFF).sum()), "epa_iterations": int((iterations >> 16).sum()),
-            "seconds": seconds,
-        }  # fmt: skip
-
     def _pack(self) -> PackedWorld:
         if self._packed is None:
             position = {identity: k for k, identity in enumerate(self._bodies)}
             allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
             self._packed = PackedWorld(list(self._bodies.values()), allowed)
         elif self._moved:
-            self._packed.move(np.array([body.X_WB for body in self._bodies.values()]).reshape(-1, 4, 4))
-        self._moved = False
+            moved = sorted(self._moved)
+            at = np.searchsorted(self._packed.ids, moved)  # ids ascend
+            self._packed.move(at, np.array([self._bodies[identity].X_WB for identity in moved]))
+        self._moved.clear()
         return self._packed
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What `World.stats` of a question are made of, when they are asked for."""
+
+    packed: PackedWorld
+    candidates: int
+    hit: np.ndarray
+    how: np.ndarray
+    iterations: np.ndarray
+    answered: list[int]
+    seconds: dict
+
+    def stats(self) -> dict:
+        """As `World.stats` says."""
+        packed, n = self.packed, len(self.packed.ids)
+        skipped = count_skipped(packed.static, packed.group, packed.mask, packed.allowed)
+        pairs = n * (n - 1) // 2
+        skipped[CULLED] = pairs - sum(skipped.values()) - self.candidates
+        return {
+            "bodies": n, "static": int(packed.static.sum()), "pairs": pairs, "skipped": skipped,
+            "narrowphase": self.answered[1], "convex_pairs": self.answered[0], "mesh_pairs": self.answered[2],
+            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
+            "how": dict(Counter(HOW[how] for how in self.how)),
+            "gjk_iterations": int((self.iterations & 0xFFFF).sum()), "epa_iterations": int((self.iterations >> 16).sum()),
+            "seconds": self.seconds,
+        }  # fmt: skip
 
 
 def _within(rows: np.ndarray, limit: float) -> np.ndarray:
@@ -328,6 +363,12 @@ def _read_only(X: np.ndarray) -> np.ndarray:
     X = X.copy()
     X.flags.writeable = False
     return X
+
+
+def _flag(field: str, value) -> bool:
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        return bool(value)
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {value!r}")
 
 
 def _bits(field: str, value) -> int:

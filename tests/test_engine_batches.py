@@ -13,6 +13,7 @@ import pytest
 
 import collide
 from collide import batches
+from collide import workers as workers_module
 from collide.errors import InvalidArgument, InvalidPose
 
 EYE = np.eye(4)
@@ -20,7 +21,11 @@ EYE = np.eye(4)
 
 @pytest.fixture(autouse=True)
 def threads_for_few_poses(monkeypatch):
-    monkeypatch.setattr(batches, "_FEWEST_A_THREAD", 1)
+    monkeypatch.setattr(batches, "_FEWEST_PLAIN", 1)
+    monkeypatch.setattr(workers_module, "_ALONE", 0.0)
+    monkeypatch.setattr(workers_module, "_SHORTEST", 1e-5)
+    monkeypatch.setattr(workers_module, "_LONGEST", 1e-4)
+    monkeypatch.setattr(workers_module, "_GAIN", 0.0)
 
 
 def _shapes(rng):
@@ -351,7 +356,7 @@ def test_a_fork_while_a_tree_grows_does_not_hang():
 @pytest.mark.parametrize("workers", (2, 3, 8))
 def test_pieces_of_a_batch_are_all_of_it_and_none_too_small(workers):
     for n in (2 * workers, 2 * workers + 1, 97, 4096):
-        pieces = batches._pieces(n, workers, 2)
+        pieces = workers_module.pieces_of(n, workers, 2)
         assert [k for piece in pieces for k in range(n)[piece]] == list(range(n))
         lengths = [piece.stop - piece.start for piece in pieces]
         assert len(lengths) >= workers and min(lengths) >= 2

@@ -61,7 +61,7 @@ def site(tmp_path) -> Path:
 
 
 def files_in(folder: str) -> dict[str, int]:
-    return {file.name: file.stat().st_mtime_ns for file in Path(folder).iterdir() if file.suffix == ".nbc"}
+    return {file.name: file.stat().st_mtime_ns for file in Path(folder).iterdir() if file.suffix == ".kernel"}
 
 
 def test_an_edit_in_a_callee_is_seen_and_the_old_kernels_stay_apart(site, tmp_path):
@@ -115,10 +115,8 @@ def test_importing_the_package_does_not_import_numba(site):
 def test_a_damaged_kernel_is_compiled_anew(site, tmp_path, damage):
     cache = tmp_path / "kernels"
     first, _ = ask(site, cache)
-    for file in cache.rglob("*bounding_boxes*.nb[ic]"):
-        data = file.read_bytes()
-        if damage == "empty" or file.suffix == ".nbc":
-            file.write_bytes(b"" if damage == "empty" else data[:500])
+    (file,) = cache.rglob("*bounding_boxes*.kernel")
+    file.write_bytes(b"" if damage == "empty" else file.read_bytes()[:500])
     again, said = ask(site, cache)
     assert again["box"] == first["box"] and "damaged" in said
     last, said = ask(site, cache)
@@ -257,7 +255,7 @@ def interrupted(self, module, library):
 CPUContext.post_lowering = interrupted
 assert outer(1.0) == 2.0
 assert meanwhile == [3.0, 5.0] == [inner(1.0), somebody_elses(np.array([1.0, 5.0]), -1)], meanwhile
-print(_jit._Locator(outer._function)._py_file)
+print("both")
 """
 
 
@@ -288,4 +286,4 @@ def test_what_else_is_compiled_meanwhile_is_compiled_as_well(tmp_path):
         [sys.executable, script], env={**os.environ, "COLLIDE_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": root},
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
-    assert child.stdout == f"{script}\n", child.stderr[-3000:]
+    assert child.stdout == "both\n", child.stderr[-3000:]

@@ -26,7 +26,8 @@ FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "coll
 ROOMS = {
     "errors": set(),
     "cache_folder": set(),
-    "_jit": {"cache_folder", "_lean_compile"},
+    "_jit": {"cache_folder", "_kernel_cache", "_lean_compile"},
+    "_kernel_cache": {"cache_folder"},
     "_lanes": set(),
     "_lean_compile": set(),
     "_simd": set(),
@@ -39,9 +40,10 @@ ROOMS = {
     "certificates": {"errors", "transforms", "geometry", "results"},
     "mesh_certificates": {"certificates", "geometry"},
     "unions": {"_jit", "geometry", "narrowphase", "results"},
-    "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions"},
+    "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions", "workers"},
+    "workers": {"errors"},
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
-    "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "unions"},
+    "query": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "unions", "workers"},
     "meshes": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches"},
     "manifolds": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "meshes"},
     "packed_world": {"_jit", "errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
@@ -75,6 +77,7 @@ COMPILERS = {
 #: The files that make code, and what they need for it: everything else goes through them.
 COMPILER_PACKAGES = {
     "collide/_jit.py": {"numba"},
+    "collide/_kernel_cache.py": {"numba", "llvmlite"},
     "collide/_lean_compile.py": {"numba", "llvmlite"},
     "collide/_simd.py": {"numba", "llvmlite"},
     "collide/_lanes.py": {"numba", "llvmlite"},

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from collide.cache_folder import TRUST
 from collide.reports import doctor
 from collide.reports.tables import lay_out, table_lines
 
@@ -34,4 +37,16 @@ def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
     blocked.write_text("a file where a folder should be")
     monkeypatch.setenv("COLLIDE_CACHE_DIR", str(blocked))
     caches = doctor.examine().caches
-    assert all(check.passed is None and "COLLIDE_CACHE_DIR" in check.found for check in caches)
+    assert [check.passed is None and "COLLIDE_CACHE_DIR" in check.found for check in caches[:2]] == [True, True]
+
+
+@pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
+def test_a_cache_that_others_may_write_is_worth_knowing(monkeypatch, tmp_path):
+    monkeypatch.setenv("COLLIDE_CACHE_DIR", str(tmp_path))
+    tmp_path.chmod(0o777)
+    told, *_ = doctor.examine().caches
+    assert told.what == "kernels" and told.passed is None
+    assert "code" in told.found and f"{tmp_path} may be written by others" in told.found
+    tmp_path.chmod(0o700)
+    kernels, _, warning = doctor.examine().caches
+    assert kernels.passed and warning.what == "kernels are code"

@@ -220,21 +220,23 @@ def single_calls_are_safe() -> bool:
     return not PLAIN_PYTHON and layouts_are_known()  # plain Python lets go of its lock in mid-kernel
 
 
+@cache
+def _space_of_single_calls() -> _Workspace:
+    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either is
+    good as long as it is held."""
+    return _Workspace()
+
+
 class SinglePair:
     """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call.
 
     collide : a built-in function of two poses; None where it leaves the answer to the long way.
     """
 
-    #: One for all single calls: their kernels keep Python's lock.
-    _space: _Workspace | None = None
-
     def __init__(self, table: ShapeTable):
-        if SinglePair._space is None:
-            SinglePair._space = _Workspace()
         table.plant(np.arange(2))
-        self.table = table  # held, since kernels read its buffers
-        header = np.array([*object_words(), *SinglePair._space.header_of(table).tolist()])
+        self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
+        header = np.array([*object_words(), *self._space.header_of(table).tolist()])
         self.collide, self._distance = built_in(collide_single, header), built_in(distance_single, header)
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:

@@ -114,10 +114,18 @@ def _optional() -> list[Check]:
 
 
 def _caches() -> list[Check]:
-    from collide.cache_folder import cache_folder
+    from collide.cache_folder import cache_folder, why_distrusted
 
-    where = {"kernels": cache_folder("kernels"), "prepared inputs": cache_folder("scenes")}
-    return [_cache(what, folder) for what, folder in where.items()]
+    kernels = cache_folder("kernels")
+    try:
+        why = why_distrusted(kernels)
+    except OSError:  # told below
+        why = None
+    if why is not None:
+        told = f"{kernels} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR"
+        return [Check("kernels", told, None), _cache("prepared inputs", cache_folder("scenes"))]
+    checks = [_cache("kernels", kernels), _cache("prepared inputs", cache_folder("scenes"))]
+    return [*checks, Check("kernels are code", "who can write in their folder decides what runs: only its user may")]
 
 
 def _cache(what: str, folder: Path) -> Check:

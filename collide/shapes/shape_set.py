@@ -59,9 +59,9 @@ class ShapeSet:
         return np.array([is_plain(shape) for shape in self.shapes])
 
     @cached_property
-    def meshed(self) -> bool:
-        """Whether one of them is a mesh or has one in it."""
-        return any(shape.meshed for shape in self.shapes)
+    def meshed(self) -> np.ndarray:
+        """(shapes,) bool: which are a mesh or have one in them."""
+        return np.array([shape.meshed for shape in self.shapes])
 
     @cached_property
     def table(self) -> ShapeTable:
@@ -88,6 +88,6 @@ class Picked(Sequence):
         return len(self.rows)
 
     def __getitem__(self, k):
-        if isinstance(k, slice):
+        if isinstance(k, (slice, np.ndarray)):
             return Picked(self.shape_set, self.rows[k])
         return self.shape_set.shapes[self.rows[k]]

@@ -310,20 +310,14 @@ class Workspace:
         )
         self._doubles = np.empty(doubles)
         self._integers = np.empty(INTEGERS, dtype=np.int64)
-        self._heap: np.ndarray | None = None
+        self._heap = np.empty(2 * HEAP, dtype=np.int64)  # memory that nobody touches costs nothing
         self.n_stack = n_stack
         #: Stack, its length, doubles, integers, and where the exact stage stands.
         self.addresses = (
             address_of(self._stack), n_stack, address_of(self._doubles), address_of(self._integers),
             decide_exactly.address,
         )  # fmt: skip
-
-    @property
-    def heap_address(self) -> int:
-        if self._heap is None:
-            self._heap = np.empty(2 * HEAP, dtype=np.int64)
-            self._heap_address = address_of(self._heap)
-        return self._heap_address
+        self.heap_address = address_of(self._heap)
 
 
 _kept = threading.local()
