@@ -196,7 +196,7 @@ def _pairs_of_unions():
 
 
 def test_unions_have_the_same_bits_single_batched_swapped_in_threads_lists_and_sets(monkeypatch):
-    monkeypatch.setattr(batches, "_FEWEST_A_THREAD", 8)
+    monkeypatch.setattr(batches, "_FEWEST", 8)
     hits = []
     for A, B, X_WA, X_WB in _pairs_of_unions():
         n = len(X_WA)
