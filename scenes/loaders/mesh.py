@@ -16,7 +16,7 @@ import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import cache
-from collide.scenes.loaders.documents import read_bytes
+from collide.scenes.loaders.files import read_bytes
 from collide.scenes.loaders.triangles import SUFFIXES, read_triangles
 from collide.shapes.base import Shape
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import InvalidPose, InvalidShape
-from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose, scaled
+from collide.errors import InvalidPose, InvalidShape, brief
+from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
 from collide.shapes import (
     Box,
     Capsule,
@@ -57,7 +57,7 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
     if unknown or len(kinds.data) != 1:
-        found = f"unknown shape {unknown[0]!r}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
+        found = f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
         kinds.fail(f"{found}; known shapes are {', '.join(KINDS)}")
     kind = next(iter(kinds.data))
     try:
@@ -75,7 +75,7 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
 
 def _placed(error: Exception, path: object, place: str) -> str:
     """The message with its place before it, once: shapes nest."""
-    return str(error) if str(error).startswith(f"{path}: ") else f"{path}: {place}: {error}"
+    return str(error) if str(error).startswith(f"{path}: ") else placed(error, path, place)
 
 
 def _plain(kind: str, fields: Fields, metres: float) -> Shape:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from collide.errors import brief, cut
 from collide.scenes.loaders.documents import read_document
-from collide.scenes.loaders.fields import Fields, brief
+from collide.scenes.loaders.fields import Fields
 
 
 def read_state(path) -> dict[str, float]:
@@ -36,8 +37,8 @@ def state_of(data: Any, path: object, element: str = "") -> dict[str, float]:
     values: dict[str, float] = {}
     for k, (joint, value) in enumerate(zip(names, positions)):
         if joint in values:
-            fields.fail(f'joint "{joint}" stands twice', names_key)
-        values[str(joint)] = fields.checked_number(value, f'{positions_key}[{k}] "{joint}"')
+            fields.fail(f'joint "{cut(str(joint))}" stands twice', names_key)
+        values[str(joint)] = fields.checked_number(value, f'{positions_key}[{k}] "{cut(str(joint))}"')
     return values
 
 

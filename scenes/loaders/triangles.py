@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError
-from collide.scenes.loaders.documents import read_bytes
+from collide.scenes.loaders.files import read_bytes
 from collide.shapes.mesh import Mesh
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf", ".off")
