@@ -25,8 +25,10 @@ DEEPEST = 100
 MOST_REPEATED = 1_000_000
 #: Files that a scene may include, each time that one is included counted.
 MOST_INCLUDED = 1_000
-#: Facets and vertices that the nodes of one mesh file may place, each time that a mesh is placed counted.
-MOST_PLACED = 100_000_000
+#: Nodes of one mesh file, each time that one is repeated counted.
+MOST_NODES = 100_000
+#: Facets that the nodes of one mesh file place, each time that a mesh is placed counted.
+MOST_PLACED = 50_000_000
 
 _PIECE = 2**20
 _KINDS = (
