@@ -19,7 +19,7 @@ _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 #: What packs vertices in a way of its own.
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization")
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
 
 
 class Source(NamedTuple):
@@ -139,8 +139,8 @@ class _Check:
         if packed:
             _at(self.path, where, f"its vertices are packed ({packed[0]}), which is not read: export it without compression")
         mode = primitive.get("mode", _TRIANGLES)
-        if mode not in (_TRIANGLES, _STRIP):
-            kind = "a fan of triangles" if mode == _FAN else "points or lines"
+        if mode not in (_POINTS, _TRIANGLES, _STRIP):
+            kind = "a fan of triangles" if mode == _FAN else "lines"
             self.notes[f"{where} is {kind} (mode {brief(mode)}) and was not read"] = None
             return
         vertices = self._accessor(primitive["attributes"].get("POSITION"), f"{where}.attributes.POSITION", "VEC3")

@@ -38,7 +38,7 @@ def read(content: bytes, path: Path) -> Read:
     objects: dict[str, _Object] = {}
     here: _Object | None = None
     name = path.name
-    rows: list[list[bytes]] = []
+    coordinates: list[bytes] = []
     lines: list[int] = []
     few: list[int] = []
     number = 0
@@ -50,7 +50,7 @@ def read(content: bytes, path: Path) -> Read:
         if words[0] == b"v":
             if len(words) < 4:
                 refuse(path, f"a vertex has three coordinates, got {shown(line)}", number)
-            rows.append(words[1:4])
+            coordinates += words[1:4]
             lines.append(number)
         elif words[0] == b"f":
             if len(words) < 4:
@@ -58,13 +58,13 @@ def read(content: bytes, path: Path) -> Read:
                 continue
             if here is None:
                 here = objects.setdefault(name, _Object())
-            here.corners += _ids(words, len(rows), number, line, path)
+            here.corners += _ids(words, len(lines), number, line, path)
             here.counts.append(len(words) - 1)
             here.lines.append(number)
         elif words[0] == b"o":
             # equal names are one object, wherever its faces stand
             name, here = name_of(line, path.name), None
-    vertices = floats(rows, lines, path)
+    vertices = floats(coordinates, lines, path)
     notes = few_corners(few)
     if not objects:
         return Read([Part(path.name, vertices, NO_FACES)], notes)

@@ -18,6 +18,7 @@ from collide.scenes.loaders.polygons import (
     refuse,
     shown,
     whole,
+    wholes,
 )
 
 _KIND = re.compile(rb"(?:ST)?C?N?(4?n?)OFF(\s*BINARY)?", re.IGNORECASE)
@@ -48,27 +49,28 @@ def read(content: bytes, path: Path) -> Read:
 
 
 def _table(vertex_lines: list[tuple[int, bytes]], face_lines: list[tuple[int, bytes]], path: Path) -> Read:
-    rows = [line.split()[:3] for _, line in vertex_lines]
-    for (number, line), row in zip(vertex_lines, rows):
-        if len(row) < 3:
+    coordinates: list[bytes] = []
+    for number, line in vertex_lines:
+        words = line.split()[:3]
+        if len(words) < 3:
             refuse(path, f"a vertex has three coordinates, got {shown(line)}", number)
-    vertices = floats(rows, [number for number, _ in vertex_lines], path)
-    corners: list[int] = []
+        coordinates += words
+    vertices = floats(coordinates, [number for number, _ in vertex_lines], path)
+    ids: list[bytes] = []
     counts: list[int] = []
     numbers: list[int] = []
     few: list[int] = []
     for number, line in face_lines:
         words = line.split()
-        count = whole(words[0], "the count of corners", path, number)
+        count = int(words[0]) if words[0].isdigit() else whole(words[0], "the count of corners", path, number)
         if count < 0 or len(words) < count + 1:
             refuse(path, f"a face of {count} corners has {len(words) - 1} numbers: {shown(line)}", number)
-        ids = [whole(word, "a vertex of a face", path, number) for word in words[1 : count + 1]]
         if count < 3:
             few.append(number)
             continue
-        corners += ids
+        ids += words[1 : count + 1]
         counts.append(count)
         numbers.append(number)
-    flat, sizes = np.array(corners, dtype=np.int64), np.array(counts, dtype=np.int64)
-    check_ids(flat, sizes, len(vertices), 0, numbers, path)
-    return Read([Part(path.name, vertices, fans(flat, sizes) if counts else NO_FACES)], few_corners(few))
+    corners, sizes = wholes(ids, "a vertex of a face", path, numbers, counts), np.array(counts, dtype=np.int64)
+    check_ids(corners, sizes, len(vertices), 0, numbers, path)
+    return Read([Part(path.name, vertices, fans(corners, sizes) if counts else NO_FACES)], few_corners(few))

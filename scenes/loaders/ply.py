@@ -8,7 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.scenes.loaders.polygons import NO_FACES, Part, Read, check_ids, fans, few_corners, refuse, shown, whole
+from collide.scenes.loaders.polygons import (
+    NO_FACES,
+    Part,
+    Read,
+    check_ids,
+    fans,
+    few_corners,
+    numbers,
+    refuse,
+    shown,
+    whole,
+    wholes,
+)
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
@@ -131,62 +143,84 @@ class _Text:
                 f"declares {element.count} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; export it again",
             )
         self._at += element.count
-        columns: _Columns = {}
-        starts = [0] * len(rows)
-        for one in element.properties:
-            columns[one.name] = self._list(one, rows, starts) if one.length else self._column(one, rows, starts)
-        for (line, words), start in zip(rows, starts):
-            if start != len(words):
-                refuse(self._path, f"a row of {element.name} has {start} numbers, got {len(words)}: {shown(b' '.join(words))}", line)
         if element.name == "face":
             self.lines = [line for line, _ in rows]
+        return self._equal_rows(element, rows) or self._row_by_row(element, rows)
+
+    def _equal_rows(self, element: _Element, rows: list) -> _Columns | None:
+        """All rows at once, where their lists are as long as those of the first; None where anything is amiss."""
+        width = len(rows[0][1]) if rows else 0
+        if not rows or any(len(words) != width for _, words in rows):
+            return None
+        table = numbers([word for _, words in rows for word in words])
+        columns: _Columns = {}
+        at = 0
+        for one in element.properties:
+            if table is None or at >= width:
+                return None
+            if one.length and (table[at] % 1 or not 0 <= table[at] < width - at or (table[at::width] != table[at]).any()):
+                return None
+            count, at = (int(table[at]), at + 1) if one.length else (1, at)
+            values = table.reshape(-1, width)[:, at : at + count].ravel()
+            if one.kind[0] != "f" and not ((values == np.floor(values)) & (np.abs(values) < 2**53)).all():
+                return None
+            values = _as(values, one)
+            columns[one.name] = (values, np.full(len(rows), count, dtype=np.int64)) if one.length else values
+            at += count
+        return columns if at == width else None
+
+    def _row_by_row(self, element: _Element, rows: list) -> _Columns:
+        values: list[list[bytes]] = [[] for _ in element.properties]
+        counts: list[list[int]] = [[] for _ in element.properties]
+        lines = [line for line, _ in rows]
+        for line, words in rows:
+            at = 0
+            for k, one in enumerate(element.properties):
+                count, shift = 1, 0
+                if one.length:
+                    count, shift = whole(self._word(line, words, at, one), f"the length of {one.name}", self._path, line), 1
+                found = words[at + shift : at + shift + count] if count >= 0 else []
+                if len(found) != count:
+                    refuse(self._path, f"{one.name} has {count} numbers, got {len(found)}: {shown(b' '.join(words))}", line)
+                values[k] += found
+                counts[k].append(count)
+                at += shift + count
+            if at != len(words):
+                refuse(self._path, f"a row of {element.name} has {at} numbers, got {len(words)}: {shown(b' '.join(words))}", line)
+        columns: _Columns = {}
+        for k, one in enumerate(element.properties):
+            column = self._column(values[k], one, lines, counts[k])
+            columns[one.name] = (column, np.array(counts[k], dtype=np.int64)) if one.length else column
         return columns
 
-    def _column(self, one: _Property, rows: list, starts: list[int]) -> np.ndarray:
-        words = [self._word(row, start, one) for row, start in zip(rows, starts)]
-        starts[:] = [start + 1 for start in starts]
-        return self._numbers(words, rows, one)
+    def _word(self, line: int, words: list[bytes], at: int, one: _Property) -> bytes:
+        if at >= len(words):
+            refuse(self._path, f"{one.name} is missing: {shown(b' '.join(words))}", line)
+        return words[at]
 
-    def _list(self, one: _Property, rows: list, starts: list[int]) -> tuple[np.ndarray, np.ndarray]:
-        values: list[bytes] = []
-        places, counts = [], []
-        for k, (row, start) in enumerate(zip(rows, starts)):
-            count = whole(self._word(row, start, one), f"the length of {one.name}", self._path, row[0])
-            found = row[1][start + 1 : start + 1 + count] if count >= 0 else []
-            if len(found) != count:
-                refuse(self._path, f"{one.name} has {count} numbers, got {len(found)}: {shown(b' '.join(row[1]))}", row[0])
-            values += found
-            places += [row] * count
-            counts.append(count)
-            starts[k] = start + 1 + count
-        return self._numbers(values, places, one), np.array(counts, dtype=np.int64)
-
-    def _word(self, row: tuple[int, list[bytes]], start: int, one: _Property) -> bytes:
-        if start >= len(row[1]):
-            refuse(self._path, f"{one.name} is missing: {shown(b' '.join(row[1]))}", row[0])
-        return row[1][start]
-
-    def _numbers(self, words: list[bytes], rows: list, one: _Property) -> np.ndarray:
-        try:
-            found = np.array([float(word) for word in words], dtype=np.float64)
-            if any(b"_" in word for word in words):
-                raise ValueError
-        except ValueError:
-            bad = next(k for k, word in enumerate(words) if not re.fullmatch(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf\w*)", word, re.IGNORECASE))
-            refuse(self._path, f"{one.name} must be a number, got {shown(words[bad])}", rows[bad][0])
-        if one.kind[0] == "f":
-            with np.errstate(over="ignore"):  # beyond the largest float is infinite, and refused as such
-                return found.astype(one.kind)
-        odd = ~((found == np.floor(found)) & (np.abs(found) < 2**53))
-        if odd.any():
-            refuse(self._path, f"{one.name} must be a whole number, got {shown(words[int(np.argmax(odd))])}", rows[int(np.argmax(odd))][0])
-        return found.astype(np.int64)
+    def _column(self, words: list[bytes], one: _Property, lines: list[int], counts: list[int]) -> np.ndarray:
+        if one.kind[0] != "f":
+            return wholes(words, one.name, self._path, lines, counts)
+        found = numbers(words)
+        if found is None:
+            k = next(k for k, word in enumerate(words) if numbers([word]) is None)
+            line = lines[int(np.searchsorted(np.cumsum(counts), k, side="right"))]
+            refuse(self._path, f"{one.name} must be a number, got {shown(words[k])}", line)
+        return _as(found, one)
 
     def end(self) -> None:
         if self._at < len(self._rows):
             line, words = self._rows[self._at]
             more = len(self._rows) - self._at
             refuse(self._path, f"{more} more lines than its header declares, the first is {shown(b' '.join(words))}", line)
+
+
+def _as(values: np.ndarray, one: _Property) -> np.ndarray:
+    """Numbers of the precision that the header declares."""
+    if one.kind[0] != "f":
+        return values.astype(np.int64)
+    with np.errstate(over="ignore"):  # beyond the largest float is infinite, and refused as such
+        return values.astype(one.kind)
 
 
 # --- binary -----------------------------------------------------------------------------------------

@@ -39,39 +39,53 @@ def shown(line: bytes) -> str:
     return brief(line.decode("utf-8", errors="replace").strip())
 
 
-def floats(rows: Sequence[Sequence[bytes]], lines: Sequence[int], path: Path) -> np.ndarray:
-    """(n, 3) of rows of three words each; SceneError with line and value for what is no finite number."""
+def numbers(words: Sequence[bytes]) -> np.ndarray | None:
+    """Words as float64; None where one of them is no number."""
+    if b"_" in b" ".join(words):  # Python takes 1_0 for ten
+        return None
     try:
-        if any(b"_" in word for row in rows for word in row):  # Python takes 1_0 for ten
-            raise ValueError
-        found = np.array([[float(word) for word in row] for row in rows], dtype=np.float64).reshape(-1, 3)
+        return np.array(list(map(float, words)), dtype=np.float64)
     except ValueError:
-        found = None
+        return None
+
+
+def floats(words: Sequence[bytes], lines: Sequence[int], path: Path) -> np.ndarray:
+    """(n, 3) of three words a line; SceneError with line and value for what is no finite number."""
+    found = numbers(words)
     if found is None or not np.isfinite(found).all():
-        for row, line in zip(rows, lines):
-            for word in row:
-                if not _is_finite(word):
-                    refuse(path, f"a coordinate must be a finite number, got {shown(word)}", line)
-    assert found is not None
-    return found
+        k = next(k for k, word in enumerate(words) if (one := numbers([word])) is None or not np.isfinite(one[0]))
+        refuse(path, f"a coordinate must be a finite number, got {shown(words[k])}", lines[k // 3])
+    return found.reshape(-1, 3)
 
 
-def _is_finite(word: bytes) -> bool:
+def wholes(words: Sequence[bytes], what: str, path: Path, lines: Sequence[int], counts: Sequence[int]) -> np.ndarray:
+    """int64 ids; SceneError with line and value. Files that keep them as 3.0 mean 3.
+
+    counts : how many of the words stand in each of the lines.
+    """
     try:
-        return b"_" not in word and bool(np.isfinite(float(word)))
-    except ValueError:
-        return False
-
-
-def whole(word: bytes, what: str, path: Path, line: int | None) -> int:
-    """A count or an id; files that keep them as 3.0 mean 3."""
-    try:
-        number = float(word) if b"." in word or b"e" in word.lower() else int(word)
-        if b"_" in word or number != int(number):
-            raise ValueError
+        if b"_" not in b" ".join(words):
+            return np.array(list(map(int, words)), dtype=np.int64)
     except (ValueError, OverflowError):
-        refuse(path, f"{what} must be a whole number, got {shown(word)}", line)
-    return int(number)
+        pass
+    found = [_whole(word) for word in words]
+    if None in found:
+        k = found.index(None)
+        line = lines[int(np.searchsorted(np.cumsum(counts), k, side="right"))]
+        refuse(path, f"{what} must be a whole number, got {shown(words[k])}", line)
+    return np.array(found, dtype=np.int64)
+
+
+def whole(word: bytes, what: str, path: Path, line: int) -> int:
+    """One number of `wholes`."""
+    return int(wholes([word], what, path, [line], [1])[0])
+
+
+def _whole(word: bytes) -> int | None:
+    value = numbers([word])
+    if value is None or value[0] != np.floor(value[0]) or not abs(value[0]) < 2**53:
+        return None
+    return int(value[0])
 
 
 def fans(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:

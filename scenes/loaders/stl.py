@@ -46,7 +46,7 @@ def _part(name: str, corners: np.ndarray) -> Part:
 def _ascii(content: bytes, path: Path) -> Read:
     parts: list[Part] = []
     before, began, name = b"endsolid", 0, path.name
-    rows: list[list[bytes]] = []
+    corners: list[bytes] = []
     lines: list[int] = []
     for number, line in enumerate(content.removeprefix(b"\xef\xbb\xbf").splitlines(), 1):
         words = line.split()
@@ -58,16 +58,16 @@ def _ascii(content: bytes, path: Path) -> Read:
         if keyword == b"vertex":
             if len(words) != 4:
                 refuse(path, f"a vertex has three coordinates, got {shown(line)}", number)
-            rows.append(words[1:])
+            corners += words[1:]
             lines.append(number)
         elif keyword == b"outer":
-            began = len(rows)
-        elif keyword == b"endloop" and len(rows) - began != 3:
-            refuse(path, f"a facet of STL has three corners, this one {len(rows) - began}", number)
+            began = len(lines)
+        elif keyword == b"endloop" and len(lines) - began != 3:
+            refuse(path, f"a facet of STL has three corners, this one {len(lines) - began}", number)
         elif keyword == b"solid":
-            name, rows, lines = name_of(line, path.name), [], []
-        elif keyword == b"endsolid" and rows:
-            parts.append(_part(name, floats(rows, lines, path)))
+            name, corners, lines = name_of(line, path.name), [], []
+        elif keyword == b"endsolid" and lines:
+            parts.append(_part(name, floats(corners, lines, path)))
         before = keyword
     if before != b"endsolid":
         refuse(path, f"ends after {before.decode()}, without endsolid: it was cut short; export it again")

@@ -7,6 +7,8 @@ and glTF are checked here, and read by pycollada and trimesh.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -114,7 +116,8 @@ def _by_trimesh(opened: MeshBytes) -> Read:
         notes = [f"the file says its unit is {metre:g} m; it was scaled to metres", *notes]
     # by name: the graph keeps no order
     found = sorted(_placed(edges, loaded.graph.base_frame), key=lambda one: one[0])
-    return Read([_part(name, loaded.geometry[geometry], X_WG, metre) for name, geometry, X_WG in found], notes)
+    shapes = {name: one for name, one in loaded.geometry.items() if isinstance(one, (trimesh.Trimesh, trimesh.PointCloud))}
+    return Read([_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in found if geometry in shapes], notes)
 
 
 def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
@@ -123,6 +126,7 @@ def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
     for upper, lower, about in edges:
         below.setdefault(upper, []).append((lower, about))
     found = []
+    several: Counter[str] = Counter()
     waiting = [(base, np.eye(4))]
     while waiting:
         node, X_WN = waiting.pop()
@@ -130,7 +134,12 @@ def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
             X = np.asarray(about.get("matrix", np.eye(4)), dtype=np.float64)
             X_WL = X if np.array_equal(X_WN, np.eye(4)) else X_WN @ X
             if about.get("geometry") is not None:
-                found.append((str(lower), about["geometry"], X_WL))
+                name = str(lower)
+                if re.fullmatch(re.escape(str(node)) + "_[0-9a-zA-Z]{6}", name):
+                    # trimesh ends the names of several primitives of one glTF mesh at random
+                    several[str(node)] += 1
+                    name = f"{node}_{several[str(node)]}"
+                found.append((name, about["geometry"], X_WL))
             waiting.append((lower, X_WL))
     return found
 
