@@ -20,6 +20,7 @@ from collide.errors import CollideError, MissingExtra, SceneError
 from collide.scenes import cache, load
 from collide.scenes.loaders.triangles import read_triangles
 
+
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path, monkeypatch):
     """Prepared meshes away from the user's; the kernels stay where they are."""
