@@ -5,6 +5,7 @@ What the work is, is counted, not timed: nodes that are built, names that are co
 
 from __future__ import annotations
 
+import base64
 import gzip
 import json
 import os
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import threading
 
+import numpy as np
 import pytest
 
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
@@ -421,6 +423,66 @@ def test_a_mesh_that_many_bodies_name_is_read_once(tmp_path, monkeypatch):
     scene = load(tmp_path / "s.json")
     assert [path.name for path in opened if path.suffix == ".obj"] == ["t.obj"]
     assert all(body.shape is scene.bodies[0].shape for body in scene.bodies)
+
+
+def urdf_chain(n: int) -> str:
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links = "".join(f'<link name="l{k}">{ball}</link>' for k in range(n))
+    limits = '<limit lower="-1" upper="1"/>'
+    joints = "".join(f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>{limits}</joint>' for k in range(n - 1))
+    return f'<robot name="r">{links}{joints}</robot>'
+
+
+def gltf_chain(n: int) -> str:
+    """Nodes one below the other, the last with a mesh of one triangle."""
+    nodes = [{"translation": [0, 0, 1], **({"children": [k + 1]} if k < n - 1 else {"mesh": 0})} for k in range(n)]
+    data = base64.b64encode(np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], "<f4").tobytes()).decode()
+    return json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": f"data:;base64,{data}"}],
+    })  # fmt: skip
+
+
+LONG = {
+    "bodies.json": lambda n: json.dumps({
+        "collide": 1, "bodies": [{"name": f"b{k}", "shape": BALL, "pose": {"xyz": [k, 0, 0]}} for k in range(n)],
+        "allow": [[f"b{k}", f"b{k + 1}"] for k in range(n - 1)],
+    }),
+    "equal objects.obj": lambda n: "".join(f"o part{k}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n" for k in range(n)),
+    "chain.urdf": urdf_chain, "chain.gltf": gltf_chain,
+    "pieces.stl": lambda n: "".join(f"solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {k}\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n" for k in range(n)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_twice_the_file_is_twice_the_work(tmp_path, name):
+    """Calls of functions, Python's and C's, while a file is read."""
+    if name.endswith("gltf"):
+        pytest.importorskip("trimesh")
+
+    def calls(n: int) -> int:
+        (tmp_path / f"{n} {name}").write_text(LONG[name](n))
+        count = 0
+
+        def counted(frame, event, argument):
+            nonlocal count
+            count += event in ("call", "c_call")
+
+        before = sys.getprofile()
+        sys.setprofile(counted)
+        try:
+            scene = load(tmp_path / f"{n} {name}")
+        finally:
+            sys.setprofile(before)
+        assert len(scene.bodies) in (1, n)
+        return count
+
+    calls(10)
+    n = 400 if name.endswith("gltf") else 100
+    few, many = calls(n), calls(2 * n)
+    assert few > 1000 and many < 2.2 * few, (few, many)
 
 
 def test_missing_yaml_is_told(tmp_path, monkeypatch):

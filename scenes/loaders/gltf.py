@@ -102,6 +102,7 @@ class _Check:
     def __init__(self, header: dict, path: Path):
         self.header, self.path = header, path
         self.notes: dict[str, None] = {}
+        self._lists: dict[str, list] = {}
 
     def all(self) -> list[str]:
         for k, view in enumerate(self._list("bufferViews")):
@@ -117,10 +118,12 @@ class _Check:
         return list(self.notes)
 
     def _list(self, key: str) -> list:
-        found = self.header.get(key, [])
-        if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
-            _at(self.path, key, f"must be a list of mappings, got {brief(found)}")
-        return found
+        if key not in self._lists:
+            found = self.header.get(key, [])
+            if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+                _at(self.path, key, f"must be a list of mappings, got {brief(found)}")
+            self._lists[key] = found
+        return self._lists[key]
 
     def _count(self, value: Any, where: str) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
