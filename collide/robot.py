@@ -267,13 +267,13 @@ class Robot:
                 X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else _product(X_WJ, X_JL)
             within = np.abs(X_WLs[:, :, :3]) <= LARGEST
         if not within.all():
-            self._refuse_pose(X_WLs, within.all(axis=(2, 3)), q)
+            self._refuse_pose(X_WLs, within, q)
         return X_WLs
 
     def _refuse_pose(self, X_WLs: np.ndarray, within: np.ndarray, q: np.ndarray) -> NoReturn:
-        """InvalidPose about the link nearest to the root that stands too far away.   within : (N, links)."""
-        row = int(np.argmin(within.all(axis=1)))
-        joint = next(joint for joint in self._order if not within[row, self._index[joint.child]])
+        """InvalidPose about the link nearest to the root that stands too far away.   within : (N, links, 3, 4)."""
+        row = int(np.argmin(within.all(axis=(1, 2, 3))))
+        joint = next(joint for joint in self._order if not within[row, self._index[joint.child]].all())
         at = X_WLs[row, self._index[joint.child], :3, 3].tolist()
         value = f" = {self.joint_value(joint.name, q[row]):g}" if joint.name in self._drivers else ""
         follows = f", which follows {cut(joint.mimic.joint)}," if joint.mimic is not None else ""
@@ -397,6 +397,8 @@ def _checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
     axis = np.asarray(joint.axis, dtype=np.float64)
     if axis.shape != (3,) or not np.isfinite(axis).all():
         raise SceneError(f"axis must be 3 finite numbers, got {joint.axis!r}", element=element)
+    largest = float(np.abs(axis).max())
+    axis = axis / largest if largest > 1e100 else axis  # the square of its length must be a number
     length = math.sqrt(float(axis @ axis))
     if joint.type in ("revolute", "continuous", "prismatic", "planar"):
         if not length > 1e-9:

@@ -247,6 +247,12 @@ def test_links_that_leave_the_range_of_poses_are_named():
             chain(None, kind=kind).link_poses(values)
 
 
+def test_an_axis_of_any_length_is_a_direction():
+    for length in (1e-8, 1.0, 1e200, 1.7e308):
+        robot = Robot("r", ["a", "b"], [Joint("j", "prismatic", "a", "b", axis=np.array([0.0, length, 0.0]))])
+        assert robot.joints[0].axis.tolist() == [0, 1, 0]
+
+
 class Counted(str):
     """A name that counts how often names are compared: lists compare one by one, dictionaries hardly ever."""
 

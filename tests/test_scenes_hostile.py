@@ -6,17 +6,21 @@ What the work is, is counted, not timed: nodes that are built, names that are co
 from __future__ import annotations
 
 import base64
+import copy
 import gzip
 import json
 import os
 import random
+import re
 import subprocess
 import sys
 import threading
+from collections import Counter
 
 import numpy as np
 import pytest
 
+from collide.cli import main
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
 from collide.robot import Robot
 from collide.scenes import cache, load
@@ -235,6 +239,7 @@ def test_large_files_are_refused_unread(tmp_path):
     [
         ("a: " + "9" * 5000, "line 1, column 4: '9999.*cannot be read as int"),
         ('{"a": ' + "9" * 5000 + "}", "the integer 9999.* has 5000 digits"),
+        ("a: " + "9" * 2**20, "line 1, column 4: '9999.*cannot be read as int"),  # seconds to hours, if digits are tried in every way
         ("a: 2001-99-99", "line 1, column 4: '2001-99-99' cannot be read as timestamp"),
         ("a: !!int x", "line 1, column 4: 'x' cannot be read as int"),
         ("a: !!set [1]", "a tag does not fit what stands there"),
@@ -367,6 +372,127 @@ def test_a_mimic_of_huge_multiplier_is_told(tmp_path):
         load(tmp_path / "r.urdf", state={"j": float("inf")})
 
 
+# --- junk in every place ------------------------------------------------------------------------------
+
+URDF = (
+    '<robot name="r"><link name="a"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+    '<link name="b"><collision><origin xyz="0 0 1" rpy="0 0 1"/><geometry><mesh filename="t.obj" scale="1 1 1"/></geometry></collision></link>'
+    '<link name="c"/><joint name="j" type="revolute"><origin xyz="0 0 1" rpy="0 0 1"/><axis xyz="0 0 1"/><parent link="a"/><child link="b"/>'
+    '<limit lower="-1" upper="1"/></joint><joint name="k" type="revolute"><parent link="b"/><child link="c"/><limit lower="-1" upper="1"/>'
+    '<mimic joint="j" multiplier="2" offset="0.1"/></joint></robot>'
+)
+SCENE = {
+    "collide": 1, "name": "n", "about": "x", "units": "m", "include": ["i.json"],
+    "robots": [
+        {"urdf": "r.urdf", "name": "left", "prefix": "l_", "pose": {"xyz": [0, 5, 0], "rpy": [0, 0, 1]}, "state": {"j": 0.5},
+         "base": "fixed", "meshes": "hull", "srdf": False},
+        {"robot": {
+            "name": "arm", "links": [{"name": "base", "collision": [{"shape": BALL, "pose": {"quat_wxyz": [1, 0, 0, 0]}}]}, {"name": "hand"}],
+            "joints": [{"name": "s", "type": "prismatic", "parent": "base", "child": "hand", "origin": {"xyz": [0, 0, 1]}, "axis": [1, 0, 0],
+                        "limits": [0, 2], "mimic": {"joint": "x", "multiplier": 1, "offset": 0}}],
+            "allow": [["base", "hand", "why"]], "states": {"out": {"s": 1.0}},
+        }, "state": "out"},
+    ],
+    "bodies": [
+        {"name": "a", "shape": {"box": {"size": [1, 1, 1]}}, "static": True, "group": 1, "mask": 3, "pose": {"matrix": np.eye(4).tolist()}},
+        {"name": "m", "shape": {"mesh": {"file": "t.obj", "scale": [1, 1, 2], "as": "hull"}}},
+        {"name": "c", "shape": {"compound": [{"shape": {"capsule": {"radius": 1, "length": 1}}, "pose": {"rpy_deg": [0, 90, 0]}}]}},
+        {"name": "h", "shape": {"hull": {"points": [[0, 0, 0], [1, 0, 0]], "radius": 1}}},
+        {"name": "p", "shape": {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}}},
+    ],
+    "allow": [["a", "m", "r"]], "states": {"st": {"l_j": 0.1}},
+}  # fmt: skip
+PLANNING = {
+    "name": "x", "robot_model_name": "r",
+    "robot_state": {
+        "joint_state": {"name": ["j"], "position": [0.1]},
+        "multi_dof_joint_state": {"joint_names": ["v"], "transforms": [{"translation": {"x": 0, "y": 0, "z": 0}, "rotation": {"w": 1}}]},
+        "attached_collision_objects": [{"link_name": "b", "touch_links": ["a"], "object": {
+            "id": "held", "pose": {"position": [0, 0, 1]}, "primitives": [{"type": 1, "dimensions": [1, 1, 1]}], "primitive_poses": [{"position": [0, 0, 0]}],
+        }}],
+    },
+    "fixed_frame_transforms": [{"header": {"frame_id": "world"}, "child_frame_id": "f", "transform": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}],
+    "allowed_collision_matrix": {"entry_names": ["a", "b"], "entry_values": [[True, False], {"enabled": [False, True]}],
+                                 "default_entry_names": ["a"], "default_entry_values": [True]},
+    "link_padding": [{"link_name": "a", "padding": 0.1}],
+    "world": {"octomap": {"octomap": {"data": [1]}}, "collision_objects": [{
+        "id": "o", "header": {"frame_id": "f"}, "operation": 0, "pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": [0, 0, 0, 1]},
+        "meshes": [{"vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1}, {"y": 1}], "triangles": [{"vertex_indices": [0, 1, 2]}]}], "mesh_poses": [{}],
+        "planes": [{"coef": [0, 0, 1, 0]}], "plane_poses": [{}], "primitives": [{"type": "sphere", "dimensions": [1]}],
+    }]},
+}  # fmt: skip
+STATE = {"joint_state": {"name": ["j"], "position": [0.5]}}
+JUNK = [
+    None, True, 0, -1, 1.5, 1e60, float("nan"), 10**60, "", "x", "1", [], [1], [[]], ["x"], {}, {"x": 1}, [None], [{}], {"a": {"b": [1]}},
+    [[1, 2, 3]], "\0", [True],
+]  # fmt: skip
+
+
+def places(data, above=()):
+    """The place of everything in a document, as keys."""
+    yield above
+    for key in data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        yield from places(data[key], (*above, key))
+
+
+def put(data, place, value):
+    if not place:
+        return value
+    data = copy.copy(data)
+    data[place[0]] = put(data[place[0]], place[1:], value)
+    return data
+
+
+@pytest.fixture
+def beside(tmp_path):
+    (tmp_path / "r.urdf").write_text(URDF)
+    (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "i.json").write_text('{"collide": 1}')
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", ["scene", "planning", "state"])
+def test_junk_in_every_place_of_a_document(beside, kind):
+    """A scene that a World can be made of, or one error of ours; a sample of every place with every kind of junk."""
+    document = {"scene": SCENE, "planning": PLANNING, "state": STATE}[kind]
+
+    def ask(data) -> str:
+        (beside / "s.json").write_text(json.dumps(data))
+        try:
+            load(beside / "r.urdf", state=beside / "s.json") if kind == "state" else load(beside / "s.json", robot=beside / "r.urdf").world()
+        except CollideError as error:
+            assert len(str(error)) < 5000
+            return "refused"
+        return "taken"
+
+    assert ask(document) == "taken"
+    cases = [(place, junk) for place in places(document) for junk in JUNK]
+    outcomes = Counter()
+    for place, junk in random.Random(kind).sample(cases, min(len(cases), 400)):
+        try:
+            outcomes[ask(put(document, place, junk))] += 1
+        except Exception as error:
+            raise AssertionError(f"{place}: {junk!r}") from error
+    assert outcomes["refused"] > 80 and outcomes["taken"] > 3, outcomes
+
+
+def test_junk_in_every_attribute_of_a_urdf(beside):
+    junk = ("", "x", "nan", "1e308", "-1e308", "1e400", "0", "-1", "1 2", "1 2 3", "0 0 0", "1e60 0 0", "a", "b", "j", "\u0661", "9" * 5000, "1_0")
+    outcomes = Counter()
+    for found in re.finditer(r'="([^"]*)"', URDF):
+        for value in junk:
+            (beside / "r.urdf").write_text(URDF[: found.start(1)] + value + URDF[found.end(1) :])
+            try:
+                load(beside / "r.urdf", state={"j": 0.5}).world()
+                outcomes["taken"] += 1
+            except CollideError as error:
+                outcomes["refused"] += 1
+                assert len(str(error)) < 1000
+            except Exception as error:
+                raise AssertionError(f"{URDF[found.start(1) - 20 : found.end(1)]}: {value!r}") from error
+    assert min(outcomes.values()) > 50, outcomes
+
+
 # --- as much work as there is to do -----------------------------------------------------------------
 
 
@@ -483,6 +609,27 @@ def test_twice_the_file_is_twice_the_work(tmp_path, name):
     n = 400 if name.endswith("gltf") else 100
     few, many = calls(n), calls(2 * n)
     assert few > 1000 and many < 2.2 * few, (few, many)
+
+
+def test_copies_of_scenes_go_to_files_alone(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").write_text("collide: 1")
+    for name in (str(tmp_path / "mine"), "../../mine", "x" * 5000, "a\0b", ""):
+        assert main(["scenes", "--copy", name]) == 2
+        assert "no shipped scene is called" in (said := capsys.readouterr().err) and len(said) < 400
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe.json")
+        assert main(["scenes", "--force", "--copy", "workcell", "pipe.json"]) == 2
+        assert "pipe.json is no file" in capsys.readouterr().err
+    assert main(["scenes", "--copy", "workcell"]) == 0 and load(tmp_path / "workcell.json").bodies
+
+
+def test_locality_reads_as_safely_as_scenes(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(files, "LARGEST_MESH", 2 * files._PIECE)
+    (tmp_path / "bomb.stl.gz").write_bytes(gzip.compress(bytes(9 * files._PIECE)))
+    (tmp_path / "cut.stl").write_bytes(bytes(80) + b"\5\0\0\0" + bytes(120))
+    for name, message in (("bomb.stl.gz", "unpacks to more than 2 MiB"), ("cut.stl", "says 5 facets, but the file holds 2.4"), ("gone.ply", "no such file")):
+        assert main(["locality", str(tmp_path / name)]) == 2 and message in capsys.readouterr().err
 
 
 def test_missing_yaml_is_told(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def check(content: bytes, path: Path) -> list[str]:
     return [] if moved is None else ["meshes that bones move (<instance_controller>) were not read"]
 
 
-def _at(path: Path, element: ET.Element, what: str, inside: str = ""):
+def _at(path: Path, element: ET.Element, what: str, inside: str = "") -> NoReturn:
     name = "".join(f' {key}="{cut(element.get(key) or "")}"' for key in ("id", "name", "material") if element.get(key))[:100]
     raise SceneError(what, path=path, element=f"<{element.tag}{name}>{inside}")
 
@@ -69,7 +70,6 @@ def _numbers(element: ET.Element | None, kind: type, path: Path, inside: str = "
         bad = next(word for word in words if not _reads(word, kind))
     assert element is not None
     _at(path, element, f"must hold {what} at every place, got {brief(bad)}", inside)
-    raise AssertionError
 
 
 def _reads(word: str, kind: type) -> bool:
@@ -131,12 +131,10 @@ def _positions(vertex: ET.Element, by_id: dict, path: Path) -> int:
     place = next((one for one in vertices.findall("input") if one.get("semantic") == "POSITION"), None)
     if place is None:
         _at(path, vertices, 'has no <input semantic="POSITION">')
-    assert place is not None
     source = _named(place, "source", by_id, path)
     array = source.find("float_array")
     if array is None:
         _at(path, source, "has no <float_array>")
-    assert array is not None
     values = _numbers(array, float, path)
     if not np.isfinite(values).all():
         k = int(np.argmax(~np.isfinite(values)))
@@ -158,7 +156,7 @@ def _named(element: ET.Element, key: str, by_id: dict, path: Path) -> ET.Element
     found = by_id.get((element.get(key) or "").removeprefix("#"))
     if found is None:
         _at(path, element, f"{key} names {brief(element.get(key))}, which is not in the file")
-    return found  # type: ignore[return-value]
+    return found
 
 
 # --- nodes ----------------------------------------------------------------------------------------

@@ -120,7 +120,7 @@ def _check_events(events, path: Path) -> None:
     """
     import yaml
 
-    sizes: dict[str, int] = {}  # of anchored nodes that have ended
+    sizes: dict[str | None, int] = {}  # of anchored nodes that have ended
     opened: list[tuple[str | None, int]] = []  # anchor of a list or mapping, and the nodes before it
     nodes = repeated = 0
     for event in events:
@@ -181,6 +181,7 @@ def _yaml_loader():
                 problem = f"{brief(node.value) if isinstance(node, yaml.ScalarNode) else 'what stands here'} cannot be read as {kind}"
                 raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
 
-    number = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
+    # No two ways to read the same digits: a megabyte of them must not be tried in every way.
+    number = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)[eE][-+]?\d+$")
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+.0123456789"))
     return Loader

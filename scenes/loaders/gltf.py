@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path, PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 from urllib.parse import unquote
 
 import numpy as np
@@ -80,7 +80,7 @@ def _beside(path: Path, uri: str, k: int) -> Path:
     return path.parent / name
 
 
-def _at(path: Path, element: str, what: str):
+def _at(path: Path, element: str, what: str) -> NoReturn:
     raise SceneError(what, path=path, element=element)
 
 
@@ -156,7 +156,7 @@ class _Check:
     def _accessor(self, index: Any, where: str, kind: str) -> dict:
         accessor = self._entry("accessors", index, where)
         count, component = self._count(accessor.get("count"), f"accessors[{index}].count"), accessor.get("componentType")
-        if component not in _COMPONENTS or accessor.get("type") != kind:
+        if not isinstance(component, int) or component not in _COMPONENTS or accessor.get("type") != kind:
             _at(self.path, f"accessors[{index}]", f"holds {brief(accessor.get('type'))} of type {brief(component)}, which {where} cannot be")
         if kind == "SCALAR" and component not in (5121, 5123, 5125):
             _at(self.path, f"accessors[{index}]", f"indices must be whole numbers without a sign, got type {component}")

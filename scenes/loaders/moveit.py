@@ -367,7 +367,7 @@ def _matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
     An entry for the pair decides; else the defaults of its members, of which a False wins.
     """
     entries = matrix.words("entry_names")
-    rows = [row.get("enabled") if isinstance(row, dict) else row for row, _ in matrix.items("entry_values")]
+    rows: list[Any] = [row.get("enabled") if isinstance(row, dict) else row for row, _ in matrix.items("entry_values")]
     if len(rows) != len(entries) or any(not isinstance(row, list) or len(row) != len(entries) for row in rows):
         matrix.fail(f"must hold {len(entries)} rows of {len(entries)} values, one for each of entry_names", "entry_values")
     default_names = matrix.words("default_entry_names")

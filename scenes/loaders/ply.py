@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class _Property(NamedTuple):
 
 class _Element(NamedTuple):
     name: str
-    count: int
+    rows: int
     properties: list[_Property]
 
 
@@ -60,7 +60,7 @@ def read(content: bytes, path: Path) -> Read:
     vertices = _vertices(columns, path)
     faces = next((columns["face"][key] for key in _CORNERS if key in columns.get("face", {})), None)
     if faces is None:
-        if any(element.count for element in elements if element.name in ("face", "tristrips")):
+        if any(element.rows for element in elements if element.name in ("face", "tristrips")):
             refuse(path, f"its faces are not lists called {' or '.join(_CORNERS)}, which alone are read")
         return Read([Part(path.name, vertices, NO_FACES)], [])
     if not isinstance(faces, tuple):
@@ -136,13 +136,13 @@ class _Text:
         self.lines: list[int] | None = None
 
     def element(self, element: _Element) -> _Columns:
-        rows = self._rows[self._at : self._at + element.count]
-        if len(rows) < element.count:
+        rows = self._rows[self._at : self._at + element.rows]
+        if len(rows) < element.rows:
             refuse(
                 self._path,
-                f"declares {element.count} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; export it again",
+                f"declares {element.rows} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; export it again",
             )
-        self._at += element.count
+        self._at += element.rows
         if element.name == "face":
             self.lines = [line for line, _ in rows]
         return self._equal_rows(element, rows) or self._row_by_row(element, rows)
@@ -235,7 +235,7 @@ class _Binary:
         self._content, self._at, self._endian, self._path = content, at, endian, path
 
     def element(self, element: _Element) -> _Columns:
-        if not element.count or not element.properties:
+        if not element.rows or not element.properties:
             none = np.zeros(0)
             return {one.name: (none.astype(np.int64), none.astype(np.int64)) if one.length else none for one in element.properties}
         return self._equal_rows(element) or self._row_by_row(element)
@@ -252,15 +252,15 @@ class _Binary:
                 fields.append((f"v{k}", self._endian + one.kind))
                 at += np.dtype(one.kind).itemsize
         layout = np.dtype(fields)
-        if self._at + layout.itemsize * element.count > len(self._content):
+        if self._at + layout.itemsize * element.rows > len(self._content):
             if not any(one.length for one in element.properties):
                 self._cut_short(element, (len(self._content) - self._at) // layout.itemsize)
             return None
-        rows = np.frombuffer(self._content, layout, element.count, self._at)
+        rows = np.frombuffer(self._content, layout, element.rows, self._at)
         for k, one in enumerate(element.properties):
             if one.length and (rows[f"n{k}"] != rows[f"n{k}"][0]).any():
                 return None
-        self._at += layout.itemsize * element.count
+        self._at += layout.itemsize * element.rows
         return {
             one.name: (_native(rows[f"v{k}"]).ravel(), rows[f"n{k}"].astype(np.int64)) if one.length else _native(rows[f"v{k}"])
             for k, one in enumerate(element.properties)
@@ -269,7 +269,7 @@ class _Binary:
     def _row_by_row(self, element: _Element) -> _Columns:
         found: list[list[np.ndarray]] = [[] for _ in element.properties]
         counts: list[list[int]] = [[] for _ in element.properties]
-        for row in range(element.count):
+        for row in range(element.rows):
             for k, one in enumerate(element.properties):
                 count = 1
                 if one.length:
@@ -294,10 +294,10 @@ class _Binary:
             self._cut_short(element, row)
         return np.frombuffer(self._content, self._endian + kind, count, at)
 
-    def _cut_short(self, element: _Element, holds: int):
+    def _cut_short(self, element: _Element, holds: int) -> NoReturn:
         refuse(
             self._path,
-            f"declares {element.count} of {element.name}, but holds {holds}: it was cut short or is damaged; export it again",
+            f"declares {element.rows} of {element.name}, but holds {holds}: it was cut short or is damaged; export it again",
         )
 
     def end(self) -> None:

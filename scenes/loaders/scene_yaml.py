@@ -154,7 +154,7 @@ def _read_robot(building: _Building, entry: Fields) -> Robot:
     srdf = entry.get("srdf")
     if isinstance(srdf, str):
         srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
-    elif srdf not in (None, False):
+    elif srdf is not None and srdf is not False:
         entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
     file = resources.find(entry.text("urdf"), building.path, building.package_path, element=entry.place("urdf"))
     return urdf.load_robot(

@@ -118,17 +118,16 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
     from collide.scenes.loaders import mesh as mesh_loader
-    from collide.scenes.loaders.mesh_shapes import element_shapes
+    from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
     file = mesh(fields.text("file"), fields.place("file"), taken)
     shapes = element_shapes(file, scale, f"{fields.path}: {fields.element}")
     about = [approximation for _, approximation in shapes if approximation]
-    points = np.concatenate([part.points for part in file.parts]) * scale
-    note = mesh_loader.size_note(float(np.ptp(points, axis=0).max()), fields.element)
+    note = mesh_loader.size_note(extent(file, scale), fields.element)
     notes = [note] if note else []
-    if np.prod(scale) < 0:
+    if mirrors(scale):
         notes.append(f"{fields.element}: the scale {scale.tolist()} mirrors; the mesh was mirrored")
     if len(shapes) == 1:
         return Described(shapes[0][0], about[0] if about else None, notes)

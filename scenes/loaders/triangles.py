@@ -56,7 +56,7 @@ def read_triangles(path: Path) -> tuple[list[tuple[str, np.ndarray, np.ndarray]]
     Raises SceneError for what cannot be read, MissingExtra without the library that reads it.
     """
     parts, notes = triangles_of(open_mesh(path))
-    return [tuple(part) for part in parts], notes
+    return [(name, vertices, faces) for name, vertices, faces in parts], notes
 
 
 def triangles_of(opened: MeshBytes) -> Read:
@@ -115,7 +115,7 @@ def _by_trimesh(opened: MeshBytes) -> Read:
     if metre != 1.0:
         notes = [f"the file says its unit is {metre:g} m; it was scaled to metres", *notes]
     # by name: the graph keeps no order
-    found = sorted(_placed(edges, loaded.graph.base_frame), key=lambda one: one[0])
+    found = sorted(_placed(edges, str(loaded.graph.base_frame)), key=lambda one: one[0])
     shapes = {name: one for name, one in loaded.geometry.items() if isinstance(one, (trimesh.Trimesh, trimesh.PointCloud))}
     return Read([_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in found if geometry in shapes], notes)
 

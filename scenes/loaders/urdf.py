@@ -24,7 +24,7 @@ from collide.scenes.loaders import mesh as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.fields import placed
 from collide.scenes.loaders.files import is_file, read_bytes
-from collide.scenes.loaders.mesh_shapes import element_shapes
+from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 from collide.shapes.base import Shape
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
 from collide.transforms import pose
@@ -334,10 +334,8 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
     if file not in reading.mesh_files:
         reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
         reading.notes += reading.mesh_files[file].notes
-    parts = reading.mesh_files[file].parts
     shapes = [(shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")]
-    points = np.concatenate([part.points for part in parts]) * scale
-    _note_size(float(np.ptp(points, axis=0).max()), place, reading)
+    _note_size(extent(reading.mesh_files[file], scale), place, reading)
     reading.seconds += time.perf_counter() - started
     return shapes
 
@@ -348,7 +346,7 @@ def _mesh_scale(element: ET.Element, place: str, reading: Reading) -> np.ndarray
     scale = np.broadcast_to(floats(element, "scale", 1 if single else 3, place, reading, "1 1 1"), (3,)).copy()
     if not scale.all():
         reading.fail(place, f'<mesh> scale must not be 0, got "{cut(text)}"')
-    if np.prod(scale) < 0:
+    if mirrors(scale):
         reading.notes.append(f'{place}: the mesh scale "{cut(text)}" mirrors; the mesh was mirrored')
     return scale
 
