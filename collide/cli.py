@@ -399,6 +399,8 @@ def _copy_scene(words: list[str], force: bool) -> str:
     target = Path(words[1] if len(words) == 2 else source.name)
     if target.is_dir():
         target = target / source.name
+    if target.exists() and not target.is_file():
+        raise InvalidArgument(f"{target} is no file: a scene is not copied there")
     if target.exists() and not force:
         raise InvalidArgument(f"{target} exists already: give another destination, or --force to overwrite it")
     shutil.copyfile(source, target)

@@ -12,6 +12,49 @@
 
 from __future__ import annotations
 
+import reprlib
+from collections.abc import Iterable
+
+#: Characters of a value, of a place in a file and of a whole message that are shown; names may have a megabyte.
+LONGEST_VALUE, LONGEST_PLACE, LONGEST_MESSAGE = 80, 240, 4000
+
+
+def brief(value: object) -> str:
+    """A value for a message, cut where it is long, and never written out whole before it is cut."""
+    if isinstance(value, str):
+        return repr(value) if len(value) <= LONGEST_VALUE else repr(value[: LONGEST_VALUE - 3]) + "..."
+    return cut(_SHORT.repr(value), LONGEST_VALUE)
+
+
+def cut(text: str, most: int = LONGEST_VALUE) -> str:
+    """A text with its middle left out where it is longer than ``most`` characters."""
+    if len(text) <= most:
+        return text
+    left, right = most * 3 // 4 - 2, most // 4 - 1
+    return f"{text[:left]}...{text[-right:]}"
+
+
+def listing(names: Iterable[object], most: int = 30) -> str:
+    """Names separated by commas, each cut where it is long; of many the first."""
+    names = list(names)
+    shown = ", ".join(cut(str(name)) for name in names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+class _Short(reprlib.Repr):
+    """`reprlib` with room for a row of a matrix, and for integers that Python does not write out."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother = 5, LONGEST_VALUE, LONGEST_VALUE
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = 12
+
+    def repr_int(self, x: int, level: int) -> str:
+        return repr(x) if x.bit_length() < 256 else f"an integer of {x.bit_length()} bits"
+
+
+_SHORT = _Short()
+
 
 class CollideError(Exception):
     """Base of every error that collide raises on purpose."""
@@ -48,9 +91,10 @@ class SceneError(CollideError, ValueError):
     """
 
     def __init__(self, what: str, *, path: object = None, element: str | None = None):
-        self.what, self.path, self.element = what, path, element
-        place = ": ".join(str(p) for p in (path, element) if p is not None)
-        super().__init__(f"{place}: {what}" if place else what)
+        self.what, self.path = cut(what, LONGEST_MESSAGE), path
+        self.element = None if element is None else cut(element, LONGEST_PLACE)
+        place = ": ".join(str(p) for p in (path, self.element) if p is not None)
+        super().__init__(f"{place}: {self.what}" if place else self.what)
 
 
 class MissingExtra(CollideError, ImportError):

@@ -13,15 +13,17 @@ axes across its normal, ``NAME/yaw`` [rad]); six for a floating joint (``NAME/x`
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.shapes.base import Shape
-from collide.transforms import as_poses
+from collide.transforms import LARGEST, as_poses
 
 #: Columns of ``q`` by joint type.
 COLUMNS = {
@@ -88,7 +90,8 @@ class Robot:
     semantic_pairs : (link, link, reason) from an SRDF. None: links next to each other in the tree
         are taken as never tested.
     states : named joint values, ``{"ready": {"joint1": 0.0, ...}}``.
-    notes : what the person who loads the robot should know.
+    notes : what the person who loads the robot should know. Joints that cannot follow what they are said to mimic
+        (a joint that does not exist, a circle) become joints of their own, and a note is added for each.
 
     Attributes
     ----------
@@ -96,6 +99,7 @@ class Robot:
     root : the link without a parent.   base_links : links welded to the root, root included.
     rigid_clusters : tuples of links welded together by fixed joints, in the order of the links.
     disabled_pairs : [(link, link, reason)], both with collision geometry, in the order of the links.
+    place : the robot and the file it comes from, for messages.
 
     Raises SceneError naming the link or joint where the joints do not make one tree.
     """
@@ -115,20 +119,25 @@ class Robot:
         self.name = name
         self.links = tuple(links)
         self._index = _indices("link", self.links)
-        self.joints = tuple(_checked_joint(joint, self._index) for joint in joints)
-        _indices("joint", [joint.name for joint in self.joints])
+        self.sources = list(sources)
+        self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
+        checked = [_checked_joint(joint, self._index) for joint in joints]
+        _indices("joint", [joint.name for joint in checked])
+        broken = _broken_mimics(checked)
+        self.joints = tuple(replace(joint, mimic=None) if joint.name in broken else joint for joint in checked)
         self.root, self._order = _tree(self.links, self.joints)
         self._drivers = _resolve_mimics(self.joints)
         self._set_columns()
         self.geometry = {link: tuple(elements) for link, elements in (geometry or {}).items() if elements}
         for link in self.geometry:
             if link not in self._index:
-                raise SceneError(f"unknown link; the robot has {', '.join(self.links)}", element=f'link "{link}"')
+                raise SceneError(f"unknown link; the robot has {listing(self.links)}", element=f'link "{cut(link)}"')
         self.rigid_clusters = _clusters(self.links, self.joints)
         self.base_links = next(cluster for cluster in self.rigid_clusters if self.root in cluster)
         self.semantic_pairs = None if semantic_pairs is None else tuple(semantic_pairs)
         self.states = {label: dict(values) for label, values in (states or {}).items()}
-        self.notes, self.sources = list(notes), list(sources)
+        file = Path(self.sources[0]).name if self.sources else f"robot {cut(name)}"
+        self.notes = [*notes, *(f"{file}: {_about_broken(joint, why)}" for joint, why in broken.items())]
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
@@ -189,7 +198,7 @@ class Robot:
                 q[column[name]] = value
             elif name not in by_name or by_name[name].type in ("planar", "floating"):
                 raise InvalidArgument(
-                    f"robot {self.name}: unknown joint {name!r}; it has {', '.join(self.joint_names) or 'no joints'}"
+                    f"robot {self.name}: unknown joint {brief(name)}; it has {listing(self.joint_names) or 'no joints'}"
                 )
             elif by_name[name].mimic is not None:
                 followers.append((by_name[name], value))
@@ -244,25 +253,44 @@ class Robot:
 
         Every row is computed alone, by the same additions and multiplications: one row gives the
         same bits as that row in a batch.
+
+        Raises InvalidArgument for configurations of another shape or not finite, and InvalidPose, naming file, link and
+        joint, where a link leaves the numbers that poses may have.
         """
         q = self._as_configurations(q)
         X_WLs = np.empty((len(q), len(self.links), 4, 4))
         X_WLs[:, self._index[self.root]] = np.eye(4) if X_WR is None else as_poses(X_WR, "X_WR")[0]
-        for joint in self._order:
-            X_WJ = _product(X_WLs[:, self._index[joint.parent]], joint.X_PJ[None])
-            X_JL = self._motion(joint, q)
-            X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else _product(X_WJ, X_JL)
+        with np.errstate(over="ignore", invalid="ignore"):  # looked at below
+            for joint in self._order:
+                X_WJ = _product(X_WLs[:, self._index[joint.parent]], joint.X_PJ[None])
+                X_JL = self._motion(joint, q)
+                X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else _product(X_WJ, X_JL)
+            within = np.abs(X_WLs[:, :, :3]) <= LARGEST
+        if not within.all():
+            self._refuse_pose(X_WLs, within, q)
         return X_WLs
+
+    def _refuse_pose(self, X_WLs: np.ndarray, within: np.ndarray, q: np.ndarray) -> NoReturn:
+        """InvalidPose about the link nearest to the root that stands too far away.   within : (N, links, 3, 4)."""
+        row = int(np.argmin(within.all(axis=(1, 2, 3))))
+        joint = next(joint for joint in self._order if not within[row, self._index[joint.child]].all())
+        at = X_WLs[row, self._index[joint.child], :3, 3].tolist()
+        value = f" = {self.joint_value(joint.name, q[row]):g}" if joint.name in self._drivers else ""
+        follows = f", which follows {cut(joint.mimic.joint)}," if joint.mimic is not None else ""
+        raise InvalidPose(
+            f'{self.place}: link "{cut(joint.child)}" stands at {at}: coordinates must be finite and within {LARGEST:g}; '
+            f'look at the origin of joint "{cut(joint.name)}"{follows} and at its value{value}'
+        )
 
     def _as_configurations(self, q) -> np.ndarray:
         try:
             array = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InvalidArgument(f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {q!r}") from None
+        except (TypeError, ValueError, OverflowError):
+            raise InvalidArgument(f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}") from None
         if array.ndim not in (1, 2) or array.shape[-1] != self.dof:
             raise InvalidArgument(
                 f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
-                f"{', '.join(self.joint_names) or 'no joints'}; got {array.shape}"
+                f"{listing(self.joint_names) or 'no joints'}; got {array.shape}"
             )
         array = array if array.ndim == 2 else array[None]
         bad = np.argwhere(~np.isfinite(array))
@@ -353,22 +381,24 @@ def _indices(kind: str, names: Sequence[str]) -> dict[str, int]:
     index: dict[str, int] = {}
     for k, name in enumerate(names):
         if name in index:
-            raise SceneError(f"the name is used twice (entries {index[name]} and {k}): rename one", element=f'{kind} "{name}"')
+            raise SceneError(f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"')
         index[name] = k
     return index
 
 
 def _checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
-    element = f'joint "{joint.name}"'
+    element = f'joint "{cut(joint.name)}"'
     if joint.type not in COLUMNS:
-        raise SceneError(f'unknown type "{joint.type}"; known are {", ".join(COLUMNS)}', element=element)
+        raise SceneError(f'unknown type "{cut(joint.type)}"; known are {", ".join(COLUMNS)}', element=element)
     for role, link in (("parent", joint.parent), ("child", joint.child)):
         if link not in links:
-            raise SceneError(f'its {role} is link "{link}", which the robot does not have', element=element)
+            raise SceneError(f'its {role} is link "{cut(link)}", which the robot does not have', element=element)
     X_PJ = as_poses(joint.X_PJ, f"{element} origin")[0]
     axis = np.asarray(joint.axis, dtype=np.float64)
     if axis.shape != (3,) or not np.isfinite(axis).all():
         raise SceneError(f"axis must be 3 finite numbers, got {joint.axis!r}", element=element)
+    largest = float(np.abs(axis).max())
+    axis = axis / largest if largest > 1e100 else axis  # the square of its length must be a number
     length = math.sqrt(float(axis @ axis))
     if joint.type in ("revolute", "continuous", "prismatic", "planar"):
         if not length > 1e-9:
@@ -389,23 +419,23 @@ def _tree(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Join
     for joint in joints:
         if joint.child in above:
             raise SceneError(
-                f'link "{joint.child}" has two parents: it is also the child of joint "{above[joint.child].name}"',
-                element=f'joint "{joint.name}"',
+                f'link "{cut(joint.child)}" has two parents: it is also the child of joint "{cut(above[joint.child].name)}"',
+                element=f'joint "{cut(joint.name)}"',
             )
         above[joint.child] = joint
     _refuse_cycles(links, above)
     roots = [link for link in links if link not in above]
     if len(roots) > 1:
         raise SceneError(
-            f"{len(roots)} links have no parent ({', '.join(roots)}): a robot is one tree; join them to one root"
+            f"{len(roots)} links have no parent ({listing(roots)}): a robot is one tree; join them to one root"
         )
     below: dict[str, list[Joint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     order: list[Joint] = []
-    waiting = [roots[0]]
+    waiting = deque([roots[0]])
     while waiting:
-        children = below.get(waiting.pop(0), [])
+        children = below.get(waiting.popleft(), [])
         order.extend(children)
         waiting.extend(joint.child for joint in children)
     return roots[0], order
@@ -414,43 +444,76 @@ def _tree(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Join
 def _refuse_cycles(links: Sequence[str], above: Mapping[str, Joint]) -> None:
     rooted: set[str] = set()
     for link in links:
-        path: list[str] = []
+        path: dict[str, None] = {}  # in order, and found at once
         here = link
         while here in above and here not in rooted and here not in path:
-            path.append(here)
+            path[here] = None
             here = above[here].parent
         if here in path:
-            cycle = [*path[path.index(here) :][::-1], path[-1]]
+            upwards = list(path)
+            cycle = [*upwards[upwards.index(here) :][::-1], upwards[-1]]
             raise SceneError(
-                f"the joints make a cycle, {' -> '.join(cycle)}: a robot is a tree",
-                element=f'joint "{above[here].name}"',
+                f"the joints make a cycle, {_chain(cycle)}: a robot is a tree",
+                element=f'joint "{cut(above[here].name)}"',
             )
         rooted.update(path)
+
+
+def _chain(names: Sequence[str]) -> str:
+    return " -> ".join(map(cut, names if len(names) <= 12 else [*names[:6], "...", *names[-6:]]))
+
+
+def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
+    """Joint -> why it cannot follow another: there is none of that name, or they follow each other in a circle."""
+    single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
+    broken: dict[str, str] = {}
+    for joint in joints:
+        if joint.mimic is None:
+            continue
+        if not (math.isfinite(joint.mimic.multiplier) and math.isfinite(joint.mimic.offset)):
+            what = f"multiplier {joint.mimic.multiplier} and offset {joint.mimic.offset} must be finite"
+            raise SceneError(what, element=f'joint "{cut(joint.name)}" mimic')
+        if joint.name not in single:
+            broken[joint.name] = f"a {joint.type} joint has no single value that could follow another"
+        elif joint.mimic.joint not in single:
+            broken[joint.name] = f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
+    ended: set[str] = set()  # joints whose chain was followed to its end
+    for name in single:
+        chain: dict[str, int] = {}
+        here: str | None = name
+        while here is not None and here not in ended and here not in chain:
+            chain[here] = len(chain)
+            mimic = single[here].mimic
+            here = mimic.joint if mimic is not None and here not in broken else None
+        if here in chain:
+            circle = list(chain)[chain[here] :]
+            broken.update({one: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for one in circle})
+        ended.update(chain)
+    return broken
+
+
+def _about_broken(name: str, why: str) -> str:
+    return f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest to it unless a value is given'
 
 
 def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
     """Joint of one coordinate -> (the joint that drives it, multiplier, offset), chains followed to their end."""
     single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
     drivers: dict[str, tuple[str, float, float]] = {}
-    for joint in joints:
-        if joint.mimic is not None and joint.name not in single:
-            raise SceneError(f"a {joint.type} joint has no single value that could follow another", element=f'joint "{joint.name}"')
-    for joint in single.values():
-        here, multiplier, offset, seen = joint, 1.0, 0.0, [joint.name]
-        while here.mimic is not None:
-            mimic = here.mimic
-            element = f'joint "{here.name}" mimic'
-            if not (math.isfinite(mimic.multiplier) and math.isfinite(mimic.offset)):
-                raise SceneError(f"multiplier {mimic.multiplier} and offset {mimic.offset} must be finite", element=element)
-            if mimic.joint not in single:
-                raise SceneError(f'it follows joint "{mimic.joint}", which does not exist or has no single value', element=element)
-            if mimic.joint in seen:
-                raise SceneError(f"joints follow each other in a circle: {' -> '.join([*seen, mimic.joint])}", element=element)
-            offset += multiplier * mimic.offset
-            multiplier *= mimic.multiplier
-            here = single[mimic.joint]
-            seen.append(here.name)
-        drivers[joint.name] = (here.name, multiplier, offset)
+    for name in single:
+        chain = [name]
+        while chain[-1] not in drivers and (mimic := single[chain[-1]].mimic) is not None:
+            chain.append(mimic.joint)
+        drivers.setdefault(chain[-1], (chain[-1], 1.0, 0.0))
+        for here in reversed(chain[:-1]):
+            mimic = single[here].mimic
+            assert mimic is not None
+            driver, multiplier, offset = drivers[mimic.joint]
+            found = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
+            if not all(map(math.isfinite, found)):
+                what = f'along the chain to joint "{cut(driver)}" its multiplier becomes {found[0]:g} and its offset {found[1]:g}'
+                raise SceneError(f"{what}: both must be finite", element=f'joint "{cut(here)}" mimic')
+            drivers[here] = (driver, *found)
     return drivers
 
 
@@ -475,10 +538,10 @@ def _clusters(links: Sequence[str], joints: Sequence[Joint]) -> tuple[tuple[str,
 def _joint_value(name: str, value) -> float:
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"joint {name}: the value must be a number, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidArgument(f"joint {cut(str(name))}: the value must be a number, got {brief(value)}") from None
     if isinstance(value, bool) or not math.isfinite(number):
-        raise InvalidArgument(f"joint {name}: the value must be a finite number, got {value!r}")
+        raise InvalidArgument(f"joint {cut(str(name))}: the value must be a finite number, got {brief(value)}")
     return number
 
 

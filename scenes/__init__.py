@@ -38,13 +38,12 @@ def shipped() -> list[str]:
 
 def path(name: str) -> Path:
     """The file of a shipped scene, to be copied and changed; SceneError lists the names."""
-    from collide.errors import SceneError
+    from collide.errors import SceneError, brief
 
-    for suffix in _SUFFIXES:
-        file = _assets() / (name + suffix)
-        if file.is_file():
+    for file in _assets().iterdir():
+        if file.suffix in _SUFFIXES and file.stem == name:
             return file
-    raise SceneError(f"no shipped scene is called {name!r}; there are {', '.join(shipped())}")
+    raise SceneError(f"no shipped scene is called {brief(name)}; there are {', '.join(shipped())}")
 
 
 def _assets() -> Path:

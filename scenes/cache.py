@@ -23,7 +23,7 @@ import numpy as np
 from collide.cache_folder import cache_folder
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
-VERSION = 2
+VERSION = 3
 
 _log = logging.getLogger(__name__)
 

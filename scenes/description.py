@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.shapes.base import Shape
+from collide.transforms import as_poses
 
 if TYPE_CHECKING:
     from collide.robot import LinkShape, Robot
@@ -62,7 +63,14 @@ class Placement:
         """body name -> (4, 4) pose X_WB."""
         X_WLs = self.robot.link_poses(self.q, self.X_WR)[0]
         at = {link: X_WLs[k] for k, link in enumerate(self.robot.links)}
-        return {name: _posed(at[link], X_LB) for name, (link, X_LB) in self.carried.items()}
+        return {name: self._checked(name, _posed(at[link], X_LB)) for name, (link, X_LB) in self.carried.items()}
+
+    def _checked(self, name: str, X_WB: np.ndarray) -> np.ndarray:
+        """What was multiplied together along the robot; InvalidPose names robot, link and file where it is no pose."""
+        try:
+            return as_poses(X_WB, f'{self.robot.place}: the pose of "{cut(name)}", on link "{cut(self.carried[name][0])}",')[0]
+        except InvalidPose as error:
+            raise InvalidPose(f"{error}; look at the origins of the joints above it and at their values") from None
 
 
 @dataclass
@@ -87,6 +95,8 @@ class Scene:
     seconds: dict[str, float] = field(default_factory=dict)
     placements: dict[str, Placement] = field(default_factory=dict)
     state_notes: list[str] = field(default_factory=list)
+    #: body name -> its source, as far as `add` knows: so that ten thousand bodies are added in one pass
+    _sources: dict[str, str] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def state(self) -> dict[str, float]:
@@ -101,7 +111,7 @@ class Scene:
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise InvalidArgument(f"scene {self.name}: no body {name!r}; it has {', '.join(b.name for b in self.bodies)}")
+        raise InvalidArgument(f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}")
 
     def world(self) -> World:
         """A `collide.World` of these bodies, in their order, with the allowed pairs entered."""
@@ -140,8 +150,7 @@ class Scene:
 
     def _named_state(self, name: str) -> dict[str, float]:
         if name not in self.states:
-            known = ", ".join(self.states) or "none"
-            raise InvalidArgument(f"scene {self.name}: unknown state {name!r}; it has {known}")
+            raise InvalidArgument(f"scene {self.name}: unknown state {brief(name)}; it has {listing(self.states) or 'none'}")
         return self.states[name]
 
     def joint_shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
@@ -154,9 +163,9 @@ class Scene:
         }
         for joint, value in values.items():
             if joint not in owner:
-                known = ", ".join(j for p in self.placements.values() for j in p.robot.joint_names)
+                known = listing(j for p in self.placements.values() for j in p.robot.joint_names)
                 raise InvalidArgument(
-                    f"scene {self.name}: unknown joint {joint!r}; "
+                    f"scene {self.name}: unknown joint {brief(joint)}; "
                     + (f"its robots have {known}" if known else "it has no robot with joints")
                 )
             shares[owner[joint]][joint] = value
@@ -166,14 +175,16 @@ class Scene:
 
     def add(self, body: SceneBody) -> None:
         """A further body; SceneError where the name is taken."""
-        for other in self.bodies:
-            if other.name == body.name:
-                raise SceneError(
-                    f'a body named "{body.name}" exists already, from {other.source or "this scene"}; rename one '
-                    "or give a robot a prefix",
-                    element=body.source or None,
-                )
+        if len(self._sources) != len(self.bodies):  # the list was changed by hand
+            self._sources = {other.name: other.source for other in self.bodies}
+        if body.name in self._sources:
+            raise SceneError(
+                f'a body named "{cut(body.name)}" exists already, from {self._sources[body.name] or "this scene"}; '
+                "rename one or give a robot a prefix",
+                element=body.source or None,
+            )
         self.bodies.append(body)
+        self._sources[body.name] = body.source
 
     def place_robot(
         self,
@@ -191,19 +202,21 @@ class Scene:
         mobile : the base moves too, so that it is tested against static bodies.
         allowed : pairs never tested, by default those of the robot.
         """
-        label = _free_name(name or robot.name, self.robots)
+        label = free_name(name or robot.name, dict.fromkeys(self.robots, 1))
         q, notes = robot.configuration(values or {})
         placement = Placement(robot, X_WR, q, frozenset(values or ()))
         notes += robot.default_notes(placement.given, q)
+        links: dict[str, SceneBody] = {}
         for link in robot.links:
             if link in robot.geometry:
                 body, X_LB = _link_body(link, robot.geometry[link])
                 body.owner, body.static = label, link in robot.base_links and not mobile
                 self.add(body)
+                links[body.name] = body
                 placement.carried[body.name] = (link, X_LB)
         self.robots[label], self.placements[label] = robot, placement
         for body_name, X_WB in placement.body_poses().items():
-            self.body(body_name).X_WB = X_WB
+            links[body_name].X_WB = X_WB
         self.allowed += list(robot.disabled_pairs if allowed is None else allowed)
         self.sources += [source for source in robot.sources if source not in self.sources]
         self.notes += robot.notes + notes
@@ -215,9 +228,8 @@ class Scene:
     def carry(self, owner: str, link: str, body: SceneBody, X_LB: np.ndarray) -> None:
         """A body that moves with a link of a robot in the scene, such as a grasped part."""
         placement = self.placements[owner]
-        X_WL = placement.robot.link_poses(placement.q, placement.X_WR)[0, placement.robot.links.index(link)]
-        self.add(replace(body, X_WB=_posed(X_WL, X_LB), owner=owner, static=False))
         placement.carried[body.name] = (link, X_LB)
+        self.add(replace(body, X_WB=placement.body_poses()[body.name], owner=owner, static=False))
 
 
 def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
@@ -239,11 +251,15 @@ def _posed(X_WL: np.ndarray, X_LB: np.ndarray) -> np.ndarray:
     return X_WL.copy() if np.array_equal(X_LB, np.eye(4)) else X_WL @ X_LB
 
 
-def _free_name(name: str, taken: Iterable[str]) -> str:
-    """``name``, or the first of name_2, name_3, ... that is not taken."""
-    taken = set(taken)
-    free, k = name, 1
+def free_name(name: str, taken: dict[str, int]) -> str:
+    """``name``, or the first of name_2, name_3, ... that is not taken; it is then.
+
+    taken : name -> the last number tried for it, so that n equal names take n steps.
+    """
+    free, k = name, taken.get(name, 0)
     while free in taken:
         k += 1
-        free = f"{name}_{k}"
+        free = f"{name}_{k}" if k > 1 else name
+    taken[name] = max(k, 1)
+    taken.setdefault(free, 1)
     return free

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import InvalidArgument, InvalidPose, SceneError
 from collide.robot import Joint, LinkShape, Mimic, Robot
 from collide.shapes import Sphere
 from collide.transforms import pose
@@ -173,7 +173,7 @@ def test_refused_configurations(q, message):
 @pytest.mark.parametrize(
     ("links", "joints", "message"),
     [
-        (["a", "b", "a"], [], r'link "a": the name is used twice \(entries 0 and 2\)'),
+        (["a", "b", "a"], [], r'link "a": the name is used twice \(links 0 and 2\)'),
         (["a", "b"], [], r"2 links have no parent \(a, b\)"),
         (["a"], [Joint("j", "fixed", "a", "z")], 'joint "j": its child is link "z", which the robot does not have'),
         (["a", "b"], [Joint("j", "glide", "a", "b")], 'joint "j": unknown type "glide"; known are revolute'),
@@ -181,15 +181,109 @@ def test_refused_configurations(q, message):
         (["r", "a", "b"], [Joint("j", "fixed", "a", "b"), Joint("k", "fixed", "b", "a")], "the joints make a cycle, .*a.*b"),
         (["a"], [Joint("j", "fixed", "a", "a")], "cycle, a -> a"),
         (["a", "b"], [Joint("j", "revolute", "a", "b", axis=(0, 0, 0))], r'joint "j": axis \[0.0, 0.0, 0.0\] has length 0'),
-        (["a", "b"], [Joint("j", "revolute", "a", "b", mimic=Mimic("j"))], 'joint "j" mimic: joints follow each other in a circle'),
-        (["a", "b"], [Joint("j", "revolute", "a", "b", mimic=Mimic("k"))], 'it follows joint "k", which does not exist'),
-        (["a", "b"], [Joint("j", "planar", "a", "b", axis=(0, 0, 1), mimic=Mimic("j"))], "no single value"),
+        (["a", "b"], [Joint("j", "revolute", "a", "b", mimic=Mimic("j", np.inf))], 'joint "j" mimic: multiplier inf'),
+        (
+            ["a", "b", "c", "d"],
+            [Joint("j", "revolute", "a", "b"), Joint("k", "revolute", "b", "c", mimic=Mimic("j", 1e200)),
+             Joint("l", "revolute", "c", "d", mimic=Mimic("k", 1e200))],
+            'joint "l" mimic: along the chain to joint "j" its multiplier becomes inf',
+        ),
         ([], [], "no links"),
     ],
 )
 def test_refused_trees(links, joints, message):
     with pytest.raises(SceneError, match=message):
         Robot("r", links, joints)
+
+
+def chain(*mimics: Mimic | None, kind: str = "revolute", **options) -> Robot:
+    """A chain of joints j0, j1, ... about z, each 1 m above the last."""
+    up = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]])
+    joints = [Joint(f"j{k}", kind, f"l{k}", f"l{k + 1}", up, np.array([1.0, 0, 0]), -2.0, 2.0, mimic) for k, mimic in enumerate(mimics)]
+    return Robot("arm", [f"l{k}" for k in range(len(mimics) + 1)], joints, **options)
+
+
+@pytest.mark.parametrize(
+    ("mimics", "free", "why"),
+    [
+        ((None, Mimic("gone", 2.0)), ("j0", "j1"), {"j1": 'it mimics joint "gone", which does not exist'}),
+        ((Mimic("j0"), None), ("j0", "j1"), {"j0": "joints mimic each other in a circle, j0 -> j0"}),
+        ((Mimic("j1"), Mimic("j2"), Mimic("j0"), Mimic("j2", -1.0, 0.5)), ("j0", "j1", "j2"), dict.fromkeys(("j0", "j1", "j2"), "in a circle")),
+    ],
+)
+def test_a_broken_mimic_joint_is_a_joint_of_its_own_and_noted(mimics, free, why):
+    robot = chain(*mimics, sources=["/models/arm.urdf"], notes=["first"])
+    assert robot.joint_names == free and robot.notes[0] == "first" and len(robot.notes) == 1 + len(why)
+    for note in robot.notes[1:]:
+        joint = note.split('"')[1]
+        assert note.startswith(f'arm.urdf: joint "{joint}": ') and why.pop(joint) in note and "a joint of its own" in note
+    q, notes = robot.configuration({name: 0.25 for name in free})
+    assert notes == [] and robot.joint_value(free[-1], q) == 0.25
+    if len(mimics) == 4:
+        assert robot.joint_value("j3", q) == 0.25  # what follows a joint of the circle follows it still
+    assert robot.renamed("left_").notes == robot.notes
+
+
+def test_a_planar_joint_cannot_follow():
+    robot = chain(None, Mimic("j0"), kind="planar")
+    assert robot.dof == 6 and "a planar joint has no single value" in robot.notes[0]
+
+
+def test_links_that_leave_the_range_of_poses_are_named():
+    """By a mimic's multiplier, by values, by origins: an error with file, link and joint, and no warning of numpy's."""
+    robot = chain(None, Mimic("j0", 1e308), kind="revolute", sources=["a.urdf"])
+    with pytest.raises(InvalidPose, match=r'^a\.urdf: robot arm: link "l2" stands at .*joint "j1", which follows j0, and at its value = inf'):
+        robot.link_poses([[0.0], [100.0]])
+    robot = chain(None, None, kind="prismatic")
+    with pytest.raises(InvalidPose, match=r'robot arm: link "l1" stands at \[1e\+60, 0\.0, 1\.0\].*joint "j0" and at its value = 1e\+60'):
+        robot.link_poses([1e60, 1.0])
+    far = np.eye(4)
+    far[0, 3] = 7e49
+    joints = [Joint("j", "fixed", "a", "b", far), Joint("k", "fixed", "b", "c", far)]
+    with pytest.raises(InvalidPose, match='link "c" stands at'):
+        Robot("r", ["a", "b", "c"], joints).link_poses([])
+    for kind, values in (("floating", [1e308] * 6), ("planar", [1e308] * 3)):
+        with pytest.raises(InvalidPose, match='link "l1"'):
+            chain(None, kind=kind).link_poses(values)
+
+
+def test_an_axis_of_any_length_is_a_direction():
+    for length in (1e-8, 1.0, 1e200, 1.7e308):
+        robot = Robot("r", ["a", "b"], [Joint("j", "prismatic", "a", "b", axis=np.array([0.0, length, 0.0]))])
+        assert robot.joints[0].axis.tolist() == [0, 1, 0]
+
+
+class Counted(str):
+    """A name that counts how often names are compared: lists compare one by one, dictionaries hardly ever."""
+
+    comparisons = 0
+
+    def __eq__(self, other):
+        Counted.comparisons += 1
+        return str.__eq__(self, other)
+
+    __hash__ = str.__hash__
+
+
+@pytest.mark.parametrize("order", ["root first", "root last", "star"])
+@pytest.mark.parametrize("mimic", [False, True])
+def test_trees_are_read_in_one_pass(order, mimic):
+    def comparisons(n: int) -> int:
+        links = [Counted(f"l{k}") for k in range(n + 1)]
+        joints = [
+            Joint(
+                Counted(f"j{k}"), "revolute", Counted("l0" if order == "star" else f"l{k}"), Counted(f"l{k + 1}"),
+                mimic=Mimic(Counted(f"j{k - 1}")) if mimic and k else None,
+            )
+            for k in range(n)
+        ]
+        Counted.comparisons = 0
+        Robot("r", links[:: -1 if order == "root last" else 1], joints[:: -1 if order == "root last" else 1])
+        return Counted.comparisons
+
+    few, many = comparisons(100), comparisons(200)
+    assert 200 < few and many < 2.2 * few, (few, many)
+
 
 
 def test_geometry_of_an_unknown_link():

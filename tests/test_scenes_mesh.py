@@ -114,7 +114,7 @@ def test_pieces_of_a_convex_mesh_are_its_hull(tmp_path):
 def test_messages_about_files_cut_short_and_numbers_out_of_range(tmp_path):
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "box.stl")
     (tmp_path / "cut.stl").write_bytes((tmp_path / "box.stl").read_bytes()[:-37])
-    with pytest.raises(SceneError, match=r"cut\.stl: has no vertices.*cut short"):
+    with pytest.raises(SceneError, match=r"cut\.stl: its header says 12 facets, but the file holds 11\.26: it was cut short"):
         load(tmp_path / "cut.stl")
     (tmp_path / "big.obj").write_text("v 0 0 0\nv 1e60 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(SceneError, match=r"big\.obj: Mesh: vertices\[1, 0\] is 1e\+60") as refusal:
@@ -169,7 +169,7 @@ def test_several_files_and_repeated_names(tmp_path):
         ("a.obj", b"# nothing\n", "a.obj"),
         ("a.glb", b"glTF" + bytes(40), "a.glb"),
         ("a.gltf", b"{", "is not glTF"),
-        ("a.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "coordinates must be finite"),
+        ("a.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: a coordinate must be a finite number, got 'nan'"),
         ("a.3ds", b"", "unknown format '.3ds'; known are URDF"),
     ],
 )
@@ -240,9 +240,10 @@ def test_unwritable_cache(tmp_path, monkeypatch):
 
 def test_warm_load_imports_no_mesh_library(tmp_path):
     """In a fresh process, a robot whose meshes are prepared needs neither trimesh nor its company."""
-    l_shape().export(tmp_path / "l.stl")
+    pytest.importorskip("collada")
+    l_shape().export(tmp_path / "l.dae")
     (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"><collision><geometry><mesh filename="l.stl"/></geometry></collision></link></robot>'
+        '<robot name="r"><link name="a"><collision><geometry><mesh filename="l.dae"/></geometry></collision></link></robot>'
     )
     program = (
         "import json, sys\n"

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from collide import scenes
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.robot import Robot
-from collide.scenes.description import Scene, SceneBody
+from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh as mesh_loader
 from collide.scenes.loaders.documents import read_document
+from collide.scenes.loaders.files import starts_like_xml
 
 FORMATS = (
     "URDF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
@@ -80,19 +81,28 @@ def _paths(package_path) -> list[Path]:
 
 def _resolve(path) -> Path:
     """The file meant: a path, or the bare name of a shipped scene."""
+    if not str(path):
+        raise SceneError("the name of a scene is empty: give a file, or the name of a shipped scene")
     file = Path(path)
-    if file.exists():
+    if _exists(file):
         return file
     if str(path) in scenes.shipped():
         return scenes.path(str(path))
     if file.suffix or len(file.parts) > 1:
-        raise SceneError("no such file", path=path)
-    raise SceneError(f"no such file, and no shipped scene of that name; there are {', '.join(scenes.shipped())}", path=path)
+        raise SceneError("no such file", path=cut(str(path), LONGEST_PLACE))
+    raise SceneError(f"no such file, and no shipped scene of that name; there are {', '.join(scenes.shipped())}", path=cut(str(path), LONGEST_PLACE))
+
+
+def _exists(file: Path) -> bool:
+    try:
+        return file.exists()
+    except (OSError, ValueError):  # a name longer than any file's, or with a zero in it
+        return False
 
 
 def _in_state(scene: Scene, state: str | Path | Mapping[str, float]) -> Scene:
     """The scene with its robots at a named state, at values, or at the values in a file."""
-    if isinstance(state, Path) or (isinstance(state, str) and state not in scene.states and Path(state).exists() and not Path(state).is_dir()):
+    if isinstance(state, Path) or (isinstance(state, str) and state not in scene.states and _exists(Path(state)) and not Path(state).is_dir()):
         from collide.scenes.loaders.states import read_state
 
         path, state = state, read_state(state)
@@ -113,17 +123,9 @@ def _load_one(path: Path, options: Options) -> Scene:
         raise SceneError(f"is a folder; name a file in it. Known formats: {FORMATS}", path=path)
     if suffix in (".yaml", ".yml", ".json"):
         return _load_document(path, options)
-    if suffix in (".urdf", ".xml", ".xacro", ".srdf", ".sdf", ".mjcf", ".world") or _starts_like_xml(path):
+    if suffix in (".urdf", ".xml", ".xacro", ".srdf", ".sdf", ".mjcf", ".world") or starts_like_xml(path):
         return _load_xml(path, options)
     raise SceneError(f"unknown format {path.suffix!r}; known are {FORMATS}", path=path)
-
-
-def _starts_like_xml(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(256).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
-    except OSError:
-        return False
 
 
 def _load_xml(path: Path, options: Options) -> Scene:
@@ -176,28 +178,26 @@ def load_meshes(path: Path, options: Options) -> Scene:
     started = time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))
+    names: dict[str, int] = {}
     for part in file.parts:
         source = f"{path}: {part.name}"
         shape, approximation = part_shape(part, scale, source)
         note = mesh_loader.size_note(float(np.ptp(part.points, axis=0).max()) * abs(scale), source)
         scene.notes += [note] if note else []
-        scene.add(SceneBody(_free(part.name, scene), shape, np.eye(4), source=source, approximation=approximation))
+        scene.add(SceneBody(free_name(part.name, names), shape, np.eye(4), source=source, approximation=approximation))
     scene.seconds["meshes"] = time.perf_counter() - started
     return scene
-
-
-def _free(name: str, scene: Scene) -> str:
-    taken = {body.name for body in scene.bodies}
-    return next(free for free in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if free not in taken)
 
 
 def _together(parts: list[Scene]) -> Scene:
     """Several scenes as one; a mesh whose name is taken is numbered, anything else must be renamed."""
     whole = Scene(" + ".join(part.name for part in parts))
+    names: dict[str, int] = {}
     for part in parts:
         for body in part.bodies:
             if body.owner is None and not part.robots and len(part.sources) == 1 and Path(part.sources[0]).suffix.lower() in mesh_loader.SUFFIXES:
-                body = replace(body, name=_free(body.name, whole))
+                body = replace(body, name=free_name(body.name, names))
+            names.setdefault(body.name, 1)
             whole.add(body)
         for name in part.robots:
             if name in whole.robots:

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from collide.errors import InvalidPose, SceneError
+from collide.errors import LONGEST_MESSAGE, LONGEST_PLACE, InvalidPose, SceneError, brief, cut
 from collide.transforms import as_poses, pose
 
 
@@ -26,13 +26,18 @@ class Fields:
         known = tuple(known)
         for key in data:
             if known and key not in known:
-                self.fail(f"unknown key {key!r}{did_you_mean(key, known)}; known keys are {', '.join(known)}")
+                self.fail(f"unknown key {brief(key)}{did_you_mean(key, known)}; known keys are {', '.join(known)}")
 
     def __contains__(self, key: str) -> bool:
         return key in self.data
 
     def get(self, key: str, default: Any = None) -> Any:
         return self.data.get(key, default)
+
+    def named(self, name: str) -> Fields:
+        """This mapping, its place told with its name: ``bodies[3] "mug"``."""
+        self.element = f'{self.element} "{cut(name)}"'
+        return self
 
     def place(self, key: str) -> str:
         return f"{self.element}.{key}" if self.element else key
@@ -51,6 +56,14 @@ class Fields:
         if not isinstance(value, list):
             self.fail(f"must be a list, got {brief(value)}", key)
         return [(entry, f"{self.place(key)}[{k}]") for k, entry in enumerate(value)]
+
+    def words(self, key: str) -> list[str]:
+        """A list of names; an absent or empty key gives none."""
+        found = self.items(key)
+        for word, place in found:
+            if isinstance(word, bool) or not isinstance(word, (str, int)):
+                raise SceneError(f"must be a name, got {brief(word)}", path=self.path, element=place)
+        return [str(word) for word, _ in found]
 
     def text(self, key: str, default: str | None = None) -> str:
         value = self.data.get(key, default)
@@ -89,7 +102,7 @@ class Fields:
             self.fail(f"must be a number, got {brief(value)}", key)
         number = _to_float(value)
         if not math.isfinite(number):
-            self.fail(f"must be a finite number, got {value!r}", key)
+            self.fail(f"must be a finite number, got {brief(value)}", key)
         return number
 
     def numbers(self, key: str, shape: tuple[int | None, ...]) -> np.ndarray:
@@ -97,6 +110,8 @@ class Fields:
         if key not in self.data:
             self.fail(f"{key!r} is missing")
         shown = " × ".join("N" if n is None else str(n) for n in shape)
+        if stranger := _no_number(self.data[key], len(shape)):
+            self.fail(f"must be {shown} numbers, got {stranger}", key)
         try:
             array = np.array(self.data[key], dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -133,7 +148,12 @@ def read_pose(parent: Fields, key: str, metres: float = 1.0) -> np.ndarray:
             return pose(xyz, quat_wxyz=fields.numbers("quat_xyzw", (4,))[[3, 0, 1, 2]])
         return pose(xyz)
     except InvalidPose as error:
-        raise InvalidPose(f"{fields.path}: {fields.element}: {error}") from None
+        raise InvalidPose(placed(error, fields.path, fields.element)) from None
+
+
+def placed(error: Exception, path: object, element: str) -> str:
+    """A message with the place it is about before it."""
+    return f"{path}: {cut(element, LONGEST_PLACE)}: {cut(str(error), LONGEST_MESSAGE)}"
 
 
 def _matrix(fields: Fields, metres: float) -> np.ndarray:
@@ -166,14 +186,25 @@ def scaled(values, metres: float):
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(str(word), list(known), n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
+    close = difflib.get_close_matches(cut(str(word)), [str(name) for name in known], n=1)
+    return f" (did you mean {brief(close[0])}?)" if close else ""
 
 
-def brief(value: Any) -> str:
-    """A value for a message, cut where it is long."""
-    shown = repr(value)
-    return shown if len(shown) <= 80 else shown[:77] + "..."
+def _no_number(value: Any, depth: int) -> str:
+    """What stands among numbers and is none, in words; lists are ``depth`` deep. Empty where all are numbers.
+
+    numpy would take the text "1.5" and the truth value true as numbers.
+    """
+    if isinstance(value, np.ndarray):
+        return ""
+    if depth and isinstance(value, (list, tuple)):
+        kinds = set(map(type, value)) - {float, int}
+        return next(filter(None, (_no_number(entry, depth - 1) for entry in value)), "") if kinds else ""
+    if not depth and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return ""
+    if isinstance(value, str) and not depth:
+        return f"the text {brief(value)}; numbers stand without quotes"
+    return brief(value)
 
 
 def _listing(known: Iterable[str]) -> str:

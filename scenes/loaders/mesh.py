@@ -1,4 +1,4 @@
-"""Mesh files: read once by trimesh, looked at, and kept as arrays (`collide.scenes.cache`).
+"""Mesh files: read once, looked at, and kept as arrays (`collide.scenes.cache`).
 
 Afterwards neither trimesh nor scipy nor a compiler is imported. `mesh_shapes.py` makes shapes of what is read here.
 """
@@ -16,8 +16,7 @@ import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import cache
-from collide.scenes.loaders.documents import read_bytes
-from collide.scenes.loaders.triangles import SUFFIXES, read_triangles
+from collide.scenes.loaders.triangles import SUFFIXES, MeshBytes, open_mesh, triangles_of
 from collide.shapes.base import Shape
 
 #: What a mesh may become: itself, the hull of its vertices, or a union of convex pieces.
@@ -59,22 +58,20 @@ class MeshFile:
 
 
 def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
-    """The meshes of a file, from the cache of prepared inputs or through trimesh.
+    """The meshes of a file, from the cache of prepared inputs or by its reader.
 
     meshes : "mesh" for the triangles, "hull", or "pieces" for a convex decomposition of every mesh.
     """
     check_meshes_option(meshes)
     if path.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format {path.suffix!r}; known are {', '.join(SUFFIXES)}", path=path)
-    blobs = [read_bytes(path)]
-    if path.suffix.lower() == ".gltf":
-        blobs += _gltf_buffers(blobs[0], path)
+    opened = open_mesh(path)
     # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
     known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
-    entry = cache.key(blobs, {"meshes": meshes, "suffix": path.suffix.lower(), "volumes": known})
+    entry = cache.key(opened.blobs, {"meshes": meshes, "suffix": opened.suffix, "volumes": known})
     file = _kept(entry)
     if file is None:
-        file, raw = _read_with_trimesh(path, meshes == "mesh")
+        file, raw = _read(opened, meshes == "mesh")
         if meshes == "pieces":
             for part, (vertices, faces) in zip(file.parts, raw):
                 part.pieces = _decompose(vertices, faces, path)
@@ -111,14 +108,13 @@ def size_note(extent: float, what: str) -> str | None:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _read_with_trimesh(path: Path, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
-    found, notes = read_triangles(path)
-    import trimesh  # what is missing has been told by now
-
+def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
+    found, notes = triangles_of(opened)
+    path, notes = opened.path, list(notes)
     parts, raw = [], []
     for name, vertices, faces in found:
         if len(vertices):
-            part, about = _describe(None if as_it_is else trimesh, name, vertices, faces, path)
+            part, about = _describe(as_it_is, name, vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
@@ -127,7 +123,7 @@ def _read_with_trimesh(path: Path, as_it_is: bool) -> tuple[MeshFile, list[tuple
     return MeshFile(parts, notes), raw
 
 
-def _describe(trimesh, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
+def _describe(as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
     if not np.isfinite(vertices).all():
         row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
         raise SceneError(f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite", path=path)
@@ -143,9 +139,9 @@ def _describe(trimesh, label: str, vertices: np.ndarray, faces: np.ndarray, path
         notes.append(f"{len(vertices) - len(used)} vertices that no face uses were left out")
     if not len(faces):
         notes.append("has points but no faces; their hull was taken")
-    elif trimesh is None:
+    elif as_it_is:
         return _as_it_is(label, vertices, faces, path), notes
-    closed, fill = _volumes(trimesh, vertices, faces)
+    closed, fill = _volumes(vertices, faces, path)
     return MeshPart(label, distinct(vertices[used]), fill, closed, len(faces)), notes
 
 
@@ -164,10 +160,14 @@ def distinct(vertices: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(vertices[np.sort(first)] + 0.0)
 
 
-def _volumes(trimesh, vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float]:
+def _volumes(vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[bool, float]:
     """Whether the mesh is closed, and its volume over that of its hull (NaN where unknown)."""
     if len(faces) < 4:
         return False, np.nan
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingExtra("trimesh", extra="robots", purpose=f"compare the mesh {path.name} with its hull") from None
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.merge_vertices()
     if not (mesh.is_watertight and mesh.is_winding_consistent):
@@ -193,16 +193,6 @@ def _decompose(vertices: np.ndarray, faces: np.ndarray, path: Path) -> list[np.n
     if not pieces:
         raise SceneError("the convex decomposition found no piece; use its hull instead", path=path)
     return pieces
-
-
-def _gltf_buffers(blob: bytes, path: Path) -> list[bytes]:
-    """The files a glTF text refers to: they are part of it, for the cache."""
-    try:
-        buffers = json.loads(blob).get("buffers", [])
-        names = [str(buffer["uri"]) for buffer in buffers if "uri" in buffer]
-    except (ValueError, AttributeError, TypeError, KeyError):
-        raise SceneError("is not glTF: its text is not JSON with a list of buffers", path=path) from None
-    return [read_bytes(path.parent / name) for name in names if not name.startswith("data:")]
 
 
 # --- arrays for the cache -------------------------------------------------------------------------

@@ -36,12 +36,30 @@ def part_shape(part: MeshPart, scale, place: str) -> Taken:
     factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
     try:
         if part.pieces is not None and not _is_convex(part):
-            return Taken(_union([ConvexHull(points * factors) for points in part.pieces]), _about_pieces(part))
+            return Taken(_union([ConvexHull(_times(points, factors)) for points in part.pieces]), _about_pieces(part))
         if part.facets is not None:
             return Taken(_as_it_is(part, factors), None)
-        return Taken(ConvexHull(part.points * factors), _about_hull(part))
+        return Taken(ConvexHull(_times(part.points, factors)), _about_hull(part))
     except InvalidShape as error:
         raise InvalidShape(f"{place}: {error}") from None
+
+
+def mirrors(scale) -> bool:
+    """Whether factors turn a mesh into its mirror image; their product could leave the range of numbers."""
+    return bool(np.prod(np.sign(scale)) < 0.0)
+
+
+def extent(file: MeshFile, scale) -> float:
+    """The longest side of the box around all meshes of a file, times their scale."""
+    points = _times(np.concatenate([part.points for part in file.parts]), scale)
+    with np.errstate(invalid="ignore"):
+        return float(np.ptp(points, axis=0).max())
+
+
+def _times(points: np.ndarray, factors) -> np.ndarray:
+    """Points scaled; what becomes infinite is refused by the shape made of them."""
+    with np.errstate(over="ignore"):
+        return points * factors
 
 
 def element_shapes(file: MeshFile, scale, place: str) -> list[Taken]:
@@ -118,7 +136,7 @@ def _scaled(part: MeshPart, factors: np.ndarray) -> Shape:
     if (factors == factor).all() and factor > 0.0:
         mesh = base.scaled(factor)
     else:
-        mesh = Mesh(part.points * factors, facets if np.prod(factors) > 0.0 else facets[:, ::-1])
+        mesh = Mesh(_times(part.points, factors), facets[:, ::-1] if mirrors(factors) else facets)
     exact = (np.abs(np.frexp(factors)[0]) == 0.5).all()
     convex = part.own_hull if exact else mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
     return ConvexHull(mesh.vertices) if convex else mesh

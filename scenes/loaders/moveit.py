@@ -14,18 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import InvalidPose, InvalidShape, SceneError
+from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
-from collide.scenes.loaders.fields import Fields, brief, did_you_mean
+from collide.scenes.loaders.fields import Fields, did_you_mean, placed
+from collide.scenes.loaders.files import head
 from collide.scenes.loaders.mesh_shapes import inline_shape
 from collide.scenes.loaders.states import state_of
 from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Halfspace, Sphere
-from collide.transforms import pose
+from collide.transforms import as_poses, pose
 
 ALLOWED = "allowed by the scene"
 #: shape_msgs/SolidPrimitive: type -> (name, how many dimensions)
@@ -46,7 +47,7 @@ def load_planning_scene(
     robot : a `Robot` or the path of its URDF; None looks for it near the scene file.
     """
     fields = Fields(data, path)
-    scene = Scene(str(data.get("name") or path.stem), sources=[str(path)])
+    scene = Scene(fields.text("name") if data.get("name") else path.stem, sources=[str(path)])
     model = fields.text("robot_model_name")
     if not isinstance(robot, Robot):
         file = Path(robot) if robot is not None else find_robot(model, path)
@@ -89,7 +90,7 @@ def find_robot(model: str, scene_path: Path) -> Path:
             return min(matching, key=lambda file: (not file.with_suffix(".srdf").is_file(), len(file.name)))
     searched = ", ".join(map(str, folders)) or "no folder called robots above the scene file or the current directory"
     raise SceneError(
-        f"it needs the URDF of robot {model!r}, which is not in the file and was not found ({searched}); "
+        f"it needs the URDF of robot {brief(model)}, which is not in the file and was not found ({searched}); "
         "say where it is with robot= (--robot path.urdf)",
         path=scene_path, element="robot_model_name",
     )
@@ -97,12 +98,8 @@ def find_robot(model: str, scene_path: Path) -> Path:
 
 def _described_robot(file: Path) -> str | None:
     """The name in a URDF's <robot> tag, from its first bytes."""
-    try:
-        with file.open("rb") as stream:
-            head = stream.read(4096).decode("utf-8", errors="replace")
-    except OSError:
-        return None
-    tag = re.search(r"<robot\b[^>]*?\bname\s*=\s*[\"']([^\"']*)", head)
+    start = head(file, 4096).decode("utf-8", errors="replace")
+    tag = re.search(r"<robot\b[^>]*?\bname\s*=\s*[\"']([^\"']*)", start)
     return tag.group(1) if tag else None
 
 
@@ -139,9 +136,9 @@ def _robot_state(state: Fields, robot: Robot, scene: Scene, X_WR: np.ndarray) ->
     known = {joint.name for joint in robot.joints} | set(robot.joint_names)
     strangers = [joint for joint in given if joint not in known]
     if strangers and len(strangers) == len(given):
-        state.fail(f"none of the joints {', '.join(strangers)} is known; robot {robot.name} has {', '.join(robot.joint_names)}")
+        state.fail(f"none of the joints {listing(strangers)} is known; robot {robot.name} has {listing(robot.joint_names)}")
     if strangers:
-        scene.notes.append(f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {', '.join(strangers)}")
+        scene.notes.append(f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {listing(strangers)}")
     multi = state.get("multi_dof_joint_state")
     if isinstance(multi, dict) and multi.get("joint_names"):
         transforms = Fields(multi, state.path, state.place("multi_dof_joint_state")).items("transforms")
@@ -181,7 +178,7 @@ def _pose(fields: Fields, position: str = "position", orientation: str = "orient
     try:
         return pose(p, quat_wxyz=q[[3, 0, 1, 2]]) if q.any() else pose(p)
     except InvalidPose as error:
-        raise InvalidPose(f"{fields.path}: {fields.element}: {error}") from None
+        raise InvalidPose(placed(error, fields.path, fields.element)) from None
 
 
 def _transform(fields: Fields) -> np.ndarray:
@@ -210,7 +207,7 @@ class _Frames:
         frame = str(header.get("frame_id") or "") if isinstance(header, dict) else ""
         frame = frame.lstrip("/")
         if frame not in self.known:
-            fields.fail(f"unknown frame {frame!r}; known are {', '.join(filter(None, self.known))}", "header.frame_id")
+            fields.fail(f"unknown frame {brief(frame)}; known are {listing(filter(None, self.known))}", "header.frame_id")
         return self.known[frame]
 
 
@@ -222,16 +219,24 @@ def _add_objects(fields: Fields, scene: Scene, frames: _Frames, meshes: str) -> 
     for entry, place in world.items("collision_objects") if world else ():
         thing = Fields(entry, fields.path, place)
         name = thing.text("id")
-        thing.element = f'{place} "{name}"'
+        thing.named(name)
         if thing.get("operation", 0) in (1, "REMOVE", "remove"):
             continue
         X_WO = frames.pose(thing) @ (_pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4))
         shape, X_OS, approximation = object_shape(thing, meshes)
         scene.add(
             SceneBody(
-                name, shape, X_WO @ X_OS, static=True, source=f"{fields.path}: {thing.element}", approximation=approximation
+                name, shape, _in_world(X_WO @ X_OS, thing), static=True, source=f"{fields.path}: {thing.element}", approximation=approximation
             )
         )
+
+
+def _in_world(X_WB: np.ndarray, thing: Fields) -> np.ndarray:
+    """A pose that was multiplied together; InvalidPose names the object where it left the range of numbers."""
+    try:
+        return as_poses(X_WB, "its pose in the world")[0]
+    except InvalidPose as error:
+        raise InvalidPose(placed(error, thing.path, thing.element)) from None
 
 
 def object_shape(thing: Fields, meshes: str = "mesh") -> tuple[Shape, np.ndarray, str | None]:
@@ -251,7 +256,7 @@ def object_shape(thing: Fields, meshes: str = "mesh") -> tuple[Shape, np.ndarray
             try:
                 shape, approximation = make(Fields(entry, thing.path, place))
             except InvalidShape as error:
-                raise InvalidShape(f"{thing.path}: {place}: {error}") from None
+                raise InvalidShape(placed(error, thing.path, place)) from None
             X = _pose(Fields(places[k][0], thing.path, f"{thing.element}.{poses}[{k}]")) if k < len(places) else np.eye(4)
             items.append((shape, X))
             about += [approximation] if approximation else []
@@ -315,14 +320,14 @@ def _add_attached(fields: Fields, scene: Scene, robot: Robot, meshes: str) -> No
         attached = Fields(entry, fields.path, place)
         link = attached.text("link_name")
         if link not in robot.links:
-            attached.fail(f"unknown link {link!r}; robot {robot.name} has {', '.join(robot.links)}", "link_name")
+            attached.fail(f"unknown link {brief(link)}; robot {robot.name} has {listing(robot.links)}", "link_name")
         thing = attached.sub("object", ())
         name = thing.text("id")
         X_LO = _pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4)
         shape, X_OS, approximation = object_shape(thing, meshes)
         body = SceneBody(name, shape, np.eye(4), source=f"{fields.path}: {thing.element}", approximation=approximation)
         scene.carry(robot.name, link, body, X_LO @ X_OS)
-        for toucher in dict.fromkeys((link, *(attached.get("touch_links") or ()))):
+        for toucher in dict.fromkeys((link, *attached.words("touch_links"))):
             if toucher in robot.geometry:
                 scene.allowed.append((name, toucher, "attached to the link"))
 
@@ -337,17 +342,17 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
     robot that it does not name it says nothing: there the robot's own pairs hold, which is noted.
     """
     names = [body.name for body in scene.bodies]
-    matrix = fields.get("allowed_collision_matrix")
     pairs: dict[tuple[str, str], str] = {}
     own = robot.disabled_pairs
-    if isinstance(matrix, dict) and matrix.get("entry_names"):
-        pairs.update({pair: ALLOWED for pair in _matrix_pairs(fields.sub("allowed_collision_matrix", ()), names)})
-        named = {*map(str, matrix["entry_names"]), *map(str, matrix.get("default_entry_names") or [])}
+    matrix = fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
+    if matrix is not None and matrix.get("entry_names"):
+        pairs.update({pair: ALLOWED for pair in _matrix_pairs(matrix, names)})
+        named = {*matrix.words("entry_names"), *matrix.words("default_entry_names")}
         strangers = [link for link in robot.links if link in robot.geometry and link not in named]
         own = [(a, b, reason) for a, b, reason in own if a in strangers or b in strangers]
         if own:
             scene.notes.append(
-                f"{Path(str(fields.path)).name}: the allowed-collision matrix does not name {', '.join(strangers)}; "
+                f"{Path(str(fields.path)).name}: the allowed-collision matrix does not name {listing(strangers)}; "
                 "for these the pairs that the robot itself disables hold"
             )
     for a, b, reason in (*own, *robot.rigid_pairs):
@@ -361,13 +366,12 @@ def _matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
 
     An entry for the pair decides; else the defaults of its members, of which a False wins.
     """
-    entries = [str(name) for name in matrix.get("entry_names")]
-    rows = matrix.get("entry_values") or []
-    rows = [row.get("enabled") if isinstance(row, dict) else row for row in rows]
+    entries = matrix.words("entry_names")
+    rows: list[Any] = [row.get("enabled") if isinstance(row, dict) else row for row, _ in matrix.items("entry_values")]
     if len(rows) != len(entries) or any(not isinstance(row, list) or len(row) != len(entries) for row in rows):
         matrix.fail(f"must hold {len(entries)} rows of {len(entries)} values, one for each of entry_names", "entry_values")
-    default_names = [str(name) for name in matrix.get("default_entry_names") or []]
-    default_values = matrix.get("default_entry_values") or []
+    default_names = matrix.words("default_entry_names")
+    default_values = [value for value, _ in matrix.items("default_entry_values")]
     if len(default_names) != len(default_values):
         matrix.fail(f"must hold one value for each of {len(default_names)} default_entry_names", "default_entry_values")
     index = {name: k for k, name in enumerate(entries)}
@@ -395,6 +399,6 @@ def _note_what_is_ignored(fields: Fields, scene: Scene) -> None:
         for entry, _ in fields.items(key):
             value = entry.get("padding" if key == "link_padding" else "scale") if isinstance(entry, dict) else None
             if value not in (None, neutral):
-                scene.notes.append(f"{key} of {entry.get('link_name')} is {value}: not applied")
+                scene.notes.append(f"{key} of {entry.get('link_name')} is {brief(value)}: not applied")
 
 

@@ -13,7 +13,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
-from collide.errors import SceneError
+from collide.errors import SceneError, brief, cut
+from collide.scenes.loaders.files import is_file
 
 
 class NotFound(SceneError):
@@ -27,35 +28,37 @@ def find(filename: str, beside: Path, package_path: Iterable = (), *, element: s
 
     Raises NotFound (a SceneError) with every place searched, and SceneError for remote files.
     """
-    scheme, rest = _split(filename)
+    scheme, rest = _split(filename, beside, element)
     if scheme in ("package", "model"):
         candidates: Iterable[Path] = _package_candidates(rest, beside, package_path)
     elif scheme in ("", "file"):
         candidates = _plain_candidates(rest, beside, package_path)
     else:
-        raise SceneError(f'"{filename}": files are not fetched over {scheme}; download it first', path=beside, element=element)
-    searched: list[str] = []
+        raise SceneError(f'"{cut(filename)}": files are not fetched over {cut(scheme)}; download it first', path=beside, element=element)
+    searched: dict[str, None] = {}
     for candidate in candidates:
-        if candidate.is_file():
+        if is_file(candidate):
             return candidate
-        if str(candidate) not in searched:
-            searched.append(str(candidate))
+        searched[str(candidate)] = None
     advice = ""
     if scheme == "package":
         advice = "; say where packages lie with package_path (--package-path) or ROS_PACKAGE_PATH"
         if rest.startswith("example-robot-data/"):
             advice = "; it comes with pip install 'collide-robotics[demo]'"
-    places = "".join(f"\n    {place}" for place in searched)
-    raise NotFound(f'cannot find "{filename}"{advice}. Searched:{places}', path=beside, element=element)
+    places = "".join(f"\n    {cut(place, 240)}" for place in searched)
+    raise NotFound(f'cannot find "{cut(filename, 240)}"{advice}. Searched:{places}', path=beside, element=element)
 
 
-def _split(filename: str) -> tuple[str, str]:
+def _split(filename: str, beside: Path, element: str | None) -> tuple[str, str]:
     name = filename.strip().replace("\\", "/")
     if "://" not in name:
         return "", name
     scheme, rest = name.split("://", 1)
     if scheme == "file":
-        rest = unquote(urlsplit(name).path)
+        try:
+            rest = unquote(urlsplit(name).path)
+        except ValueError as error:  # brackets of an address that is none
+            raise SceneError(f"{brief(filename)} is no file:// name: {error}", path=beside, element=element) from None
         # file:///C:/part.stl names C:/part.stl
         rest = rest[1:] if len(rest) > 2 and rest[0] == "/" and rest[2] == ":" else rest
     return scheme.lower(), rest

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from collide.errors import SceneError
+from collide.errors import SceneError, brief, listing
 from collide.robot import COLUMNS, Joint, LinkShape, Mimic, Robot
-from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose
+from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
 from collide.scenes.loaders.shape_yaml import read_shape
 from collide.scenes.loaders.states import state_of
 
@@ -31,7 +31,7 @@ def inline_robot(entry: Fields, metres: float, mesh: Callable) -> Robot:
     for data, place in fields.items("links"):
         link = Fields(data, fields.path, place, _LINK)
         name = link.text("name")
-        link.element = f'{place} "{name}"'
+        link.named(name)
         links.append(name)
         geometry[name] = _collision(link, metres, mesh, notes)
     joints = [_joint(Fields(data, fields.path, place, _JOINT), metres) for data, place in fields.items("joints")]
@@ -62,7 +62,7 @@ def _collision(link: Fields, metres: float, mesh: Callable, notes: list[str]) ->
 
 def _joint(fields: Fields, metres: float) -> Joint:
     name = fields.text("name")
-    fields.element = f'{fields.element} "{name}"'
+    fields.named(name)
     kind = fields.choice("type", COLUMNS, "")
     axis = fields.numbers("axis", (3,)) if "axis" in fields else np.array([0.0, 0.0, 1.0])
     lower, upper = -math.inf, math.inf
@@ -83,26 +83,26 @@ def _joint(fields: Fields, metres: float) -> Joint:
 
 
 def _pairs(fields: Fields, links: list[str]) -> list[tuple[str, str, str]]:
-    pairs = []
+    pairs, known = [], set(links)
     for entry, place in fields.items("allow"):
         if not isinstance(entry, list) or len(entry) not in (2, 3) or not all(isinstance(word, str) for word in entry):
             raise SceneError(f"must be [link, link] or [link, link, reason], got {brief(entry)}", path=fields.path, element=place)
         for link in entry[:2]:
-            if link not in links:
-                raise SceneError(f"unknown link {link!r}{did_you_mean(link, links)}", path=fields.path, element=place)
+            if link not in known:
+                raise SceneError(f"unknown link {brief(link)}{did_you_mean(link, links)}", path=fields.path, element=place)
         pairs.append((entry[0], entry[1], entry[2] if len(entry) == 3 else "allowed by the robot"))
     return pairs
 
 
 def _states(fields: Fields, robot: Robot) -> dict[str, dict[str, float]]:
-    states = {}
+    states, known = {}, set(robot.joint_names)
     for name, data in fields.sub("states", ()).data.items():
         place = f"{fields.place('states')}.{name}"
         values = state_of(data, fields.path, place)
         for joint in values:
-            if joint not in robot.joint_names:
+            if joint not in known:
                 raise SceneError(
-                    f"unknown joint {joint!r}{did_you_mean(joint, robot.joint_names)}; it has {', '.join(robot.joint_names)}",
+                    f"unknown joint {brief(joint)}{did_you_mean(joint, robot.joint_names)}; it has {listing(robot.joint_names)}",
                     path=fields.path, element=place,
                 )
         states[str(name)] = values

@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import InvalidArgument, SceneError, brief, listing
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import resources, shape_yaml, urdf
-from collide.scenes.loaders.documents import read_document
-from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose
-from collide.scenes.loaders.mesh import OPTIONS, read_mesh
+from collide.scenes.loaders.documents import parse_document
+from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
+from collide.scenes.loaders.files import LARGEST_TEXT, MOST_INCLUDED, read_text
+from collide.scenes.loaders.mesh import OPTIONS, MeshFile, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of
 
@@ -28,6 +29,14 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _SCENE = ("collide", "name", "about", "units", "include", "robots", "bodies", "allow", "states")
 _ROBOT = ("urdf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
 _BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
+
+
+@dataclass
+class _Included:
+    """How many files a scene has included so far, and how many characters they have: files that include many multiply."""
+
+    files: int = 0
+    characters: int = 0
 
 
 @dataclass
@@ -42,6 +51,8 @@ class _Building:
     missing_meshes: str
     open_files: tuple[Path, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    included: _Included = field(default_factory=lambda: _Included())
+    mesh_files: dict[tuple[Path, str], MeshFile] = field(default_factory=dict)
 
     def mesh(self, filename: str, place: str, taken: str | None = None):
         """The mesh file that a shape names, read; its time counts as ``meshes``.
@@ -49,8 +60,11 @@ class _Building:
         taken : how the shape itself says that the mesh is taken; else as meshes of the scene are.
         """
         started = time.perf_counter()
-        file = read_mesh(resources.find(filename, self.path, self.package_path, element=place), taken or self.meshes)
-        self.scene.notes += [note for note in file.notes if note not in self.scene.notes]
+        key = resources.find(filename, self.path, self.package_path, element=place), taken or self.meshes
+        if key not in self.mesh_files:
+            self.mesh_files[key] = read_mesh(*key)
+            self.scene.notes += [note for note in self.mesh_files[key].notes if note not in self.scene.notes]
+        file = self.mesh_files[key]
         self.seconds["meshes"] = self.seconds.get("meshes", 0.0) + time.perf_counter() - started
         return file
 
@@ -63,7 +77,8 @@ def build(
     data : the document, as plain data.   path : of the file it came from; names in it are relative to that.
     """
     path = Path(path)
-    scene = Scene(str(data.get("name") or path.stem) if isinstance(data, Mapping) else path.stem)
+    named = isinstance(data, Mapping) and data.get("name")
+    scene = Scene(Fields(data, path).text("name") if named else path.stem)
     _build_into(_Building(scene, path, 1.0, meshes, tuple(package_path), missing_meshes, seconds=scene.seconds), data)
     return scene
 
@@ -83,8 +98,9 @@ def _build_into(building: _Building, data: Any) -> None:
         _add_robot(building, Fields(entry, building.path, place, _ROBOT))
     for entry, place in document.items("bodies"):
         _add_body(building, Fields(entry, building.path, place, _BODY))
+    names = {body.name: None for body in scene.bodies}
     for entry, place in document.items("allow"):
-        scene.allowed.append(_allowed_pair(document, entry, place, scene))
+        scene.allowed.append(_allowed_pair(document, entry, place, names))
     if document.get("states") is not None:
         _add_states(document, scene)
 
@@ -97,17 +113,20 @@ def _include(building: _Building, entry: Any, place: str) -> None:
     if file.resolve() in chain:
         names = " -> ".join(one.name for one in (*chain, file))
         raise SceneError(f"files include each other in a circle: {names}", path=building.path, element=place)
-    inner = _Building(
-        building.scene, file, 1.0, building.meshes, building.package_path, building.missing_meshes, chain, building.seconds
-    )
-    _build_into(inner, read_document(file))
+    text, so_far = read_text(file), building.included
+    so_far.files, so_far.characters = so_far.files + 1, so_far.characters + len(text)
+    for number, most, of_what in ((so_far.files, MOST_INCLUDED, "files"), (so_far.characters, LARGEST_TEXT, "characters")):
+        if number > most:
+            what = f"with this the scene includes more than {most:,} {of_what}, repeats counted: put their bodies in one file"
+            raise SceneError(what, path=building.path, element=place)
+    _build_into(replace(building, path=file, metres=1.0, open_files=chain), parse_document(text, file))
 
 
 # --- robots -------------------------------------------------------------------------------------
 
 
 def _add_robot(building: _Building, entry: Fields) -> None:
-    robot = _read_robot(building, entry).renamed(str(entry.get("prefix") or ""))
+    robot = _read_robot(building, entry).renamed(_prefix(entry))
     name = entry.text("name", robot.name)
     X_WR = read_pose(entry, "pose", building.metres)
     mobile = entry.choice("base", ("fixed", "mobile"), "fixed") == "mobile"
@@ -118,6 +137,10 @@ def _add_robot(building: _Building, entry: Fields) -> None:
         entry.fail(str(error), "state")
     except SceneError as error:
         raise SceneError(error.what, path=building.path, element=entry.element) from None
+
+
+def _prefix(entry: Fields) -> str:
+    return entry.text("prefix") if entry.get("prefix") else ""
 
 
 def _read_robot(building: _Building, entry: Fields) -> Robot:
@@ -131,7 +154,7 @@ def _read_robot(building: _Building, entry: Fields) -> Robot:
     srdf = entry.get("srdf")
     if isinstance(srdf, str):
         srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
-    elif srdf not in (None, False):
+    elif srdf is not None and srdf is not False:
         entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
     file = resources.find(entry.text("urdf"), building.path, building.package_path, element=entry.place("urdf"))
     return urdf.load_robot(
@@ -147,16 +170,16 @@ def _robot_state(entry: Fields, robot: Robot) -> dict[str, float]:
         return {}
     if isinstance(state, str):
         if state not in robot.states:
-            entry.fail(f"unknown state {state!r}{did_you_mean(state, robot.states)}; known are {', '.join(robot.states) or 'none'}", "state")
+            entry.fail(f"unknown state {brief(state)}{did_you_mean(state, robot.states)}; known are {listing(robot.states) or 'none'}", "state")
         return dict(robot.states[state])
-    prefix = str(entry.get("prefix") or "")
+    prefix = _prefix(entry)
     known = set(robot.joint_names) | {joint.name for joint in robot.joints}
     values = {}
     for joint, value in state_of(state, entry.path, entry.place("state")).items():
         full = joint if joint in known else prefix + joint
         if full not in known:
             entry.fail(
-                f"unknown joint {joint!r}{did_you_mean(joint, known)}; robot {robot.name} has {', '.join(robot.joint_names)}",
+                f"unknown joint {brief(joint)}{did_you_mean(joint, known)}; robot {robot.name} has {listing(robot.joint_names)}",
                 "state",
             )
         values[full] = value
@@ -168,7 +191,7 @@ def _robot_state(entry: Fields, robot: Robot) -> dict[str, float]:
 
 def _add_body(building: _Building, entry: Fields) -> None:
     name = entry.text("name")
-    entry.element = f'{entry.element} "{name}"'
+    entry.named(name)
     if "shape" not in entry:
         entry.fail("'shape' is missing")
     described = shape_yaml.read_shape(entry.data["shape"], entry.path, entry.place("shape"), building.metres, building.mesh)
@@ -182,14 +205,13 @@ def _add_body(building: _Building, entry: Fields) -> None:
     building.scene.notes += described.notes
 
 
-def _allowed_pair(document: Fields, entry: Any, place: str, scene: Scene) -> tuple[str, str, str]:
+def _allowed_pair(document: Fields, entry: Any, place: str, names: Mapping[str, None]) -> tuple[str, str, str]:
     if not isinstance(entry, list) or len(entry) not in (2, 3) or not all(isinstance(word, str) for word in entry):
         raise SceneError(f"must be [body, body] or [body, body, reason], got {brief(entry)}", path=document.path, element=place)
-    names = [body.name for body in scene.bodies]
     for name in entry[:2]:
         if name not in names:
             raise SceneError(
-                f"no body is called {name!r}{did_you_mean(name, names)}; bodies are {', '.join(names)}",
+                f"no body is called {brief(name)}{did_you_mean(name, names)}; bodies are {listing(names)}",
                 path=document.path, element=place,
             )
     if entry[0] == entry[1]:

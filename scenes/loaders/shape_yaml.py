@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import InvalidPose, InvalidShape
-from collide.scenes.loaders.fields import Fields, brief, did_you_mean, read_pose, scaled
+from collide.errors import InvalidPose, InvalidShape, brief
+from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
 from collide.shapes import (
     Box,
     Capsule,
@@ -57,7 +57,7 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
     if unknown or len(kinds.data) != 1:
-        found = f"unknown shape {unknown[0]!r}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
+        found = f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
         kinds.fail(f"{found}; known shapes are {', '.join(KINDS)}")
     kind = next(iter(kinds.data))
     try:
@@ -75,7 +75,7 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
 
 def _placed(error: Exception, path: object, place: str) -> str:
     """The message with its place before it, once: shapes nest."""
-    return str(error) if str(error).startswith(f"{path}: ") else f"{path}: {place}: {error}"
+    return str(error) if str(error).startswith(f"{path}: ") else placed(error, path, place)
 
 
 def _plain(kind: str, fields: Fields, metres: float) -> Shape:
@@ -118,17 +118,16 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
     from collide.scenes.loaders import mesh as mesh_loader
-    from collide.scenes.loaders.mesh_shapes import element_shapes
+    from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
     file = mesh(fields.text("file"), fields.place("file"), taken)
     shapes = element_shapes(file, scale, f"{fields.path}: {fields.element}")
     about = [approximation for _, approximation in shapes if approximation]
-    points = np.concatenate([part.points for part in file.parts]) * scale
-    note = mesh_loader.size_note(float(np.ptp(points, axis=0).max()), fields.element)
+    note = mesh_loader.size_note(extent(file, scale), fields.element)
     notes = [note] if note else []
-    if np.prod(scale) < 0:
+    if mirrors(scale):
         notes.append(f"{fields.element}: the scale {scale.tolist()} mirrors; the mesh was mirrored")
     if len(shapes) == 1:
         return Described(shapes[0][0], about[0] if about else None, notes)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from collide.errors import SceneError
+from collide.errors import SceneError, cut, listing
 
 
 @dataclass
@@ -33,23 +33,25 @@ def read_srdf(path: Path, links: list[str], joints: list[str]) -> Semantics:
     if root.tag != "robot":
         raise SceneError("the outermost element of an SRDF is <robot>", path=path, element=f"<{root.tag}>")
     strangers: list[str] = []
+    known = set(links)
     for element in root.findall("disable_collisions"):
         a, b = element.get("link1"), element.get("link2")
         if not a or not b:
             raise SceneError("needs link1 and link2", path=path, element="<disable_collisions>")
-        unknown = [link for link in (a, b) if link not in links]
+        unknown = [link for link in (a, b) if link not in known]
         strangers += unknown
         if not unknown:
             semantics.pairs.append((a, b, f"SRDF: {element.get('reason') or 'no reason given'}"))
     _read_states(root, path, joints, semantics)
     if strangers:
-        semantics.notes.append(f"links that the robot does not have: {', '.join(dict.fromkeys(strangers))}")
+        semantics.notes.append(f"links that the robot does not have: {listing(dict.fromkeys(strangers))}")
     semantics.notes = [f"{path.name}: {note}" for note in semantics.notes]
     return semantics
 
 
 def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> None:
     """Group states. Two groups may share a name ("home" of an arm and of its gripper): one state."""
+    known = set(joints)
     for state in root.findall("group_state"):
         name = state.get("name")
         if not name:
@@ -58,13 +60,13 @@ def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> N
         for joint in state.findall("joint"):
             label, text = joint.get("name", ""), joint.get("value", "")
             words = text.split()
-            if label not in joints or len(words) != 1:
-                semantics.notes.append(f'state "{name}": joint "{label}" with value "{text}" was left out')
+            if label not in known or len(words) != 1:
+                semantics.notes.append(f'state "{cut(name)}": joint "{cut(label)}" with value "{cut(text)}" was left out')
                 continue
             try:
                 value = float(words[0])
             except ValueError:
                 value = math.nan
             if not math.isfinite(value):
-                raise SceneError(f'the value must be a finite number, got "{text}"', path=path, element=f'state "{name}" joint "{label}"')
+                raise SceneError(f'the value must be a finite number, got "{cut(text)}"', path=path, element=f'state "{cut(name)}" joint "{cut(label)}"')
             values[label] = value

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from collide.errors import brief, cut
 from collide.scenes.loaders.documents import read_document
-from collide.scenes.loaders.fields import Fields, brief
+from collide.scenes.loaders.fields import Fields
 
 
 def read_state(path) -> dict[str, float]:
@@ -29,15 +30,15 @@ def state_of(data: Any, path: object, element: str = "") -> dict[str, float]:
     names_key = next((key for key in ("name", "joint_names") if isinstance(fields.get(key), list)), None)
     if names_key is None:
         return {str(joint): fields.checked_number(value, str(joint)) for joint, value in data.items()}
-    names, positions_key = data[names_key], "positions" if "positions" in fields else "position"
+    names, positions_key = fields.words(names_key), "positions" if "positions" in fields else "position"
     positions = fields.get(positions_key)
     if not isinstance(positions, list) or len(positions) != len(names):
         fields.fail(f"must hold one value for each of the {len(names)} joints in {names_key}, got {brief(positions)}", positions_key)
     values: dict[str, float] = {}
     for k, (joint, value) in enumerate(zip(names, positions)):
         if joint in values:
-            fields.fail(f'joint "{joint}" stands twice', names_key)
-        values[str(joint)] = fields.checked_number(value, f'{positions_key}[{k}] "{joint}"')
+            fields.fail(f'joint "{cut(joint)}" stands twice', names_key)
+        values[joint] = fields.checked_number(value, f'{positions_key}[{k}] "{cut(joint)}"')
     return values
 
 

@@ -18,12 +18,13 @@ from typing import NoReturn
 
 import numpy as np
 
-from collide.errors import InvalidPose, InvalidShape, SceneError
+from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robot import Joint, LinkShape, Mimic, Robot
 from collide.scenes.loaders import mesh as mesh_loader
 from collide.scenes.loaders import resources
-from collide.scenes.loaders.documents import read_bytes
-from collide.scenes.loaders.mesh_shapes import element_shapes
+from collide.scenes.loaders.fields import placed
+from collide.scenes.loaders.files import is_file, read_bytes
+from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 from collide.shapes.base import Shape
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
 from collide.transforms import pose
@@ -81,12 +82,12 @@ def find_srdf(urdf: Path, robot_name: str | None, given) -> Path | None:
     if given is False:
         return None
     if given is not None:
-        if not Path(given).is_file():
+        if not is_file(Path(given)):
             raise SceneError("no such file", path=given)
         return Path(given)
     for folder in (urdf.parent, urdf.resolve().parent.parent / "srdf"):
         for stem in dict.fromkeys(filter(None, (urdf.stem, robot_name))):
-            if (folder / f"{stem}.srdf").is_file():
+            if is_file(folder / f"{stem}.srdf"):
                 return folder / f"{stem}.srdf"
     return None
 
@@ -97,9 +98,6 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
         reading.fail("<robot>", "has no <link>" + _expand_advice(root))
-    for k, name in enumerate(links):
-        if name in links[:k]:
-            reading.fail(f'link "{name}"', f"the name is used twice (links {links.index(name)} and {k}): rename one")
     joints = [_joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))]
     geometry = {name: _link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
     _note_unchecked(root, geometry, reading)
@@ -123,7 +121,7 @@ def _note_unchecked(root: ET.Element, geometry: dict, reading: Reading) -> None:
         if element.find("visual") is not None and element.find("collision") is None
     ]
     if bare:
-        reading.notes.append(f"links with a visual but no collision geometry are NOT checked: {', '.join(bare)}")
+        reading.notes.append(f"links with a visual but no collision geometry are NOT checked: {listing(bare)}")
     if not any(geometry.values()):
         reading.notes.append("no link has collision geometry: nothing of this robot is checked")
 
@@ -153,7 +151,7 @@ def parse_xml(path: Path, notes: list[str]) -> ET.Element:
                 element.tag = element.tag[len(own) :]
     foreign = sorted({element.tag.rsplit("}", 1)[-1] for element in root.iter() if str(element.tag).startswith("{")})
     if foreign:
-        notes.append(f"elements of another namespace were not read: {', '.join(foreign)}")
+        notes.append(f"elements of another namespace were not read: {listing(foreign)}")
     return root
 
 
@@ -170,8 +168,8 @@ def _with_prefixes_declared(blob: bytes, path: Path, notes: list[str]) -> ET.Ele
     try:
         root = ET.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text[: start.end()]) + names + text[start.end() :])
     except ET.ParseError as error:
-        raise SceneError(f"is not well-formed XML, even with the prefix {', '.join(unbound)} declared: {error}", path=path) from None
-    notes.append(f"XML prefix not declared: {', '.join(unbound)}; what carries it was not read")
+        raise SceneError(f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path) from None
+    notes.append(f"XML prefix not declared: {listing(unbound)}; what carries it was not read")
     return root
 
 
@@ -188,6 +186,10 @@ def _name(element: ET.Element, kind: str, k: int, reading: Reading) -> str:
     return name
 
 
+def _place(kind: str, name: str) -> str:
+    return f'{kind} "{cut(name)}"'
+
+
 def floats(element: ET.Element, attribute: str, count: int, place: str, reading: Reading, default: str | None = None) -> np.ndarray:
     """``count`` finite numbers of an attribute, separated by blanks or commas."""
     text = element.get(attribute, default)
@@ -198,9 +200,9 @@ def floats(element: ET.Element, attribute: str, count: int, place: str, reading:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         advice = "; expand the xacro first" if "${" in text or "$(" in text else ""
-        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{text}"{advice}')
+        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{cut(text)}"{advice}')
     if len(values) != count or not all(map(math.isfinite, values)):
-        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{text}"')
+        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{cut(text)}"')
     return np.array(values)
 
 
@@ -212,14 +214,14 @@ def _origin(element: ET.Element, place: str, reading: Reading) -> np.ndarray:
     try:
         return pose(xyz, rpy=floats(origin, "rpy", 3, place, reading, "0 0 0"))
     except InvalidPose as error:
-        raise InvalidPose(f"{reading.path}: {place} <origin>: {error}") from None
+        raise InvalidPose(placed(error, reading.path, f"{place} <origin>")) from None
 
 
 # --- joints -------------------------------------------------------------------------------------
 
 
 def _joint(element: ET.Element, name: str, reading: Reading) -> Joint:
-    place = f'joint "{name}"'
+    place = _place("joint", name)
     ends = {}
     for role in ("parent", "child"):
         end = element.find(role)
@@ -273,7 +275,7 @@ def _link_shapes(link: ET.Element, name: str, reading: Reading) -> list[LinkShap
     shapes: list[LinkShape] = []
     collisions = link.findall("collision")
     for k, collision in enumerate(collisions):
-        place = f'link "{name}"' + (f" collision {k}" if len(collisions) > 1 else "")
+        place = _place("link", name) + (f" collision {k}" if len(collisions) > 1 else "")
         X_LG = _origin(collision, place, reading)
         source = f"{reading.path}: {place}"
         for shape, approximation in _element_shapes(collision, name, place, reading):
@@ -292,7 +294,7 @@ def _element_shapes(collision: ET.Element, link: str, place: str, reading: Readi
     try:
         shape = _primitive(element, place, reading)
     except InvalidShape as error:
-        raise InvalidShape(f"{reading.path}: {place}: {error}") from None
+        raise InvalidShape(placed(error, reading.path, place)) from None
     sizes = [value for attribute in ("size", "radius", "length") for value in np.ravel(getattr(shape, attribute, ()))]
     _note_size(float(max(sizes)), place, reading)
     return [(shape, None)]
@@ -310,7 +312,7 @@ def _primitive(element: ET.Element, place: str, reading: Reading):
         return Cylinder(one("radius"), one("length"))
     if element.tag == "capsule":
         return Capsule(one("radius"), one("length"))
-    reading.fail(place, f"unknown shape <{element.tag}>; known are box, sphere, cylinder, capsule and mesh")
+    reading.fail(place, f"unknown shape <{cut(element.tag)}>; known are box, sphere, cylinder, capsule and mesh")
 
 
 def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
@@ -322,7 +324,7 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
         file = resources.find(filename, reading.path, reading.package_path, element=place)
     except resources.NotFound as error:
         if reading.missing_meshes == "skip":
-            reading.notes.append(f"{place} has no collision mesh {filename}: that link is NOT checked by it")
+            reading.notes.append(f"{place} has no collision mesh {cut(filename, 240)}: that link is NOT checked by it")
             return []
         raise SceneError(
             f"{error.what}\n    (missing_meshes=\"skip\", --missing-meshes skip, loads the robot without it)",
@@ -332,10 +334,8 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
     if file not in reading.mesh_files:
         reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
         reading.notes += reading.mesh_files[file].notes
-    parts = reading.mesh_files[file].parts
     shapes = [(shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")]
-    points = np.concatenate([part.points for part in parts]) * scale
-    _note_size(float(np.ptp(points, axis=0).max()), place, reading)
+    _note_size(extent(reading.mesh_files[file], scale), place, reading)
     reading.seconds += time.perf_counter() - started
     return shapes
 
@@ -345,9 +345,9 @@ def _mesh_scale(element: ET.Element, place: str, reading: Reading) -> np.ndarray
     single = len(text.replace(",", " ").split()) == 1
     scale = np.broadcast_to(floats(element, "scale", 1 if single else 3, place, reading, "1 1 1"), (3,)).copy()
     if not scale.all():
-        reading.fail(place, f'<mesh> scale must not be 0, got "{text}"')
-    if np.prod(scale) < 0:
-        reading.notes.append(f'{place}: the mesh scale "{text}" mirrors; the mesh was mirrored')
+        reading.fail(place, f'<mesh> scale must not be 0, got "{cut(text)}"')
+    if mirrors(scale):
+        reading.notes.append(f'{place}: the mesh scale "{cut(text)}" mirrors; the mesh was mirrored')
     return scale
 
 
