@@ -236,6 +236,7 @@ def limits(asked: Asked, random) -> list[float]:
     """Limits about the distance, of its order, and of the sizes of the pair."""
     r, found = asked.r, []
     if r.distance > 0:
+        found.append(float(np.nextafter(float(asked.truth.upper), math.inf)))  # the truth is within, if only just
         found += [r.distance * f for f in (random.uniform(0.1, 0.99), 1 - 1e-9, 1 + 1e-9, random.uniform(1.01, 3), 10.0)]
     return [*found, 0.0, asked.S * 10.0 ** random.uniform(-12, 0.5)]
 
