@@ -21,8 +21,9 @@ OPEN = Path(__file__).with_name("soak_open.txt")
 
 #: Pairs that found a failure once, (seed, case): 1, 3, 4, 11 and 13 of the attack on the engine, and later ones.
 FOUND = [
-    (2, number)
-    for number in (1, 37, 95, 101, 137, 182, 225, 304, 322, 395, 539, 653, 921, 957, 1140, 1327, 1394, 1480, 2104, 2338, 2365)
+    *((2, k) for k in (1, 37, 95, 101, 137, 182, 225, 304, 322, 395, 539, 653, 921, 957, 1140, 1327, 1394, 1480, 2104)),
+    *((2, k) for k in (2138, 2338, 2365)),
+    *((3, k) for k in (298, 572, 1548, 1602, 1701)),
 ]
 
 
