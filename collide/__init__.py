@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         ShapeSet,
         Sphere,
     )
+    from collide.shapes.tessellation import tessellate
     from collide.transforms import pose
     from collide.world import World
 
@@ -73,6 +74,7 @@ _HOMES = {
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
         "Halfspace", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
+    "collide.shapes.tessellation": ("tessellate",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
 }
@@ -83,7 +85,8 @@ __all__ = [
     "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
     "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
-    "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions", "verify", "walk",
+    "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
+    "walk",
 ]
 
 

@@ -10,20 +10,22 @@ imports what it needs.
 
 from __future__ import annotations
 
-import argparse
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
-from typing import NoReturn
 
+from collide import arguments
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
-from collide.reports.units import UNITS, count, parse_length
+from collide.reports.units import count
 
 _STARTED = time.perf_counter()
 
 FREE, YES, ERROR, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
+#: What is larger is read as a scene by no loader (`scenes/loaders/documents.py`), and need not be looked into.
+_LARGEST_SCENE = 256 * 2**20
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -47,16 +49,20 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
-    parser = _parser()
     try:
-        args = parser.parse_args(argv)
-    except SystemExit as stop:  # argparse after --help, --version or a usage error
+        args = arguments.parse(argv)
+    except arguments.UsageError as wrong:
+        _say(f"error: {wrong}")
+        return ERROR
+    except SystemExit as stop:  # argparse after --help and --version
         return stop.code if isinstance(stop.code, int) else ERROR
     if args.command is None:
-        parser.print_help()
+        arguments.parser().print_help()
         return FREE
+    if getattr(args, "json", None) not in (None, "-"):
+        _check_place("--json", args.json, ".json")  # before the work, not after it
     with _log_on_stderr(getattr(args, "quiet", False)):
-        return args.run(args)
+        return _COMMANDS[args.command](args)
 
 
 def _fail(error: Exception) -> int:
@@ -66,8 +72,8 @@ def _fail(error: Exception) -> int:
         traceback.print_exc()
     if isinstance(error, CollideError):
         what = str(error)
-    elif isinstance(error, OSError) and error.filename is not None:
-        what = f"{error.filename}: {error.strerror}"
+    elif isinstance(error, OSError) and error.strerror is not None:
+        what = f"{error.filename}: {error.strerror}" if error.filename is not None else f"writing: {error.strerror}"
     elif isinstance(error, ModuleNotFoundError) and error.name in ("numpy", "numba", "llvmlite"):
         what = f"{error.name} is not installed: pip install collide-robotics"
     elif isinstance(error, MemoryError):
@@ -123,38 +129,70 @@ def _log_on_stderr(quiet: bool):
 def _report(args) -> int:
     from collide.reports import terminal
 
-    report = _make(args, clearance=args.clearance)
-    if args.json:
-        _write_json(report.to_dict(), args.json)
+    if args.geometry and not args.json:
+        raise InvalidArgument("--geometry adds to the JSON of a report: give --json FILE too")
+    made = _make(args, clearance=args.clearance)
+    if args.geometry:
+        from collide.reports import geometry
+
+        for one in made:
+            one.report.geometry = geometry.of_scene(one.scene)
+    _write_reports(made, args.json)
     if args.json != "-" and not args.quiet:
+        from collide.reports import states
+
         width, whole_names = terminal.output_width(sys.stdout)
-        terminal.write(terminal.render(report, everything=args.all, width=width, whole_names=whole_names))
+        shown = {"everything": args.all, "proofs": args.proofs or args.all, "width": width, "whole_names": whole_names}
+        terminal.write(states.render(made, **shown))
     return FREE
 
 
 def _check(args) -> int:
-    from collide.reports import terminal
-    from collide.reports.tables import printable
+    from collide.reports import checking, junit
 
-    report = _make(args, min_depth=args.min_depth)
-    if args.json:
-        _write_json(report.to_dict(), args.json)
+    known = checking.read_baseline(args.baseline) if args.baseline else None
+    for place, suffix in ((args.write_baseline, ".json"), (args.junit, ".xml")):
+        if place:
+            _check_place("--write-baseline" if suffix == ".json" else "--junit", place, suffix)
+    made = _make(args, min_depth=args.min_depth)
+    checks = [
+        checking.check(
+            one.report, one.label, touching_counts=args.touching_is_collision, known=known,
+            tolerance=args.baseline_tolerance,
+        )
+        for one in made
+    ]  # fmt: skip
+    _write_reports(made, args.json)
+    if args.write_baseline:
+        _write_text(checking.baseline_text(checks), args.write_baseline)
+    if args.junit:
+        _write_text(junit.text(checks), args.junit)
     if args.json != "-" and not args.quiet:
-        classes = {"collision": report.colliding, "shallow": report.shallow, "touching": report.touching}
-        for what, pairs in classes.items():
-            for pair in pairs:
-                measure = "unbounded" if pair.distance is None else repr(pair.distance)
-                terminal.write_text("\t".join((what, printable(pair.a), printable(pair.b), measure)) + "\n")
-        sys.stdout.flush()
+        _print_lines(line for one in checks for line in one.lines(len(checks) > 1))
     if not args.quiet:
-        _say(report.verdict())
-        _say_what_was_taken(report)
-    if report.colliding or (args.touching_is_collision and report.touching):
+        for one in checks:
+            _say(one.verdict())
+        _say_what_was_taken(made[0].report)
+    if args.write_baseline:
+        return FREE
+    if any(one.fails for one in checks):
         return YES
-    if report.unanswered:
-        first = report.unanswered[0]
+    unanswered = [entry for one in checks for entry in one.unanswered]
+    if unanswered:
+        first = unanswered[0]
         raise UnsupportedQuery(f"whether the scene is free is not known: {first['a']} and {first['b']}: {first['why']}")
     return FREE
+
+
+def _print_lines(lines) -> None:
+    from itertools import islice
+
+    from collide.reports import terminal
+
+    lines = iter(lines)
+    while some := list(islice(lines, 4096)):
+        terminal.write_text("".join(line + "\n" for line in some))
+    sys.stdout.flush()
 
 
 def _say_what_was_taken(report) -> None:
@@ -167,14 +205,59 @@ def _say_what_was_taken(report) -> None:
             _say(f"{what}: {', '.join(bodies[:3])}{more} (see: collide report)")
 
 
-def _make(args, **limits):
-    """Load the scene of the arguments and make its report."""
+def _make(args, **limits) -> list:
+    """Load the scene of the arguments and report on it, in each state asked for: `states.Stated`."""
     progress = _progress(args.quiet)
-    scene = _load(args, progress)
+    scenes = _load(args, progress)
+    trajectory = _trajectory(args, scenes)
+    ignore = [_pair(scenes[0][1], words) for words in args.ignore]
     _watch_compiler(progress)
-    from collide.reports import report
+    from collide.reports import report, states
+    from collide.reports.trajectory import at_start, follow
 
-    return report.make(scene, progress=progress, started=_STARTED, **limits)
+    made = []
+    for label, scene in scenes:
+        if trajectory is not None:
+            scene = at_start(scene, trajectory)
+        one = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
+        if trajectory is not None:
+            tested = report.without(scene, ignore)
+            one.trajectory = follow(tested, trajectory, resolution=args.resolution, progress=progress, **limits)
+        made.append(states.Stated(label, scene, one))
+    return made
+
+
+def _trajectory(args, scenes):
+    if args.trajectory is None:
+        return None
+    if len(scenes) > 1:
+        raise InvalidArgument("--trajectory starts from one state: give --state once, with one state")
+    from collide.scenes.loaders.trajectories import read_trajectory
+
+    return read_trajectory(args.trajectory)
+
+
+def _pair(scene, words: str) -> tuple[str, str]:
+    """The two bodies that ``A,B`` names; a comma may also stand in a name."""
+    names = {body.name for body in scene.bodies}
+    pieces = words.split(",")
+    splits = [(",".join(pieces[:k]).strip(), ",".join(pieces[k:]).strip()) for k in range(1, len(pieces))]
+    if not splits:
+        raise InvalidArgument(f"--ignore: takes two bodies, A,B, got {words!r}")
+    for a, b in splits:
+        if a in names and b in names and a != b:
+            return a, b
+    a, b = splits[0]
+    if a == b:
+        raise InvalidArgument(f"--ignore: {a!r} twice; a body is never tested against itself")
+    import difflib
+
+    wrong = b if a in names else a
+    near = difflib.get_close_matches(wrong, sorted(names), 3, 0.5)
+    known = [body.name for body in scene.bodies]
+    listed = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
+    hint = f"did you mean {' or '.join(near)}?" if near else f"it has {listed}"
+    raise InvalidArgument(f"--ignore: scene {scene.name} has no body {wrong!r}; {hint}")
 
 
 def _progress(quiet: bool) -> Callable:
@@ -190,33 +273,44 @@ def _watch_compiler(progress: Callable) -> None:
     _jit.on_compile = lambda _kernel: progress("compiling kernels (once per version)")
 
 
-def _load(args, progress: Callable):
+def _load(args, progress: Callable) -> list:
+    """The scene in each state asked for: (label, Scene); one without a label where no state was named."""
     with progress("reading the scene"):
         from collide.scenes import load
 
         options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
         given = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
-        return load(*args.scenes, state=args.state, **given)
+        words = args.state or []
+        if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
+            return [("", load(*args.scenes, state=words[0] if words else None, **given))]
+        from collide.scenes.loaders.state_words import in_states
+
+        found = in_states(load(*args.scenes, state=None, **given), words)
+        return found if len(found) > 1 else [("", found[0][1])]
 
 
 def _compare(args) -> int:
     progress = _progress(args.quiet)
-    scene = _load(args, progress)
+    scenes = _load(args, progress)
+    if len(scenes) > 1:
+        raise InvalidArgument("--state: compare takes one state")
     _watch_compiler(progress)
     from collide.adapters.peers.compare import compare
 
-    engines = [name.strip() for name in args.engines.split(",") if name.strip()]
     with progress("asking the engines"):
-        comparison = compare(scene, engines=engines, max_distance=args.clearance)
+        comparison = compare(
+            scenes[0][1], engines=args.engines, max_distance=args.clearance, tolerance=args.tolerance
+        )
     if args.json:
-        _write_json(comparison.to_dict(), args.json)
+        _write_json(comparison.to_dict().items(), args.json)
     if args.json != "-" and not args.quiet:
         from collide.reports import comparing, terminal
 
         width, whole_names = terminal.output_width(sys.stdout)
         lines = comparing.render(comparison, everything=args.all, width=width, whole_names=whole_names)
         terminal.write(lines)
-    return YES if comparison.ours_wrong else FREE
+    wrong = comparison.ours_wrong or (args.fail_on == "peer-wrong" and comparison.peers_wrong)
+    return YES if wrong else FREE
 
 
 def _stress(args) -> int:
@@ -229,7 +323,7 @@ def _stress(args) -> int:
     with progress("asking the hard families"):
         table = run(args.family or None, n=args.cases, seed=args.seed, engine=args.engine)
     if args.json:
-        _write_json(table.to_dict(), args.json)
+        _write_json(table.to_dict().items(), args.json)
     if args.save:
         table.save(args.save)
     if args.json != "-" and not args.quiet:
@@ -267,7 +361,7 @@ def _locality(args) -> int:
         with progress("drawing"):
             locality.plot(measured, args.plot)
     if args.json:
-        _write_json(locality.to_dict(measured, args.repeated), args.json)
+        _write_json(locality.to_dict(measured, args.repeated).items(), args.json)
     if args.json != "-" and not args.quiet:
         for k, table in enumerate(locality.tables(measured)):
             terminal.write_text("\n" if k else "")
@@ -341,273 +435,58 @@ def _doctor(args) -> int:
     return FREE if examination.sound else YES
 
 
-def _write_json(data: dict, place: str) -> None:
-    import json
+# --- files --------------------------------------------------------------------------------------
 
-    text = json.dumps(data, indent=2, allow_nan=False, ensure_ascii=place == "-") + "\n"
+
+def _write_reports(made: list, place: str | None) -> None:
+    if place:
+        from collide.reports import states
+
+        _write_json(states.items(made), place)
+
+
+def _write_json(items, place: str) -> None:
+    """One JSON object, (key, value) after (key, value), to a .json file or to standard output."""
+    from collide.reports.json_text import pieces
+
     if place == "-":
-        sys.stdout.write(text)
+        for text in pieces(items, ascii_only=True):
+            sys.stdout.write(text)
         return
-    # "--json a.yaml b.yaml" must not overwrite a scene
-    if not place.lower().endswith(".json") and (os.path.isfile(place) or not os.path.exists(place)):
-        raise InvalidArgument(f"--json: {place!r} must end in .json, or be - for standard output")
+    _write_text(pieces(items), place)
+
+
+def _write_text(pieces, place: str) -> None:
+    try:
+        with open(place, "w", encoding="utf-8") as file:
+            file.writelines(pieces)
+    except OSError as error:  # a full disk is told without the file's name
+        raise OSError(error.errno, error.strerror, place) from None
+
+
+def _check_place(option: str, place: str, suffix: str) -> None:
+    """``--json a.yaml b.yaml`` must not overwrite a scene; devices and pipes are written to as they are."""
+    if not place.lower().endswith(suffix) and (os.path.isfile(place) or not os.path.exists(place)):
+        otherwise = ", or be - for standard output" if option == "--json" else ""
+        raise InvalidArgument(f"{option}: {place!r} must end in {suffix}{otherwise}")
     if _is_scene(place):
-        raise InvalidArgument(f"--json: {place!r} is a scene; it is not overwritten by a report")
-    with open(place, "w", encoding="utf-8") as file:
-        file.write(text)
+        raise InvalidArgument(f"{option}: {place!r} is a scene; it is not overwritten by a report")
 
 
 def _is_scene(place: str) -> bool:
     import json
 
-    if not os.path.isfile(place):
+    if not os.path.isfile(place) or os.path.getsize(place) > _LARGEST_SCENE:
         return False
     try:
         with open(place, encoding="utf-8") as file:
             data = json.load(file)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return isinstance(data, dict) and ("collide" in data or "robot_model_name" in data)
 
 
-# --- arguments ----------------------------------------------------------------------------------
-
-
-class _Parser(argparse.ArgumentParser):
-    """argparse with the one-line errors of the rest, and no guessing at shortened options."""
-
-    def __init__(self, *args, **kwargs):
-        kwargs.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
-        super().__init__(*args, allow_abbrev=False, **kwargs)
-
-    def error(self, message: str) -> NoReturn:
-        _say(f"error: {message} (see: {self.prog} --help)")
-        raise SystemExit(ERROR)
-
-
-class _Version(argparse.Action):
-    def __call__(self, parser, namespace, values, option_string=None):
-        import collide
-
-        print(f"collide {collide.__version__}")
-        raise SystemExit(FREE)
-
-
-_TOP = """examples:
-  collide scenes                          the scenes that come with collide
-  collide report workcell                 a first report, nothing else needed
-  collide report panda_workbench --clearance 50mm
-  collide report part_a.stl part_b.obj    do two meshes meet?
-  collide check scene.yaml && echo free   for scripts
-  collide doctor                          is this installation sound?
-
-exit status: 0 done or free, 1 collision found, 2 error (one line on stderr)"""
-
-_REPORT = """examples:
-  collide report workcell
-  collide report panda_workbench --clearance 50mm
-  collide report robot.urdf --srdf robot.srdf --state joints.yaml
-  collide report planning_scene.yaml --robot panda.urdf --state goal
-  collide report part_a.stl part_b.obj --scale mm --meshes pieces
-  collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
-
-A scene is a file (URDF, planning scene, mesh, scene YAML) or the name of a
-shipped one; several files make one scene. The exit status is 0 whenever a
-report was made: use `collide check` to branch on collisions. The JSON is
-described in docs/report-schema.md."""
-
-_CHECK = """examples:
-  collide check scene.yaml && echo free
-  collide check robot.urdf --state joints.yaml --min-depth 0.1mm
-  collide check scene.yaml | cut -f2,3       the names of the pairs
-
-Each line of output is one pair, fields separated by tabs: `collision`,
-`shallow` or `touching`, body A, body B, signed distance in metres (negative:
-overlapping). The verdict goes to stderr, and there which bodies are surfaces
-without an inside or not the shape the scene names.
-
-exit status: 0 free, 1 collision, 2 error. Pairs that touch within rounding are
-printed, and do not count as collisions unless --touching-is-collision is given."""
-
-_COMPARE = """examples:
-  collide compare workcell
-  collide compare scene.yaml --engines fcl,coal --clearance 10cm
-  collide compare panda_workbench --json comparison.json
-
-The same scene is asked of every engine; where two answers differ, exact
-arithmetic decides.
-Engines come with: pip install 'collide-robotics[peers]'
-
-exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
-
-_STRESS = """examples:
-  collide stress                                 every family, 40 cases each
-  collide stress --family needles --family flat --cases 300 --seed 7
-  collide stress --engine coal --json coal.json  the same cases asked of a peer
-  collide stress --save wrong.json               every refuted answer, as Python
-
-The families are the cases collision libraries get wrong: exact contact, flush
-and tilted boxes, gaps of one unit in the last place, needles, plates, tiny
-against huge. Each answer is judged by exact rational arithmetic that shares no
-code with the engine.
-
-exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
-
-_LOCALITY = """examples:
-  collide locality bunny.ply
-  collide locality teapot.ply dragon.ply.gz --plot stretches.png
-  collide locality part.stl --json - | jq '.meshes[].local_stretch'
-
-How fast meshes can be tested for collision is bounded by how local they are
-(Erickson, "Local polyhedra and geometric graphs", 2003):
-  global stretch   longest edge over shortest
-  local stretch    longest edge at a vertex, over the distance to its nearest
-                   other vertex; of order k: to its k-th nearest
-Each is given for its worst vertex, and as a distribution: one bad vertex does
-not slow a mesh down, long edges packed closely together do. --plot draws how
-many vertices have which stretch: pip install 'collide-robotics[plots]' first.
-The last table is about the trees: the one that queries walk, and the graded
-box-tree that the paper's bounds are proven for, its outliers and its bounds.
-docs/locality.md explains the numbers and what to do about large ones.
-
-Vertices with equal coordinates are one vertex. Vertices that no facet uses
-count as neighbours.
-
-exit status: 0 measured, 2 error"""
-
-_SCENES = """examples:
-  collide scenes
-  collide scenes --copy workcell             to ./workcell.json, for editing
-  collide scenes --copy workcell cell.json && collide report cell.json"""
-
-_DOCTOR = """Shows versions, optional packages and the extras that bring them, where compiled
-kernels and prepared inputs are kept, and asks a few pairs with known answers.
-
-exit status: 0 sound, 1 something is broken"""
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="collide", epilog=_TOP,
-        description="Which bodies of a robot scene collide, how deep, how near the others are, and how that is known.",
-    )
-    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and leave")
-    parser.set_defaults(command=None)
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
-    _add_report(commands)
-    _add_check(commands)
-    _add_compare(commands)
-    _add_stress(commands)
-    _add_locality(commands)
-    _add_scenes(commands)
-    _add(commands, "doctor", _doctor, "is this installation sound?", _DOCTOR)
-    return parser
-
-
-def _add(commands, name: str, run: Callable, summary: str, epilog: str) -> argparse.ArgumentParser:
-    parser = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:], epilog=epilog)
-    parser.set_defaults(run=run)
-    return parser
-
-
-def _add_stress(commands) -> None:
-    parser = _add(commands, "stress", _stress, "the hard families, judged exactly", _STRESS)
-    parser.add_argument("--family", action="append", metavar="NAME", help="only this one; may be given again")
-    parser.add_argument("--cases", type=_positive_count, default=40, metavar="N", help="cases a family (40)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
-    parser.add_argument("--engine", default="collide", metavar="E", help="collide, fcl, coal or pybullet (collide)")
-    parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
-    _output_arguments(parser)
-
-
-def _add_locality(commands) -> None:
-    parser = _add(commands, "locality", _locality, "how local are these meshes?", _LOCALITY)
-    parser.add_argument("meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too")
-    parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
-    parser.add_argument("--repeated", action="store_true",
-                        help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
-    _output_arguments(parser)
-
-
-def _positive_count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of cases (1 or more)")
-    return number
-
-
-def _add_report(commands) -> None:
-    parser = _add(commands, "report", _report, "what collides, what is near, and how that is known", _REPORT)
-    _scene_arguments(parser)
-    parser.add_argument("--clearance", type=_length, default=0.0, metavar="D",
-                        help="list pairs nearer than this too: 0.05 (metres), 50mm, 5cm")
-    parser.add_argument("--all", action="store_true", help="do not shorten long lists")
-    _output_arguments(parser)
-
-
-def _add_check(commands) -> None:
-    parser = _add(commands, "check", _check, "is the scene free of collisions? for scripts", _CHECK)
-    _scene_arguments(parser)
-    parser.add_argument("--min-depth", type=_length, default=0.0, metavar="D",
-                        help="collisions proven less deep than this do not count: 0.001 (metres), 1mm")
-    parser.add_argument("--touching-is-collision", action="store_true",
-                        help="count pairs that touch within rounding as collisions")
-    _output_arguments(parser)
-
-
-def _add_compare(commands) -> None:
-    parser = _add(commands, "compare", _compare, "ask other engines about the same scene", _COMPARE)
-    _scene_arguments(parser)
-    parser.add_argument("--engines", default="fcl,coal,pybullet", metavar="NAMES",
-                        help="engines to ask, separated by commas (default: %(default)s)")
-    parser.add_argument("--clearance", type=_length, default=0.1, metavar="D",
-                        help="compare distances up to this: 0.05 (metres), 50mm (default: 10cm)")
-    parser.add_argument("--all", action="store_true", help="do not shorten long lists")
-    _output_arguments(parser)
-
-
-def _add_scenes(commands) -> None:
-    parser = _add(commands, "scenes", _scenes, "the scenes that come with collide", _SCENES)
-    parser.add_argument("--copy", nargs="+", metavar=("NAME", "DEST"), help="copy a scene's file, to be changed")
-    parser.add_argument("--force", action="store_true", help="let --copy overwrite a file")
-
-
-def _scene_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("scene")
-    group.add_argument("scenes", nargs="+", metavar="SCENE", help="a file, or the name of a shipped scene")
-    group.add_argument("--state", metavar="FILE|NAME", help="joint values: a YAML or JSON file, or a state's name")
-    group.add_argument("--robot", metavar="URDF", help="the robot of a planning scene")
-    group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the URDF)")
-    group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
-                       help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
-    group.add_argument("--missing-meshes", choices=("error", "skip"),
-                       help="what to do about mesh files that are missing")
-    group.add_argument("--package-path", action="append", metavar="DIR",
-                       help="where package:// is looked for; may be given more than once")
-    group.add_argument("--scale", type=_scale, metavar="S", help="factor for mesh files, or their unit: 0.001 or mm")
-
-
-def _output_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", metavar="FILE|-", help="write JSON to a .json file, or - for standard output")
-    parser.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
-
-
-def _length(text: str) -> float:
-    try:
-        return parse_length(text)
-    except InvalidArgument as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _scale(text: str) -> float:
-    """A factor, or the unit that mesh files are written in."""
-    if text in UNITS:
-        return UNITS[text]
-    try:
-        return float(text)
-    except ValueError:
-        units = ", ".join(unit for unit in UNITS if unit.isascii() and unit)
-        raise argparse.ArgumentTypeError(f"must be a number or one of the units {units}, got {text!r}") from None
+_COMMANDS: dict[str, Callable] = {
+    "report": _report, "check": _check, "compare": _compare, "stress": _stress, "locality": _locality,
+    "scenes": _scenes, "doctor": _doctor,
+}  # fmt: skip

@@ -91,7 +91,7 @@ class PackedWorld:
         return found
 
     def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
-        from collide.meshes.curved import APART, OPEN
+        from collide.meshes.hits import APART, OPEN
         from collide.meshes.hulls_first import rows_within
         from collide.meshes.single import one_state
 

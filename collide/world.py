@@ -189,6 +189,7 @@ class World:
     def distances(self, max_distance: float = math.inf) -> WorldResult:
         """Every tested pair at most ``max_distance`` [m] apart, hits included, sorted by (a, b).
 
+        None is left out that is not proven farther apart: ``lower ≤ max_distance`` of all of them.
         Two half-spaces that meet have distance −inf.
         """
         limit = check_distance("World.distances: max_distance", max_distance)
@@ -312,8 +313,8 @@ class World:
 
 
 def _within(rows: np.ndarray, limit: float) -> np.ndarray:
-    """Pairs not farther apart than the limit, and hits: an undecided one may lie an ulp beyond 0."""
-    return rows["hit"] | (rows["distance"] <= limit)
+    """Pairs that are not proven farther apart than the limit: those whose brackets reach to both sides of it are told, too."""
+    return ~(rows["lower"] > limit)
 
 
 def _one_pose(X, name: str) -> np.ndarray:

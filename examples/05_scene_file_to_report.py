@@ -27,8 +27,8 @@ with tempfile.TemporaryDirectory() as folder:
     file.write_text(json.dumps(SCENE), encoding="utf-8")
     made = report.make(load(file), clearance=0.02)  # metres here, whatever the file's units
 
-# What `collide report press.json --clearance 2cm` prints:
-terminal.write(terminal.render(made, width=100))
+# What `collide report press.json --clearance 2cm --proofs` prints; without proofs it is the first page alone:
+terminal.write(terminal.render(made, proofs=True, width=100))
 
 # The same as plain data, at full precision; docs/report-schema.md describes every field.
 data = made.to_dict()

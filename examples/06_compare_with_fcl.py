@@ -33,5 +33,5 @@ for edge, gap in ((0.1, 1e-5), (1e-6, 1e-10)):
     # `exact_distance` is rational arithmetic on the numbers given: no rounding until it is printed.
     for d in comparison.disagreements[:4]:
         print(f"    {d.a}, {d.b}: {d.engine} says {d.distance}, collide {d.reference_distance}, "
-              f"exactly {d.exact_distance}")  # fmt: skip
+              f"exactly {d.exact_distance}; wrong by {d.off} m: {', '.join(d.wrong)}")  # fmt: skip
     print("  pairs where collide is refuted:", comparison.ours_wrong)

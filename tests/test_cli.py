@@ -40,7 +40,7 @@ def fake_scene(*rows):
             answers[answers["hit"] | (answers["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
         ),
-        stats=stats,
+        stats=stats, names=dict(names),
     )
     bodies = [
         SimpleNamespace(name=n, shape=Sphere(0.1), X_WB=np.eye(4), static=False, source="", approximation=None) for n in names.values()
@@ -91,7 +91,7 @@ def test_check_prints_one_line_a_pair(scene, capsys):
     cli.main(["check", "x.yaml"])
     out, err = capsys.readouterr()
     assert out == "collision\ta\tb\t-0.01\ntouching\ta\tc\t0.0\n"
-    assert err == "collide: 1 collision, 1 touching within rounding, all 3 pairs answered\n"
+    assert err == "collide: 1 collision, 1 touching, all 3 pairs answered\n"
 
 
 def test_quiet_says_nothing(scene, capsys):
@@ -130,7 +130,7 @@ def test_json_alone_on_standard_output(scene, capsys, command):
     scene(HIT)
     cli.main([command, "x.yaml", "--json", "-"])
     data = json.loads(capsys.readouterr().out)
-    assert data["schema"] == "collide-report/2" and data["colliding"][0]["depth"] == 0.01
+    assert data["schema"] == "collide-report/3" and data["colliding"][0]["depth"] == 0.01
 
 
 def test_json_beside_the_table(scene, capsys, tmp_path):
@@ -204,7 +204,10 @@ def test_ctrl_c_is_one_line(monkeypatch, capsys):
         (["report"], "required: SCENE"), (["nonsense"], "invalid choice"),
         (["report", "x", "--clearance", "-1"], "negative"), (["report", "x", "--scale", "parsec"], "units"),
         (["report", "x", "--clearance", "5parsec"], "units"), (["check", "x", "--min-dep", "1"], "--min-dep"),
-        (["report", "x", "--meshes", "voxels"], "voxels"),
+        (["report", "x", "--meshes", "voxels"], "voxels"), (["report", "x", "--scale", "nan"], "--scale: must be a finite"),
+        (["report", "x", "--scale", "0"], "other than 0"), (["compare", "x", "--engines", ""], "names no engine"),
+        (["compare", "x", "--engines", " , "], "names no engine"), (["compare", "x", "--tolerance", "-1"], "not negative"),
+        (["report", "x", "--resolution", "0"], "above 0"), (["compare", "x", "--fail-on", "luck"], "luck"),
     ],
 )
 def test_usage_errors_are_one_line_too(capsys, arguments, words):

@@ -30,7 +30,7 @@ SHOWS = {
     "09_rays_and_overlays": ["shared area 1.000000000000000", "beside it: [True, True, False]", "inside: [True, True, False]", "itself: False True"],
     "10_contacts": ["proven free", "a ball 1.00 mm above", "jaw 1 pushes along [-1.  0.  0.], 4 points", "box and ball"],
     "11_meshes_in_scenes": [
-        "as it is: [('bracket', 'chip')]", "open edges: facets", "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
+        "as it is: [('bracket', 'chip')]", "shell is a surface of 18 facets without an inside (open edges", "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
     ],
 }
 

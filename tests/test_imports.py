@@ -47,8 +47,9 @@ ROOMS = {
     "packed_world": {"_jit", "errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
     "world": {"_jit", "errors", "transforms", "shapes", "broadphase", "results", "query", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
-    "reports": {"errors", "results", "cache_folder", ""},
-    "cli": {"_jit", "errors", "reports", ""},
+    "reports": {"errors", "results", "shapes", "cache_folder", ""},
+    "arguments": {"errors", "reports", ""},
+    "cli": {"_jit", "arguments", "errors", "reports", ""},
     "__main__": {"cli"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.

@@ -179,9 +179,9 @@ def test_files_that_pages_name_exist():
 
 
 def test_commands_that_pages_show_exist():
-    from collide.cli import _parser
+    from collide.arguments import parser
 
-    (commands,) = (set(action.choices) for action in _parser()._actions if action.dest == "command")
+    (commands,) = (set(action.choices) for action in parser()._actions if action.dest == "command")
     for page in _pages():
         for word in re.findall(r"^(?:\$ )?collide ([a-z]+)\b", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
             assert word in commands, f"{page.name} shows `collide {word}`"

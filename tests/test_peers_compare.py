@@ -47,6 +47,19 @@ class Off(ExactPeer):
         return true._replace(distance=true.distance * 1.01)
 
 
+class Skewed(PairwisePeer):
+    """What collide says, and a millimetre more; where bodies touch, a depth of 0.9 m."""
+    name = "skewed"
+
+    def build(self, part):
+        return part
+
+    def ask(self, A, X_WA, B, X_WB):
+        import collide
+        r = collide.distance(A, B, X_WA, X_WB)
+        return Reply(bool(r.hit), -0.9 if abs(r.distance) < 1e-12 else r.distance + 1e-3)
+
+
 class Yes(PairwisePeer):
     name = "yes"
 
@@ -66,7 +79,7 @@ class Away(Yes):
 def liars(tmp_path, monkeypatch):
     (tmp_path / "liars.py").write_text(LIARS)
     monkeypatch.syspath_prepend(tmp_path)
-    for name in ("Liar", "Proud", "Off", "Yes", "Away"):
+    for name in ("Liar", "Proud", "Off", "Skewed", "Yes", "Away"):
         monkeypatch.setitem(protocol.ENGINES, name.lower(), f"liars:{name}")
 
 
@@ -194,3 +207,66 @@ def test_a_world_that_drops_a_pair_is_found_out(monkeypatch):
     comparison = compare(scene(), ("exact",), max_distance=0.1)
     assert [d.kind for d in comparison.disagreements if d.engine == "collide"] == ["left out"]
     assert comparison.ours_wrong == 1
+
+
+def test_distances_that_exact_arithmetic_cannot_judge_are_judged_by_the_proven_bracket():
+    can = Cylinder(0.1, 0.2)
+    pairs = [(can, Sphere(0.1), pose(), pose((x, 0, 0.01 * k))) for k, x in enumerate((0.21, 0.3, 0.5, 0.19))]
+    comparison = compare(pairs, ("skewed",))
+    skewed = comparison.summary("skewed")
+    assert (skewed.wrong, skewed.wrong_distances, skewed.not_judged) == (0, 4, 0)
+    assert skewed.furthest_off.difference == pytest.approx(1e-3, rel=1e-6)
+    assert comparison.ours_wrong == 0 and comparison.peers_wrong == 4
+    for dispute in comparison.disagreements:
+        assert dispute.judged_by == "the proven bracket" and dispute.wrong == ["skewed"]
+        assert dispute.lower <= dispute.reference_distance <= dispute.upper
+        assert dispute.off == max(dispute.lower - dispute.distance, dispute.distance - dispute.upper)
+    assert compare(pairs, ("skewed",), tolerance=0.1).peers_wrong == 0
+
+
+def test_a_ball_that_rests_on_a_table_of_several_parts_is_judged_exactly():
+    """A depth of 0.9 m for a ball at rest was "not judged", for the pose of a part of the table might be rounded."""
+    legs = [(Box((0.06, 0.06, 0.68)), pose((x, y, 0.34), rpy=(0, 0, 0.3))) for x in (-0.5, 0.5) for y in (-0.3, 0.3)]
+    table = Compound([(Box((1.4, 0.8, 0.04)), pose((0, 0, 0.7), rpy=(0, 0, 0.1))), *legs])
+    scene = Scene("kitchen", [
+        SceneBody("table", table, pose((0.3, 0.1, 0), rpy=(0, 0, 0.7)), static=True),
+        SceneBody("ball", Sphere(0.08), pose((0.31, 0.12, 0.72 + 0.08 + 4e-16))),
+    ])  # fmt: skip
+    comparison = compare(scene, ("skewed", "exact"))
+    (wrong,) = [d for d in comparison.disagreements if d.engine == "skewed" and d.kind == "distance"]
+    assert not wrong.not_judged and wrong.judged_by == "exact arithmetic" and wrong.touching
+    assert abs(wrong.exact_distance) < 1e-15 and wrong.off == pytest.approx(0.9)
+    assert comparison.summary("skewed").wrong_distances == 1 and comparison.ours_wrong == 0
+
+
+def test_parts_of_a_compound_enter_exactly():
+    """The product of two poses is not rounded: the gap of a part is that of its corners in fractions."""
+    from fractions import Fraction
+
+    rng = np.random.default_rng(4)
+    differing = 0
+    for _ in range(20):
+        X_CS, X_WC = (pose(rng.normal(size=3), rpy=rng.normal(size=3)) for _ in range(2))
+        body = Compound([(Compound([(Sphere(0.25), X_CS)]), pose((0, 0, 0)))])
+        other = pose(rng.normal(size=3) * 50)
+        question = Question.from_pairs([(body, Sphere(0.25), X_WC, other)])
+        told = protocol.engine("exact").answer(question).rows[0]["distance"]
+        centre = [sum((Fraction(X_WC[i, k]) * Fraction(X_CS[k, 3]) for k in range(3)), Fraction(X_WC[i, 3])) for i in range(3)]
+        squared = sum((c - Fraction(other[i, 3])) ** 2 for i, c in enumerate(centre))
+        # the square root is right to the last digit where its neighbours' squares lie on either side
+        gap, half = Fraction(told) + Fraction(1, 2), Fraction(np.spacing(told))
+        assert (gap - half) ** 2 <= squared <= (gap + half) ** 2
+        differing += centre != [Fraction(c) for c in (X_WC @ X_CS)[:3, 3]]
+    assert differing > 10, "poses that multiply out exactly show nothing"
+
+
+@pytest.mark.parametrize("options, status", [([], 0), (["--fail-on", "peer-wrong"], 1), (["--fail-on", "ours-wrong"], 0),
+                                             (["--fail-on", "peer-wrong", "--tolerance", "0.1"], 0)])
+def test_the_command_can_fail_on_a_wrong_peer(monkeypatch, capsys, options, status):
+    from collide import cli
+
+    can = SceneBody("can", Cylinder(0.1, 0.2), pose())
+    asked = Scene("two", [can, SceneBody("ball", Sphere(0.1), pose((0.3, 0, 0)))])
+    monkeypatch.setattr(collide.scenes, "load", lambda *paths, **options: asked)
+    assert cli.main(["compare", "two.yaml", "--engines", "skewed", *options]) == status
+    assert ("1 wrong distance (1000 µm off at worst)" in capsys.readouterr().out) == ("--tolerance" not in options)

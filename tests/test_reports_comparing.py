@@ -17,14 +17,21 @@ def dispute(kind="hit", **changes):
     return {
         "engine": "coal", "kind": kind, "a": "table", "b": "panda_hand", "size": 1.0, "reference_hit": False,
         "reference_distance": 2e-5, "hit": True, "distance": -1e-9, "exact_hit": False, "exact_distance": 2e-5,
-        "touching": False, "not_judged": "", "wrong": ["coal"], "proven": ["collide"], "note": "", **changes,
+        "touching": False, "not_judged": "", "judged_by": "exact arithmetic", "off": None, "wrong": ["coal"], "proven": ["collide"], "note": "", **changes,
+    }
+
+
+def summary(engine, **changes):
+    return {
+        "engine": engine, "skipped": "absent" if engine == "pybullet" else "", "wrong": 0, "wrong_distances": 0,
+        "contradictions": 0, "failed": [], "furthest_off": {"difference": 0.0}, **changes,
     }
 
 
 def comparison(disputes=(), ours_wrong=0):
     data = {
         "reference": "collide", "bodies": 9, "pairs": 30, "max_distance": 0.05, "tolerance": 1e-6,
-        "summaries": [{"engine": row[0], "skipped": "absent" if row[0] == "pybullet" else ""} for row in ROWS],
+        "summaries": [summary(row[0]) for row in ROWS],
         "disagreements": list(disputes), "ours_wrong": ours_wrong,
     }
     return SimpleNamespace(to_dict=lambda: data, table=lambda: (HEADERS, ROWS), ours_wrong=ours_wrong)
@@ -47,10 +54,25 @@ def test_every_dispute_carries_its_verdict():
     disputes = [dispute(), dispute(not_judged="cylinders", wrong=[], exact_hit=None, exact_distance=None),
                 dispute("distance", distance=0.3)]
     lines = text_of(comparing.render(comparison(disputes, 1), width=120))
-    assert lines[0].startswith("1 answer of collide proven wrong; ") and "3 disagreements, 2 of them" in lines[0]
+    assert lines[0].startswith("1 answer of collide proven wrong; ") and "1 disagreement not judged" in lines[0]
     assert "  not judged: cylinders" in lines
     row = next(line for line in lines if "panda_hand" in line and "not judged" not in line)
     assert "20.000 µm" in row and "-1.00e-09 m" in row and row.endswith("coal")
+
+
+def test_what_a_peer_got_wrong_is_in_the_first_line_with_the_amount():
+    asked = comparison()
+    asked.to_dict()["summaries"][1].update(wrong=1, wrong_distances=18, furthest_off={"difference": 0.912195})
+    line = " ".join(text_of(comparing.render(asked, width=200))[:1])
+    assert "coal: 1 wrong boolean, 18 wrong distances (912.195 mm off at worst)" in line
+
+
+def test_wrong_distances_come_worst_first_and_say_who_judged():
+    disputes = [dispute("distance", distance=0.3, off=0.1), dispute("distance", a="shelf", distance=-0.9, off=0.9, judged_by="the proven bracket")]
+    lines = text_of(comparing.render(comparison(disputes), width=120))
+    shelf, table = (next(k for k, line in enumerate(lines) if name in line.split()) for name in ("shelf", "table"))
+    assert shelf < table and "900.000 mm" in lines[shelf] and lines[shelf].endswith("coal (by bracket)")
+    assert any(line.startswith("  by bracket: ") for line in lines)
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])

@@ -5,10 +5,14 @@
     comparison.ours_wrong       # how often collide is refuted by exact arithmetic, contradicts itself or fails
     headers, rows = comparison.table()
 
-A boolean disagreement nearer to touching than `TOUCHING` of the pair's size is "within rounding":
-both engines computed with rounded numbers, and one ulp decides. It counts against an engine only
-where that engine claims a proof. What exact arithmetic cannot judge (cylinders, cones, ellipsoids,
-half-spaces) is reported as not judged, and counts against nobody.
+A boolean disagreement about a pair that touches within rounding (`collide.reports.classes`, as in reports) is "within
+rounding": both engines computed with rounded numbers, and one ulp decides. It counts against an engine only where
+that engine claims a proof.
+
+A distance is wrong where it is off by more than the tolerance. What exact arithmetic cannot judge (cylinders, cones,
+ellipsoids, half-spaces, depths of unions) is judged by the bracket that the reference proves, and ``judged_by`` says
+so: a distance outside it by more than the tolerance is wrong, and so is a boolean that its sign refutes beyond
+rounding. Where there is no bracket either, the pair is not judged, and counts against nobody.
 
 The other engines see a mesh as a surface. Here a closed one is a solid, and a body wholly inside it hits: where exact
 arithmetic finds that no surfaces meet and one body lies inside the other, a peer's "apart" is the right answer to
@@ -27,9 +31,9 @@ from collide.adapters.peers.exact_peer import INSIDE, ExactPeer, is_rounded
 from collide.adapters.peers.protocol import ENGINES, Question, Table, engine
 from collide.adapters.peers.question import ask, is_union
 from collide.errors import InvalidArgument
+from collide.reports import classes
 
-#: A pair whose exact distance is within this part of its size touches within rounding.
-TOUCHING = 1e-12
+EXACT, BRACKET = "exact arithmetic", "the proven bracket"
 #: What other engines promise of a distance, as a part of the pair's size; larger differences are listed.
 TOLERANCE = 1e-6
 
@@ -43,9 +47,12 @@ class Disagreement:
         inside the other), "contradiction"
         (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a World
         reports no row where its own pair query finds one).
-    exact_hit, exact_distance : the verdict; None where the pair is not judged, and then
-        ``not_judged`` says why. Of meshes that meet the distance is None: nobody knows how deep they are.
-    touching : the exact distance is within rounding of 0; None where not judged.
+    exact_hit, exact_distance : the verdict of exact arithmetic; None where it cannot tell. Of meshes that meet the
+        distance is None: nobody knows how deep they are.
+    lower, upper : the bracket that the reference proves; None where there is none, or where it has no end.
+    judged_by : exact arithmetic, or the bracket; empty where the pair is not judged, and then ``not_judged`` says why.
+    off : how far the engine's distance is from the exact one, or outside the bracket [m]; None where not judged.
+    touching : the pair touches within rounding; None where not judged.
     wrong : the names of the engines that the verdict refutes.   proven, undecided : of those that claim
         a proof, and of those that say themselves that the boolean is open.
     distances in m, negative inside; None where an engine gives none.
@@ -62,6 +69,10 @@ class Disagreement:
     distance: float | None
     exact_hit: bool | None = None
     exact_distance: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    judged_by: str = ""
+    off: float | None = None
     touching: bool | None = None
     not_judged: str = ""
     wrong: list[str] = field(default_factory=list)
@@ -96,7 +107,7 @@ class Summary:
     wrong : booleans that exact arithmetic refutes beyond rounding (or within it, where proven).
     wrong_within_rounding : refuted, but the pair touches within rounding, or the engine said itself
         that rounding leaves it open (undecided) and its bracket holds the truth.
-    wrong_distances : farther than the tolerance from the exact distance.
+    wrong_distances : off by more than the tolerance.   furthest_off : the worst of them.
     contradictions : boolean against own distance, beyond rounding.
     gap, depth : largest differences to the reference, apart and overlapping; overlaps of unions and meshes
         are left out, since engines mean different things by their depth.
@@ -123,6 +134,7 @@ class Summary:
     not_judged: int = 0
     gap: Largest = field(default_factory=Largest)
     depth: Largest = field(default_factory=Largest)
+    furthest_off: Largest = field(default_factory=Largest)
     failed: list[dict[str, str]] = field(default_factory=list)
     unsupported: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
@@ -151,6 +163,11 @@ class Comparison:
         ours = self.summaries[0]
         return ours.wrong + ours.wrong_distances + ours.contradictions + len(ours.failed)
 
+    @property
+    def peers_wrong(self) -> int:
+        """Answers of the other engines known to be wrong: refuted booleans and distances, and contradictions."""
+        return sum(s.wrong + s.wrong_distances + s.contradictions for s in self.summaries[1:])
+
     def summary(self, name: str) -> Summary:
         for summary in self.summaries:
             if summary.engine == name:
@@ -159,17 +176,17 @@ class Comparison:
 
     def to_dict(self) -> dict:
         """Plain data for JSON: dicts, lists, texts and finite numbers."""
-        return asdict(self) | {"ours_wrong": self.ours_wrong}
+        return asdict(self) | {"ours_wrong": self.ours_wrong, "peers_wrong": self.peers_wrong}
 
     def table(self) -> tuple[list[str], list[list[str]]]:
         """Headers and rows of text for printing, one row per engine.
 
-        "differ" counts booleans, "inside" those that differ because the engine sees surfaces only, "distance off" distances farther than the tolerance from the
-        reference's (for the reference: from the exact ones), "largest" differences both engines' own.
+        "differ" counts booleans, "inside" those that differ because the engine sees surfaces only, "wrong distances"
+        those off by more than the tolerance, "furthest off" the worst of them, "largest" differences both engines' own.
         """
         headers = [
             "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
-            "contradicts itself", "distance off", "largest gap difference", "largest depth difference",
+            "contradicts itself", "wrong distances", "furthest off", "largest gap difference", "largest depth difference",
             "failed", "unsupported",
         ]
         return headers, [_printed(s, s.engine == self.reference) for s in self.summaries]
@@ -240,6 +257,8 @@ class _Judge:
     def __init__(self, question: Question, tolerance: float):
         self.question, self.tolerance = question, tolerance
         self.size = question.sizes()
+        bodies = classes.body_sizes(question.bodies)
+        self.rounding = [float(classes.roundings(bodies[i], bodies[j])) for i, j in question.pairs]
         self.union = [is_union(body.shape) for body in question.bodies]
         self._verdicts: dict[int, Table] = {}
 
@@ -250,31 +269,47 @@ class _Judge:
         return self._verdicts[k]
 
     def decide(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> Disagreement:
-        """Write the verdict down, and who is wrong by it."""
+        """Write the verdict down, and who is wrong by it.
+
+        parties : the engines concerned with their rows; where there are two the reference is the first.
+        """
         table = self.verdict(k)
         row = table.rows[0]
-        if not row["answered"]:
-            dispute.not_judged = table.reasons[0]
-            return dispute
-        dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), _number(row["distance"])
-        if dispute.kind == "hit" and table.reasons[0] == INSIDE and not dispute.hit:
-            dispute.kind = "inside"
-            parties = parties[:1]  # the reference alone knows insides
-        depth = dispute.reference_distance if dispute.exact_distance is None else dispute.exact_distance
-        dispute.touching = depth is not None and abs(depth) <= TOUCHING * dispute.size
-        pair = self.question.pairs[k]
-        if dispute.touching and any(is_rounded(self.question.bodies[i]) for i in pair):
-            dispute.not_judged = "touching within the rounding of the body itself"
-            return dispute
-        if dispute.kind == "distance" and dispute.exact_hit and any(self.union[i] for i in pair):
-            dispute.not_judged = "the depth of a union"
-            return dispute
-        self._charge(dispute, k, parties)
+        if row["answered"]:
+            dispute.exact_hit, dispute.exact_distance = bool(row["hit"]), _number(row["distance"])
+            if dispute.kind == "hit" and table.reasons[0] == INSIDE and not dispute.hit:
+                dispute.kind = "inside"
+                parties = parties[:1]  # the reference alone knows insides
+        why = self._not_exact(dispute, k, row["answered"], table.reasons[0])
+        if not why:
+            known = dispute.reference_distance if dispute.exact_distance is None else dispute.exact_distance
+            dispute.touching = known is not None and bool(classes.is_touching(known, known, self.rounding[k]))
+            self._charge(dispute, k, parties)
+        elif len(parties) == 2 and dispute.lower is not None and dispute.upper is not None:
+            self._charge_by_bracket(dispute, k, parties, why)
+        else:
+            dispute.not_judged = why
         return dispute
 
+    def _not_exact(self, dispute: Disagreement, k: int, answered: bool, reason: str) -> str:
+        """Why exact arithmetic says nothing about a dispute; empty where it does."""
+        if not answered:
+            return reason
+        pair = self.question.pairs[k]
+        exact = dispute.exact_distance
+        touching = exact is not None and classes.is_touching(exact, exact, self.rounding[k])
+        if touching and is_rounded(*(self.question.bodies[i] for i in pair)):
+            return "touching within the rounding of the body itself"
+        if dispute.kind == "distance" and dispute.exact_hit and any(self.union[i] for i in pair):
+            return "the depth of a union"
+        return ""
+
     def _charge(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> None:
-        """Name who is wrong by the verdict, who claimed a proof, and who admitted not to know."""
+        """Name who is wrong by the exact verdict, who claimed a proof, and who admitted not to know."""
+        dispute.judged_by = EXACT
         truth = float(dispute.exact_distance or 0.0)
+        if dispute.distance is not None and dispute.exact_distance is not None:
+            dispute.off = abs(dispute.distance - truth)
         for name, answer in parties:
             missed = self.misses(k, answer, truth)
             if dispute.kind == "distance":
@@ -288,15 +323,36 @@ class _Judge:
             elif answer["undecided"]:
                 dispute.undecided.append(name)
 
+    def _charge_by_bracket(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]], why: str) -> None:
+        """Judge the engine by what the reference proves, where exact arithmetic cannot."""
+        (reference, ours), (name, answer) = parties
+        lower, upper = float(ours["lower"]), float(ours["upper"])
+        dispute.touching = bool(classes.is_touching(lower, upper, self.rounding[k]))
+        dispute.off = outside(answer["distance"], lower, upper) if answer["has_distance"] else None
+        if dispute.kind == "distance":
+            refuted = dispute.off is not None and dispute.off > self.tolerance * dispute.size
+        elif dispute.touching:
+            dispute.not_judged = why
+            return
+        else:
+            refuted = bool(answer["hit"]) == (lower > 0.0)
+        dispute.judged_by = BRACKET
+        dispute.proven.append(reference)
+        dispute.wrong += [name] if refuted else []
+
     def misses(self, k: int, answer: np.void, truth: float) -> bool:
         """Whether a proven bracket does not hold the exact distance, which was rounded once."""
         pair = self.question.pairs[k]
         if truth <= 0 and any(self.union[i] for i in pair):
             return False  # exact arithmetic has the depths of parts, not of the union
-        rounded = any(is_rounded(self.question.bodies[i]) for i in pair)
-        slack = TOUCHING * self.size[k] if rounded else 0.0
+        slack = self.rounding[k] if is_rounded(*(self.question.bodies[i] for i in pair)) else 0.0
         below = answer["lower"] > np.nextafter(truth, np.inf) + slack
         return bool(below or answer["upper"] < np.nextafter(truth, -np.inf) - slack)
+
+
+def outside(distance: float, lower: float, upper: float) -> float:
+    """How far a distance is outside a bracket [m]; 0 within it."""
+    return float(max(lower - distance, distance - upper, 0.0))
 
 
 def _dispute(judge: _Judge, k: int, kind: str, theirs: Table, ours: Table | None = None) -> Disagreement:
@@ -308,6 +364,8 @@ def _dispute(judge: _Judge, k: int, kind: str, theirs: Table, ours: Table | None
         None if reference is None else _number(reference["distance"]),
         bool(row["hit"]), _number(row["distance"]), note=theirs.reasons[k],
     )
+    if reference is not None:
+        dispute.lower, dispute.upper = _number(reference["lower"]), _number(reference["upper"])
     parties = [(theirs.engine, row)] if ours is None else [(ours.engine, reference), (theirs.engine, row)]
     return judge.decide(dispute, k, parties)
 
@@ -318,7 +376,7 @@ def _own(judge: _Judge, table: Table) -> list[Disagreement]:
     for k, row in enumerate(table.rows):
         if not row["answered"]:
             continue
-        beyond_rounding = row["has_distance"] and abs(row["distance"]) > TOUCHING * judge.size[k]
+        beyond_rounding = row["has_distance"] and abs(row["distance"]) > judge.rounding[k]
         opposed = beyond_rounding and not row["undecided"] and bool(row["hit"]) != bool(row["distance"] < 0)
         if opposed or row["lower"] > row["upper"]:
             found.append(_dispute(judge, k, "contradiction", table))
@@ -328,24 +386,31 @@ def _own(judge: _Judge, table: Table) -> list[Disagreement]:
 
 
 def _between(judge: _Judge, ours: Table, theirs: Table, summary: Summary) -> list[Disagreement]:
-    """Where two engines differ; the largest differences go into the summary."""
+    """Where two engines differ, in their booleans or their distances; the largest differences go into the summary."""
     found = []
     for k in np.flatnonzero(ours.rows["answered"] & theirs.rows["answered"]).tolist():
         mine, other = ours.rows[k], theirs.rows[k]
-        if mine["hit"] != other["hit"]:
-            found.append(_dispute(judge, k, "hit", theirs, ours))
+        differing = _dispute(judge, k, "hit", theirs, ours) if mine["hit"] != other["hit"] else None
+        found += [differing] if differing else []
+        summary.agreeing += differing is None
+        if not (mine["has_distance"] and other["has_distance"]) or (differing and differing.kind == "inside"):
             continue
-        summary.agreeing += 1
-        if not (mine["has_distance"] and other["has_distance"]):
-            continue
-        if mine["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
-            continue
+        lower, upper = _bracket(mine)
+        if lower < -judge.rounding[k] and mine["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
+            continue  # engines mean different things by the depth of a union
         difference = abs(float(mine["distance"]) - float(other["distance"]))
         (summary.depth if mine["hit"] else summary.gap).see(difference, *judge.question.names(k))
         missed = theirs.engine == "exact" and judge.misses(k, mine, float(other["distance"]))
-        if missed or difference > judge.tolerance * judge.size[k]:
+        if missed or outside(other["distance"], lower, upper) > judge.tolerance * judge.size[k]:
             found.append(_dispute(judge, k, "distance", theirs, ours))
     return found
+
+
+def _bracket(row: np.void) -> tuple[float, float]:
+    """What an engine proves of its distance, or the distance itself."""
+    if math.isnan(row["lower"]) or math.isnan(row["upper"]):
+        return float(row["distance"]), float(row["distance"])
+    return float(row["lower"]), float(row["upper"])
 
 
 def _tally(summary: Summary, disagreements: list[Disagreement], reference: str) -> None:
@@ -364,6 +429,8 @@ def _tally(summary: Summary, disagreements: list[Disagreement], reference: str) 
         if summary.engine in d.wrong:
             excused = summary.engine in d.undecided or (d.touching and summary.engine not in d.proven)
             (distances if d.kind == "distance" else rounding if excused else wrong).add(pair)
+            if d.kind == "distance" and d.engine == summary.engine and d.off is not None:
+                summary.furthest_off.see(d.off, *pair)
     summary.wrong, summary.wrong_within_rounding, summary.wrong_distances = map(len, (wrong, rounding, distances))
 
 
@@ -373,13 +440,12 @@ def _number(value) -> float | None:
 
 def _printed(s: Summary, is_reference: bool) -> list[str]:
     if s.skipped:
-        return [s.engine, f"skipped: {s.skipped}", *[""] * 13]
+        return [s.engine, f"skipped: {s.skipped}", *[""] * 14]
     agree, differ, inside = ("", "", "") if is_reference else map(str, (s.agreeing, s.hit_disagreements, s.inside))
-    off = s.wrong_distances if is_reference else s.distance_disagreements
     largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
     return [
         s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong), str(s.wrong_within_rounding),
-        str(s.not_judged), str(s.contradictions), str(off), *largest,
+        str(s.not_judged), str(s.contradictions), str(s.wrong_distances), _length(s.furthest_off), *largest,
         str(len(s.failed)), str(sum(s.unsupported.values())),
     ]
 

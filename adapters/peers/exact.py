@@ -167,9 +167,9 @@ def verify(answer, P, R1, t1, Q, R2, t2):
 
 
 def _integers(rows):
-    """Rows of three doubles as integer 3-tuples and an exponent e: integers * 2**e."""
-    # A double is a ratio whose denominator is a power of two.
-    ratios = [[float(x).as_integer_ratio() for x in row] for row in rows]
+    """Rows of three doubles, or Fractions of their kind, as integer 3-tuples and an exponent e: integers * 2**e."""
+    # A double is a ratio whose denominator is a power of two; so are sums and products of doubles.
+    ratios = [[(x if isinstance(x, Fraction) else float(x)).as_integer_ratio() for x in row] for row in rows]
     if not ratios or any(len(row) != 3 for row in ratios):
         raise ValueError("expected at least one row of three coordinates")
     shift = max(d.bit_length() - 1 for row in ratios for _, d in row)

@@ -1,15 +1,20 @@
 """Exact arithmetic as an engine: polytopes, spheres, capsules and meshes, judged without rounding.
 
-Bodies enter as the doubles they are, poses entry by entry. Cylinders, cones, ellipsoids and
-half-spaces have no exact answer here: not judged. Of meshes that meet no depth is known.
+Bodies enter as the doubles they are, poses entry by entry, those of parts in a compound multiplied out exactly.
+Cylinders, cones, ellipsoids and half-spaces have no exact answer here: not judged. Of meshes that meet no depth is
+known.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
 
 from collide.adapters.peers.protocol import PairwisePeer, Reply
-from collide.adapters.peers.question import Body, corners
+from collide.adapters.peers.question import Body, convex_parts, corners
 from collide.errors import UnsupportedQuery
 from collide.shapes import Compound, HPolytope, Mesh, Shape
 
@@ -34,6 +39,18 @@ class ExactPeer(PairwisePeer):
         if found is None:
             raise UnsupportedQuery(str(self.refuses(part)))
         return found
+
+    def parts(self, body: Body) -> Iterator[tuple]:
+        """The corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
+        if not isinstance(body.shape, Compound) or _has(body, Mesh):
+            yield from super().parts(body)
+            return
+        for part, poses in _placed(body.shape, ()):
+            built = corners(part)
+            if built is None:
+                raise UnsupportedQuery(str(self.refuses(part)))
+            points, radius = built
+            yield (_moved(points, poses), radius), body.X_WB
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:
         from collide.adapters.peers import exact
@@ -64,10 +81,33 @@ def _with_mesh(A, X_WA, B, X_WB) -> Reply:
     return Reply(False, verdict.distance, certified=True)
 
 
-def is_rounded(body: Body) -> bool:
-    """True where what exact arithmetic sees of a body is itself rounded once.
+def is_rounded(*bodies: Body) -> bool:
+    """True where what exact arithmetic sees of a pair is itself rounded once.
 
-    Corners of an HPolytope and poses of parts in a Compound are: verdicts nearer to touching than
-    that rounding say nothing.
+    Corners of an HPolytope are, and poses of parts in a compound where a mesh takes part: verdicts nearer to touching
+    than that rounding say nothing.
     """
-    return isinstance(body.shape, Compound | HPolytope)
+    meshed = any(_has(body, Mesh) for body in bodies)
+    return any(_has(body, HPolytope) or (meshed and isinstance(body.shape, Compound)) for body in bodies)
+
+
+def _has(body: Body, kind: type) -> bool:
+    return any(isinstance(part, kind) for part, _ in convex_parts(body.shape, np.eye(4)))
+
+
+def _placed(shape: Shape, poses: tuple) -> Iterator[tuple[Shape, tuple]]:
+    """The parts of a compound, each with the poses that lead out of it, the innermost first."""
+    if isinstance(shape, Compound):
+        for part, X in shape.items:
+            yield from _placed(part, (X, *poses))
+    else:
+        yield shape, poses
+
+
+def _moved(points: np.ndarray, poses: tuple) -> list[list[Fraction]]:
+    """Points (n, 3) under poses (4, 4), one after the other, without any rounding."""
+    moved = [[Fraction(float(x)) for x in point] for point in points]
+    for X in poses:
+        rows = [[Fraction(float(x)) for x in row] for row in X[:3]]
+        moved = [[sum((a * x for a, x in zip(row, point)), row[3]) for row in rows] for point in moved]
+    return moved

@@ -218,6 +218,10 @@ class PairwisePeer(Peer):
         """The engine's own geometry for one convex shape; raises UnsupportedQuery with the reason."""
         raise TypeError(f"{type(self).__name__} builds nothing: derive it from PairwisePeer and define build")
 
+    def parts(self, body: Body) -> Iterator[tuple[Any, np.ndarray]]:
+        """The engine's geometries of a body, each with its pose in the world (4, 4)."""
+        return ((self.build(part), X_WP) for part, X_WP in convex_parts(body.shape, body.X_WB))
+
     def ask(self, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Reply:
         """Two geometries at two poses (4, 4)."""
         raise TypeError(f"{type(self).__name__} asks nothing: derive it from PairwisePeer and define ask")
@@ -237,7 +241,7 @@ class PairwisePeer(Peer):
             reason = self.supports(body.shape)
             if reason:
                 return UnsupportedQuery(reason)
-            return [(self.build(part), X_WP) for part, X_WP in convex_parts(body.shape, body.X_WB)]
+            return list(self.parts(body))
         except UnsupportedQuery as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever a binding throws costs this body alone

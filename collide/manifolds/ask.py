@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from collide.batches import ask
 from collide.errors import InvalidArgument, InvalidPose
 from collide.manifolds.convex import convex_contacts
 from collide.manifolds.rows import Contacts, no_rows
@@ -64,17 +67,27 @@ def contacts(A, B, X_WA, X_WB, *, margin: float = 0.0, max_contacts: int = 8, ch
 
 
 def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, most: int) -> np.ndarray:
-    """Rows of two shapes at checked poses (4, 4)."""
+    """Rows of two shapes at checked poses (4, 4): none where `distance` proves them farther apart than the margin."""
+    rows = _rows_of_parts(A, B, X_WA, X_WB, margin, most)
+    # Parts are asked a little beyond the margin, for what rounding may have moved; where that matters the distance tells.
+    near = not len(rows) or rows["upper"].min() <= margin
+    if near or ask(A, B, X_WA[None], X_WB[None], False, math.inf, False, 1)["lower"][0] <= margin:
+        return rows
+    return no_rows()
+
+
+def _rows_of_parts(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, most: int) -> np.ndarray:
     parts_a, parts_b = _parts(A, X_WA), _parts(B, X_WB)
     if len(parts_a) == len(parts_b) == 1 and parts_a[0][2] == parts_b[0][2] == 0.0:
         return _two(parts_a[0][0], parts_b[0][0], parts_a[0][1], parts_b[0][1], margin, most)
     found, patches = [], 0
     for i, (one, X_WO, off_a) in enumerate(parts_a):
         for j, (other, X_WP, off_b) in enumerate(parts_b):
-            rows = _two(one, other, X_WO, X_WP, margin, most)
+            off = off_a + off_b
+            rows = _two(one, other, X_WO, X_WP, margin + off, most)
             rows["part_a"], rows["part_b"] = i, j
-            rows["lower"] -= off_a + off_b
-            rows["upper"] += off_a + off_b
+            rows["lower"] -= off
+            rows["upper"] += off
             rows["patch"] += patches
             patches = int(rows["patch"].max(initial=patches - 1)) + 1
             found.append(rows)

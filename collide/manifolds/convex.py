@@ -119,14 +119,14 @@ def _joined(nearest: Points, more: Points, facets: np.ndarray, others: np.ndarra
 
 
 def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
-    """The row of `distance`, None where they are farther apart than the margin."""
+    """The row of `distance`, None where it is proven that they are farther apart than the margin."""
     row = ask(A, B, X_WA[None], X_WB[None], False, margin, False, 1)[0]
     if np.isneginf(row["distance"]):
         raise UnsupportedQuery(
             f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the way out; "
             "collide() still answers"
         )
-    if row["beyond"] or (not row["hit"] and row["distance"] > margin):
+    if row["beyond"] or row["lower"] > margin:
         return None
     return row
 

@@ -65,15 +65,17 @@ def _corners_over(pairs: Pairs, face, other, which, n, error: float, exchanged: 
     T, P = face[which], other[which]
     edges = T[:, [1, 2, 0], :2] - T[:, :, :2]
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    longest = np.hypot(edges[..., 0], edges[..., 1]).max(axis=1, initial=0.0)
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    longest = lengths.max(axis=1, initial=0.0)
     clear = np.abs(area) > _CLEAR * error * longest
     safe = np.where(clear, area, 1.0)
     # Weight of corner k: what the edge opposite to it spans with the point, over the whole.
     away = P[:, :, None, :2] - T[:, None, :, :2]  # (pair, point, corner)
     spans = edges[:, None, :, 0] * away[..., 1] - edges[:, None, :, 1] * away[..., 0]
     weights = spans[:, :, [1, 2, 0]] / safe[:, None, None]
-    outside = np.minimum(_ERRORS_OUTSIDE * error * longest / np.abs(safe), _FARTHEST_OUTSIDE)
-    inside = (weights >= -outside[:, None, None]).all(axis=2) & clear[:, None]
+    # Off an edge by an error, whatever the shape of the facet: no more of a needle's length than of its width.
+    outside = np.minimum(_ERRORS_OUTSIDE * error * lengths[:, [1, 2, 0]] / np.abs(safe)[:, None], _FARTHEST_OUTSIDE)
+    inside = (weights >= -outside[:, None]).all(axis=2) & clear[:, None]
     height = (weights * T[:, None, :, 2]).sum(axis=2)
     gap = (height - P[:, :, 2]) if exchanged else (P[:, :, 2] - height)
     spread = T[:, :, 2].max(axis=1, initial=-np.inf) - T[:, :, 2].min(axis=1, initial=np.inf)
@@ -98,8 +100,11 @@ def _crossings(pairs: Pairs, a, b, which, error: float) -> Points:
     safe = np.where(clear, span, 1.0)
     s = (w[..., 0] * f[..., 1] - w[..., 1] * f[..., 0]) / safe
     t = (w[..., 0] * e[..., 1] - w[..., 1] * e[..., 0]) / safe
-    outside = np.minimum(_ERRORS_OUTSIDE * error * (long_e + long_f) / np.abs(safe), _FARTHEST_OUTSIDE)
-    hit = clear & (np.minimum(s, t) >= -outside) & (np.maximum(s, t) <= 1 + outside)
+    # Beyond the end of either edge by an error, across the other: no more of a long edge than of a short one.
+    outside_e, outside_f = (
+        np.minimum(_ERRORS_OUTSIDE * error * other / np.abs(safe), _FARTHEST_OUTSIDE) for other in (long_f, long_e)
+    )
+    hit = clear & (s >= -outside_e) & (s <= 1 + outside_e) & (t >= -outside_f) & (t <= 1 + outside_f)
     row, i, j = np.nonzero(hit)
     s, t = s[hit], t[hit]
     gap = w[..., 2][hit] + t * f[row, 0, j, 2] - s * e[row, i, 0, 2]

@@ -6,6 +6,7 @@ import numpy as np
 
 from collide.manifolds.convex import against_plane
 from collide.manifolds.facets import Posed, posed
+from collide.manifolds.overlaps import CLEAR
 from collide.manifolds.patches import Patch, patches_of
 from collide.manifolds.points import across
 from collide.manifolds.reduce import chosen
@@ -45,7 +46,8 @@ def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
 
 def _ordered(one: Body, other: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
     here = posed(one, other, X_WA, X_WB)
-    patches, deep = patches_of(here, margin)
+    rounding = 0.0 if margin + one.radius + other.radius == 0.0 else CLEAR * here.error
+    patches, deep = patches_of(here, margin + rounding)
     if not patches:
         return _witness(A, B, X_WA, X_WB, margin) if deep else no_rows()
     made = [finished(here, patch, margin, most) for patch in patches]

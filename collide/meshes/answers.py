@@ -13,33 +13,34 @@ import numpy as np
 
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.bodies import Body, body_of, has_facets, hull_of, is_halfspace
-from collide.meshes.curved import APART, curved_rows, decide
+from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace
+from collide.meshes.curved import curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
-from collide.meshes.hits import apart_nearby, core_hits, hits, swept_apart
+from collide.meshes.hits import APART, HIT, apart_nearby, core_hits, states, swept_apart
 from collide.meshes.way_out import way_out
+from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.queries import surface_distances
 from collide.results import EXACT, FIELDS, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
 from collide.shapes.mesh import Mesh
 
-#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
-_FAR = 1e20
+#: Facets nearer than this share of the pair's size tell its direction badly.
+NEAR = 2.0**-24
 #: `certified` promises gaps in brackets no wider than this, in units of the pair's size.
 PROMISE = 2.0**-43
 
 
-def mesh_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool for poses (n, 4, 4): whether two shapes, a mesh among them, share a point. Raises UnsupportedQuery."""
+def mesh_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) APART, HIT or OPEN for poses (n, 4, 4) of two shapes, a mesh among them. Raises UnsupportedQuery."""
     if is_halfspace(A) or is_halfspace(B):
-        return ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1)
+        return np.where(ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1), HIT, APART)
     if not has_facets(A):
-        return mesh_hits(B, A, X_WB, X_WA)
+        return mesh_states(B, A, X_WB, X_WA)
     if not has_facets(B):
-        return decide(body_of(A), enclosure_of(B), given(X_WA), given(X_WB)).state != APART
+        return decide(body_of(A), enclosure_of(B), given(X_WA), given(X_WB)).state
     one, other = body_of(A), body_of(B)
-    return hits(one, other, X_WA, X_WB) if one.key <= other.key else hits(other, one, X_WB, X_WA)
+    return states(one, other, X_WA, X_WB) if one.key <= other.key else states(other, one, X_WB, X_WA)
 
 
 def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
@@ -107,7 +108,7 @@ def _rows(A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool) -> np.ndarra
         apart[~sure] = apart_nearby(A, B, X_WA[left[~sure]], X_WB[left[~sure]])
         sure |= apart
     rows[left] = _gaps(A, B, X_WA[left], X_WB[left], found, limit)
-    if limit > _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent)):
+    if limit > farthest_told(A, B):
         for k in left[found.facets[:, 0] < 0].tolist():
             rows[k] = _far_gap(A, B, X_WA[k], X_WB[k], limit)
     rows["hit"], rows["hit"][left] = True, ~apart
@@ -130,6 +131,7 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     normal = np.where(unseen[:, None], _unit(across - start), found.normal)
     lost = (normal == 0.0).all(axis=1)
     normal[lost] = _unit((across - start)[lost])
+    turned = _of_hulls(A, B, X_WA, X_WB, found, normal)
     rows["normal"] = normal + 0.0
     rows["lower"] = np.maximum(_down(found.lower - radius) if radius else found.lower, 0.0)
     rows["upper"] = np.maximum(_up(found.upper - radius) if radius else found.upper, 0.0)
@@ -138,6 +140,7 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
     none = rows["distance"] == 0.0
     rows["distance"][none] = rows["upper"][none]
     rows["point_a"], rows["point_b"] = found.point_a + A.radius * normal, found.point_b - B.radius * normal
+    lay_points_apart(rows, turned)
     rows["part_a"], rows["part_b"] = np.maximum(found.facets[:, 0], 0), np.maximum(found.facets[:, 1], 0)
     beyond = unseen | (rows["lower"] > limit)
     rows["beyond"] = beyond
@@ -152,6 +155,22 @@ def _gaps(A: Body, B: Body, X_WA, X_WB, found, limit: float) -> np.ndarray:
         rows["point_a"][unseen], rows["point_b"][unseen] = middle - half, middle + half
     rows["exact"] = np.minimum(found.counters[:, 2], 255)
     return rows
+
+
+def _of_hulls(A: Body, B: Body, X_WA, X_WB, found, normal: np.ndarray) -> np.ndarray:
+    """Numbers of the rows whose ``normal`` becomes, in place, that of the hulls.
+
+    Of a pair of facets that all but touch rounding leaves many directions, and the pair found may be one around the corner of
+    two faces that lie on each other. Hulls that are as far apart, as far as is proven, know the bodies' own direction.
+    """
+    near = np.flatnonzero((found.facets[:, 0] >= 0) & (found.distance <= NEAR * _size(A, B, X_WA, X_WB)))
+    if not len(near):
+        return near
+    hulls = ask(hull_of(A), hull_of(B), X_WA[near], X_WB[near], False, math.inf, False, 1)
+    as_far = hulls["upper"] + A.radius + B.radius >= found.lower[near]
+    near, hulls = near[as_far], hulls[as_far]
+    normal[near] = hulls["normal"]
+    return near
 
 
 def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:

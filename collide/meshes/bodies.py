@@ -6,6 +6,7 @@ capsule a segment and one. A cylinder, cone or ellipsoid has no facets: see `enc
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from collide.geometry.packing import HALFSPACE, POINTS
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
+
+#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
+_FAR = 1e20
 
 
 class Body(NamedTuple):
@@ -94,6 +98,11 @@ def hull_of(body: Body) -> Shape:
     if not body.hull:
         body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
     return body.hull[0]
+
+
+def farthest_told(A: Body, B: Body) -> float:
+    """The largest gap [m] that box-trees tell: their boxes are floats, in units of the smaller body's size."""
+    return _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
 
 
 def _of_mesh(mesh: Mesh) -> Body:

@@ -15,19 +15,18 @@ import numpy as np
 from collide.batches import ask
 from collide.geometry.mesh_tree.layout import REACH
 from collide.geometry.packing import POINTS
-from collide.meshes.bodies import Body, hull_of
+from collide.meshes.bodies import Body, farthest_told, hull_of
 from collide.meshes.enclosures import Enclosure
 from collide.meshes.facet_rows import Posed, facet_rows
-from collide.meshes.hits import core_hits
+from collide.meshes.hits import APART, HIT, OPEN, core_hits, holds_points
 from collide.meshes.near_facets import Facets, near_facets
 from collide.meshes.way_out import way_out
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.other_searches import lay_points_apart
 from collide.narrowphase.triangles.inside import OUTSIDE
 from collide.narrowphase.triangles.queries import points_in_solid, surface_distances
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 
-#: What is known of a pose.
-APART, HIT, OPEN = range(3)
 #: Facets of a pose that are asked about together: so many first, then so many times more.
 _FIRST, _MORE = 8, 4
 
@@ -136,14 +135,13 @@ def curved_rows(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, *, limit: float
 
 
 def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: float) -> np.ndarray:
-    """Rows of bodies that are known to be apart."""
-    n = len(PA.X)
-    rows = np.zeros(n, dtype=PAIR_DTYPE)
-    found = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf))
-    seen = np.flatnonzero(found.facets[:, 0] >= 0)
+    """Rows of bodies that are known to be apart; only what is no farther than ``farthest`` [m] is looked for."""
+    rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
+    facets = _facets_to_begin_with(A, E, PA, PB, farthest)
+    seen = np.flatnonzero(facets >= 0)
     if len(seen):
-        rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), found.facets[seen, 0])
-    for k in np.flatnonzero(found.facets[:, 0] < 0).tolist():
+        rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), facets[seen])
+    for k in np.flatnonzero(facets < 0).tolist():
         rows[k] = _far(A, E, PA, PB, k, farthest)
     rows["vertices_a"] = rows["vertices_b"] = -1
     rows["hit"] = False
@@ -153,19 +151,39 @@ def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: f
     return rows
 
 
+def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float) -> np.ndarray:
+    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``farthest``.
+
+    The polytope around the shape tells, by its surface: what comes nearer to the shape than the limit either comes as
+    near to that surface, or lies inside it. So a part of the mesh that is wholly inside, however far from the surface,
+    is not beyond the limit; one point of every part says whether there is one.
+    """
+    facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf)).facets[:, 0].copy()
+    unseen = np.flatnonzero(facets < 0)
+    if len(unseen) and farthest < math.inf:
+        enclosed = unseen[holds_points(E.outer, A.points, PB.X[unseen], PA.X[unseen])]
+        if len(enclosed):
+            nearest = surface_distances(A.tree, E.outer.tree, PA.X[enclosed], PB.X[enclosed]).facets[:, 0]
+            facets[enclosed] = np.maximum(nearest, 0)  # any facet will do to begin with
+    return facets
+
+
 def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) -> np.ndarray:
-    """Rows of the nearest facets; ``facets`` (n,) are numbers of near ones."""
+    """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
+
+    Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need not.
+    """
     n = len(PA.X)
     order = np.empty(len(A.tree.ids), dtype=np.int64)
     order[A.tree.ids] = np.arange(len(order))
     first = order[facets]
     poses, places = [np.arange(n)], [first]
-    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf)]
+    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf, depths=False)]
     upper = asked[0]["upper"].copy()
     near = near_facets(A.tree, E.packed, PA, PB, asked[0]["normal"], upper)
     for some in _rounds(near, lambda facets: (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])):
         pose, place = near.pose[some], near.place[some]
-        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf)  # whatever the batch
+        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=False)  # whatever the batch
         poses.append(pose)
         places.append(place)
         asked.append(rows)
@@ -176,7 +194,8 @@ def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) ->
 
 def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper) -> np.ndarray:
     """One row a pose from those of its facets."""
-    order = np.lexsort((place, rows["distance"], pose))
+    # The nearest by its upper bound and the width of its bracket: where that is wide the distance is a guess, and so are points.
+    order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
     best = order[np.flatnonzero(np.diff(pose[order], prepend=-1))]
     out = np.zeros(len(best), dtype=PAIR_DTYPE)
     for name in FIELDS:  # padding stays 0
@@ -191,6 +210,7 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
     none = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
     out["distance"][none] = np.maximum(out["upper"][none], 5e-324)
     out["upper"] = np.maximum(out["upper"], out["distance"])
+    lay_points_apart(out, np.flatnonzero(out["distance"] != rows["distance"][best]))
     promise = PROMISE_STORED if E.packed.kind == POINTS else PROMISE_CURVED
     out["certified"] = certified | (out["upper"] - out["lower"] <= promise * _size(A, E, PA, PB))
     out["how"][out["how"] == UNDECIDED] = EXACT  # the polytope around it is apart from the mesh
@@ -205,7 +225,7 @@ def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
 
 def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
     """The row of bodies that are out of sight: beyond the limit, or farther than boxes in floats can tell."""
-    if limit < math.inf:
+    if limit <= farthest_told(A, E.outer):
         return _unseen(A, E, PA, PB, k, limit)
     hulls = ask(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], False, limit, False, 1)
     row = hulls[0]

@@ -31,11 +31,12 @@ class Posed(NamedTuple):
 
 
 def facet_rows(
-    tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, pose: np.ndarray, place: np.ndarray, *, boolean: bool, limit: float
-) -> np.ndarray:
+    tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, pose: np.ndarray, place: np.ndarray, *, boolean: bool, limit: float,
+    depths: bool = True,
+) -> np.ndarray:  # fmt: skip
     """Rows (PAIR_DTYPE) of k facets, each at one of n pairs of poses, against a convex set; the facet is A.
 
-    pose, place : (k,) which poses, and which triangles in the order of the tree.   boolean, limit : as of `run_pairs`.
+    pose, place : (k,) which poses, and which triangles in the order of the tree.   boolean, limit, depths : as of `run_pairs`.
     """
     corners, own = np.unique(place, return_inverse=True)
     table = FacetTable(tree.triangles[corners].reshape(-1, 3, 3), packed)
@@ -48,7 +49,7 @@ def facet_rows(
     rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
     shape_of = np.concatenate([own.ravel(), np.full(len(which), len(corners))]).astype(np.int64)
     pairs = np.stack([np.arange(len(pose)), len(pose) + again.ravel()], axis=1)
-    return run_pairs(table, PoseTable(rows, _NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit)  # type: ignore[arg-type]
+    return run_pairs(table, PoseTable(rows, _NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit, depths=depths)  # type: ignore[arg-type]
 
 
 _NO_TERMS = np.zeros((0, 12, TERMS))

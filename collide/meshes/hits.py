@@ -20,6 +20,8 @@ from collide.narrowphase.triangles.queries import (
     surfaces_meet,
 )
 
+#: What is known of a pose.
+APART, HIT, OPEN = range(3)
 #: As many points and poses are looked at in one go.
 _CHUNK = 1 << 16
 #: Below so many points and poses, asking takes no longer than leaving out those far away.
@@ -46,6 +48,13 @@ def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> Hits:
             if len(left):
                 _mark_inside(body, other.points, X_WO, X_WP, left, core, inside)
     return Hits(core, inside)
+
+
+def holds_points(body: Body, points: np.ndarray, X_WO: np.ndarray, X_WP: np.ndarray) -> np.ndarray:
+    """(n,) bool, exactly: whether the solid at X_WO (n, 4, 4) holds one of the points (k, 3) of a frame at X_WP."""
+    held = np.zeros(len(X_WO), dtype=bool)
+    _mark_inside(body, points, X_WO, X_WP, np.arange(len(X_WO)), held, np.full((len(X_WO), 3), np.nan))
+    return held
 
 
 def _mark_inside(body: Body, points, X_WO, X_WP, left, core, inside) -> None:
@@ -88,19 +97,24 @@ def swept_apart(A: Body, B: Body, found: SurfaceDistances) -> tuple[np.ndarray, 
     return apart, apart | (found.upper <= radius) | found.meets
 
 
-def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether the bodies share a point; what rounding leaves open, swept balls only, is a hit."""
-    answer = core_hits(A, B, X_WA, X_WB).core
+def states(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) APART, HIT or OPEN: whether the bodies share a point; rounding leaves open swept balls only."""
+    answer = np.where(core_hits(A, B, X_WA, X_WB).core, HIT, APART)
     radius = A.radius + B.radius
-    left = np.flatnonzero(~answer)
+    left = np.flatnonzero(answer == APART)
     if radius > 0.0 and len(left):
         found = surface_distances(A.tree, B.tree, X_WA[left], X_WB[left], radius * FARTHER)
         apart, sure = swept_apart(A, B, found)
         if not sure.all():
             more = surface_distances(A.tree, B.tree, X_WA[left[~sure]], X_WB[left[~sure]])
-            apart[~sure] = swept_apart(A, B, more)[0]
-        answer[left] = ~apart
+            apart[~sure], sure[~sure] = swept_apart(A, B, more)
+        answer[left] = np.where(apart, APART, np.where(sure, HIT, OPEN))
     return answer
+
+
+def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: False only where the bodies are proven apart."""
+    return states(A, B, X_WA, X_WB) != APART
 
 
 def apart_nearby(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:

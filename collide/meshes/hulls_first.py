@@ -11,9 +11,8 @@ import math
 import numpy as np
 
 from collide.batches import ask
-from collide.meshes.pair_queries import pair_rows
+from collide.meshes.pair_queries import convex_cover, pair_rows
 from collide.shapes.base import Shape
-from collide.shapes.mesh import Mesh
 
 
 def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
@@ -21,7 +20,7 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
 
     Raises UnsupportedQuery where the hulls are not enough and the shapes are not answered.
     """
-    hulls = _hull(A), _hull(B)
+    hulls = convex_cover(A), convex_cover(B)
     if limit < math.inf and None not in hulls:
         rows = ask(*hulls, X_WA, X_WB, False, limit, False, 1, depths=False)
         if rows["beyond"][0] or rows["lower"][0] > limit:
@@ -29,10 +28,3 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
             rows["part_a"], rows["part_b"] = 0, 0
             return rows
     return pair_rows(A, B, X_WA, X_WB, limit=limit)
-
-
-def _hull(shape: Shape) -> Shape | None:
-    """What holds the shape and is made of convex parts, where there is such."""
-    if isinstance(shape, Mesh):
-        return shape.convex_hull
-    return None if shape.meshed else shape

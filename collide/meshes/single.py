@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.answers import PROMISE
+from collide.meshes.answers import NEAR, PROMISE
 from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
-from collide.meshes.curved import APART, HIT
+from collide.meshes.hits import APART, HIT
 from collide.meshes.pair_queries import pair_states
 from collide.meshes.union_parts import is_union
 from collide.narrowphase import run
@@ -66,6 +66,8 @@ class PreparedPair:
         ]
         facets = [marks[FACET_A], marks[FACET_B]]
         away = abs(X_WB[0, 3] - X_WA[0, 3]) + abs(X_WB[1, 3] - X_WA[1, 3]) + abs(X_WB[2, 3] - X_WA[2, 3])
+        if numbers[DISTANCE] <= NEAR * (self._reaches + away):
+            return None
         narrow = upper <= lower + PROMISE * (self._reaches + away)
         if self._exchanged:
             normal = [0.0 - x for x in normal]

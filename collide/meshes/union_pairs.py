@@ -12,12 +12,12 @@ import math
 import numpy as np
 
 from collide.batches import ask
-from collide.meshes.answers import PROMISE, facet_rows_of, hull_shape, mesh_hits, mesh_rows
+from collide.meshes.answers import PROMISE, facet_rows_of, hull_shape, mesh_rows, mesh_states
 from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
-from collide.meshes.curved import APART, HIT, OPEN, curved_rows, decide
+from collide.meshes.curved import curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
-from collide.meshes.hits import core_hits
+from collide.meshes.hits import APART, HIT, OPEN, core_hits
 from collide.narrowphase.triangles.queries import FARTHER, all_hits, first_hits, surface_distances
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.base import Shape
@@ -34,12 +34,7 @@ def part_states(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed) -> np.ndarray:
     states = np.full(len(slop), OPEN)
     exact = slop == 0.0
     if exact.any():
-        PA, PB = X_WA.of(exact), X_WB.of(exact)
-        if has_facets_or_plane(A) and has_facets_or_plane(B):
-            states[exact] = np.where(mesh_hits(A, B, PA.X, PB.X), HIT, APART)
-            _open_ones(A, B, PA, PB, states, np.flatnonzero(exact))
-        else:
-            states[exact] = _curved_states(A, B, PA, PB)
+        states[exact] = mesh_states(A, B, X_WA.X[exact], X_WB.X[exact])
     if not exact.all():
         PA, PB = X_WA.of(~exact), X_WB.of(~exact)
         if is_halfspace(A) or is_halfspace(B):
@@ -50,23 +45,6 @@ def part_states(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed) -> np.ndarray:
         else:
             states[~exact] = _curved_states(A, B, PA, PB)
     return states
-
-
-def _open_ones(A: Shape, B: Shape, PA: Posed, PB: Posed, states: np.ndarray, at: np.ndarray) -> None:
-    """Mark hits of swept balls, at ``at``, that are not proven."""
-    met = np.flatnonzero(states[at] == HIT)
-    if not len(met) or is_halfspace(A) or is_halfspace(B):
-        return
-    radius = body_of(A).radius + body_of(B).radius
-    if radius > 0.0:
-        found = surface_distances(body_of(A).tree, body_of(B).tree, PA.X[met], PB.X[met], radius * FARTHER)
-        core = core_hits(body_of(A), body_of(B), PA.X[met], PB.X[met]).core
-        states[at[met[~core & (found.upper > radius)]]] = OPEN
-
-
-def has_facets_or_plane(shape: Shape) -> bool:
-    """Whether a single body is answered without a bracket: facets, and half-spaces."""
-    return is_halfspace(shape) or has_facets(shape)
 
 
 def _curved_states(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from collide.batches import ask
 from collide.meshes.answers import rows_in_order
 from collide.meshes.bodies import is_halfspace
-from collide.meshes.curved import APART, HIT, OPEN
+from collide.meshes.hits import APART, HIT, OPEN
 from collide.meshes.union_pairs import part_rows, part_states
 from collide.meshes.union_parts import UnionParts, union_of
 from collide.meshes.way_out import Parting, shortened

@@ -32,6 +32,8 @@ TIED = TIES + max(MOST_TIES + 1, PRODUCT_TERMS)
 OWN_DOUBLES, OWN_INTEGERS = FINE_AT + 5 * FINE + 24, TIED + ENTRY
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
 _NEAR_MISS = 2.0**-48
+#: Of a bracket's width, what weighted points of curved cores may miss the foot by.
+_OF_WIDTH = 2.0**-10
 #: Least weight of a foot well inside its facet.
 _WELL_INSIDE = 2.0**-10
 #: So many vertices of two cores are worth a better seed for EPA than GJK's.
@@ -189,8 +191,13 @@ def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radiu
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, x, y, z)) <= slack):
         facet = facet_of(polytope, count, facet, x, y, z, slack)
         _load_facet(polytope, facet, points, ids, weights, named, x, y, z)
-    if depths and not curved and _miss(points, weights, x, y, z) > _NEAR_MISS * size:
-        weigh_nearest(polytope, count, facet, points, ids, weights, named, x, y, z, _NEAR_MISS * size)
+    # The surface of curved cores keeps a width. Where many facets are as near, slivers mostly, none need hold the foot.
+    # Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
+    enough = _NEAR_MISS * size
+    if curved:
+        enough = max(slack, _OF_WIDTH * (depth - surface)) if surface > error else slack
+    if depths and _miss(points, weights, x, y, z) > enough:
+        weigh_nearest(polytope, count, facet, points, ids, weights, named, x, y, z, enough)
     if surface > error:
         above = min(above, -surface)
     return depth, bound, above, shallowest, deepest, nx, ny, nz, 3, 4 if status == ENCLOSED else 3, rounds

@@ -17,6 +17,7 @@ from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.decide_planes import decide_planes
 from collide.narrowphase.deepen import deepen_pairs
 from collide.narrowphase.halfspaces import settle
+from collide.narrowphase.other_searches import settle_by_other_searches
 from collide.narrowphase.poses import (
     ANSWERED,
     BAD_POSE,
@@ -43,25 +44,27 @@ def run_pairs(
     boolean: bool,
     limit: float,
     stop_at_hit: bool = False,
+    depths: bool = True,
 ) -> np.ndarray:
     """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
 
-    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.
+    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.   depths : whether it is wanted how deep overlaps are.
     Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     table.plant(shape_of[pairs])
     tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+    depths = depths and not boolean
     done = 0
     while done < len(pairs):
         last = len(pairs) if boolean else done + ROWS_TOGETHER
         todo, out = pairs[done:last], rows[done:last]
         answered = answer_pairs(
-            *tables, address_of(todo), len(todo), boolean, not boolean, stop_at_hit, limit, address_of(out),
+            *tables, address_of(todo), len(todo), boolean, depths, stop_at_hit, limit, address_of(out),
             *_of_thread.space.addresses,
         )  # fmt: skip
-        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=not boolean)
+        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
         if stop_at_hit and out["hit"][answered - 1]:
@@ -105,6 +108,11 @@ def _finish(
             if shallow.any():
                 deepen_pairs(*tables, address_of(shallow), len(rows), limit, address_of(rows), *terms, digits)
         settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
+        if not distrust_doubles:
+            shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+            settle_by_other_searches(
+                rows, pairs, shapes_and_poses, _of_thread.space.addresses, boolean=boolean, depths=depths, limit=limit
+            )
 
 
 def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:

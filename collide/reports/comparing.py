@@ -6,7 +6,7 @@ Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and 
 from __future__ import annotations
 
 from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, wrapped
-from collide.reports.units import count, lengths
+from collide.reports.units import brief_length, count, lengths
 
 SHORT = 12
 
@@ -34,20 +34,34 @@ def verdict(data: dict) -> str:
     """The comparison in one line."""
     asked = [summary["engine"] for summary in data["summaries"] if not summary["skipped"]]
     wrong, disputes = data["ours_wrong"], data["disagreements"]
-    judged = sum(not dispute["not_judged"] for dispute in disputes)
     parts = [
         f"{count(wrong, 'answer')} of {data['reference']} proven wrong" if wrong else
         f"no answer of {data['reference']} proven wrong",
         f"{count(data['pairs'], 'pair')} asked of {', '.join(asked)}",
+        *(found for summary in data["summaries"][1:] for found in [_wrong_of(summary)] if found),
     ]
     inside = sum(dispute["kind"] == "inside" for dispute in disputes)
-    if len(disputes) > inside:
-        parts.append(f"{count(len(disputes) - inside, 'disagreement')}, {judged - inside} of them judged exactly")
-    else:
+    unjudged = sum(bool(dispute["not_judged"]) for dispute in disputes)
+    if not len(disputes) - inside:
         parts.append("no disagreement")
+    if unjudged:
+        parts.append(f"{count(unjudged, 'disagreement')} not judged")
     if inside:
         parts.append(f"{count(inside, 'answer')} about insides of solids, which others do not see")
     return "; ".join(parts)
+
+
+def _wrong_of(summary: dict) -> str:
+    """What one engine got wrong, in a few words."""
+    counts = [
+        (summary["wrong"], "wrong boolean"), (summary["wrong_distances"], "wrong distance"),
+        (summary["contradictions"], "contradiction"), (len(summary["failed"]), "failure"),
+    ]  # fmt: skip
+    found = [count(n, what) for n, what in counts if n]
+    if summary["wrong_distances"]:
+        worst = f" ({brief_length(summary['furthest_off']['difference'])} off at worst)"
+        found = [text + worst if "distance" in text else text for text in found]
+    return f"{summary['engine']}: {', '.join(found)}" if found else ""
 
 
 def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Table:
@@ -63,7 +77,7 @@ def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Tabl
 _TITLES = {
     "hit": "DISAGREEMENTS  does the pair collide?",
     "inside": "INSIDE  one body lies inside the other: engines that see surfaces call it free",
-    "distance": "DISTANCES APART  by more than the tolerance",
+    "distance": "WRONG DISTANCES  off by more than the tolerance, the worst first",
     "contradiction": "CONTRADICTIONS  an engine's boolean against its own distance",
     "left out": "LEFT OUT  a World gave no row where its pair query finds one",
 }
@@ -98,11 +112,15 @@ def _dispute_table(title: str, disputes: list[dict], reference: str, limit: int 
     reasons = dict.fromkeys(d["not_judged"].removeprefix("not judged: ") for d in shown if d["not_judged"])
     rows = [list(row) for row in zip(*(cells for _, cells in columns))]
     notes = [f"not judged: {reason}" for reason in reasons]
+    if any(d["judged_by"] == "the proven bracket" for d in shown):
+        notes.append(f"by bracket: exact arithmetic cannot tell; it is outside the bracket that {reference} proves")
     return Table(title, [column for column, _ in columns], rows, notes=notes, more=len(disputes) - len(shown))
 
 
 def _off(dispute: dict) -> float:
-    """How far the engine's distance is from the exact one, or from the reference's where there is none."""
+    """How far the engine's distance was found off, or is from the reference's where that is not known."""
+    if dispute["off"] is not None:
+        return float(dispute["off"])
     truth = dispute["reference_distance"] if dispute["exact_distance"] is None else dispute["exact_distance"]
     return 0.0 if truth is None or dispute["distance"] is None else abs(dispute["distance"] - truth)
 
@@ -118,4 +136,5 @@ def _blame(dispute: dict) -> str:
     if dispute["not_judged"]:
         return "not judged"
     names = ", ".join(dispute["wrong"]) or "none"
-    return f"{names} (touching)" if dispute["touching"] else names
+    said = [word for word, so in (("touching", dispute["touching"]), ("by bracket", dispute["judged_by"] == "the proven bracket")) if so]
+    return f"{names} ({', '.join(said)})" if said else names

@@ -23,7 +23,8 @@ def silent(label: str):
 class Progress:
     """``progress = Progress()``, then ``with progress("compiling kernels (once per version)"): ...``
 
-    Stages nest: the innermost is shown. ``patience`` [s] is how long a stage may last unannounced
+    Stages nest: the innermost is shown. ``with`` gives a function that changes its label, None from a silent
+    one. ``patience`` [s] is how long a stage may last unannounced
     where stderr is no terminal.
     """
 
@@ -42,7 +43,7 @@ class Progress:
         if len(self._stages) == 1:
             self._start()
         try:
-            yield
+            yield stage.rename
         finally:
             self._stages.remove(stage)
             if not self._stages:
@@ -76,7 +77,7 @@ class Progress:
                 self._write(f"\r\x1b[2K{stage.label} … {stage.seconds:.0f} s")
         elif stage.seconds >= self.patience and not stage.announced:
             stage.announced = True
-            self._write(f"collide: {stage.label} ...\n")
+            self._write(f"collide: {stage.name} ...\n")
 
     def _write(self, text: str) -> None:
         try:
@@ -90,7 +91,11 @@ class Progress:
 
 class _Stage:
     def __init__(self, label: str):
-        self.label, self.started, self.announced = label, time.monotonic(), False
+        self.name = self.label = label
+        self.started, self.announced = time.monotonic(), False
+
+    def rename(self, label: str) -> None:
+        self.label = label
 
     @property
     def seconds(self) -> float:

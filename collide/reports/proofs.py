@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collide.results import EXACT, HOW, UNDECIDED
+from collide.results import HOW, UNDECIDED
 
 #: What each entry of `collide.results.HOW` means to a reader.
 SENTENCES = {
@@ -22,11 +22,12 @@ REASONS = {
     "static–static": "both bodies are fixed: their placement is taken as intended",
     "filtered by group and mask": "their groups and masks exclude each other",
     "allowed": "the scene allows this contact",
+    "ignored": "named by --ignore",
     "cannot be answered": "listed above: whether these bodies collide is NOT known",
 }
 
 BROADPHASE = "broadphase"
-
+IGNORED = "ignored"
 
 UNDECIDED_NAME = HOW[UNDECIDED]
 
@@ -34,8 +35,3 @@ UNDECIDED_NAME = HOW[UNDECIDED]
 def name_of(how: int) -> str:
     """The argument's name for the number in a result row."""
     return HOW[how] if how < len(HOW) else f"argument {how}"
-
-
-def is_below_rounding(how: int) -> bool:
-    """True where doubles leave the sign open, whether or not exact arithmetic has settled it."""
-    return how in (UNDECIDED, EXACT)

@@ -1,16 +1,6 @@
 """The collision report as plain data: classes of pairs, what was skipped, why each answer holds.
 
-`make` asks a scene's World one question and sorts the rows. The classes, with
-lower ≤ signed distance ≤ upper proven for every row:
-
-========== ================================================================================
-colliding  the bodies share a point: proven
-shallow    colliding, but proven less deep than ``min_depth``: −lower < min_depth
-touching   touching within rounding: doubles leave the sign open, and exact arithmetic has
-           settled it where it can; with meshes: gap or overlap below rounding
-near       apart, and 0 < distance ≤ clearance
-========== ================================================================================
-
+`make` asks a scene's World one question and sorts the rows into the classes of `reports/classes.py`.
 `Report.to_dict` is the JSON of ``schema.json`` (docs/report-schema.md explains it).
 """
 
@@ -19,61 +9,39 @@ from __future__ import annotations
 import math
 import platform
 import time
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 
+import numpy as np
+
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.reports import meshes, proofs
+from collide.reports import classes, meshes, proofs
+from collide.reports.pairs import Pairs
 from collide.reports.progress import silent
 from collide.reports.units import brief_length, count
-from collide.results import UNDECIDED
 
-SCHEMA = "collide-report/2"
+SCHEMA = "collide-report/3"
 
 #: Why a pair that cannot be answered is not tested.
 UNANSWERED = "cannot be answered"
 
 
-@dataclass(frozen=True)
-class Pair:
-    """One pair of bodies; lengths in metres, vectors in the world frame.
-
-    ``distance`` is signed, ``depth`` its positive part (None where apart). ``normal`` points from
-    a to b. ``approximated`` lists which of the two bodies are not the shape the scene names.
-    """
-
-    a: str
-    b: str
-    distance: float | None
-    depth: float | None
-    lower: float | None
-    upper: float | None
-    normal: list[float]
-    point_a: list[float]
-    point_b: list[float]
-    part_a: int
-    part_b: int
-    how: str
-    certified: bool
-    approximated: list[str]
-
-    @property
-    def decided(self) -> bool:
-        """Whether the sign is proven."""
-        return self.how != proofs.UNDECIDED_NAME
-
-
 @dataclass
 class Report:
-    """What `make` found; every field is plain data, ready for JSON."""
+    """What `make` found: plain data, and the classes of pairs, which become plain data when they are looked at.
+
+    bodies : their names, in the order of the scene.
+    geometry, trajectory : what `geometry.of_scene` and `trajectory.follow` gave, where it was asked for.
+    """
 
     scene: dict
     query: dict
     pairs: dict
-    colliding: list[Pair]
-    shallow: list[Pair]
-    touching: list[Pair]
-    near: list[Pair]
+    colliding: Pairs
+    shallow: Pairs
+    touching: Pairs
+    near: Pairs
     meshes: list[dict]
     approximations: list[dict]
     unanswered: list[dict]
@@ -83,6 +51,9 @@ class Report:
     notes: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     versions: dict[str, str | None] = field(default_factory=dict)
+    bodies: list[str] = field(default_factory=list)
+    geometry: dict | None = None
+    trajectory: dict | None = None
 
     @property
     def collides(self) -> bool:
@@ -96,11 +67,13 @@ class Report:
         if self.shallow:
             parts.append(f"{len(self.shallow)} shallower than {brief_length(self.query['min_depth'])}")
         if self.touching:
-            parts.append(f"{len(self.touching)} touching within rounding")
+            parts.append(f"{len(self.touching)} touching")
         if clearance > 0:
             parts.append(f"{len(self.near) or 'none'} within {brief_length(clearance)}")
         if self.unanswered:
             parts.append(f"{count(len(self.unanswered), 'pair')} NOT ANSWERED")
+        if self.query["ignored"]:
+            parts.append(f"{len(self.query['ignored'])} ignored")
         excluded, total = self.pairs["excluded"], self.pairs["total"]
         pairs = count(total, "pair")
         parts.append(
@@ -111,36 +84,33 @@ class Report:
         )
         return ", ".join(parts)
 
+    def items(self) -> Iterator[tuple[str, object]]:
+        """The JSON that ``schema.json`` describes, key by key, with the classes of pairs as `Pairs`."""
+        found = {name: getattr(self, name) for name in classes.NAMES}
+        yield "schema", SCHEMA
+        yield "verdict", {
+            "text": self.verdict(), "collides": self.collides, **{name: len(pairs) for name, pairs in found.items()},
+        }  # fmt: skip
+        yield from ((name, getattr(self, name)) for name in ("scene", "query", "pairs"))
+        yield from found.items()
+        yield from (
+            (name, getattr(self, name))
+            for name in (
+                "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes", "seconds", "versions",
+            )
+        )  # fmt: skip
+        asked = {"trajectory": self.trajectory, "geometry": self.geometry}
+        yield from ((name, value) for name, value in asked.items() if value is not None)
+
     def to_dict(self) -> dict:
         """The report as JSON-ready data that ``schema.json`` describes: no NaN, no infinity."""
-        classes = {
-            name: [asdict(pair) for pair in getattr(self, name)]
-            for name in ("colliding", "shallow", "touching", "near")
-        }
-        return {
-            "schema": SCHEMA,
-            "verdict": {
-                "text": self.verdict(),
-                "collides": self.collides,
-                **{name: len(pairs) for name, pairs in classes.items()},
-            },
-            "scene": self.scene,
-            "query": self.query,
-            "pairs": self.pairs,
-            **classes,
-            "meshes": self.meshes,
-            "approximations": self.approximations,
-            "unanswered": self.unanswered,
-            "skipped": self.skipped,
-            "proofs": self.proofs,
-            "work": self.work,
-            "notes": self.notes,
-            "seconds": self.seconds,
-            "versions": self.versions,
-        }
+        return {name: list(value.dicts()) if isinstance(value, Pairs) else value for name, value in self.items()}
 
 
-def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, started: float | None = None) -> Report:
+def make(
+    scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, started: float | None = None,
+    ignore: Iterable[tuple[str, str]] = (),
+) -> Report:  # fmt: skip
     """Test a scene and sort what was found.
 
     Parameters
@@ -150,27 +120,40 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
     min_depth : collisions proven less deep than this [m] are a class of their own; ≥ 0.
     progress : called with a label, gives a context manager around long work (`progress.Progress`).
     started : ``time.perf_counter()`` when the user's command began; the total counts from there.
+    ignore : pairs of bodies, by name, that are not tested: the report says so.
 
     Raises
     ------
-    InvalidArgument : clearance or min_depth is negative or not finite.
+    InvalidArgument : clearance or min_depth is negative or not finite; a body to ignore is not in the scene.
     CollideError : whatever the World refuses.
     """
     clearance, min_depth = _length("clearance", clearance), _length("min_depth", min_depth)
+    ignored = [_known_pair(scene, pair) for pair in ignore]
+    if ignored:
+        scene = without(scene, ignored)
     begun = time.perf_counter()
     with (progress or silent)("testing the scene"):
-        world, result, unanswered = _ask(scene, max(clearance, _rounding_of(scene)))
+        sizes = classes.body_sizes(scene.bodies)
+        world, result, unanswered = _ask(scene, max(clearance, float(classes.roundings(sizes, 0.0).max(initial=0.0))))
     tested = time.perf_counter()
     stats = world.stats
-    classes = _classes(result, scene, clearance, min_depth)
+    names = world.names
+    size = np.zeros(max(names, default=-1) + 1)
+    size[list(names)] = sizes
+    rounding = classes.roundings(size[result.rows["a"]], size[result.rows["b"]])
+    approximated = frozenset(body.name for body in scene.bodies if body.approximation)
+    found = {
+        name: Pairs.of(result, chosen, names, approximated)
+        for name, chosen in classes.classify(result.rows, rounding, clearance=clearance, min_depth=min_depth).items()
+    }
     report = Report(
         scene=_scene(scene),
-        query={"clearance": clearance, "min_depth": min_depth},
+        query={"clearance": clearance, "min_depth": min_depth, "ignored": [list(pair) for pair in ignored]},
         pairs=_pairs(stats),
-        colliding=classes["colliding"],
-        shallow=classes["shallow"],
-        touching=classes["touching"],
-        near=classes["near"],
+        colliding=found[classes.COLLIDING],
+        shallow=found[classes.SHALLOW],
+        touching=found[classes.TOUCHING].by_name(),
+        near=found[classes.NEAR],
         meshes=meshes.of_scene(scene),
         approximations=_approximations(scene),
         unanswered=unanswered,
@@ -179,9 +162,24 @@ def make(scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, s
         work=_work(stats),
         notes=[str(note) for note in scene.notes],
         versions=versions(),
+        bodies=[body.name for body in scene.bodies],
     )
     report.seconds = _seconds(scene, stats, begun, tested, started)
     return report
+
+
+def without(scene, pairs: Iterable[tuple[str, str]]):
+    """The scene with these pairs of bodies never tested, ``ignored`` being the reason."""
+    return replace(scene, allowed=[*scene.allowed, *((a, b, proofs.IGNORED) for a, b in pairs)])
+
+
+def _known_pair(scene, pair) -> tuple[str, str]:
+    a, b = pair
+    for name in (a, b):
+        scene.body(name)
+    if a == b:
+        raise InvalidArgument(f"ignore: {a!r} twice; a body is never tested against itself")
+    return a, b
 
 
 def _ask(scene, limit: float):
@@ -208,78 +206,6 @@ def _length(name: str, value: float) -> float:
     if not (math.isfinite(number) and number >= 0):
         raise InvalidArgument(f"{name} must be finite and not negative [m], got {value!r}")
     return number
-
-
-# --- pairs --------------------------------------------------------------------------------------
-
-
-def _rounding_of(scene) -> float:
-    """A distance [m] below which pairs of this scene may touch within rounding: 2⁻⁴⁰ of its size."""
-    size = 0.0
-    for body in scene.bodies:
-        reach = max((packed.reach + abs(X[:3, 3]).sum() for packed, X in body.shape.bounding_parts()), default=0.0)
-        size = max(size, float(abs(body.X_WB[:3, 3]).max()) + float(reach))
-    return size * 2.0**-40
-
-
-def _classes(result, scene, clearance: float, min_depth: float) -> dict[str, list[Pair]]:
-    """The rows of a World result, each in its class, in the order people read them."""
-    approximated = {body.name for body in scene.bodies if body.approximation}
-    meshed = {body.name for body in scene.bodies if meshes.is_meshed(body.shape)}
-    rounding = _rounding_of(scene) if meshed else 0.0
-    classes: dict[str, list[Pair]] = {"colliding": [], "shallow": [], "touching": [], "near": []}
-    for row, (a, b) in zip(result.rows, result.names):
-        kind = _class_of(row, min_depth, rounding if a in meshed or b in meshed else None)
-        if not row["beyond"] and (kind != "near" or row["distance"] <= clearance):
-            classes[kind].append(_pair(row, a, b, approximated))
-    classes["colliding"].sort(key=_deepest_first)
-    classes["shallow"].sort(key=_deepest_first)
-    classes["touching"].sort(key=lambda pair: (pair.a, pair.b))
-    classes["near"].sort(key=lambda pair: (pair.distance, pair.a, pair.b))
-    return classes
-
-
-def _class_of(row, min_depth: float, rounding: float | None) -> str:
-    """rounding : of pairs with a mesh, whose facets are tested exactly however deep the overlap: what is below it [m]."""
-    below = proofs.is_below_rounding(int(row["how"]))
-    if rounding is not None and row["how"] != UNDECIDED:
-        below = max(-row["lower"], row["upper"]) <= rounding
-    if below:
-        return "touching"
-    if not row["hit"]:
-        return "near"
-    # the depth is at most −lower: below min_depth only when that is proven
-    return "shallow" if -row["lower"] < min_depth else "colliding"
-
-
-def _deepest_first(pair: Pair) -> tuple:
-    return (-math.inf if pair.depth is None else -pair.depth, pair.a, pair.b)
-
-
-def _pair(row, a: str, b: str, approximated: set[str]) -> Pair:
-    distance = _finite(row["distance"])
-    hit = bool(row["hit"])
-    return Pair(
-        a=a, b=b,
-        distance=distance,
-        depth=None if not hit or distance is None else max(0.0, -distance),
-        lower=_finite(row["lower"]), upper=_finite(row["upper"]),
-        normal=_vector(row["normal"]), point_a=_vector(row["point_a"]), point_b=_vector(row["point_b"]),
-        part_a=int(row["part_a"]), part_b=int(row["part_b"]),
-        how=proofs.name_of(int(row["how"])),
-        certified=bool(row["certified"]),
-        approximated=[name for name in (a, b) if name in approximated],
-    )
-
-
-def _finite(value) -> float | None:
-    """The number, −0.0 as 0.0; None where it is infinite (an unbounded depth or bracket)."""
-    number = float(value) + 0.0
-    return number if math.isfinite(number) else None
-
-
-def _vector(values) -> list[float]:
-    return [float(v) + 0.0 for v in values]
 
 
 # --- everything around the pairs ----------------------------------------------------------------

@@ -129,10 +129,10 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
     if zero and number == 0.0:
         return 0.0
     if not number > 0:
-        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {value!r}")
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {number!r}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {value!r}; scale the scene"
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {number!r}; scale the scene"
         )
     return number
 

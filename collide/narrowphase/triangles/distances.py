@@ -67,6 +67,9 @@ _UNLIKE = 2.0**MOST_UNLIKE
 #: and again depth first, which costs no heap, while the bound has not got better for so many pairs of leaves.
 _DIVES, _PATIENCE = 4, 16
 
+#: Points nearer than so many times the error of a coordinate tell no direction: it may be off by one over that.
+_TURNED = 2.0**26
+
 DOUBLES = PLACING + CORNERS + NEAR
 FLOATS = 2 * FRAME + NEAR_PROBE + 2 * WIDTH
 
@@ -262,7 +265,7 @@ def _near_leaves(P, W, run_a, run_b, XA, XB, placing, near, T, new, of_a, corner
             width = max(width, width_between - error)
             least = min(length, near[_BEST])
             if width < least * (1.0 - 2.0**-44) - error:
-                width = max(width, widest_slab(T) - 2.0 * error)
+                width = max(width, widest_slab(T)[0] - 2.0 * error)
             near[_LEAST] = min(near[_LEAST], width)
             if length < near[_BEST]:
                 near[_BEST] = length
@@ -275,16 +278,58 @@ def _near_leaves(P, W, run_a, run_b, XA, XB, placing, near, T, new, of_a, corner
 
 
 @kernel
-def _finish(near, marks, ids_a, ids_b, XA, meets, flip, limit, out):
+def _direction_between(P, W, XA, XB, near, marks, T):
+    """The unit vector from A to B along which the nearest triangles are apart; zeros where none can be told.
+
+    The line between the nearest points, unless rounding has turned it. Points nearer than `_TURNED` errors are compared with
+    the normals and edges of both triangles, and the widest slab tells; within rounding, one of these. The points are then
+    laid along that, through their middle: how far this moves them is how far they were from being the nearest.
+    """
+    x = near[_POINTS + 3] - near[_POINTS]
+    y = near[_POINTS + 4] - near[_POINTS + 1]
+    z = near[_POINTS + 5] - near[_POINTS + 2]
+    size = max(abs(x), abs(y), abs(z))
+    width = -math.inf
+    if size > 0.0:
+        x /= size
+        y /= size
+        z /= size
+        length = math.sqrt(x * x + y * y + z * z)
+        x /= length
+        y /= length
+        z /= length
+        if size > _TURNED * near[_WORLD_ERROR]:
+            return x, y, z
+    to_world(XA, 0.0, 0.0, 0.0, P, 9 * marks[FACET_A], T, 0)
+    to_world(XB, XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11], W, 9 * marks[FACET_B], T, 9)
+    if size > 0.0:
+        width = slab(T, x, y, z)
+    widest, nx, ny, nz = widest_slab(T)
+    if widest <= width - 4.0 * near[_WORLD_ERROR]:
+        return x, y, z
+    for axis in range(3):
+        half = 0.5 * near[_BEST] * (nx if axis == 0 else (ny if axis == 1 else nz))
+        middle = 0.5 * near[_POINTS + axis] + 0.5 * near[_POINTS + 3 + axis]
+        near[_POINTS + axis] = middle - half
+        near[_POINTS + 3 + axis] = middle + half
+    return nx, ny, nz
+
+
+@kernel
+def _finish(near, marks, ids_a, ids_b, P, W, XA, XB, T, meets, flip, limit, out):
     """The row of results."""
     marks[MEETS] = 1 if meets else 0
     found = marks[FACET_A] >= 0
+    if found and not meets:
+        out[NORMAL], out[NORMAL + 1], out[NORMAL + 2] = _direction_between(P, W, XA, XB, near, marks, T)
+    else:
+        out[NORMAL] = out[NORMAL + 1] = out[NORMAL + 2] = 0.0
     if found:
         marks[FACET_A] = ids_a[marks[FACET_A]]
         marks[FACET_B] = ids_b[marks[FACET_B]]
     length = near[_BEST]
     error = 4.0 * near[_WORLD_ERROR]
-    for k in range(RESULT):
+    for k in range(NORMAL):
         out[k] = 0.0
     if not meets:
         out[DISTANCE] = length
@@ -299,8 +344,8 @@ def _finish(near, marks, ids_a, ids_b, XA, meets, flip, limit, out):
             y = x
         out[POINT_A + k] = (y if flip else x) + shift
         out[POINT_B + k] = (x if flip else y) + shift
-        normal = (y - x) / length if found and not meets and length > 0.0 else 0.0
-        out[NORMAL + k] = -normal if flip else normal
+        if flip:
+            out[NORMAL + k] = -out[NORMAL + k]
     if flip:
         one = marks[FACET_A]
         marks[FACET_A] = marks[FACET_B]
@@ -489,5 +534,5 @@ def near_surfaces(
                 _set_near_probe(placing, near, 1, boxes_b, b, gap_b, probe)
                 boxes_nearest(boxes_a, NODE * link_a, slabs_a, SLAB * link_a, frame_b, probe, out)
                 top = _push_nearest(out, bound, link_a, order, stack, bounds, top, b, False)
-        _finish(near, marks, ids_a, ids_b, XA, meets, flip, limit, view_f64(results_at + 8 * RESULT * k, RESULT))
+        _finish(near, marks, ids_a, ids_b, P, W, XA, XB, T, meets, flip, limit, view_f64(results_at + 8 * RESULT * k, RESULT))
     return n

@@ -239,9 +239,12 @@ def slab(T, nx, ny, nz):
 
 @kernel
 def widest_slab(T):
-    """The widest slab across a normal of either triangle or of a pair of edges: for pairs whose nearest points came
-    out badly."""
+    """(width, nx, ny, nz): the widest slab across a normal of either triangle or of a pair of edges, its unit vector from the
+    first to the second: for pairs whose nearest points came out badly. (−∞, 0, 0, 0) where nothing has a direction."""
     best = -math.inf
+    nx = 0.0
+    ny = 0.0
+    nz = 0.0
     for i in range(3):
         a = 3 * i
         b = 3 * ((i + 1) % 3)
@@ -257,8 +260,13 @@ def widest_slab(T):
                 b = a + 3
                 c = a
                 d = a + 6
-            best = max(best, _across(T, a, b, c, d))
-    return best
+            width, x, y, z = _across(T, a, b, c, d)
+            if width > best:
+                best = width
+                nx = x
+                ny = y
+                nz = z
+    return best, nx, ny, nz
 
 
 @kernel
@@ -274,8 +282,12 @@ def _across(T, a, b, c, d):
     nz = ex * fy - ey * fx
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     if not length > 0.0:
-        return -math.inf
+        return -math.inf, 0.0, 0.0, 0.0
     nx /= length
     ny /= length
     nz /= length
-    return max(slab(T, nx, ny, nz), slab(T, -nx, -ny, -nz))
+    width = slab(T, nx, ny, nz)
+    opposite = slab(T, -nx, -ny, -nz)
+    if opposite > width:
+        return opposite, -nx, -ny, -nz
+    return width, nx, ny, nz

@@ -43,10 +43,10 @@ class SurfaceDistances(NamedTuple):
     """Distances of two surfaces at N pairs of poses [m].
 
     distance, lower, upper : (N,) with lower ≤ truth ≤ upper proven; 0 where they meet; the limit, with an infinite
-        upper, where nothing nearer was found.
+        upper, where everything is proven farther.
     point_a, point_b, normal : (N, 3) nearest points in the world and the unit vector from A's to B's; a common point
         and 0 where they meet.
-    facets : (N, 2) int64 facet numbers of A and of B; −1 where nothing nearer than the limit was found.
+    facets : (N, 2) int64 facet numbers of A and of B; −1 where everything is proven farther than the limit.
     meets : (N,) bool, decided exactly.
     counters : (N, 3) int64: pairs of boxes looked at, of triangles, decided exactly.
     """
@@ -147,6 +147,20 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     for tree in (A, B):
         tree.ask_slabs(make_slabs)
     X_WA, X_WB, n = matched(X_WA, X_WB)
+    results, marks = _near(A, B, X_WA, X_WB, n, limit)
+    # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
+    left = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
+    if len(left):
+        poses = (X if X.ndim == 2 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
+        results[left], marks[left] = _near(A, B, *poses, len(left), np.inf)
+    return SurfaceDistances(
+        results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
+        marks[:, 2] != 0, marks[:, 3:],
+    )  # fmt: skip
+
+
+def _near(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, n: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """(results, marks) of `distances.near_surfaces`."""
     results = np.empty((n, distances.RESULT))
     marks = np.zeros((n, distances.MARKS), dtype=np.int64)
     work = _workspace(WIDTH * (A.depth + B.depth + 4))
@@ -158,10 +172,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     )  # fmt: skip
     if done < n:
         raise InvalidPose(f"pose {done}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
-    return SurfaceDistances(
-        results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
-        marks[:, 2] != 0, marks[:, 3:],
-    )  # fmt: skip
+    return results, marks
 
 
 def facets_within(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, reach: float, most: int) -> NearPairs | None:

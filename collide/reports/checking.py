@@ -1,0 +1,220 @@
+"""What a script wants to know of a report: which pairs count as collisions, and which of them are new.
+
+A baseline is a JSON file of known collisions: one that `baseline_text` wrote, or any report's. A collision counts as
+known where the baseline has the pair, and it is no deeper than it was there by more than a tolerance.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from collide.errors import InvalidArgument
+from collide.reports import trajectory
+from collide.reports.report import Report
+from collide.reports.tables import printable
+from collide.reports.units import brief_length, count
+
+SCHEMA = "collide-baseline/1"
+COLLISION, SHALLOW, TOUCHING, KNOWN, DEEPER, GONE = "collision", "shallow", "touching", "known", "deeper", "gone"
+#: Classes that a baseline may hold.
+_KNOWN_CLASSES = (COLLISION, TOUCHING)
+#: What a pair is called here, and the class of a report that it is in; the worst first.
+_CLASSES = {COLLISION: "colliding", SHALLOW: "shallow", TOUCHING: "touching"}
+
+
+class Finding(NamedTuple):
+    """One pair that a check tells of: ``what`` it is, and its signed distance [m], None where the depth is unbounded.
+
+    where : of a trajectory, at which share of the path it begins.   before : the depth in the baseline [m].
+    """
+
+    what: str
+    a: str
+    b: str
+    distance: float | None
+    where: str = ""
+    before: float | None = None
+
+    @property
+    def depth(self) -> float:
+        return math.inf if self.distance is None else max(0.0, -self.distance)
+
+
+@dataclass
+class Check:
+    """The findings in one state, and whether they fail the check.
+
+    label : of the state, "" where none was asked for.   failing : findings that count as collisions; ``findings``
+        begins with them.
+    """
+
+    label: str
+    scene: str
+    bodies: list[str]
+    summary: str
+    findings: list[Finding] = field(default_factory=list)
+    failing: list[Finding] = field(default_factory=list)
+    unanswered: list[dict] = field(default_factory=list)
+    against_baseline: bool = False
+
+    @property
+    def fails(self) -> bool:
+        return bool(self.failing)
+
+    def lines(self, several: bool) -> Iterator[str]:
+        """One line a finding, fields separated by tabs; with the state where there are several."""
+        for found in self.findings:
+            measure = "unbounded" if found.distance is None else repr(found.distance)
+            extra = [text for text in (printable(self.label) if several else "", found.where) if text]
+            yield "\t".join((found.what, printable(found.a), printable(found.b), measure, *extra))
+
+    def verdict(self) -> str:
+        label = f"{self.label}: " if self.label else ""
+        if not self.against_baseline:
+            return label + self.summary
+        counts = {what: sum(found.what == what for found in self.findings) for what in (KNOWN, DEEPER, GONE)}
+        new = len(self.failing) - counts[DEEPER]
+        parts = [count(new, "new collision") if new else "no new collision"]
+        parts += [f"{counts[DEEPER]} known and deeper than before"] if counts[DEEPER] else []
+        parts += [f"{counts[what]} {word}" for what, word in ((KNOWN, "known"), (GONE, "gone")) if counts[what]]
+        deeper = next((found for found in self.findings if found.what == DEEPER), None)
+        said = "" if deeper is None else (
+            f"; {deeper.a} and {deeper.b}: {brief_length(deeper.depth)} deep, was {_length(deeper.before)}"
+        )  # fmt: skip
+        return f"{label}{', '.join(parts)}{said} ({self.summary})"
+
+
+def _length(depth: float | None) -> str:
+    return "unbounded" if depth is None or math.isinf(depth) else brief_length(depth)
+
+
+def check(report: Report, label: str, *, touching_counts: bool, known: Baseline | None, tolerance: float) -> Check:
+    """Sort the pairs of a report, and of its trajectory, into what counts and what does not.
+
+    touching_counts : pairs that touch within rounding count as collisions.   known : from `read_baseline`, or None.
+    tolerance : by how much a known collision may be deeper than it was [m].
+    """
+    made = Check(label, report.scene["name"], report.bodies, report.verdict(), against_baseline=known is not None)
+    made.unanswered = [*report.unanswered, *(report.trajectory or {}).get("unanswered", [])]
+    if report.trajectory is not None:
+        made.summary = f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
+    left = dict(known.of(label)) if known is not None else {}
+    for found in _pairs(report):
+        counts = found.what == COLLISION or (found.what == TOUCHING and touching_counts)
+        entry = left.pop(_key(found), None)
+        if counts and entry is not None:
+            before = math.inf if entry.distance is None else entry.depth
+            deeper = found.depth > before + tolerance
+            found = found._replace(what=DEEPER if deeper else KNOWN, before=before)
+            counts = deeper
+        (made.failing if counts else made.findings).append(found)
+    made.findings[:0] = made.failing
+    gone = [entry for entry in left.values() if entry.what == COLLISION or touching_counts]
+    made.findings += [entry._replace(what=GONE) for entry in gone]
+    return made
+
+
+def _pairs(report: Report) -> Iterator[Finding]:
+    """Pairs that the trajectory meets, each in its worst class; then those of the start that it does not move."""
+    followed: dict[frozenset, Finding] = {}
+    for what, name in _CLASSES.items():
+        for pair in (report.trajectory or {}).get(name, []):
+            found = Finding(what, pair["a"], pair["b"], pair["distance"], trajectory.place(pair["from"]))
+            followed.setdefault(frozenset((pair["a"], pair["b"])), found)
+    yield from followed.values()
+    for what, name in _CLASSES.items():
+        for pair in getattr(report, name):
+            if not followed or frozenset((pair.a, pair.b)) not in followed:
+                yield Finding(what, pair.a, pair.b, pair.distance)
+
+
+# --- baselines ----------------------------------------------------------------------------------
+
+
+class Baseline(NamedTuple):
+    """Known collisions by state; a baseline of one state without a name holds for every state."""
+
+    states: dict[str, dict[tuple, Finding]]
+
+    def of(self, label: str) -> dict[tuple, Finding]:
+        return self.states.get(label, self.states.get("", {}))
+
+
+def _key(found: Finding) -> tuple:
+    """What makes a pair the same: its bodies in any order, and whether it collides or touches."""
+    return (TOUCHING if found.what == TOUCHING else COLLISION, frozenset((found.a, found.b)))
+
+
+def baseline_text(checks: Iterable[Check]) -> str:
+    """The collisions of checks as the text of a baseline: sorted by name, one a line, for version control."""
+    entries = []
+    for one in checks:
+        for found in one.findings:
+            if found.what in _KNOWN_CLASSES:
+                depth = None if math.isinf(found.depth) else found.depth
+                state = {"state": one.label} if one.label else {}
+                entries.append({**state, "class": found.what, "a": found.a, "b": found.b, "depth": depth})
+    entries.sort(key=lambda entry: (entry.get("state", ""), entry["class"], entry["a"], entry["b"]))
+    lines = ",\n    ".join(json.dumps(entry, ensure_ascii=False) for entry in entries)
+    listed = f"[\n    {lines}\n  ]" if entries else "[]"
+    return f'{{\n  "schema": "{SCHEMA}",\n  "collisions": {listed}\n}}\n'
+
+
+def read_baseline(path) -> Baseline:
+    """The known collisions in a file: a baseline, or the JSON of a report.
+
+    Raises InvalidArgument where the file is neither, naming what is wrong with it.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            data = json.load(file)
+    except (ValueError, RecursionError) as error:
+        raise InvalidArgument(f"--baseline: {path}: is not JSON: {error}") from None
+    schema = data.get("schema") if isinstance(data, dict) else None
+    try:
+        return Baseline(_states(data, str(schema)))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise InvalidArgument(
+            f"--baseline: {path}: is damaged ({type(error).__name__}: {error}): write it anew with --write-baseline"
+        ) from None
+    except _Unknown:
+        raise InvalidArgument(
+            f"--baseline: {path}: is neither a baseline nor the JSON of a report (schema {schema!r}): write one with "
+            "collide check SCENE --write-baseline FILE"
+        ) from None
+
+
+class _Unknown(Exception):
+    """A file of another kind."""
+
+
+def _states(data: dict, schema: str) -> dict[str, dict[tuple, Finding]]:
+    if schema == SCHEMA:
+        entries = [(entry.get("state", ""), entry["class"], entry) for entry in data["collisions"]]
+    elif schema.startswith("collide-states/"):
+        entries = [(one["name"], what, e) for one in data["states"] for what, e in _of_report(one["report"])]
+    elif schema.startswith("collide-report/"):
+        entries = [("", what, entry) for what, entry in _of_report(data)]
+    else:
+        raise _Unknown
+    states: dict[str, dict[tuple, Finding]] = {state: {} for state, _, _ in entries}
+    for state, what, entry in entries:
+        depth = entry["depth"]
+        found = Finding(str(what), str(entry["a"]), str(entry["b"]), None if depth is None else -float(depth))
+        if what not in _KNOWN_CLASSES:
+            raise ValueError(f"class {what!r}")
+        states[state][_key(found)] = found
+    return states
+
+
+def _of_report(data: dict) -> Iterator[tuple[str, dict]]:
+    """The collisions of a report, shallow ones and those of its trajectory included, and what touches."""
+    yield from ((COLLISION, entry) for name in ("colliding", "shallow") for entry in data[name])
+    yield from ((TOUCHING, {**entry, "depth": 0.0}) for entry in data["touching"])
+    for entry in (data.get("trajectory") or {}).get("colliding", []):
+        distance = entry["distance"]
+        yield COLLISION, {**entry, "depth": None if distance is None else max(0.0, -distance)}

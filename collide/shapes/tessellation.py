@@ -1,0 +1,285 @@
+"""Shapes as triangles, to draw them or to hand them to programs that know triangles alone.
+
+Every convex shape becomes a closed polyhedron inside it, its vertices on the surface (rounded once), facets
+counter-clockwise seen from outside; no point of the shape is farther from it than the tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.shapes.base import Shape
+from collide.shapes.compound import Compound
+from collide.shapes.hpolytope import HPolytope
+from collide.shapes.hull import ConvexHull
+from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
+
+#: Where no tolerance is given: this part of a shape's largest radius.
+_USUAL = 0.01
+#: Larger tessellations are refused: a tolerance in the wrong unit, mostly.
+MOST_VERTICES = 2_000_000
+
+
+class Tessellation(tuple):
+    """``vertices, faces = collide.tessellate(shape)``; and how far it is off.
+
+    vertices : (V, 3) float64 [m], in the frame of the shape.   faces : (F, 3) int64 rows of ``vertices``,
+        counter-clockwise seen from outside.
+    deviation : no point of the shape is farther from the triangles' solid than this [m]; 0 of polytopes and meshes.
+    """
+
+    deviation: float
+
+    def __new__(cls, vertices: np.ndarray, faces: np.ndarray, deviation: float = 0.0):
+        made = super().__new__(cls, (vertices, faces))
+        made.deviation = deviation
+        return made
+
+    def __getnewargs__(self):
+        return (*self, self.deviation)
+
+    @property
+    def vertices(self) -> np.ndarray:
+        return self[0]
+
+    @property
+    def faces(self) -> np.ndarray:
+        return self[1]
+
+
+def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | None = None) -> Tessellation:
+    """A shape as triangles in its own frame: (vertices (V, 3) float64, faces (F, 3) int64), outward oriented.
+
+    tolerance : no point of the shape is farther than this [m] from the solid that the triangles bound; by default a
+        hundredth of each shape's largest radius. ``deviation`` of the result says what was reached.
+    size : edge length [m] of the square that stands for a `Halfspace`, which has no end: around the point of its
+        plane nearest the origin, facing out of the solid, open.
+
+    Convex shapes give a closed surface. A `ConvexHull` without an inside gives both sides of a flat polygon, or no
+    triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part, parts overlapping.
+
+    Raises InvalidArgument for a tolerance or size that is not above 0, and where a shape would take more than
+    `MOST_VERTICES` vertices; UnsupportedQuery for a half-space without ``size``.
+    """
+    if not isinstance(shape, Shape):
+        raise InvalidArgument(f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
+    for name, value in (("tolerance", tolerance), ("size", size)):
+        if value is not None and not _is_length(value):
+            raise InvalidArgument(f"tessellate: {name} must be a finite length above 0 [m], got {value!r}")
+    if isinstance(shape, Compound):
+        return _together([(tessellate(part, tolerance=tolerance, size=size), X) for part, X in shape.items])
+    if isinstance(shape, Halfspace):
+        return _square(shape, size)
+    for kind, made in _KINDS.items():
+        if isinstance(shape, kind):
+            return made(shape, tolerance)
+    if hasattr(shape, "vertices") and hasattr(shape, "faces"):
+        return Tessellation(shape.vertices, np.asarray(shape.faces, dtype=np.int64))
+    raise UnsupportedQuery(f"tessellate: a {type(shape).__name__} has no triangles here")
+
+
+def _is_length(value) -> bool:
+    return not isinstance(value, bool) and isinstance(value, (int, float, np.number)) and 0 < float(value) < math.inf
+
+
+def _together(parts: list[tuple[Tessellation, np.ndarray]]) -> Tessellation:
+    """Posed parts beside each other, each with the vertices of its own."""
+    vertices = [part.vertices @ X[:3, :3].T + X[:3, 3] for part, X in parts]
+    starts = np.cumsum([0, *map(len, vertices)])
+    faces = [part.faces + start for (part, _), start in zip(parts, starts)]
+    return Tessellation(np.concatenate(vertices), np.concatenate(faces), max(part.deviation for part, _ in parts))
+
+
+def _square(shape: Halfspace, size: float | None) -> Tessellation:
+    if size is None:
+        raise UnsupportedQuery("tessellate: a Halfspace has no end; give the size [m] of a square to stand for it")
+    length = float(np.linalg.norm(shape.normal))
+    normal = shape.normal / length
+    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+    middle = shape.offset / length * normal
+    vertices = np.array([middle + size * (x * first + y * second) for x, y in corners])
+    return Tessellation(vertices, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+# --- polytopes, and what is swept over them ------------------------------------------------------
+
+
+def _hull(points: np.ndarray) -> Tessellation:
+    """The hull of points, without those that are no corner of it."""
+    found = ConvexHull(points).hull
+    corners = found.vertices
+    row = np.zeros(len(points), dtype=np.int64)
+    row[corners] = np.arange(len(corners))
+    return Tessellation(points[corners], row[found.facets.reshape(-1, 3)])
+
+
+def _box(shape: Box, _) -> Tessellation:
+    signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, 8).T
+    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return Tessellation(signs * shape.size, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]))
+
+
+def _swept(points: np.ndarray, radius: float, tolerance: float | None) -> Tessellation:
+    """The hull of points, and a ball along it: the hull of what the ball's own tessellation covers.
+
+    The sum of two sets is off by as much as the one of them that is. Of the vertices of the sum only those are made
+    that may be corners: a point and a direction whose facets both are extreme in some direction near.
+    """
+    if radius == 0.0:
+        return _hull(points)
+    ball = _ball(radius, tolerance)
+    directions = ball.vertices / radius
+    edge = np.linalg.norm(directions[ball.faces] - directions[np.roll(ball.faces, 1, axis=1)], axis=2).max()
+    corners = points[ConvexHull(points).hull.vertices] if len(points) > 1 else points
+    reach = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    made = []
+    for start in range(0, len(directions), 256):
+        some = directions[start : start + 256]
+        heights = corners @ some.T
+        # a corner of the sum has a facet's normal within an edge of its direction
+        k, d = np.nonzero(heights >= heights.max(axis=0) - 2 * reach * edge)
+        made.append(corners[k] + radius * some[d])
+        _refuse_more_than(sum(map(len, made)))
+    vertices, faces = _hull(np.unique(np.concatenate(made), axis=0))
+    return Tessellation(vertices, faces, ball.deviation)
+
+
+# --- curved shapes -------------------------------------------------------------------------------
+
+
+def _cylinder(shape: Cylinder, tolerance: float | None) -> Tessellation:
+    ring, deviation = _ring(shape.radius, tolerance)
+    n, half = len(ring), 0.5 * shape.length
+    vertices = np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (-half, half)])
+    k, after = np.arange(n), np.roll(np.arange(n), -1)
+    sides = np.concatenate([np.column_stack([k, after, after + n]), np.column_stack([k, after + n, k + n])])
+    return Tessellation(vertices, np.concatenate([sides, _fan(n)[:, ::-1], _fan(n) + n]), deviation)
+
+
+def _cone(shape: Cone, tolerance: float | None) -> Tessellation:
+    ring, deviation = _ring(shape.radius, tolerance)
+    n, half = len(ring), 0.5 * shape.length
+    vertices = np.vstack([np.column_stack([ring, np.full(n, -half)]), [[0.0, 0.0, half]]])
+    k = np.arange(n)
+    sides = np.column_stack([k, np.roll(k, -1), np.full(n, n)])
+    return Tessellation(vertices, np.concatenate([sides, _fan(n)[:, ::-1]]), deviation)
+
+
+def _ring(radius: float, tolerance: float | None) -> tuple[np.ndarray, float]:
+    """Points on a circle (n, 2), and how far their polygon is off."""
+    part = _part(radius, tolerance)
+    _refuse_more_than(math.pi / math.sqrt(2 * part))
+    n = max(8, math.ceil(math.pi / math.acos(1.0 - part)) if part < 1 else 8)
+    n += -n % 4  # the axes are met exactly
+    angles = np.arange(n) * (2 * math.pi / n)
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)]), radius * _off(math.pi / n)
+
+
+def _fan(n: int) -> np.ndarray:
+    """A convex polygon of n corners, as triangles."""
+    k = np.arange(1, n - 1)
+    return np.column_stack([np.zeros_like(k), k, k + 1])
+
+
+def _ellipsoid(shape: Ellipsoid, tolerance: float | None) -> Tessellation:
+    largest = float(shape.radii.max())
+    ball = _ball(largest, tolerance)
+    # a linear image is off by no more than its longest axis times
+    return Tessellation(ball.vertices / largest * shape.radii, ball.faces, ball.deviation)
+
+
+def _ball(radius: float, tolerance: float | None) -> Tessellation:
+    """A ball by an icosahedron whose facets are cut into small ones and pushed outwards."""
+    part = _part(radius, tolerance)
+    cuts = 2  # even ones: the axes are among the directions then, and a swept box keeps its flat sides
+    while (found := _geodesic(cuts))[2] > part:
+        # the deviation falls with the square of the cuts
+        cuts = max(cuts + 2, 2 * math.floor(0.5 * cuts * math.sqrt(found[2] / part)))
+        _refuse_more_than(10 * cuts * cuts + 2)
+    directions, faces, off = found
+    return Tessellation(radius * directions, faces, radius * off)
+
+
+@lru_cache(maxsize=16)
+def _geodesic(cuts: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Unit vectors (10 cuts² + 2, 3), faces, and how far the polyhedron is from the unit ball at most."""
+    corners, sides = _icosahedron()
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(cuts + 1), np.arange(cuts + 1), indexing="ij"))
+    inside = i + j <= cuts
+    i, j = i[inside], j[inside]
+    weights = np.column_stack([cuts - i - j, i, j])
+    # corners, edges and insides of the twenty facets, told apart by which corners they lie between, and how
+    keys = np.concatenate([_keys(weights, side) for side in sides])
+    points = np.concatenate([weights @ corners[side] for side in sides])
+    _, first, ids = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    directions = points[first] / np.linalg.norm(points[first], axis=1)[:, None]
+    at = {pair: k for k, pair in enumerate(zip(i.tolist(), j.tolist()))}
+    small = [(at[a, b], at[a + 1, b], at[a, b + 1]) for a, b in at if a + b < cuts]
+    small += [(at[a + 1, b], at[a + 1, b + 1], at[a, b + 1]) for a, b in at if a + b < cuts - 1]
+    starts = len(weights) * np.arange(len(sides))
+    faces = ids.reshape(-1)[np.array(small)[None] + starts[:, None, None]].reshape(-1, 3)
+    a, b, c = (directions[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    heights = np.einsum("ij,ij->i", normals, a) / np.linalg.norm(normals, axis=1)
+    directions.flags.writeable = faces.flags.writeable = False
+    return directions, faces, float(1.0 - heights.min())
+
+
+def _keys(weights: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """(n, 12): the weight of each corner of the icosahedron, equal for one point of two facets."""
+    keys = np.zeros((len(weights), 12), dtype=np.int32)
+    keys[:, side] = weights
+    return keys
+
+
+def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
+    golden = (1 + math.sqrt(5)) / 2
+    corners = np.array([(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)])
+    corners = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])
+    near = np.linalg.norm(corners[:, None] - corners[None], axis=2) < 2.1
+    sides = [
+        (a, b, c)
+        for a in range(12) for b in range(a + 1, 12) for c in range(b + 1, 12)
+        if near[a, b] and near[b, c] and near[a, c]
+    ]  # fmt: skip
+    outward = [np.linalg.det(corners[list(side)]) > 0 for side in sides]
+    return corners, np.array([side if out else side[::-1] for side, out in zip(sides, outward)])
+
+
+def _part(radius: float, tolerance: float | None) -> float:
+    """The tolerance as a part of a radius."""
+    return _USUAL if tolerance is None else float(tolerance) / radius
+
+
+def _off(angle: float) -> float:
+    """1 − cos, to the last digit."""
+    return 2 * math.sin(angle / 2) ** 2
+
+
+def _refuse_more_than(vertices: float) -> None:
+    if vertices > MOST_VERTICES:
+        raise InvalidArgument(
+            f"tessellate: the tolerance would take more than {MOST_VERTICES} vertices; give a larger one [m]"
+        )
+
+
+_KINDS: dict[type[Shape], Callable[..., Tessellation]] = {
+    Box: _box,
+    Sphere: lambda shape, tolerance: _ball(shape.radius, tolerance),
+    Capsule: lambda shape, tolerance: _swept(
+        np.array([(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]) * shape.length, shape.radius, tolerance
+    ),
+    Cylinder: _cylinder,
+    Cone: _cone,
+    Ellipsoid: _ellipsoid,
+    ConvexHull: lambda shape, tolerance: _swept(shape.points, shape.radius, tolerance),
+    HPolytope: lambda shape, _: _hull(shape.vertices),
+}
