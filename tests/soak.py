@@ -16,11 +16,13 @@ import sys
 import time
 from pathlib import Path
 
-from soak_judges import judge
+from soak_judges import judge, judge_group
 from soak_pairs import KINDS, draw
 
 #: Failures of one promise and pair of kinds whose code is printed.
 SHOWN = 1
+#: So many cases are asked together as well, in one batch and in one World.
+GROUP = 6
 #: Longer code is told by its case number alone; --save keeps all of it.
 LONGEST = 4000
 
@@ -50,6 +52,16 @@ class Tally:
         self.failed[case.kinds] += bool(judged.failures)
         return new
 
+    def add_group(self, number: int, failures) -> list[tuple[str, str, str]]:
+        """Counts failures of cases asked together; those that are to be printed."""
+        new = []
+        for failure in failures:
+            self.promises[failure[0]].add(number)
+            self.where[failure[0], ("many", "bodies")] += 1
+            if self.where[failure[0], ("many", "bodies")] <= SHOWN:
+                new.append(failure)
+        return new
+
     def summary(self) -> str:
         total, failed = sum(self.pairs.values()), sum(self.failed.values())
         lines = [
@@ -69,7 +81,7 @@ class Tally:
 def soak(seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs: int | None = None, say=print, save=None) -> Tally:
     """Judge cases 0, 1, 2 … until the time is up or so many are judged."""
     tally, began, told = Tally(), time.monotonic(), time.monotonic()
-    number = 0
+    number, group = 0, []
     while (pairs is None or number < pairs) and time.monotonic() - began < 60 * minutes:
         case = draw(seed, number, ratio, kinds)
         for failure in tally.add(case, judged := judge(case)):
@@ -77,10 +89,22 @@ def soak(seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs
         if save is not None and judged.failures:
             (save / f"case_{seed}_{number}.py").write_text("\n\n".join(_code(*failure) for failure in judged.failures))
         number += 1
+        group = [*group, case][-GROUP:]
+        if number % (4 * GROUP) == 0:
+            for failure in tally.add_group(number - 1, judge_group(group, _group_code(seed, ratio, kinds, group))):
+                say(_code(*failure))
         if time.monotonic() - told > 20:
             told = time.monotonic()
             say(f"… {number} pairs in {told - began:.0f} s, {sum(tally.failed.values())} failed")
     return tally
+
+
+def _group_code(seed: int, ratio: float, kinds, group) -> str:
+    numbers = [case.number for case in group]
+    return (
+        "import sys, numpy as np, collide as C; sys.path.insert(0, 'tests')\nfrom soak_pairs import draw\n"
+        f"cases = [draw({seed}, k, {ratio!r}, {tuple(kinds)!r}) for k in {numbers}]\n"
+    )
 
 
 def _code(promise: str, found: str, text: str) -> str:

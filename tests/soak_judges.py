@@ -236,6 +236,7 @@ def limits(asked: Asked, random) -> list[float]:
     """Limits about the distance, of its order, and of the sizes of the pair."""
     r, found = asked.r, []
     if r.distance > 0:
+        found.append(float(np.nextafter(float(asked.truth.upper), math.inf)))  # the truth is within, if only just
         found += [r.distance * f for f in (random.uniform(0.1, 0.99), 1 - 1e-9, 1 + 1e-9, random.uniform(1.01, 3), 10.0)]
     return [*found, 0.0, asked.S * 10.0 ** random.uniform(-12, 0.5)]
 
@@ -323,9 +324,21 @@ def _contact_failures(asked: Asked, rows) -> Iterator[tuple[str, str]]:
                 yield "contacts: points lie on their bodies", f"row {k}, {name}: off by {away:.3g}, distance {float(d)!r}"
 
 
+def judge_certificate(asked: Asked) -> Iterator[Failure]:
+    """Where there is a certificate, it stands against all vertices in integers."""
+    if asked.random.uniform() < 0.7 or sum(len(getattr(p, "points", ())) for s in asked.pair[:2] for p in pieces(s)) > 100:
+        return
+    if asked.r.certificate is None:
+        return
+    try:
+        collide.verify(*asked.pair, asked.r)
+    except collide.CertificateRefused as error:
+        yield asked.failed("certificates are accepted", str(error), "r = C.distance(A, B, X_WA, X_WB); C.verify(A, B, X_WA, X_WB, r)")
+
+
 JUDGES = (
     judge_bracket, judge_normal, judge_points, judge_move, judge_swapped, judge_ladder, judge_unsigned, judge_limits,
-    judge_world, judge_contacts,
+    judge_world, judge_contacts, judge_certificate,
 )  # fmt: skip
 
 
@@ -358,3 +371,53 @@ def judge(case: Case, engine: Engine | None = None, judges=JUDGES) -> Judged:
     return Judged(failures, asked.hit, width <= 2 * max(Decimal(asked.r.upper) - Decimal(asked.r.lower), Decimal(1e-15 * asked.S)))
 
 
+# --- many pairs at once ------------------------------------------------------------------------------
+
+
+def judge_group(cases: list[Case], text: str, engine: Engine | None = None) -> Iterator[Failure]:
+    """Cases asked in one batch of lists of shapes, in threads too, and all their bodies in one World.
+
+    text : code that makes ``cases``.
+    """
+    engine = engine or Engine()
+    cases = [c for c in cases if not all(isinstance(s, collide.Halfspace) for s in (c.A, c.B))]
+    columns = [c.A for c in cases], [c.B for c in cases], np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])
+    singles = np.concatenate([engine.distance(c.A, c.B, c.X_WA, c.X_WB).rows for c in cases])  # type: ignore[operator]
+    lists = "[c.A for c in cases], [c.B for c in cases], np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])"
+    for threads in (1, 2):
+        rows = engine.distance(*columns, threads=threads).rows  # type: ignore[operator]
+        if differ := same_bits(rows, singles):
+            where = [c.number for c, one, other in zip(cases, rows, singles) if same_bits(one, other)]
+            yield f"lists of shapes in {threads} threads, the bits of singles", f"{differ} in cases {where}", text + f"C.distance({lists}, threads={threads})"
+    hits = engine.collide(*columns)  # type: ignore[operator]
+    alone = np.array([engine.collide(c.A, c.B, c.X_WA, c.X_WB) for c in cases])  # type: ignore[operator]
+    if (hits != alone).any():
+        yield "booleans of lists of shapes, those of singles", f"cases {[c.number for c in np.array(cases, dtype=object)[hits != alone]]}", text + f"C.collide({lists})"
+    yield from _world_failures(cases, text, engine)
+
+
+def _world_failures(cases: list[Case], text: str, engine: Engine) -> Iterator[Failure]:
+    """A World of all bodies has the rows that its pairs have one by one."""
+    bodies = [(s, X) for c in cases for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)) if not isinstance(s, collide.Halfspace)]
+    world = engine.World()  # type: ignore[operator]
+    for shape, X in bodies:
+        world.add(shape, X)
+    text += "w = C.World()\nfor c in cases:\n    for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)):\n        isinstance(s, C.Halfspace) or w.add(s, X)\n"
+    limit = float(np.median([size_of(c) for c in cases])) * 0.1
+    rows = world.distances(limit).rows
+    found = {(int(row["a"]), int(row["b"])): row for row in rows}
+    told, lost, other = f"limit {limit!r}: {len(rows)} rows", [], []
+    for i, (A, X_WA) in enumerate(bodies):
+        for j in range(i + 1, len(bodies)):
+            q = engine.distance(A, bodies[j][0], X_WA, bodies[j][1], max_distance=limit).rows  # type: ignore[operator]
+            row = found.pop((i, j), None)
+            if row is None:
+                lost += [(i, j)] * bool(q["upper"][0] <= limit)
+            elif q["lower"][0] > limit or same_bits(row, q, skip=("a", "b", "iterations")):
+                other.append((i, j))
+    if lost or found:
+        yield "a World has the rows of its pairs", f"{told}; lost {lost}, of no pair {list(found)}", text + f"w.distances({limit!r}).rows"
+    if other:
+        yield "a World has the bits of its pairs", f"{told}; pairs {other}", text + f"w.distances({limit!r}).rows"
+    if world.collides() != bool(len(world.collisions())):
+        yield "World.collides() == any collisions()", told, text + "w.collides(), len(w.collisions())"

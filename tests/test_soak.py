@@ -8,18 +8,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soak_judges
-from soak import Tally, main, soak
-from soak_judges import Engine, judge
+from soak import Tally, _group_code, main, soak
+from soak_judges import Engine, judge, judge_group
 from soak_pairs import CURVED, KINDS, draw, question
 
 import collide
 
-SEED, PAIRS, RATIO = 1, 200, 1e6
+SEED, PAIRS, RATIO = 1, 180, 1e6
 #: Lines "seed case: promise" of failures that are known and not mended yet: to be emptied, and no others are forgiven.
 OPEN = Path(__file__).with_name("soak_open.txt")
 
 
-def known_open() -> set[tuple[int, str]]:
+#: Pairs that found a failure once, (seed, case): 1, 3, 4, 11 and 13 of the attack on the engine, and later ones.
+FOUND = [
+    *((2, k) for k in (1, 37, 95, 101, 137, 182, 225, 304, 322, 395, 539, 653, 921, 957, 1140, 1327, 1394, 1480, 2104)),
+    *((2, k) for k in (2138, 2338, 2365)),
+    *((3, k) for k in (298, 572, 1548, 1602, 1701)),
+]
+
+
+def known_open() -> set[tuple[int, int, str]]:
     if not OPEN.exists():
         return set()
     lines = [line for line in OPEN.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
@@ -27,22 +35,21 @@ def known_open() -> set[tuple[int, str]]:
     for line in lines:
         place, promise = line.split(": ", 1)
         seed, number = map(int, place.split())
-        assert seed == SEED
-        found.add((number, promise))
+        found.add((seed, number, promise))
     return found
 
 
 def test_pairs_of_all_kinds_keep_every_promise():
     forgiven, failures, truths = known_open(), [], collections.Counter()
     sharp = 0
-    for number in range(PAIRS):
-        case = draw(SEED, number, RATIO)
+    for seed, number in [*((SEED, number) for number in range(PAIRS)), *FOUND]:
+        case = draw(seed, number, RATIO)
         judged = judge(case)
         truths[judged.truth] += 1
         sharp += judged.told
         for promise, found, _ in judged.failures:
-            if (number, promise) not in forgiven:
-                failures.append(f"python tests/soak.py --seed {SEED} --case {number}   # {case.kinds}: {promise}: {found}")
+            if (seed, number, promise) not in forgiven:
+                failures.append(f"python tests/soak.py --seed {seed} --case {number}   # {case.kinds}: {promise}: {found}")
     assert not failures, "\n".join(failures)
     assert truths[True] >= PAIRS / 5 and truths[False] >= PAIRS / 3 and truths[None] <= PAIRS / 50
     assert sharp >= 0.9 * PAIRS, "the oracle is too coarse to judge the engine"
@@ -188,6 +195,24 @@ def test_a_world_that_loses_a_pair_is_noticed():
     cases = [draw(24, number, RATIO, ("sphere", "box", "hull")) for number in range(15)]
     found = [judge(case, Engine(World=Forgetful), (soak_judges.judge_world,)).failures for case in cases]
     assert sum(any(name == "World.distances holds all pairs within" for name, *_ in failures) for failures in found) >= 13
+
+
+def test_many_bodies_at_once_and_a_batch_that_mixes_them_up_is_noticed():
+    cases = [draw(SEED, number, RATIO, KINDS) for number in range(8)]
+    text = _group_code(SEED, RATIO, KINDS, cases)
+    told: dict = {}
+    exec(text, told)  # noqa: S102 code that the soak itself wrote
+    assert question(told["cases"][3]) == question(cases[3])
+    assert not list(judge_group(cases, text))
+
+    def mixed_up(A, *arguments, **options):
+        found = collide.distance(A, *arguments, **options)
+        if isinstance(A, list):
+            found.rows = found.rows[::-1].copy()
+        return found
+
+    promises = [promise for promise, *_ in judge_group(cases, text, Engine(distance=mixed_up))]
+    assert "lists of shapes in 2 threads, the bits of singles" in promises
 
 
 def test_an_exception_is_a_failure():
