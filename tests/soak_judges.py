@@ -24,6 +24,8 @@ from collide.results import FIELDS, HOW, flipped
 
 #: Of the size and of coordinates: what points of gaps and normals may be off by rounding; points of overlaps.
 FEW_ULPS, POINTS = 64 * 2.0**-53, 1e-12
+#: Points of bodies with a cylinder, cone or ellipsoid nearer than rounding: what the search for depths stops at, 2⁻³⁶ of the size.
+CURVED_POINTS = 2.0**-36
 UNDECIDED = HOW.index("undecided")
 #: Poses of the ladder of booleans along the normal.
 RUNGS = 24
@@ -71,6 +73,11 @@ class Asked:
     @cached_property
     def one_convex(self) -> bool:
         return all(len(pieces(s)) == 1 and not any(isinstance(p, collide.Mesh) for p in pieces(s)) for s in self.pair[:2])
+
+    @cached_property
+    def curved(self) -> bool:
+        round_ones = collide.Cylinder, collide.Cone, collide.Ellipsoid
+        return any(isinstance(p, round_ones) for s in self.pair[:2] for p in pieces(s))
 
     def text(self, ask: str) -> str:
         return question(self.case) + ask
@@ -152,7 +159,8 @@ def judge_points(asked: Asked) -> Iterator[Failure]:
         return
     for name, shape, X in (("point_a", asked.case.A, asked.case.X_WA), ("point_b", asked.case.B, asked.case.X_WB)):
         away = curved_oracle.away_from(shape, X, getattr(r, name))
-        allowed = (POINTS if r.certified else 1e-10) * asked.coordinates + (1 if r.certified else 4) * (r.upper - r.lower)
+        rounding = CURVED_POINTS if asked.curved else POINTS
+        allowed = (rounding if r.certified else 1e-10) * asked.coordinates + (1 if r.certified else 4) * (r.upper - r.lower)
         if not away <= allowed:
             sure = "certified " if r.certified else "uncertified "
             yield asked.failed(f"{sure}points lie on their bodies", f"{name} is off by {away:.3g}, allowed {allowed:.3g}")
@@ -236,7 +244,7 @@ def limits(asked: Asked, random) -> list[float]:
     """Limits about the distance, of its order, and of the sizes of the pair."""
     r, found = asked.r, []
     if r.distance > 0:
-        found.append(float(np.nextafter(float(asked.truth.upper), math.inf)))  # the truth is within, if only just
+        found.append(float(np.nextafter(max(float(asked.truth.upper), 0.0), math.inf)))  # the truth is within, if only just
         found += [r.distance * f for f in (random.uniform(0.1, 0.99), 1 - 1e-9, 1 + 1e-9, random.uniform(1.01, 3), 10.0)]
     return [*found, 0.0, asked.S * 10.0 ** random.uniform(-12, 0.5)]
 

@@ -388,6 +388,23 @@ def test_a_needle_of_a_facet_does_not_turn_the_normal_of_a_depth(scale):
         assert missed < 1e-12 * max(2.0 * scale, float(np.abs(X[:3, 3]).max())), (missed, X.tolist(), A, B)
 
 
+def test_a_facet_as_thin_as_rounding_proves_no_depth():
+    """A tiny box within a box: two vertices of a needle were not level themselves, two others were counted in their place, and
+    the depth 1.05 came out as 0.81, bracket and all."""
+    X = np.array(
+        [
+            [-0.7985161689327858, -0.5419543924831456, 0.2620255033792149, -0.8478375655125645],
+            [0.05417370885914911, 0.3688149141725913, 0.9279228245669507, 0.8621926312021686],
+            [-0.5995307641992615, 0.7551562722722287, -0.26514499283705306, -0.27518696934255593],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    cube = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    r = collide.distance(collide.ConvexHull(cube, radius=0.05), collide.ConvexHull(cube * 1e-6), X, X)
+    assert r.lower <= r.distance <= r.upper and r.certified
+    assert abs(r.distance + 1.050001) < 1e-12 and r.lower > -1.0500011
+
+
 def test_a_depth_whose_first_surface_rounding_spoils():
     """Two prisms of 1,000 corners, 6.4e-17 deep: no surface that begins with the axes of the world could be closed."""
     from collide.scenes.families import generate

@@ -71,9 +71,9 @@ def _product(coordinates, m, i, gx, gy, gz):
 
 @kernel
 def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz, limit):
-    """Whether no vertices have a product with g of at most the limit, but those of a body's in some vertex pairs.
+    """Whether those of a body's vertices in some vertex pairs, and no others, have a product with g of at most the limit.
 
-    ids : the pairs, at most three, with ``own`` different vertices of body 0 or 1; these are below the limit.
+    ids : the pairs, at most three, with ``own`` different vertices of body 0 or 1.
 
     A scan; or, where there is a support tree, a look at their neighbours: the vertices of a hull below a level hang
     together. Also a scan where they have very many, as the tip of a cone has.
@@ -81,6 +81,13 @@ def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz
     i = ids[body]
     j = ids[2 * min(pairs - 1, 1) + body]
     k = ids[2 * (pairs - 1) + body]
+    # Vertices of a facet as thin as rounding need not be level themselves, and then they must not be counted for others.
+    if (
+        _product(coordinates, m, i, gx, gy, gz) > limit
+        or _product(coordinates, m, j, gx, gy, gz) > limit
+        or _product(coordinates, m, k, gx, gy, gz) > limit
+    ):
+        return False
     if tree == 0 or _has_many_neighbours(tree, m, i, j, k):
         # What fills up the last block are copies of vertex 0.
         copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
