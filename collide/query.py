@@ -8,6 +8,7 @@ import weakref
 
 import numpy as np
 
+from collide import reading
 from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
@@ -15,7 +16,7 @@ from collide.narrowphase import run
 from collide.results import PairResult
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.shape_set import Picked
-from collide.transforms import as_poses
+from collide.transforms import as_poses, poses_as_given
 
 
 def collide(
@@ -81,7 +82,7 @@ def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algor
     if axes is not None or threads != 1:
         raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
     found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
-    return bool(found.hit[0]) if _is_single(X_WA) and _is_single(X_WB) else found.hit
+    return bool(found.hit[0]) if _batch(X_WA, "X_WA")[1] and _batch(X_WB, "X_WB")[1] else found.hit
 
 
 def _is_named(algorithm, name: str) -> bool:
@@ -218,12 +219,9 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
 
 def check_distance(name: str, value) -> float:
     """A distance limit [m]: a number ≥ 0, infinity allowed."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name} must be a number ≥ 0 [m], got {value!r}") from None
-    if not number >= 0.0:
-        raise InvalidArgument(f"{name} must be ≥ 0 [m], got {value!r}")
+    number = reading.number(value)
+    if number is None or not number >= 0.0:
+        raise InvalidArgument(f"{name} must be a number ≥ 0 [m], got {reading.told(value)}")
     return number
 
 
@@ -236,14 +234,12 @@ def _poses(A, B, X_WA, X_WB):
     X_WB, single_b = _batch(X_WB, "X_WB")
     counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
     single = single_a and single_b
-    for name, given in (("A", A), ("B", B)):
-        if isinstance(given, Picked) or (
-            isinstance(given, (list, tuple)) and all(isinstance(shape, Shape) for shape in given)
-        ):
-            counts[name] = len(given)
+    for name, side in (("A", A), ("B", B)):
+        if _is_sequence(side):
+            counts[name] = len(side)
             single = False
-        elif not isinstance(given, Shape):
-            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {given!r}")
+        elif not isinstance(side, Shape):
+            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(side)}")
     wanted = max(counts.values()) if min(counts.values()) else 0
     for name, count in counts.items():
         if count != wanted and (count != 1 or name in "AB"):
@@ -253,17 +249,16 @@ def _poses(A, B, X_WA, X_WB):
     return X_WA, X_WB, single
 
 
+def _is_sequence(side) -> bool:
+    """Whether it is shapes, one a pose."""
+    return isinstance(side, Picked) or (isinstance(side, (list, tuple)) and all(isinstance(shape, Shape) for shape in side))
+
+
 def _batch(X, name: str) -> tuple[np.ndarray, bool]:
     """(poses (n, 4, 4), whether a single one was given)."""
-    if isinstance(X, np.ndarray) and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
+    if type(X) is np.ndarray and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
         return np.ascontiguousarray(X).reshape(-1, 4, 4), X.ndim == 2
-    return as_poses(X, name, check=False), _is_single(X)
-
-
-def _is_single(X) -> bool:
-    if isinstance(X, tuple):
-        return all(np.ndim(part) == dimensions for part, dimensions in zip(X, (2, 1)))
-    return np.ndim(X) == 2
+    return poses_as_given(X, name, check=False)
 
 
 def _one(shapes, k: int) -> Shape:

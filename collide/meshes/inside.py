@@ -18,7 +18,7 @@ from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.surfaces.volumes import without_area
 from collide.meshes.bodies import body_of
 from collide.meshes.exact_places import cross, inner, integers, minus, on_one_grid, placed
-from collide.meshes.rays import as_it_is, is_single, matched_count, raycast, vectors
+from collide.meshes.rays import as_it_is, matched_count, raycast, vectors
 from collide.narrowphase.triangles.inside import INSIDE, OUTSIDE, UNDECIDED
 from collide.narrowphase.triangles.queries import points_in_solid, surfaces_meet
 from collide.results import UNDECIDED as LEFT_OPEN
@@ -28,7 +28,7 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Capsule, Cone, Cylinder, Ellipsoid, Sphere
-from collide.transforms import LARGEST, as_poses
+from collide.transforms import LARGEST, poses_as_given
 
 #: The facets without area of meshes that have been asked.
 _thin: WeakKeyDictionary[MeshTree, MeshTree | None] = WeakKeyDictionary()
@@ -60,14 +60,13 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     if beyond.any():
         k = int(np.argmax(beyond))
         raise InvalidArgument(f"contains: points_W[{k}] exceeds {LARGEST:g}, got {points[k].tolist()}")
-    single = one and is_single(X_WA)
-    X_WA = as_poses(X_WA, "X_WA", check=check_poses)
+    X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
     n = matched_count("contains", X_WA=len(X_WA), points_W=len(points))
     points = np.ascontiguousarray(np.broadcast_to(points, (n, 3)))
     if n == 0:
         return np.zeros(0, dtype=bool)
     answer = _in_mesh(shape, X_WA, points) if isinstance(shape, Mesh) else _in_convex(shape, X_WA, points)
-    return bool(answer[0]) if single else answer
+    return bool(answer[0]) if one and single_pose else answer
 
 
 def _at(points: np.ndarray) -> np.ndarray:
