@@ -12,7 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from collide.errors import InvalidArgument, InvalidPose
+from collide import reading
+from collide.errors import InvalidPose
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
 from collide.narrowphase import run
@@ -40,7 +41,7 @@ def ask(
     """
     n = length_of(A, B, X_WA, X_WB)
     out = np.zeros(n, dtype=bool if boolean else PAIR_DTYPE)
-    workers, fewest = _workers(threads), _FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD
+    workers, fewest = reading.whole("threads", threads, 1), _FEWEST_OF_MESHES if _any_meshed(A) or _any_meshed(B) else _FEWEST_A_THREAD
     workers = min(workers, n // fewest)
     for X, copy in zip((X_WA, X_WB), kept):
         if workers < 2 or len(X) == 1:
@@ -113,12 +114,6 @@ def _pool(workers: int) -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):  # a forked child has none of its parent's threads
     os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def _workers(threads) -> int:
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
-    return int(threads)
 
 
 def _refuse_poses(X_WA, X_WB, check: bool) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import CollideError
+from collide.errors import CollideError, InvalidArgument
 
 #: Array kinds that are read as they are; objects are read one by one.
 _REAL = "fiub"
@@ -46,6 +46,21 @@ def number(value: Any) -> float | None:
         return None
 
 
+def limit(what: str, value: Any, unit: str = " [m]") -> float:
+    """A limit: a number ≥ 0, infinity allowed where it is given as such. Raises InvalidArgument."""
+    read = number(value)
+    if read is None or not read >= 0.0 or (math.isinf(read) and value != read):
+        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {told(value)}")
+    return read
+
+
+def whole(what: str, value: Any, least: int) -> int:
+    """An integer, and not True. Raises InvalidArgument."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {told(value)}")
+    return int(value)
+
+
 def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
     """Real numbers as a float64 array of whatever shape; the caller's own array where it is one already.
 
@@ -75,7 +90,7 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
         return np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         # numpy's own words for rows of different lengths are long, and tell no more
-        raise error(f"{what} must be numbers of shape {wanted}, rows equally long, got {told(value)}") from None
+        raise error(f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {told(value)}") from None
 
 
 def _is_masked(value: Any) -> bool:

@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     #: `Single` or `Batch`; Any where a type checker cannot tell which, and values of fields are Any, too.
     Asked = TypeVar("Asked", default=Any)
-    One, Many = TypeVar("One"), TypeVar("Many")
+    One = TypeVar("One")
+    Many = TypeVar("Many")
 
     class Field(Generic[One, Many]):
         """A field of a `PairResult` to a type checker: a scalar of a single result, a column of a batch."""

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import _jit
+from collide import _jit, reading
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
+from collide.margins import checked_margin, within
 from collide.packed_world import PackedWorld
-from collide.query import check_distance
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.shapes.base import Shape
 from collide.transforms import as_poses
@@ -85,6 +85,8 @@ class World:
             raise InvalidArgument(f"World.add: name must be a non-empty string, got {name!r}")
         if name in self._ids:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
+        if not isinstance(static, (bool, np.bool_, int)):
+            raise InvalidArgument(f"World.add: static must be True or False, got {reading.told(static)}")
         body = Body(identity, name, shape, X_WB, bool(static), _bits("group", group), _bits("mask", mask))
         self._bodies[identity], self._ids[name] = body, identity
         self._next += 1
@@ -123,7 +125,7 @@ class World:
         reason : a few words; `stats` counts skipped pairs under it.
         """
         if b is None:
-            self._allow_matrix(np.asarray(a), reason)
+            self._allow_matrix(reading.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument), reason)
             return
         i, j = self._id(a), self._id(b)
         if i == j:
@@ -149,16 +151,19 @@ class World:
                 return self._ids[body]
             known = ", ".join(sorted(self._ids)[:12]) or "none"
             raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
-        try:
-            identity = int(body)
-        except (TypeError, ValueError):
-            raise UnknownBody(f"a body is named by its id or its name, got {body!r}") from None
-        if identity not in self._bodies:
-            raise UnknownBody(f"no body has id {identity}; it may have been removed")
-        return identity
+        if isinstance(body, bool) or not isinstance(body, (int, np.integer)):
+            raise UnknownBody(f"a body is named by its id or its name, got {reading.told(body)}")
+        if body not in self._bodies:
+            raise UnknownBody(f"no body has id {reading.told(body)}; it may have been removed")
+        return int(body)
 
     def __len__(self) -> int:
         return len(self._bodies)
+
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle holds: bodies and filters of its own; tables with addresses are made anew."""
+        kept = {name: dict(getattr(self, name)) for name in ("_bodies", "_ids", "_allowed")}
+        return {**self.__dict__, **kept, "_packed": None, "_stats": {}}
 
     @property
     def ids(self) -> list[int]:
@@ -176,10 +181,24 @@ class World:
 
     # --- queries --------------------------------------------------------------------------------
 
-    def collides(self) -> bool:
-        """Whether any tested pair hits; stops at the first that does."""
-        rows, _ = self._ask(0.0, boolean=True, stop_at_hit=True)
-        return bool(rows["hit"].any())
+    def collides(self, *, security_margin: float = 0.0) -> bool:
+        """Whether any tested pair hits; stops at the first that does.
+
+        security_margin : [m], ≥ 0, finite: pairs at most so far apart are hits, too, decided as by `collide.collide`; which
+            those are, `distances` says. Then every pair is asked.
+        """
+        margin = checked_margin("World.collides: security_margin", security_margin)
+        if not margin:
+            rows, _ = self._ask(0.0, boolean=True, stop_at_hit=True)
+            return bool(rows["hit"].any())
+        rows, _ = self._ask(margin)
+        bodies = self._bodies
+
+        def pair(k: int):
+            a, b = bodies[int(rows["a"][k])], bodies[int(rows["b"][k])]
+            return a.shape, b.shape, a.X_WB, b.X_WB
+
+        return bool(within(rows, margin, pair).any())
 
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
@@ -191,7 +210,7 @@ class World:
 
         Two half-spaces that meet have distance −inf.
         """
-        limit = check_distance("World.distances: max_distance", max_distance)
+        limit = reading.limit("World.distances: max_distance", max_distance)
         rows, _ = self._ask(limit)
         return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
 
@@ -222,7 +241,7 @@ class World:
 
         Such are some shapes against a mesh. Allow these pairs, and the rest of the World is answered.
         """
-        limit = check_distance("World.unanswerable: max_distance", max_distance)
+        limit = reading.limit("World.unanswerable: max_distance", max_distance)
         packed, ids = self._pack(), list(self._bodies)
         return [(ids[a], ids[b], why) for a, b, why in packed.refused(packed.candidates(limit), limit)]
 
@@ -232,7 +251,7 @@ class World:
         Field a is −1 for the outside shape, b the body; normals point from the shape to the body.
         Filters do not apply, and `stats` stays that of the last query of the whole World.
         """
-        limit = check_distance("World.query: max_distance", max_distance)
+        limit = reading.limit("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):
             raise InvalidArgument(f"World.query: shape must be a shape, got {shape!r}")
         X_WS = _one_pose(X_WS, "World.query: X_WS")

@@ -60,7 +60,7 @@ BAD_SHAPES = [
     (lambda: Box((1, 1, 0)), ("Box", "size.z", "0")),
     (lambda: Box((1, 1, 1e60)), ("Box", "size[2]", "1e+60")),
     (lambda: Box((1, 1e-60, 1)), ("Box", "size.y", "1e-60")),
-    (lambda: Box("abc"), ("Box", "size", "str")),
+    (lambda: Box("abc"), ("Box", "size", "text")),
     (lambda: Capsule(-0.1, 1.0), ("Capsule", "radius", "-0.1")),
     (lambda: Capsule(0.1, -1.0), ("Capsule", "length", "-1.0")),
     (lambda: Capsule(0.1, NAN), ("Capsule", "length", "nan")),

@@ -146,9 +146,9 @@ class WorldContacts:
 
 
 class Contacts:
-    """Contacts of one pair of bodies, at one pair of poses or many: the fields of `CONTACT_DTYPE` as columns.
+    """Contacts of one pair of bodies, or of many: the fields of `CONTACT_DTYPE` as columns.
 
-    ``rows`` is the structured array of all contacts, pose after pose; those of pose k are
+    ``rows`` is the structured array of all contacts, pair after pair (pose after pose, of two shapes); those of pair k are
     ``rows[starts[k]:starts[k + 1]]``, and ``result[k]`` is a result of them alone. ``len(result)`` is the number of
     contacts; that of poses is ``len(starts) − 1``. Iterating gives the rows.
     """

@@ -103,9 +103,7 @@ def raycast(
     UnsupportedQuery for shapes without facets.
     """
     body = facet_body(shape, "raycast")
-    limit = reading.number(max_distance)
-    if limit is None or not limit >= 0.0:
-        raise InvalidArgument(f"raycast: max_distance must be a number ≥ 0, got {reading.told(max_distance)}")
+    limit = reading.limit("raycast: max_distance", max_distance, "")
     X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, limit, check_poses)
     n = len(given)
     hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], given, not all_hits)

@@ -91,7 +91,7 @@ class Mesh(Shape):
         self._store(solid=not spoilt)
 
     @classmethod
-    def _from_fields(cls, vertices, faces, solid, scale) -> Mesh:
+    def _from_fields(cls, vertices, faces, solid, scale=1.0) -> Mesh:
         """The mesh that a pickle or a file tells of: what it says is a solid must be one."""
         return cls(vertices, faces, solid=bool(solid)).scaled(scale)
 
