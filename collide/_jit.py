@@ -164,6 +164,7 @@ class Entry:
                     self._forget(error)
                     dispatcher = self._compiled()
             seconds[self.name] = time.perf_counter() - started
+            log.info("kernel %s compiled or loaded: %.3f s", self.name, seconds[self.name])
             self._ready = dispatcher
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import _jit, reading
+from collide import _jit, journal, reading
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
 from collide.margins import checked_margin, within
@@ -323,7 +323,8 @@ class World:
         if self._packed is None:
             position = {identity: k for k, identity in enumerate(self._bodies)}
             allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
-            self._packed = PackedWorld(list(self._bodies.values()), allowed)
+            with journal.told("tables and box-tree of a World of %d bodies made", len(self._bodies)):
+                self._packed = PackedWorld(list(self._bodies.values()), allowed)
         elif self._moved:
             self._packed.move(np.array([body.X_WB for body in self._bodies.values()]).reshape(-1, 4, 4))
         self._moved = False

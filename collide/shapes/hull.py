@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide import journal
 from collide.errors import InvalidShape
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, facet_ids, positive, rows
@@ -78,7 +79,8 @@ class ConvexHull(Shape):
         from collide.geometry.hulls.hull import convex_hull
 
         if not hasattr(self, "_hull"):
-            hull = convex_hull(self.points)
+            with journal.told("convex hull of %d points made", len(self.points)):
+                hull = convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False
             object.__setattr__(self, "_hull", hull)

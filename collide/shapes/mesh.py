@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from collide import reading
+from collide import journal, reading
 from collide.errors import InvalidShape, UnsupportedQuery
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, facet_ids, positive, rows
@@ -103,14 +103,15 @@ class Mesh(Shape):
     def tree(self) -> MeshTree:
         """The box-tree that queries walk: made when first asked for. A scaled copy's is its base's, boxes scaled."""
         if not hasattr(self, "_tree"):
-            if self._copied is None:
-                from collide.geometry.mesh_tree.build import build_mesh_tree
+            with journal.told("box-tree of a mesh of %d facets made", len(self.faces)):
+                if self._copied is None:
+                    from collide.geometry.mesh_tree.build import build_mesh_tree
 
-                self._store(_tree=build_mesh_tree(self.vertices, self.faces))
-            else:
-                from collide.geometry.mesh_tree.scaled import scaled_tree
+                    self._store(_tree=build_mesh_tree(self.vertices, self.faces))
+                else:
+                    from collide.geometry.mesh_tree.scaled import scaled_tree
 
-                self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
+                    self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree
 
     @property
@@ -118,11 +119,12 @@ class Mesh(Shape):
         """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
         if not hasattr(self, "_hull"):
             used = self.vertices[np.unique(self.faces)]
-            if len(used) > _MANY:
-                from collide.geometry.hulls.hull import convex_hull
+            with journal.told("convex hull around a mesh of %d facets made", len(self.faces)):
+                if len(used) > _MANY:
+                    from collide.geometry.hulls.hull import convex_hull
 
-                used = used[convex_hull(used).vertices]
-            self._store(_hull=ConvexHull(used))
+                    used = used[convex_hull(used).vertices]
+                self._store(_hull=ConvexHull(used))
         return self._hull
 
     @property
@@ -138,7 +140,8 @@ class Mesh(Shape):
         if self._copied is not None:
             return self._copied.survey
         if not hasattr(self, "_survey"):
-            survey = survey_surface(self.vertices, self.faces)
+            with journal.told("surface of a mesh of %d facets looked at", len(self.faces)):
+                survey = survey_surface(self.vertices, self.faces)
             for array in (survey.corners, survey.flags, survey.shells, survey.volumes, survey.signs):
                 array.flags.writeable = False
             self._store(_survey=survey)

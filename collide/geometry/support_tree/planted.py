@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 
+from collide import journal
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.support_tree.build import build_support_tree
 from collide.geometry.support_tree.layout import SupportTree
@@ -29,7 +30,8 @@ class PlantedTree:
         if self._tree is None and not self._hopeless:
             with _growing():
                 if self._tree is None and not self._hopeless:
-                    self._tree = _grown(self._points)
+                    with journal.told("support tree of a hull of %d points made", len(self._points)):
+                        self._tree = _grown(self._points)
                     self._hopeless = self._tree is None
         return self._tree
 
