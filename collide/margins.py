@@ -66,7 +66,7 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     first = float(total)
     if first > total:
         first = math.nextafter(first, 0.0)
-    rest = float(total - first)
+    rest = float(total - Fraction(first))
     if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
         return None
     if all(swept):

@@ -54,9 +54,14 @@ def limit(what: str, value: Any, unit: str = " [m]") -> float:
     return read
 
 
+def is_whole(value: Any) -> bool:
+    """Whether it is an integer: neither True nor a time span, which to numpy is one."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+
+
 def whole(what: str, value: Any, least: int) -> int:
-    """An integer, and not True. Raises InvalidArgument."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+    """An integer. Raises InvalidArgument."""
+    if not is_whole(value) or value < least:
         raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {told(value)}")
     return int(value)
 

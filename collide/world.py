@@ -77,12 +77,12 @@ class World:
         group, mask : bit sets of up to 32 bits.
         """
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
+            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {reading.told(shape)}")
         X_WB = _one_pose(np.eye(4) if X_WB is None else X_WB, "World.add: X_WB")
         identity = self._next
         name = f"body {identity}" if name is None else name
         if not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {name!r}")
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {reading.told(name)}")
         if name in self._ids:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
         if not isinstance(static, (bool, np.bool_, int)):
@@ -151,7 +151,7 @@ class World:
                 return self._ids[body]
             known = ", ".join(sorted(self._ids)[:12]) or "none"
             raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
-        if isinstance(body, bool) or not isinstance(body, (int, np.integer)):
+        if not reading.is_whole(body):
             raise UnknownBody(f"a body is named by its id or its name, got {reading.told(body)}")
         if body not in self._bodies:
             raise UnknownBody(f"no body has id {reading.told(body)}; it may have been removed")
@@ -253,7 +253,7 @@ class World:
         """
         limit = reading.limit("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.query: shape must be a shape, got {shape!r}")
+            raise InvalidArgument(f"World.query: shape must be a shape, got {reading.told(shape)}")
         X_WS = _one_pose(X_WS, "World.query: X_WS")
         rows = self._pack().against(shape, X_WS, limit)
         rows = rows[_within(rows, limit)]
@@ -350,8 +350,8 @@ def _read_only(X: np.ndarray) -> np.ndarray:
 
 
 def _bits(field: str, value) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {value!r}")
+    if not reading.is_whole(value) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {reading.told(value)}")
     return int(value)
 
 

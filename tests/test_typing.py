@@ -49,7 +49,7 @@ WRONG = {
     "collide.distance(box, ball, np.eye(4), Xs).certfied": "has no attribute",
     "many[0].pont_a": "has no attribute",
     "c.nromal": "has no attribute",
-    "near['distnace']": "No overload|no overload|overload variant",
+    "near['distnace']": "Invalid index type",
     "collide.Bxo(1, 1, 1)": "has no attribute",
     "collide.Cylinder(0.1, lenght=0.2)": "Unexpected keyword",
     "collide.Sphere(raduis=1.0)": "Unexpected keyword",
@@ -71,8 +71,7 @@ def checked(tmp_path_factory):
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--follow-imports=silent", "--ignore-missing-imports", "--cache-dir", str(folder / "cache"),
-         "--no-site-packages" if find_spec("numpy") is None else "--show-error-codes", *files],
+        [sys.executable, "-m", "mypy", "--follow-imports=silent", "--ignore-missing-imports", "--cache-dir", str(folder / "cache"), *files],
         cwd=folder, env={**os.environ, "MYPYPATH": str(folder / "site")}, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 1, done.stdout + done.stderr

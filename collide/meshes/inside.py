@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from collide import reading
 from collide.batches import ask
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.mesh_tree.build import build_mesh_tree
@@ -50,7 +51,7 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
     points, one = vectors("contains", "points_W", points_W)
     beyond = np.abs(points).max(axis=1) > LARGEST
     if beyond.any():
