@@ -44,9 +44,8 @@ class ShapeSet:
             if not -len(self) <= rows < len(self):
                 raise IndexError(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {rows}")
             return self.shapes[rows]
-        numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else (
-            reading.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
-        )
+        rows = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
+        numbers = reading.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
         if numbers.size == 0 and numbers.ndim == 1:
             numbers = numbers.astype(np.int64)
         if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
