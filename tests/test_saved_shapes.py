@@ -168,6 +168,9 @@ def test_a_solid_must_be_one(tmp_path):
     function, (cls, (vertices, faces, _, scale)) = open_mesh.__reduce__()
     with pytest.raises(InvalidShape, match="no inside can be told"):
         function(cls, (vertices, faces, True, scale))
+    unseen = Mesh._known(vertices, faces, True)  # as prepared input of a scene may say: seen when first asked
+    with pytest.raises(InvalidShape, match="no inside can be told"):
+        collide.collide(unseen, collide.Sphere(1), EYE, EYE)
 
 
 # --- files that are no files of ours --------------------------------------------------------------

@@ -79,21 +79,22 @@ class Mesh(Shape):
         self._store(vertices=vertices, faces=faces, scale=1.0, solid=False, _copied=None)
         if solid is not None and not solid:
             return
-        report = make_report(len(vertices), True, self.survey)
-        spoilt = [str(defect) for defect in report.defects if defect.spoils] or (
-            [] if self.survey.edges else ["no facet has three distinct corners"]
-        )
+        spoilt = _what_spoils(len(vertices), self.survey)
         if solid and spoilt:
-            raise InvalidShape(
-                f"Mesh: no inside can be told: {'; '.join(spoilt)}. Repair the mesh, or leave out solid=True "
-                "and it is taken as a surface"
-            )
+            raise InvalidShape(spoilt)
         self._store(solid=not spoilt)
 
     @classmethod
-    def _from_fields(cls, vertices, faces, solid, scale=1.0) -> Mesh:
+    def _from_fields(cls, vertices, faces, solid, scale) -> Mesh:
         """The mesh that a pickle or a file tells of: what it says is a solid must be one."""
         return cls(vertices, faces, solid=bool(solid)).scaled(scale)
+
+    @classmethod
+    def _known(cls, vertices, faces, solid: bool) -> Mesh:
+        """A mesh that was looked at before, as prepared input tells: it is looked at again when a query first needs it."""
+        made = cls(vertices, faces, solid=False)
+        made._store(solid=bool(solid))
+        return made
 
     def __reduce__(self):
         rebuild, _ = super().__reduce__()
@@ -142,6 +143,9 @@ class Mesh(Shape):
         if not hasattr(self, "_survey"):
             with journal.told("surface of a mesh of %d facets looked at", len(self.faces)):
                 survey = survey_surface(self.vertices, self.faces)
+            spoilt = self.solid and _what_spoils(len(self.vertices), survey)
+            if spoilt:
+                raise InvalidShape(spoilt)
             for array in (survey.corners, survey.flags, survey.shells, survey.volumes, survey.signs):
                 array.flags.writeable = False
             self._store(_survey=survey)
@@ -247,6 +251,18 @@ _FILE_FORMAT = 1
 _FILE_FIELDS = {
     "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()), "scale": Field("f8", ()),
 }  # fmt: skip
+
+
+def _what_spoils(vertices: int, survey: Survey) -> str:
+    """Why a mesh of so many vertices is no solid, in words; empty where it is one."""
+    report = make_report(vertices, True, survey)
+    spoilt = [str(defect) for defect in report.defects if defect.spoils] or (
+        [] if survey.edges else ["no facet has three distinct corners"]
+    )
+    if not spoilt:
+        return ""
+    remedy = "Repair the mesh, or leave out solid=True and it is taken as a surface"
+    return f"Mesh: no inside can be told: {'; '.join(spoilt)}. {remedy}"
 
 
 def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
