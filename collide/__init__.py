@@ -14,6 +14,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collide import errors as errors
+    from collide import results as results
+    from collide import transforms as transforms
     from collide.certificates import Certificate, CertificateRefused, verify
     from collide.errors import (
         CollideError,
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
     from collide.meshes.pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.meshes.rays import RayHits, raycast
     from collide.query import collide, distance, walk
-    from collide.results import PairResult, WorldResult
+    from collide.results import How, PairResult, WorldResult
     from collide.robot import Robot
     from collide.shapes import (
         Box,
@@ -68,7 +71,7 @@ _HOMES = {
     "collide.meshes.pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.meshes.rays": ("RayHits", "raycast"),
     "collide.query": ("collide", "distance", "walk"),
-    "collide.results": ("PairResult", "WorldResult"),
+    "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
@@ -82,7 +85,7 @@ _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
-    "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "InvalidArgument", "InvalidPose", "InvalidShape",
+    "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
     "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
     "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
@@ -90,12 +93,19 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str):
-    if name not in _HOME:
-        raise AttributeError(f"module 'collide' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
+#: Modules that are reached by name alone: ``collide.results.HOW``.
+_MODULES = ("errors", "results", "transforms")
+
+if not TYPE_CHECKING:  # checkers are to know the names above, and no others
+
+    def __getattr__(name: str):
+        if name in _MODULES:
+            return import_module(f"collide.{name}")
+        if name not in _HOME:
+            raise AttributeError(f"module 'collide' has no attribute {name!r}")
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__():

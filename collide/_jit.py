@@ -37,6 +37,7 @@ from numba.np.arrayobj import make_array, populate_array
 from collide._kernel_cache import kernel_cache
 from collide._lean_compile import SELDOM, compiled_lean
 from collide.cache_folder import cache_folder
+from collide.journal import log
 
 PLAIN_PYTHON = bool(numba.config.DISABLE_JIT)
 _FLAGS = {"nogil": True, "error_model": "numpy", "_nrt": False}
@@ -148,6 +149,7 @@ class Entry:
             with on_compile(self.name):
                 dispatcher = self._compiled()
             seconds[self.name] = time.perf_counter() - started
+            log.info("kernel %s compiled or loaded: %.3f s", self.name, seconds[self.name])
             self._ready = dispatcher
 
 

@@ -5,31 +5,57 @@ from __future__ import annotations
 import itertools
 import math
 import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from collide import reading
 from collide.batches import ask, length_of
-from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
+from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.tables import ShapeTable
+from collide.margins import checked_margin, within
 from collide.narrowphase import run
+from collide.questions import asked_poses, pose_at, pose_batch, shape_at
 from collide.results import PairResult
 from collide.shapes.base import Shape, is_plain
-from collide.shapes.shape_set import Picked
 from collide.transforms import as_poses
 from collide.unions import UnionPair
 from collide.workers import check_threads
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
+    from collide.results import Single
+    from collide.transforms import Pose, PoseLike
+
+    Shapes = Shape | Sequence[Shape]
+
+#: No margin: told by identity, which costs single calls nothing.
+_TOUCHING = 0.0
+
+
+@overload
+def collide(
+    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, security_margin: float = ..., check_poses: bool = ..., threads: int = ...,
+    axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
+) -> bool: ...  # fmt: skip
+@overload
+def collide(
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, security_margin: float = ..., check_poses: bool = ...,
+    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
+) -> Any: ...  # fmt: skip
 def collide(
     A,
     B,
     X_WA,
     X_WB,
     *,
-    check_poses: bool = True,
-    threads: int = 1,
-    axes: np.ndarray | None = None,
-    algorithm: str | None = None,
+    security_margin=_TOUCHING,
+    check_poses=True,
+    threads=1,
+    axes=None,
+    algorithm=None,
 ):
     """Whether the closed sets A and B share a point.
 
@@ -38,7 +64,10 @@ def collide(
     A, B : shapes; or sequences of shapes, one a pose (a list, or picked from a `ShapeSet`), and then X_WA and
         X_WB are batches of that length.
     X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every
-        pose of the other's batch. ``(R, t)`` tuples are accepted.
+        pose of the other's batch. ``(R, t)`` tuples and scipy's rotations are accepted (`transforms.as_poses`).
+    security_margin : [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the
+        distance, and where the margin lies within it by growing one body (`margins.py`): exactly between polytopes and
+        balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
     check_poses : refuse matrices that are no rotation.
     threads : answer a batch in this many threads; the answers are the same bits.
     axes : warm start, float64 (N, 3): for each pose an axis that may part the bodies, zeros where none is
@@ -55,25 +84,37 @@ def collide(
 
     Raises InvalidPose, InvalidArgument; UnsupportedQuery for shapes that the algorithm does not serve.
     """
+    if algorithm is None and axes is None and security_margin is _TOUCHING and type(threads) is int and threads == 1:
+        try:
+            hit = A._prepared[B._serial].collide(X_WA, X_WB)
+            if hit is not None:
+                return hit
+        except (AttributeError, KeyError, TypeError):
+            pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
+        return _batched(A, B, X_WA, X_WB, check_poses, threads)
+    margin = checked_margin("security_margin", security_margin)
+    if margin and (axes is not None or algorithm is not None):
+        raise InvalidArgument("security_margin goes with neither axes nor algorithm")
     if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
-    if threads.__class__ is not int or threads != 1:
-        return _batched(A, B, X_WA, X_WB, check_poses, threads)
-    try:
-        hit = A._prepared[B._serial].collide(X_WA, X_WB)
-        if hit is not None:
-            return hit
-    except (AttributeError, KeyError, TypeError):
-        pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
+    if margin:
+        return _with_margin(A, B, X_WA, X_WB, margin, check_poses, threads)
     return _batched(A, B, X_WA, X_WB, check_poses, threads)
 
 
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
-    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     _prepare(A, B)
     hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
+    return bool(hits[0]) if single else hits
+
+
+def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
+    rows = ask(A, B, X_WA, X_WB, False, margin, check_poses, threads, depths=False)
+    hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
 
 
@@ -83,7 +124,7 @@ def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algor
     if axes is not None or check_threads(threads) != 1:
         raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
     found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
-    return bool(found.hit[0]) if _is_single(X_WA) and _is_single(X_WB) else found.hit
+    return bool(found.hit[0]) if pose_batch(X_WA, "X_WA")[1] and pose_batch(X_WB, "X_WB")[1] else found.hit
 
 
 def _is_named(algorithm, name: str) -> bool:
@@ -112,7 +153,7 @@ def _with_default(A, B, X_WA, X_WB, check_poses: bool):
 
     Poses are checked and copied: a certificate worked out later is one for these.
     """
-    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
 
     def ask_default(left: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
@@ -127,7 +168,7 @@ _LONGEST_AXIS = 1e100
 
 
 def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
-    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     wanted = (length_of(A, B, X_WA, X_WB), 3)
     if not isinstance(axes, np.ndarray) or axes.dtype != np.float64 or axes.shape != wanted:
         given = f"{axes.dtype} {axes.shape}" if isinstance(axes, np.ndarray) else type(axes).__name__
@@ -140,18 +181,28 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
     return bool(hits[0]) if single else hits
 
 
+@overload
+def distance(
+    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ..., check_poses: bool = ...,
+    threads: int = ..., algorithm: str | None = ...,
+) -> PairResult[Single]: ...  # fmt: skip
+@overload
+def distance(
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
+) -> PairResult: ...  # fmt: skip
 def distance(
     A,
     B,
     X_WA,
     X_WB,
     *,
-    max_distance: float = math.inf,
-    signed: bool = True,
-    check_poses: bool = True,
-    threads: int = 1,
-    algorithm: str | None = None,
-) -> PairResult:
+    max_distance=math.inf,
+    signed=True,
+    check_poses=True,
+    threads=1,
+    algorithm=None,
+):
     """Signed distance of A and B, with witness points, normal and a proven bracket.
 
     Parameters
@@ -172,7 +223,7 @@ def distance(
     Raises InvalidPose, InvalidArgument; UnsupportedQuery where the depth has no end (half-space in
     half-space).
     """
-    limit = check_distance("max_distance", max_distance)
+    limit = reading.limit("max_distance", max_distance)
     if algorithm is not None and not _is_named(algorithm, "gjk"):
         return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
     if limit == math.inf and threads.__class__ is int and threads == 1:
@@ -182,7 +233,7 @@ def distance(
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
-    X_WA, X_WB, single = _poses(A, B, X_WA, X_WB)
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     kept = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
     _prepare(A, B)
     endless = []
@@ -196,7 +247,7 @@ def distance(
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
         raise UnsupportedQuery(
-            f"distance of {type(_one(A, k)).__name__} and {type(_one(B, k)).__name__}{where}: their overlap has no "
+            f"distance of {type(shape_at(A, k)).__name__} and {type(shape_at(B, k)).__name__}{where}: their overlap has no "
             "end, so no translation of finite length separates them; collide() still answers"
         )
     return PairResult(rows, single, (_held(A), _held(B), *kept))
@@ -215,60 +266,6 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
     rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
     run.close(rows, depths=signed)
     return PairResult(rows, single, (A, B, X_WA, X_WB))
-
-
-def check_distance(name: str, value) -> float:
-    """A distance limit [m]: a number ≥ 0, infinity allowed."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name} must be a number ≥ 0 [m], got {value!r}") from None
-    if not number >= 0.0:
-        raise InvalidArgument(f"{name} must be ≥ 0 [m], got {value!r}")
-    return number
-
-
-# --- the question -------------------------------------------------------------------------------
-
-
-def _poses(A, B, X_WA, X_WB):
-    """Shapes checked, poses as batches (n, 4, 4) or (1, 4, 4) whose entries are still to be checked."""
-    X_WA, single_a = _batch(X_WA, "X_WA")
-    X_WB, single_b = _batch(X_WB, "X_WB")
-    counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
-    single = single_a and single_b
-    for name, given in (("A", A), ("B", B)):
-        if isinstance(given, Picked) or (
-            isinstance(given, (list, tuple)) and all(isinstance(shape, Shape) for shape in given)
-        ):
-            counts[name] = len(given)
-            single = False
-        elif not isinstance(given, Shape):
-            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {given!r}")
-    wanted = max(counts.values()) if min(counts.values()) else 0
-    for name, count in counts.items():
-        if count != wanted and (count != 1 or name in "AB"):
-            told = ", ".join(f"{other} {n}" for other, n in counts.items())
-            kind = InvalidPose if name.startswith("X") else InvalidArgument
-            raise kind(f"lengths do not match: {told}; batches must be equally long, or a single pose")
-    return X_WA, X_WB, single
-
-
-def _batch(X, name: str) -> tuple[np.ndarray, bool]:
-    """(poses (n, 4, 4), whether a single one was given)."""
-    if isinstance(X, np.ndarray) and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
-        return np.ascontiguousarray(X).reshape(-1, 4, 4), X.ndim == 2
-    return as_poses(X, name, check=False), _is_single(X)
-
-
-def _is_single(X) -> bool:
-    if isinstance(X, tuple):
-        return all(np.ndim(part) == dimensions for part, dimensions in zip(X, (2, 1)))
-    return np.ndim(X) == 2
-
-
-def _one(shapes, k: int) -> Shape:
-    return shapes if isinstance(shapes, Shape) else shapes[k]
 
 
 def _held(shapes):

@@ -9,7 +9,7 @@ hit             the closed sets share a point
 certified       the sign is proven and the bracket keeps the promise of `narrowphase/bounds.py`
 beyond          the pair is farther apart than the query's max_distance; `distance` and `lower` are
                 then a proven lower bound ≥ max_distance, and `upper` is infinite
-how             which argument decided: an index into `HOW`
+how             which argument decided, a `How`: an index into `HOW`
 iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis; of unions those of all
                 pairs of parts that were asked
 exact           rounds of the exact stage, 0 where doubles decided
@@ -28,21 +28,72 @@ Invariants, asserted in the tests: lower ≤ distance ≤ upper; hit ⇔ distanc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 
 from collide.errors import InvalidArgument
 
-#: What `how` indexes. A proof stands against both poses as given, entries taken as exact reals.
-HOW = (
-    "undecided",          # the bracket reaches to both sides of 0: touching within rounding
-    "separating plane",   # a plane with all of A on one side and all of B on the other
-    "common point",       # a simplex of points of A ⊖ B around the origin, clear of rounding
-    "swept overlap",      # two core points nearer than the sum of the radii
-    "closed form",        # a formula with an error bound: spheres, capsules, half-spaces
-    "exact arithmetic",   # GJK in integers, where doubles leave the sign open
-)
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from typing_extensions import Self, TypeVar
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
+    Bytes = NDArray[np.uint8]
+    Bools = NDArray[np.bool_]
+    #: `Single` or `Batch`; Any where a type checker cannot tell which, and values of fields are Any, too.
+    Asked = TypeVar("Asked", default=Any)
+    One = TypeVar("One")
+    Many = TypeVar("Many")
+
+    class Field(Generic[One, Many]):
+        """A field of a `PairResult` to a type checker: a scalar of a single result, a column of a batch."""
+
+        @overload
+        def __get__(self, result: PairResult[Single], owner: object) -> One: ...
+        @overload
+        def __get__(self, result: PairResult[Batch], owner: object) -> Many: ...
+        def __get__(self, result: Any, owner: object) -> Any: ...
+else:
+    from typing import TypeVar
+
+    Asked = TypeVar("Asked")
+
+
+class How(IntEnum):
+    """Which argument decided a pair. A proof stands against both poses as given, entries taken as exact reals.
+
+    Members are the integers of the field ``how``, print as the words of a report, and say what they mean: ``How(1)``,
+    ``str(How(1))`` = "separating plane", ``How(1).meaning``.
+    """
+
+    meaning: str
+
+    UNDECIDED = 0, "the bracket reaches to both sides of 0: touching within rounding"
+    SEPARATING_PLANE = 1, "a plane with all of A on one side and all of B on the other"
+    COMMON_POINT = 2, "a simplex of points of A ⊖ B around the origin, clear of rounding"
+    SWEPT_OVERLAP = 3, "two core points nearer than the sum of the radii"
+    CLOSED_FORM = 4, "a formula with an error bound: spheres, capsules, half-spaces"
+    EXACT_ARITHMETIC = 5, "integers, where doubles leave the sign open or the last digit of a gap or depth"
+
+    def __new__(cls, value: int, meaning: str) -> Self:
+        made = int.__new__(cls, value)
+        made._value_ = value
+        made.meaning = made.__doc__ = meaning
+        return made
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+    def __format__(self, spec: str) -> str:
+        return format(str(self), spec)
+
+
+#: Names of what `how` tells, by its value.
+HOW: tuple[str, ...] = tuple(str(how) for how in How)
 UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, EXACT = range(len(HOW))
 #: Set by a kernel on a pair outside the range of sizes; never in a result.
 REFUSED = 255
@@ -72,14 +123,43 @@ def flipped(rows: np.ndarray) -> np.ndarray:
     return swapped
 
 
-class PairResult:
+class Single:
+    """``PairResult[Single]``, to type checkers: of single poses; fields are scalars and (3,) arrays."""
+
+
+class Batch:
+    """``PairResult[Batch]``, to type checkers: fields are arrays with a leading N."""
+
+
+class PairResult(Generic[Asked]):
     """Answer of a pair query: the fields of `PAIR_DTYPE` as attributes.
 
-    Scalars and (3,) arrays for single poses; arrays with a leading N for batches, of which ``r[k]``
+    Scalars and (3,) arrays for single poses, ``how`` a `How`; arrays with a leading N for batches, of which ``r[k]``
     is one result. ``rows`` is the structured array itself.
     """
 
     __slots__ = ("_question", "_single", "rows")
+
+    if TYPE_CHECKING:
+        distance: Field[float, Floats]
+        lower: Field[float, Floats]
+        upper: Field[float, Floats]
+        normal: Field[Floats, Floats]
+        point_a: Field[Floats, Floats]
+        point_b: Field[Floats, Floats]
+        hit: Field[bool, Bools]
+        certified: Field[bool, Bools]
+        beyond: Field[bool, Bools]
+        how: Field[How, Bytes]
+        iterations: Field[int, Ints]
+        exact: Field[int, Bytes]
+        count: Field[int, Bytes]
+        a: Field[int, Ints]
+        b: Field[int, Ints]
+        part_a: Field[int, Ints]
+        part_b: Field[int, Ints]
+        vertices_a: Field[Ints, Ints]
+        vertices_b: Field[Ints, Ints]
 
     def __init__(self, rows: np.ndarray, single: bool, question: tuple):
         self.rows, self._single, self._question = rows, single, question
@@ -109,7 +189,11 @@ class PairResult:
         """(A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1."""
         return self._question
 
-    def __getitem__(self, k) -> PairResult:
+    @overload
+    def __getitem__(self, k: int) -> PairResult[Single]: ...
+    @overload
+    def __getitem__(self, k: slice) -> PairResult[Batch]: ...
+    def __getitem__(self, k):
         """Result k of a batch, or a batch of those in a slice."""
         if isinstance(k, slice):
             A, B, X_WA, X_WB = self._question
@@ -119,13 +203,17 @@ class PairResult:
         k = _row_number(k, len(self.rows))
         return PairResult(self.rows[k : k + 1], True, self._asked(k))
 
-    def __getattr__(self, name: str):
-        if name not in FIELDS:
-            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
-        values = self.rows[name]
-        if not self._single:
-            return values
-        return values[0].copy() if values.ndim > 1 else values[0].item()
+    if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
+
+        def __getattr__(self, name: str):
+            if name not in FIELDS:
+                raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
+            values = self.rows[name]
+            if not self._single:
+                return values
+            if name == "how":
+                return How(values[0])
+            return values[0].copy() if values.ndim > 1 else values[0].item()
 
     def __dir__(self):
         return [*super().__dir__(), *FIELDS]
@@ -164,7 +252,7 @@ class WorldResult:
     def __init__(self, rows: np.ndarray, bodies: dict):
         self.rows, self._bodies = rows, bodies
 
-    def pair(self, k: int) -> PairResult:
+    def pair(self, k: int) -> PairResult[Single]:
         """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate."""
         row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
@@ -173,9 +261,23 @@ class WorldResult:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[np.void]:
         return iter(self.rows)
 
+    @overload
+    def __getitem__(self, key: Literal["distance", "lower", "upper", "normal", "point_a", "point_b"]) -> Floats: ...
+    @overload
+    def __getitem__(self, key: Literal["hit", "certified", "beyond"]) -> Bools: ...
+    @overload
+    def __getitem__(self, key: Literal["how", "exact", "count"]) -> Bytes: ...
+    @overload
+    def __getitem__(
+        self, key: Literal["a", "b", "part_a", "part_b", "vertices_a", "vertices_b", "iterations"]
+    ) -> Ints: ...
+    @overload
+    def __getitem__(self, key: int) -> np.void: ...
+    @overload
+    def __getitem__(self, key: slice | Bools | Sequence[int] | NDArray[np.integer]) -> np.ndarray: ...
     def __getitem__(self, key):
         return self.rows[key]
 

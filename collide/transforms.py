@@ -19,9 +19,25 @@ re-orthonormalised. `as_poses` refuses what is too far from a rotation to be one
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Protocol
+
 import numpy as np
 
+from collide import reading
 from collide.errors import InvalidPose
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    class HasMatrix(Protocol):
+        """What describes itself by a matrix (3, 3) or (4, 4), or many: scipy's Rotation and RigidTransform."""
+
+        def as_matrix(self) -> np.ndarray: ...
+
+    #: One pose, as `pose` gives it: (4, 4) float64.
+    Pose = np.ndarray[tuple[int, int], np.dtype[np.float64]]
+    #: What queries take for one pose or many: matrices, (R, t), rotations.
+    PoseLike = ArrayLike | HasMatrix | tuple[ArrayLike | HasMatrix, ArrayLike]
 
 #: How far ``R.T @ R`` may be from the identity, in its largest entry.
 ROTATION_TOLERANCE = 1e-4
@@ -31,38 +47,45 @@ LARGEST = 1e50
 SMALLEST = 1e-50
 
 
-def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, R=None) -> np.ndarray:
-    """A (4, 4) pose from a translation [m] and one of three descriptions of a rotation.
+def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=None) -> Pose:
+    """A (4, 4) pose from a translation [m] and one of four descriptions of a rotation.
 
     Parameters
     ----------
     xyz : (3,) translation [m].
     rpy : (3,) roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them.
-    quat_wxyz : (4,) quaternion, scalar first; normalised here, because a quaternion file
+    quat_wxyz : (4,) quaternion, scalar first, of any length but 0; normalised here, because a quaternion file
         format carries rounded digits and means the rotation.
-    R : (3, 3) rotation, used as it stands.
+    quat_xyzw : the same, scalar last, as ROS and scipy have it.
+    R : (3, 3) rotation, used as it stands; or what gives one by ``as_matrix()``, as scipy's Rotation does.
+
+    Raises InvalidPose.
     """
-    if sum(option is not None for option in (rpy, quat_wxyz, R)) > 1:
-        raise InvalidPose("pose: give at most one of rpy, quat_wxyz and R")
+    if sum(option is not None for option in (rpy, quat_wxyz, quat_xyzw, R)) > 1:
+        raise InvalidPose("pose: give at most one of rpy, quat_wxyz, quat_xyzw and R")
     X = np.eye(4)
     if rpy is not None:
         X[:3, :3] = _rotation_from_rpy(_finite("rpy", rpy, (3,)))
     elif quat_wxyz is not None:
         X[:3, :3] = _rotation_from_quaternion(_finite("quat_wxyz", quat_wxyz, (4,)))
+    elif quat_xyzw is not None:
+        X[:3, :3] = _rotation_from_quaternion(np.roll(_finite("quat_xyzw", quat_xyzw, (4,)), 1))
     elif R is not None:
-        X[:3, :3] = _finite("R", R, (3, 3))
+        X[:3, :3] = _finite("R", _matrix_of(R), (3, 3))
     X[:3, 3] = _finite("xyz", xyz, (3,))
     return as_poses(X, "pose")[0]
 
 
 def _finite(name: str, values, shape) -> np.ndarray:
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidPose(f"pose: {name} must be numbers of shape {shape}, got {values!r}") from None
+    array = reading.array(f"pose: {name}", values, str(shape), InvalidPose)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {values!r}")
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {reading.told(values)}")
     return array
+
+
+def _matrix_of(R):
+    """The matrix of an object that has one, anything else as it is."""
+    return R.as_matrix() if callable(getattr(R, "as_matrix", None)) else R
 
 
 def _rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
@@ -77,10 +100,11 @@ def _rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
 
 
 def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
-    norm = np.linalg.norm(q)
-    if not norm > 1e-6:
-        raise InvalidPose(f"pose: a quaternion of length {norm:g} names no rotation, got {q.tolist()}")
-    w, x, y, z = q / norm
+    largest = np.abs(q).max()
+    if largest == 0.0:
+        raise InvalidPose(f"pose: a quaternion of length 0 names no rotation, got {q.tolist()}")
+    q = np.ldexp(q, -np.frexp(largest)[1])  # squares neither overflow nor vanish; a power of two rounds nothing
+    w, x, y, z = q / np.linalg.norm(q)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -90,13 +114,14 @@ def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
     )
 
 
-def as_poses(X, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
+def as_poses(X: PoseLike, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
     """Poses as a C-contiguous float64 batch (N, 4, 4); a single pose gives N = 1.
 
     Parameters
     ----------
-    X : (4, 4) or (N, 4, 4) homogeneous matrices, or a tuple ``(R, t)`` of a (3, 3) rotation and
-        a (3,) translation (either with a leading N).
+    X : (4, 4) or (N, 4, 4) homogeneous matrices; a tuple ``(R, t)`` of a (3, 3) rotation and
+        a (3,) translation (either with a leading N); or what gives rotations (3, 3) or poses (4, 4) by
+        ``as_matrix()``, as scipy's Rotation and RigidTransform do, alone or as R.
     name : how error messages call the argument.
     check : refuse matrices with max|RᵀR − I| > 1e-4 or det ≤ 0. Finite numbers and the last row
         are always checked.
@@ -105,29 +130,37 @@ def as_poses(X, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
     ------
     InvalidPose : names the argument, the entry of the batch and the offending value.
     """
-    X = _from_tuple(X, name) if isinstance(X, tuple) else _to_floats(X, name)
-    if X.ndim not in (2, 3) or X.shape[-2:] != (4, 4):
-        raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {X.shape}")
-    X = np.ascontiguousarray(X.reshape(-1, 4, 4))
-    _refuse(~np.isfinite(X).all(axis=(1, 2)), X, name, "has entries that are not finite")
-    _refuse((X[:, 3] != (0, 0, 0, 1)).any(axis=1), X, name, "must end in the row (0, 0, 0, 1)")
-    _refuse((np.abs(X[:, :3]) > LARGEST).any(axis=(1, 2)), X, name, f"exceeds {LARGEST:g}")
+    return poses_as_given(X, name, check=check)[0]
+
+
+def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.ndarray, bool]:
+    """(poses as `as_poses` gives them, whether a single one was given)."""
+    full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
+    if full.ndim not in (2, 3) or full.shape[-2:] != (4, 4):
+        raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}")
+    batch = np.ascontiguousarray(full.reshape(-1, 4, 4))
+    _refuse(~np.isfinite(batch).all(axis=(1, 2)), batch, name, "has entries that are not finite")
+    _refuse((batch[:, 3] != (0, 0, 0, 1)).any(axis=1), batch, name, "must end in the row (0, 0, 0, 1)")
+    _refuse((np.abs(batch[:, :3]) > LARGEST).any(axis=(1, 2)), batch, name, f"exceeds {LARGEST:g}")
     if check:
-        _check_rotations(X, name)
-    return X
+        _check_rotations(batch, name)
+    return batch, full.ndim == 2
 
 
 def _to_floats(X, name: str) -> np.ndarray:
-    try:
-        return np.asarray(X, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidPose(f"{name} must be a (4, 4) matrix of numbers, got {X!r}") from None
+    return reading.array(name, X, "(4, 4)", InvalidPose)
+
+
+def _from_object(X, name: str) -> np.ndarray:
+    matrix = _matrix_of(X)
+    found = _to_floats(matrix, name)
+    return found if matrix is X or found.shape[-2:] != (3, 3) else _from_tuple((found, np.zeros(3)), name)
 
 
 def _from_tuple(X: tuple, name: str) -> np.ndarray:
     if len(X) != 2:
         raise InvalidPose(f"{name}: a tuple must be (R, t), got {len(X)} items")
-    R, t = _to_floats(X[0], name), _to_floats(X[1], name)
+    R, t = _to_floats(_matrix_of(X[0]), name), _to_floats(X[1], name)
     if R.shape[-2:] != (3, 3) or t.shape[-1:] != (3,) or R.ndim > 3 or t.ndim > 2:
         raise InvalidPose(f"{name}: (R, t) must have shapes (3, 3) and (3,), got {R.shape} and {t.shape}")
     try:

@@ -10,8 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
+from collide import reading
 from collide.errors import InvalidArgument
 
 #: As many threads as anybody may ask for: more than one can start are never started.
@@ -27,13 +26,10 @@ _GAIN = 1.3
 
 def check_threads(threads) -> int:
     """A number of threads, as an integer. Raises InvalidArgument."""
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)):
-        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
-    if abs(int(threads)) > _MOST:
+    number = reading.whole("threads", threads, 1)
+    if number > _MOST:
         raise InvalidArgument(f"threads must be an integer from 1 to {_MOST}; more than there are processors cannot help")
-    if threads < 1:
-        raise InvalidArgument(f"threads must be an integer ≥ 1, got {threads!r}")
-    return int(threads)
+    return number
 
 
 def share(pieces: Iterable, work: Callable[[Any], None], workers: int) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import operator
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -13,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import _jit
+from collide import _jit, journal, reading
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
+from collide.margins import checked_margin, within
 from collide.packed_world import PackedWorld
-from collide.query import check_distance
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.shapes.base import Shape
 from collide.transforms import as_poses
@@ -93,12 +92,12 @@ class World:
         group, mask : bit sets of up to 32 bits.
         """
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
+            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {reading.told(shape)}")
         X_WB = _one_pose(np.eye(4) if X_WB is None else X_WB, "World.add: X_WB")
         identity = self._next
         name = f"body {identity}" if name is None else name
         if not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {name!r}")
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {reading.told(name)}")
         if name in self._ids:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
         body = Body(identity, name, shape, X_WB, _flag("static", static), _bits("group", group), _bits("mask", mask))
@@ -139,7 +138,7 @@ class World:
         reason : a few words; `stats` counts skipped pairs under it.
         """
         if b is None:
-            self._allow_matrix(np.asarray(a), reason)
+            self._allow_matrix(reading.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument), reason)
             return
         i, j = self._id(a), self._id(b)
         if i == j:
@@ -165,15 +164,11 @@ class World:
                 return self._ids[body]
             known = ", ".join(sorted(self._ids)[:12]) or "none"
             raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
-        try:
-            if isinstance(body, (bool, np.bool_)):
-                raise TypeError
-            identity = operator.index(body)
-        except TypeError:
-            raise UnknownBody(f"a body is named by its id, an integer, or its name, got {body!r}") from None
-        if identity not in self._bodies:
-            raise UnknownBody(f"no body has id {identity}; it may have been removed")
-        return identity
+        if not reading.is_whole(body):
+            raise UnknownBody(f"a body is named by its id or its name, got {reading.told(body)}")
+        if body not in self._bodies:
+            raise UnknownBody(f"no body has id {reading.told(body)}; it may have been removed")
+        return int(body)
 
     def __len__(self) -> int:
         return len(self._bodies)
@@ -194,9 +189,23 @@ class World:
 
     # --- queries --------------------------------------------------------------------------------
 
-    def collides(self) -> bool:
-        """Whether any tested pair hits; stops at the first that does."""
-        return bool(self._ask(0.0, boolean=True)["hit"].any())
+    def collides(self, *, security_margin: float = 0.0) -> bool:
+        """Whether any tested pair hits; stops at the first that does.
+
+        security_margin : [m], ≥ 0, finite: pairs at most so far apart are hits, too, decided as by `collide.collide`; which
+            those are, `distances` says. Then every pair is asked.
+        """
+        margin = checked_margin("World.collides: security_margin", security_margin)
+        if not margin:
+            return bool(self._ask(0.0, boolean=True)["hit"].any())
+        rows = self._ask(margin)
+        bodies = self._bodies
+
+        def pair(k: int):
+            a, b = bodies[int(rows["a"][k])], bodies[int(rows["b"][k])]
+            return a.shape, b.shape, a.X_WB, b.X_WB
+
+        return bool(within(rows, margin, pair).any())
 
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
@@ -209,7 +218,7 @@ class World:
         None is left out that is not proven farther apart: ``lower ≤ max_distance`` of all of them.
         Two half-spaces that meet have distance −inf.
         """
-        limit = check_distance("World.distances: max_distance", max_distance)
+        limit = reading.limit("World.distances: max_distance", max_distance)
         rows = self._ask(limit)
         return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
 
@@ -240,7 +249,7 @@ class World:
 
         Such are some shapes against a mesh. Allow these pairs, and the rest of the World is answered.
         """
-        limit = check_distance("World.unanswerable: max_distance", max_distance)
+        limit = reading.limit("World.unanswerable: max_distance", max_distance)
         packed, ids = self._pack(), list(self._bodies)
         return [(ids[a], ids[b], why) for a, b, why in packed.refused(packed.candidates(limit), limit)]
 
@@ -250,9 +259,9 @@ class World:
         Field a is −1 for the outside shape, b the body; normals point from the shape to the body.
         Filters do not apply, and `stats` stays that of the last query of the whole World.
         """
-        limit = check_distance("World.query: max_distance", max_distance)
+        limit = reading.limit("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.query: shape must be a shape, got {shape!r}")
+            raise InvalidArgument(f"World.query: shape must be a shape, got {reading.told(shape)}")
         X_WS = _one_pose(X_WS, "World.query: X_WS")
         rows = self._pack().against(shape, X_WS, limit)
         rows = rows[_within(rows, limit)]
@@ -310,7 +319,8 @@ class World:
         if self._packed is None:
             position = {identity: k for k, identity in enumerate(self._bodies)}
             allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
-            self._packed = PackedWorld(list(self._bodies.values()), allowed)
+            with journal.told("tables and box-tree of a World of %d bodies made", len(self._bodies)):
+                self._packed = PackedWorld(list(self._bodies.values()), allowed)
         elif self._moved:
             moved = sorted(self._moved)
             at = np.searchsorted(self._packed.ids, moved)  # ids ascend
@@ -368,12 +378,12 @@ def _read_only(X: np.ndarray) -> np.ndarray:
 def _flag(field: str, value) -> bool:
     if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"World.add: {field} must be True or False, got {value!r}")
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {reading.told(value)}")
 
 
 def _bits(field: str, value) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {value!r}")
+    if not reading.is_whole(value) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {reading.told(value)}")
     return int(value)
 
 

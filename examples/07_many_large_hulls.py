@@ -39,7 +39,7 @@ A, B = library[i[nearest]], library[j[nearest]]
 collide.verify(A, B, X_WA[nearest], X_WB[nearest], r[nearest])
 print(f"nearest miss: {r.distance[nearest] * 1e3:.4f} mm, proven")
 
-# A hull with its support tree, for the next process.
+# A hull in a file, for the next process: its points alone; the support tree proofs rest on is made anew from them.
 large = pebble(20000)
 collide.collide(large, large, np.eye(4), collide.pose((0.01, 0, 0)))
 with tempfile.TemporaryDirectory() as folder:

@@ -33,13 +33,13 @@ print(f"gap {gap.distance * 1e3:.3f} mm, known to {gap.upper - gap.lower:.0e} m"
 pushed = collide.distance(ring, finger, np.eye(4), collide.pose((0.075, 0, 0)))
 print(f"moved by {-pushed.distance * 1e3:.3f} mm along {np.round(pushed.normal, 2)} the finger comes free")
 
-# Copies of another size share the box-tree; a file keeps it.
+# Copies of another size share the box-tree; a file holds the facets, and the same tree is made from them.
 half = ring.scaled(0.5)
 print("half as large:", collide.collide(half, finger, np.eye(4), collide.pose((0.03, 0, 0))))
 with tempfile.TemporaryDirectory() as folder:
     ring.save(Path(folder) / "ring.npz")
     again = collide.Mesh.load(Path(folder) / "ring.npz")
-print("tree kept:", again == ring and np.array_equal(again.tree.nodes, ring.tree.nodes))
+print("the same tree:", again == ring and np.array_equal(again.tree.nodes, ring.tree.nodes))
 
 # Round pegs, and bodies made of several parts with meshes among them: here a ring on a stem, put over a peg.
 hook = collide.Compound([(ring, np.eye(4)), (collide.Box((0.02, 0.02, 0.3)), collide.pose((0.1, 0, 0.17)))])

@@ -1,8 +1,7 @@
-"""Large hulls: support trees propose, settled vertices prove. Same answers as scans, saved and loaded, validated."""
+"""Large hulls: support trees propose, settled vertices prove. Same answers as scans, validated."""
 
 from __future__ import annotations
 
-import pickle
 import threading
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import collide
 from collide.errors import InvalidShape
 from collide.geometry.support_tree import planted
-from collide.geometry.support_tree.layout import list_coordinates_of
+from collide.geometry.support_tree.layout import SupportTree, list_coordinates_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
 from collide.shapes import hull as hull_shape
@@ -151,48 +150,6 @@ def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     assert world.collides() and B._tree._tree is not None
 
 
-def test_pickles_and_files_carry_the_tree(tmp_path):
-    rng = np.random.default_rng(13)
-    A = collide.ConvexHull(_ball(rng, 1500), radius=0.01)
-    small = collide.ConvexHull(rng.normal(size=(20, 3)), faces=None)
-    bare = pickle.loads(pickle.dumps(A))
-    assert bare == A and getattr(bare, "_tree", None) is None
-    X = collide.pose((2.0, 0.03, 0.01))
-    expected = collide.distance(A, A, EYE, X).rows.tobytes()
-    A.save(tmp_path / "a.npz")
-    small.save(tmp_path / "small.npz")
-    for again in (pickle.loads(pickle.dumps(A)), collide.ConvexHull.load(tmp_path / "a.npz")):
-        assert again == A and again._tree._tree is not None
-        assert collide.distance(again, again, EYE, X).rows.tobytes() == expected
-    assert collide.ConvexHull.load(tmp_path / "small.npz") == small
-
-
-def test_files_that_are_damaged_or_others_are_refused(tmp_path):
-    A = collide.ConvexHull(_ball(np.random.default_rng(14), 600))
-    collide.collide(A, A, EYE, EYE)
-    A.save(tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as found:
-        arrays = {name: found[name] for name in found.files}
-    ring = arrays["tree_ring"].copy()
-    ring[100] = ring[101]
-    for name, change, word in (
-        ("ring", {"tree_ring": ring}, "damaged"), ("old", {"format": np.array(0)}, "another format"),
-        ("points", {"points": arrays["points"] + 1}, "damaged"),
-    ):  # fmt: skip
-        np.savez(tmp_path / f"{name}.npz", **{**arrays, **change})
-        with pytest.raises(InvalidShape, match=word):
-            collide.ConvexHull.load(tmp_path / f"{name}.npz")
-    (tmp_path / "text.npz").write_text("nothing")
-    with pytest.raises(InvalidShape, match="no file that"):
-        collide.ConvexHull.load(tmp_path / "text.npz")
-    cut = (tmp_path / "a.npz").read_bytes()[:5000]
-    (tmp_path / "cut.npz").write_bytes(cut)
-    with pytest.raises(InvalidShape):
-        collide.ConvexHull.load(tmp_path / "cut.npz")
-    with pytest.raises(InvalidShape, match="No such file"):
-        collide.ConvexHull.load(tmp_path / "missing.npz")
-
-
 def test_given_faces_are_checked_not_trusted():
     rng = np.random.default_rng(15)
     points = _ball(rng, 100)
@@ -213,12 +170,16 @@ def test_bad_proposals_cost_time_not_truth(axes):
     rng = np.random.default_rng(16)
     points = _ball(rng, 1200, axes)
     A, B = collide.ConvexHull(points), collide.ConvexHull(points)
-    arrays = {name: array.copy() for name, array in planted._grown(points).to_arrays().items()}
-    nodes, entries = arrays["nodes"], arrays["entries"]
-    last = nodes[1]  # what follows the first list are rows of points
+    tree = planted._grown(points)
+    entries, last = tree.entries.copy(), tree.nodes[1]  # what follows the first list are rows of points
     entries[last:] = rng.permutation(entries[last:])
-    arrays["list_coordinates"] = list_coordinates_of(points, nodes, _rows(arrays))
-    object.__setattr__(B, "_tree", planted.PlantedTree(B.points, arrays))
+    rows = np.concatenate([tree.owners[entries[:last]], entries[last:]])  # a tree of two levels
+    coordinates = list_coordinates_of(points, tree.nodes, rows)
+    shuffled = planted.PlantedTree(B.points)
+    shuffled._tree = SupportTree(
+        B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
+    )
+    object.__setattr__(B, "_tree", shuffled)
     X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
     good, bad = collide.distance(A, A, EYE, X_WB), collide.distance(A, B, EYE, X_WB)
     assert 30 < good.hit.sum() < 270
@@ -228,12 +189,6 @@ def test_bad_proposals_cost_time_not_truth(axes):
     assert (bad.iterations != good.iterations).any(), "the lists are still good: nothing was tested"
     for k in range(0, 300, 50):
         collide.verify(A, B, EYE, X_WB[k], bad[k])
-
-
-def _rows(arrays) -> np.ndarray:
-    """Rows of the points that entries stand for, in a tree of two levels."""
-    first = arrays["nodes"][1]
-    return np.concatenate([arrays["owners"][arrays["entries"][:first]], arrays["entries"][first:]])
 
 
 @pytest.mark.parametrize("n", [128, 512, 4096])

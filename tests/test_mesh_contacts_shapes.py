@@ -168,7 +168,7 @@ def test_what_cannot_be_answered_is_refused():
     with pytest.raises(collide.UnsupportedQuery, match="Halfspace and Halfspace"):
         collide.contacts(ground, ground, EYE, EYE)
     with pytest.raises(collide.InvalidArgument, match="A must be a shape"):
-        collide.contacts([mesh], mesh, EYE, EYE)
+        collide.contacts([mesh, None], mesh, EYE, EYE)
     with pytest.raises(collide.InvalidPose, match="X_WB"):
         collide.contacts(mesh, mesh, EYE, 2 * np.eye(4))
     with pytest.raises(collide.InvalidPose, match="lengths"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import subprocess
 import sys
 from fractions import Fraction
@@ -252,17 +251,6 @@ def test_scaled_copies_share_the_tree():
         own = collide.Mesh(other.vertices * factor, other.faces)
         assert (collide.collide(copy, own, X, Y) == collide.collide(fresh, own, X, Y)).all()
     assert mesh.scaled(4.0).tree.nodes is mesh.tree.nodes
-
-
-def test_trees_are_kept_saved_and_pickled(tmp_path):
-    mesh = collide.Mesh(*bumpy_sphere(300))
-    assert not hasattr(mesh, "_tree")
-    mesh.save(tmp_path / "bare.npz")
-    assert not hasattr(collide.Mesh.load(tmp_path / "bare.npz"), "_tree")
-    assert collide.collide(mesh, mesh, np.eye(4), np.eye(4))
-    mesh.scaled(3.0).save(tmp_path / "grown.npz")
-    for copy in (pickle.loads(pickle.dumps(mesh)), collide.Mesh.load(tmp_path / "grown.npz").base):
-        assert copy == mesh and np.array_equal(copy._tree.nodes, mesh.tree.nodes)
 
 
 def test_worlds_hold_meshes():

@@ -89,33 +89,27 @@ def test_validators_see_damage():
             validate_graded_tree(graded._replace(**change), vertices, faces)
 
 
-def test_kept_and_read_again():
+def test_pickled_and_refused_where_it_is_none():
     vertices, faces = bumpy_sphere(800)
     tree = build_mesh_tree(vertices, faces)
-    arrays = tree.to_arrays()
-    again = MeshTree.from_arrays(vertices, faces, arrays)
-    assert np.array_equal(again.triangles, tree.triangles) and again.content == tree.content
     pickled = pickle.loads(pickle.dumps(tree))
     assert pickled.content == tree.content and pickled.address != tree.address
     assert np.array_equal(all_hits(pickled, tree, np.eye(4), np.eye(4)).pairs, all_hits(tree, tree, np.eye(4), np.eye(4)).pairs)
-    nodes, order = arrays["mesh_nodes"].copy(), arrays["mesh_order"].copy()
-    links = nodes[:, 48:]
+    links = tree.links()
     inner = np.argwhere((links > 0) & tree.used())[3]
     leaf = np.argwhere((links < 0) & tree.used())[3]
+    parts = {"nodes": tree.nodes, "triangles": tree.triangles, "ids": tree.ids, "centre": tree.centre}
     for damage, message in (
-        ({"mesh_tree": np.array([99, 0, 1])}, "version .99"),
-        ({"mesh_order": order[:-1]}, "order"),
-        ({"mesh_order": np.zeros_like(order)}, "order"),
-        ({"mesh_nodes": nodes[:-1]}, "link|node|leaves"),
-        ({"mesh_nodes": _changed(nodes, inner, 1)}, "parents|down"),
-        ({"mesh_nodes": _changed(nodes, inner, 10**6)}, "down"),
-        ({"mesh_nodes": _changed(nodes, leaf, -2)}, "leaf|leaves"),
-        ({"mesh_tree": np.array([1, 0, 1])}, "depth"),
+        ({"ids": tree.ids[:-1]}, "triangles of another shape"),
+        ({"nodes": tree.nodes[:-1]}, "link|node|leaves"),
+        ({"nodes": _changed(tree.nodes, inner, 1)}, "parents|down"),
+        ({"nodes": _changed(tree.nodes, inner, 10**6)}, "down"),
+        ({"nodes": _changed(tree.nodes, leaf, -2)}, "leaf|leaves"),
+        ({"depth": 1}, "depth"),
+        ({"centre": tree.centre * np.nan}, "centre"),
     ):
         with pytest.raises(ValueError, match=message):
-            MeshTree.from_arrays(vertices, faces, {**arrays, **damage})
-    with pytest.raises(ValueError, match="no array"):
-        MeshTree.from_arrays(vertices, faces, {})
+            MeshTree(**{**parts, "exponent": tree.exponent, "depth": tree.depth, **damage})
 
 
 def _changed(nodes, place, link):

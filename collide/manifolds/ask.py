@@ -3,29 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide.batches import ask
-from collide.errors import InvalidArgument, InvalidPose
+from collide import reading
+from collide.batches import ask, length_of
+from collide.errors import InvalidArgument
 from collide.manifolds.convex import convex_contacts
 from collide.manifolds.rows import Contacts, no_rows
 from collide.manifolds.surfaces import surface_contacts
+from collide.questions import asked_poses, pose_at, shape_at
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.compound import Compound
 from collide.transforms import as_poses
+
+if TYPE_CHECKING:
+    from collide.transforms import PoseLike
+
+    Shapes = Shape | Sequence[Shape]
 
 _U = 2.0**-53
 #: Margins beyond this are no margins, and would overflow squared.
 _LARGEST_MARGIN = 1e50
 
 
-def contacts(A, B, X_WA, X_WB, *, margin: float = 0.0, max_contacts: int = 8, check_poses: bool = True) -> Contacts:
+def contacts(
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8, check_poses: bool = True
+) -> Contacts:
     """Where A and B touch, overlap, or come within a margin: a few points a patch, with one normal each.
 
     Parameters
     ----------
-    A, B : shapes.
+    A, B : shapes; or sequences of shapes, one a pose, as in `collide.collide`: a list, or picked from a `ShapeSet`.
     X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every pose of the other's batch.
     margin : [m], ≥ 0, finite: bodies, and parts of them, up to so far apart are in contact, too.
     max_contacts : of each patch, ≥ 1: the deepest is kept, then those that span the greatest area. Patches are all told.
@@ -35,6 +46,7 @@ def contacts(A, B, X_WA, X_WB, *, margin: float = 0.0, max_contacts: int = 8, ch
     -------
     Contacts : columns ``normal``, ``point_a``, ``point_b``, ``distance``, ``lower``, ``upper``, ``patch``, ``kind`` …, one
         row a contact (`manifolds/rows.py` describes them); no rows where the bodies are farther apart than the margin.
+        Those of pair k are ``rows[starts[k]:starts[k + 1]]``, or ``result[k]``.
 
     What is promised. ``point_b − point_a = distance · normal``, both points within rounding of the surfaces. ``lower`` and
     ``upper`` hold the true distance, along the normal, between the two facets named at that place. *Apart*: there is a
@@ -53,15 +65,12 @@ def contacts(A, B, X_WA, X_WB, *, margin: float = 0.0, max_contacts: int = 8, ch
     overlap. A pair near the surface costs about a millisecond, which grows with the facets within the margin.
     """
     margin, most = check_margin("contacts", margin), check_most("contacts", max_contacts)
-    for name, shape in (("A", A), ("B", B)):
-        if not isinstance(shape, Shape):
-            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+    X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    lengths = {len(X_WA), len(X_WB)}
-    if len(lengths) > 1 and 1 not in lengths:
-        raise InvalidPose(f"lengths do not match: X_WA {len(X_WA)}, X_WB {len(X_WB)}; batches must be equally long")
-    n = 0 if 0 in lengths else max(lengths)
-    found = [contact_rows(A, B, X_WA[k % len(X_WA)], X_WB[k % len(X_WB)], margin, most) for k in range(n)]
+    found = [
+        contact_rows(shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k), margin, most)
+        for k in range(length_of(A, B, X_WA, X_WB))
+    ]
     starts = np.concatenate([[0], np.cumsum([len(rows) for rows in found])]).astype(np.int64)
     return Contacts(np.concatenate([no_rows(), *found]), starts)
 
@@ -121,20 +130,15 @@ def _reach(shape: Shape) -> float:
 
 def check_margin(name: str, value) -> float:
     """A margin [m]."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgument(f"{name}: margin must be a number ≥ 0 [m], got {value!r}") from None
-    if not 0.0 <= number <= _LARGEST_MARGIN:
-        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {value!r}")
+    number = reading.number(value)
+    if number is None or not 0.0 <= number <= _LARGEST_MARGIN:
+        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {reading.told(value)}")
     return number
 
 
 def check_most(name: str, value) -> int:
     """How many contacts a patch may have."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise InvalidArgument(f"{name}: max_contacts must be an integer ≥ 1, got {value!r}")
-    return int(value)
+    return reading.whole(f"{name}: max_contacts", value, 1)
 
 
 def is_answered(shape: Shape) -> bool:

@@ -22,11 +22,18 @@ Rows of a patch stand together, the deepest first.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple, overload
 
 import numpy as np
 
 from collide.errors import InvalidArgument
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
 
 #: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch tells how the bodies overlap,
 #: and the row is the answer of `distance`: a translation that parts the bodies, and no place.
@@ -115,9 +122,21 @@ class WorldContacts:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[np.void]:
         return iter(self.rows)
 
+    @overload
+    def __getitem__(
+        self, key: Literal["distance", "lower", "upper", "apart", "normal", "point_a", "point_b"]
+    ) -> Floats: ...
+    @overload
+    def __getitem__(
+        self, key: Literal["a", "b", "part_a", "part_b", "facet_a", "facet_b", "patch", "kind"]
+    ) -> Ints: ...
+    @overload
+    def __getitem__(self, key: int) -> np.void: ...
+    @overload
+    def __getitem__(self, key: slice | NDArray[np.bool_] | Sequence[int] | NDArray[np.integer]) -> np.ndarray: ...
     def __getitem__(self, key):
         return self.rows[key]
 
@@ -127,24 +146,43 @@ class WorldContacts:
 
 
 class Contacts:
-    """Contacts of one pair of bodies, at one pair of poses or many: the fields of `CONTACT_DTYPE` as columns.
+    """Contacts of one pair of bodies, or of many: the fields of `CONTACT_DTYPE` as columns.
 
-    ``rows`` is the structured array of all contacts, pose after pose; those of pose k are
+    ``rows`` is the structured array of all contacts, pair after pair (pose after pose, of two shapes); those of pair k are
     ``rows[starts[k]:starts[k + 1]]``, and ``result[k]`` is a result of them alone. ``len(result)`` is the number of
     contacts; that of poses is ``len(starts) − 1``. Iterating gives the rows.
     """
 
     __slots__ = ("rows", "starts")
 
+    if TYPE_CHECKING:
+        distance: Floats
+        lower: Floats
+        upper: Floats
+        apart: Floats
+        normal: Floats
+        point_a: Floats
+        point_b: Floats
+        a: Ints
+        b: Ints
+        part_a: Ints
+        part_b: Ints
+        facet_a: Ints
+        facet_b: Ints
+        patch: Ints
+        kind: Ints
+
     def __init__(self, rows: np.ndarray, starts: np.ndarray):
         self.rows, self.starts = rows, starts
         for array in (rows, starts):
             array.flags.writeable = False
 
-    def __getattr__(self, name: str):
-        if name not in FIELDS:
-            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
-        return self.rows[name]
+    if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
+
+        def __getattr__(self, name: str):
+            if name not in FIELDS:
+                raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
+            return self.rows[name]
 
     def __dir__(self):
         return [*super().__dir__(), *FIELDS]
@@ -167,10 +205,10 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[np.void]:
         return iter(self.rows)
 
-    def __getitem__(self, k) -> Contacts:
+    def __getitem__(self, k: int) -> Contacts:
         """The contacts of pose k."""
         poses = len(self.starts) - 1
         if isinstance(k, bool) or not isinstance(k, (int, np.integer)):

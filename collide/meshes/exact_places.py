@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import TypeVar
 
 import numpy as np
 
 #: Integer coordinates.
 Point = tuple[int, int, int]
+#: What differences and products are exact of.
+Exact = TypeVar("Exact", int, Fraction)
 
 
 def integers(values) -> tuple[list[int], int]:
@@ -48,11 +51,11 @@ def on_one_grid(*groups: tuple[list[Point], int]) -> tuple[list[list[Point]], in
     return [[(x << g, y << g, z << g) for x, y, z in points] for points, grid in groups for g in (grid - low,)], low
 
 
-def minus(a: Point, b: Point) -> Point:
+def minus(a: tuple[Exact, Exact, Exact], b: tuple[Exact, Exact, Exact]) -> tuple[Exact, Exact, Exact]:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def cross(a: Point, b: Point) -> Point:
+def cross(a: tuple[Exact, Exact, Exact], b: tuple[Exact, Exact, Exact]) -> tuple[Exact, Exact, Exact]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

@@ -1,34 +1,32 @@
 """Whether points belong to a shape: `contains`, decided without rounding.
 
 Points are single-point hulls: what the engine proves about a shape and such a hull holds for the point. What it leaves
-open, next to curved surfaces, is decided in fractions by the shape's definition.
+open, next to curved surfaces and in nested unions, is decided in fractions by the shape's definition (`by_definition.py`).
 """
 
 from __future__ import annotations
 
-from fractions import Fraction
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from collide import reading
 from collide.batches import ask
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.layout import MeshTree
 from collide.geometry.surfaces.volumes import without_area
 from collide.meshes.bodies import body_of
+from collide.meshes.by_definition import holds
 from collide.meshes.exact_places import cross, inner, integers, minus, on_one_grid, placed
-from collide.meshes.rays import as_it_is, is_single, matched_count, raycast, vectors
+from collide.meshes.rays import as_it_is, matched_count, raycast, vectors
 from collide.narrowphase.triangles.inside import INSIDE, OUTSIDE, UNDECIDED
 from collide.narrowphase.triangles.queries import points_in_solid, surfaces_meet
 from collide.results import UNDECIDED as LEFT_OPEN
 from collide.shapes.base import Shape
-from collide.shapes.compound import Compound
-from collide.shapes.hpolytope import HPolytope
 from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh import Mesh
-from collide.shapes.primitives import Capsule, Cone, Cylinder, Ellipsoid, Sphere
-from collide.transforms import LARGEST, as_poses
+from collide.transforms import LARGEST, poses_as_given
 
 #: The facets without area of meshes that have been asked.
 _thin: WeakKeyDictionary[MeshTree, MeshTree | None] = WeakKeyDictionary()
@@ -50,24 +48,22 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     bool for a single point at a single pose, bool[N] otherwise; the same one by one or in batches. About 1 µs a point for
     solids, O(log n) for well-shaped ones.
 
-    Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match;
-    UnsupportedQuery where rounding inside a `Compound` of meshes or rounded hulls leaves it open.
+    Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}")
+        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
     points, one = vectors("contains", "points_W", points_W)
     beyond = np.abs(points).max(axis=1) > LARGEST
     if beyond.any():
         k = int(np.argmax(beyond))
         raise InvalidArgument(f"contains: points_W[{k}] exceeds {LARGEST:g}, got {points[k].tolist()}")
-    single = one and is_single(X_WA)
-    X_WA = as_poses(X_WA, "X_WA", check=check_poses)
+    X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
     n = matched_count("contains", X_WA=len(X_WA), points_W=len(points))
     points = np.ascontiguousarray(np.broadcast_to(points, (n, 3)))
     if n == 0:
         return np.zeros(0, dtype=bool)
     answer = _in_mesh(shape, X_WA, points) if isinstance(shape, Mesh) else _in_convex(shape, X_WA, points)
-    return bool(answer[0]) if single else answer
+    return bool(answer[0]) if one and single_pose else answer
 
 
 def _at(points: np.ndarray) -> np.ndarray:
@@ -147,60 +143,5 @@ def _in_convex(shape: Shape, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray
     rows = ask(shape, _POINT, X_WA, _at(points), False, 0.0, False, 1, depths=False)
     answer = rows["hit"].copy()
     for k in np.flatnonzero(answer & (rows["how"] == LEFT_OPEN)).tolist():
-        decided = _holds(shape, [_pose(X_WA, k)], points[k])
-        if decided is None:
-            raise UnsupportedQuery(
-                f"contains: rounding leaves open whether {points[k].tolist()} is in a {type(shape).__name__}; ask for its items"
-            )
-        answer[k] = decided
+        answer[k] = holds(shape, [_pose(X_WA, k)], points[k])
     return answer
-
-
-def _holds(shape: Shape, poses: list[np.ndarray], point: np.ndarray) -> bool | None:
-    """By the shape's definition, in fractions; poses lead from the world inwards. None where that is not written here."""
-    if isinstance(shape, Compound):
-        told = [_holds(part, [*poses, X], point) for part, X in shape.items]
-        return True if True in told else (None if None in told else False)
-    x, y, z = local = _seen_from([Fraction(v) for v in point.tolist()], poses)
-    if isinstance(shape, Cylinder):
-        return x * x + y * y <= Fraction(shape.radius) ** 2 and 2 * abs(z) <= Fraction(shape.length)
-    if isinstance(shape, Cone):
-        length = Fraction(shape.length)
-        up = z / length + Fraction(1, 2)  # 0 at the base, 1 at the apex
-        return 0 <= up <= 1 and x * x + y * y <= (Fraction(shape.radius) * (1 - up)) ** 2
-    if isinstance(shape, Ellipsoid):
-        return sum((v / Fraction(r)) ** 2 for v, r in zip(local, shape.radii.tolist())) <= 1
-    if isinstance(shape, HPolytope):
-        sides = zip(shape.normals.tolist(), shape.offsets.tolist())
-        return all(sum(Fraction(n) * v for n, v in zip(normal, local)) <= Fraction(offset) for normal, offset in sides)
-    if isinstance(shape, (Sphere, Capsule)):
-        half = Fraction(shape.length) / 2 if isinstance(shape, Capsule) else Fraction(0)
-        ends = [_moved([Fraction(0), Fraction(0), s * half], poses) for s in (-1, 1)]
-        return _square_from_segment([Fraction(v) for v in point.tolist()], *ends) <= Fraction(shape.radius) ** 2
-    return None
-
-
-def _moved(point: list[Fraction], poses: list[np.ndarray]) -> list[Fraction]:
-    for X in reversed(poses):
-        rows = [[Fraction(v) for v in row] for row in X[:3].tolist()]
-        point = [row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + row[3] for row in rows]
-    return point
-
-
-def _seen_from(point: list[Fraction], poses: list[np.ndarray]) -> list[Fraction]:
-    """The point in the frame of the last pose: each matrix inverted exactly."""
-    for X in poses:
-        rows = [[Fraction(v) for v in row] for row in X[:3].tolist()]
-        w = [p - row[3] for p, row in zip(point, rows)]
-        a, b, c = (tuple(row[i] for row in rows) for i in range(3))
-        det = inner(a, cross(b, c))  # type: ignore[arg-type]
-        point = [inner(w, cross(p, q)) / det for p, q in ((b, c), (c, a), (a, b))]  # type: ignore[arg-type]
-    return point
-
-
-def _square_from_segment(p: list[Fraction], a: list[Fraction], b: list[Fraction]) -> Fraction:
-    e, w = [y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, p)]
-    length, along = inner(e, e), inner(w, e)
-    t = min(max(along / length, Fraction(0)), Fraction(1)) if length else Fraction(0)
-    rest = [y - t * x for x, y in zip(e, w)]
-    return inner(rest, rest)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide import reading
 from collide.errors import InvalidArgument
 from collide.meshes.bodies import Body, facet_body
 from collide.meshes.exact_places import (
@@ -28,7 +29,7 @@ from collide.meshes.exact_places import (
 from collide.narrowphase.triangles import rays
 from collide.narrowphase.triangles.queries import facets_on_rays
 from collide.shapes.base import Shape
-from collide.transforms import LARGEST, as_poses
+from collide.transforms import LARGEST, poses_as_given
 
 #: Brackets wider than this, in units of the way to beyond the body, are worked out exactly.
 _WIDE = 2.0**-40
@@ -102,10 +103,11 @@ def raycast(
     UnsupportedQuery for shapes without facets.
     """
     body = facet_body(shape, "raycast")
-    X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, max_distance, check_poses)
+    limit = reading.limit("raycast: max_distance", max_distance, "")
+    X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, limit, check_poses)
     n = len(given)
     hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], given, not all_hits)
-    found = _Found(body, X_WA, given, exponents, hits, float(max_distance))
+    found = _Found(body, X_WA, given, exponents, hits, limit)
     found.settle(all_hits)
     ray, facet, t = found.kept()
     if all_hits:
@@ -128,10 +130,7 @@ def _nothing(n: int) -> RayHits:
 
 def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
     """((n, 3) finite float64, whether a single one was given)."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgument(f"{caller}: {name} must be numbers (3,) or (N, 3), got {values!r}") from None
+    array = reading.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {array.shape}")
     rows = np.ascontiguousarray(array.reshape(-1, 3))
@@ -145,11 +144,6 @@ def _refuse(caller: str, name: str, rows: np.ndarray, bad, complaint: str) -> No
         raise InvalidArgument(f"{caller}: {name}[{k}] {complaint}, got {rows[k].tolist()}")
 
 
-def is_single(X) -> bool:
-    """Whether a pose, or an (R, t), is one and no batch."""
-    return np.ndim(X[1]) == 1 if isinstance(X, tuple) and len(X) == 2 else np.ndim(X) == 2
-
-
 def matched_count(caller: str, **counts: int) -> int:
     """How many a batch has: all counts alike, or 1. Raises InvalidArgument."""
     n = max(counts.values()) if min(counts.values()) else 0
@@ -159,10 +153,9 @@ def matched_count(caller: str, **counts: int) -> int:
     return n
 
 
-def _asked(body: Body, X_WA, origins_W, directions_W, max_distance, check: bool):
+def _asked(body: Body, X_WA, origins_W, directions_W, limit: float, check: bool):
     """(poses, rays as kernels take them, exponents of the directions, whether single)."""
-    single = is_single(X_WA)
-    X_WA = as_poses(X_WA, "X_WA", check=check)
+    X_WA, single = poses_as_given(X_WA, "X_WA", check=check)
     origins, one = vectors("raycast", "origins_W", origins_W)
     directions, other = vectors("raycast", "directions_W", directions_W)
     _refuse("raycast", "origins_W", origins, np.abs(origins).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
@@ -170,12 +163,6 @@ def _asked(body: Body, X_WA, origins_W, directions_W, max_distance, check: bool)
     _refuse("raycast", "directions_W", directions, sizes == 0.0, "has length 0: a ray needs a direction")
     low, high = _DIRECTIONS
     _refuse("raycast", "directions_W", directions, (sizes < low) | (sizes > high), f"has no component within [{low:g}, {high:g}]")
-    try:
-        limit = float(max_distance)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgument(f"raycast: max_distance must be a number ≥ 0, got {max_distance!r}") from None
-    if not limit >= 0.0:
-        raise InvalidArgument(f"raycast: max_distance must be ≥ 0, got {max_distance!r}")
     n = matched_count("raycast", X_WA=len(X_WA), origins_W=len(origins), directions_W=len(directions))
     exponents = np.frexp(sizes)[1].astype(np.int64)
     directions = np.ldexp(directions, -exponents[:, None])

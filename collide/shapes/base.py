@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from collide import reading
 from collide.errors import InvalidShape
 from collide.geometry.packing import PackedConvex
 from collide.transforms import LARGEST, SMALLEST
@@ -54,6 +55,12 @@ class Shape:
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"{type(self).__name__} is immutable; {name} cannot be deleted")
+
+    def __copy__(self) -> Shape:
+        return self  # nothing about it can change
+
+    def __deepcopy__(self, memo: dict) -> Shape:
+        return self
 
     def __reduce__(self):
         return _rebuild, (type(self), tuple(getattr(self, f) for f in self._fields))
@@ -142,40 +149,40 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
     if zero and number == 0.0:
         return 0.0
     if not number > 0:
-        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {number!r}")
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {reading.told(value)}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {number!r}; scale the scene"
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the scene"
         )
     return number
 
 
 def scalar(shape: str, field: str, value: Any) -> float:
     """A finite real number."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidShape(f"{shape}: {field} must be a number, got {value!r}") from None
+    number = reading.number(value)
+    if number is None:
+        raise InvalidShape(f"{shape}: {field} must be a number, got {reading.told(value)}")
     if not math.isfinite(number):
-        raise InvalidShape(f"{shape}: {field} must be finite, got {value!r}")
+        raise InvalidShape(f"{shape}: {field} must be finite, got {reading.told(value)}")
     if abs(number) > LARGEST:
-        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {value!r}; scale the scene")
+        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {reading.told(value)}; scale the scene")
     return number
 
 
-def vector(shape: str, field: str, value: Any) -> np.ndarray:
-    """Three finite numbers, as a read-only array."""
-    array = rows(shape, field, value, (3,))
-    return array
+def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
+    """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
+    if (y is None) != (z is None):
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got two")
+    lengths = rows(shape, field, value if y is None else (value, y, z), (3,))
+    for axis, length in zip("xyz", lengths):
+        positive(shape, f"{field}.{axis}", length)
+    return lengths
 
 
 def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
     shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
-    try:
-        array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InvalidShape(f"{shape}: {field} must be numbers of shape {shown}, got {type(value).__name__}") from None
+    array = np.array(reading.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
     if array.shape[0] == 0:
@@ -188,3 +195,34 @@ def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
         )
     array.flags.writeable = False
     return array
+
+
+def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.ndarray:
+    """(m, 3) ids of corners 0 … n − 1, as a read-only copy. corners : what the ids count, for messages."""
+    array = reading.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
+    if array.ndim != 2 or array.shape[1] != 3:
+        cut = "; cut polygons into triangles" if array.ndim == 2 and array.shape[1] > 3 else ""
+        raise InvalidShape(f"{shape}: faces must have shape (m, 3), got {array.shape}{cut}")
+    if array.dtype.kind not in "iu":
+        raise InvalidShape(f"{shape}: faces must be integers, got {_first_odd(array)}")
+    outside = ((array < 0) | (array >= n)).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        many = int(outside.sum())
+        raise InvalidShape(
+            f"{shape}: faces[{row}] is {array[row].tolist()}, but there are {corners.format(n=n, last=n - 1)}"
+            f" ({many} such facet{'s' * (many != 1)})"
+        )
+    array = np.array(array, dtype=dtype, order="C")
+    array.flags.writeable = False
+    return array
+
+
+def _first_odd(array: np.ndarray) -> str:
+    """What is wrong with ids that are no integers: the first NaN or fraction with its facet, else the type."""
+    if array.dtype.kind == "f":
+        odd = ~np.isfinite(array) | (array != np.floor(array))
+        if odd.any():
+            row, k = (int(i) for i in np.argwhere(odd)[0])
+            return f"faces[{row}, {k}] = {array[row, k]}"
+    return f"{array.dtype} (ids that are whole: faces.astype(int))"

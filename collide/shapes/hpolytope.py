@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from collide.errors import InvalidShape, UnsupportedQuery
@@ -9,6 +11,9 @@ from collide.geometry.double_description import halfspace_vertices
 from collide.geometry.packing import pack_points
 from collide.shapes.base import Shape, alone, rows
 from collide.transforms import LARGEST
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class HPolytope(Shape):
@@ -32,7 +37,7 @@ class HPolytope(Shape):
     slop: float
     bounded: bool
 
-    def __init__(self, normals, offsets, *, bounded: bool = True):
+    def __init__(self, normals: ArrayLike, offsets: ArrayLike, *, bounded: bool = True):
         normals = rows("HPolytope", "normals", normals, (None, 3))
         offsets = rows("HPolytope", "offsets", offsets, (len(normals),))
         zero = ~normals.any(axis=1)

@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide import journal
 from collide.errors import InvalidShape
 from collide.geometry.packing import pack_points
-from collide.shapes.base import Shape, alone, positive, rows
-from collide.shapes.saved import read_arrays, write_arrays
+from collide.shapes.base import Shape, alone, facet_ids, positive, rows
+from collide.shapes.saved import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from collide.geometry.hulls.hull import Hull
 
 # Hulls and support trees are kernels: imported where used, so that shapes can be made without a compiler.
@@ -32,8 +35,8 @@ class ConvexHull(Shape):
     radius : of the ball swept over the hull [m], ≥ 0.
 
     Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support
-    tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point), kept with the shape,
-    and saved with it by `save` and by pickle.
+    tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point) and kept with the shape.
+    Files and pickles hold the points alone: proofs rest on the tree, so it is made from them and never believed.
     """
 
     __slots__ = ("_hull", "_tree", "faces", "points", "radius")
@@ -43,7 +46,7 @@ class ConvexHull(Shape):
     radius: float
     _hull: Hull
 
-    def __init__(self, points, *, faces=None, radius: float = 0.0):
+    def __init__(self, points: ArrayLike, *, faces: ArrayLike | None = None, radius: float = 0.0):
         points = rows("ConvexHull", "points", points, (None, 3))
         largest = float(np.abs(points).max())
         if 0.0 < largest < SMALLEST:
@@ -53,27 +56,13 @@ class ConvexHull(Shape):
             )
         self._store(
             points=points,
-            faces=None if faces is None else _check_faces(faces, len(points)),
+            faces=None if faces is None else facet_ids("ConvexHull", faces, len(points), np.int64, "{n} points"),
             radius=positive("ConvexHull", "radius", radius, zero=True),
         )
 
     @classmethod
-    def _from_fields(cls, points, faces, radius, tree=None):
-        made = cls(points, faces=faces, radius=radius)
-        if tree is not None:
-            from collide.geometry.support_tree.planted import PlantedTree
-
-            object.__setattr__(made, "_tree", PlantedTree(made.points, tree))
-        return made
-
-    def __reduce__(self):
-        rebuild, (cls, values) = super().__reduce__()
-        return rebuild, (cls, (*values, self._tree_arrays()))
-
-    def _tree_arrays(self) -> dict[str, np.ndarray] | None:
-        """The support tree as plain arrays, where it has been made."""
-        planted = getattr(self, "_tree", None)
-        return planted.to_arrays() if planted is not None else None
+    def _from_fields(cls, points, faces, radius) -> ConvexHull:
+        return cls(points, faces=faces, radius=radius)
 
     def _pack(self):
         if not hasattr(self, "_tree"):
@@ -90,7 +79,8 @@ class ConvexHull(Shape):
         from collide.geometry.hulls.hull import convex_hull
 
         if not hasattr(self, "_hull"):
-            hull = convex_hull(self.points)
+            with journal.told("convex hull of %d points made", len(self.points)):
+                hull = convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False
             object.__setattr__(self, "_hull", hull)
@@ -116,23 +106,20 @@ class ConvexHull(Shape):
                 raise InvalidShape(f"ConvexHull: {what}: {error}") from None
 
     def save(self, path) -> None:
-        """Write points, faces, radius and, where it has been made, the support tree to an ``.npz`` file."""
+        """Write points, faces and radius to an ``.npz`` file."""
         arrays = {"points": self.points, "radius": np.array(self.radius)}
         if self.faces is not None:
             arrays["faces"] = self.faces
-        tree = self._tree_arrays()
-        arrays.update({f"tree_{name}": array for name, array in tree.items()} if tree is not None else {})
         write_arrays("ConvexHull", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> ConvexHull:
         """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
-        arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, {"points", "radius"})
-        tree = {name[5:]: array for name, array in arrays.items() if name.startswith("tree_")}
+        arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
         try:
-            return cls._from_fields(arrays["points"], arrays.get("faces"), float(arrays["radius"]), tree or None)
-        except ValueError as error:
-            raise InvalidShape(f"ConvexHull.load: {path}: {error}; build the shape anew from its points") from None
+            return cls(arrays["points"], faces=arrays.get("faces"), radius=float(arrays["radius"]))
+        except InvalidShape as error:
+            raise InvalidShape(f"ConvexHull.load: {path}: {error}") from None
 
     def without_repeats(self) -> ConvexHull:
         """The same set with every point once, in the order of first appearance.
@@ -148,18 +135,4 @@ class ConvexHull(Shape):
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
-
-
-def _check_faces(faces, n: int) -> np.ndarray:
-    try:
-        array = np.array(faces)
-    except ValueError:
-        raise InvalidShape("ConvexHull: faces must be (m, 3) vertex ids, got rows of different lengths") from None
-    if array.ndim != 2 or array.shape[1] != 3 or not np.issubdtype(array.dtype, np.integer):
-        raise InvalidShape(f"ConvexHull: faces must be (m, 3) integers, got {array.shape} {array.dtype}")
-    if array.size and (array.min() < 0 or array.max() >= n):
-        row = int(np.argmax(((array < 0) | (array >= n)).any(axis=1)))
-        raise InvalidShape(f"ConvexHull: faces[{row}] is {array[row].tolist()}, but there are {n} points")
-    array = np.ascontiguousarray(array, dtype=np.int64)
-    array.flags.writeable = False
-    return array
+_FILE_FIELDS = {"points": Field("f8", (None, 3)), "faces": Field("i8", (None, 3), needed=False), "radius": Field("f8", ())}

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from collide import journal, reading
 from collide.errors import InvalidShape, UnsupportedQuery
 from collide.geometry.packing import pack_points
-from collide.shapes.base import Shape, alone, positive, rows
+from collide.shapes.base import Shape, alone, facet_ids, positive, rows
 from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
-from collide.shapes.saved import read_arrays, write_arrays
+from collide.shapes.saved import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from collide.geometry.locality import Locality
     from collide.geometry.mesh_tree.figures import TreeFigures
     from collide.geometry.mesh_tree.layout import MeshTree
     from collide.geometry.surfaces.survey import Survey
+
+    class HasFacets(Protocol):
+        """What carries a mesh: trimesh.Trimesh, among others."""
+
+        @property
+        def vertices(self) -> Any: ...
+        @property
+        def faces(self) -> Any: ...
 
 # What looks at surfaces is kernels: imported where used.
 
@@ -26,7 +37,8 @@ if TYPE_CHECKING:
 class Mesh(Shape):
     """Triangles: a solid, or a surface.
 
-    vertices : (n, 3) [m]; equal ones are welded, so that an STL's loose triangles close. Some may be unused.
+    vertices : (n, 3) [m]; equal ones are welded, so that an STL's loose triangles close. Some may be unused. Or, with no
+        faces, an object that has ``vertices`` and ``faces``, as a trimesh.Trimesh does.
     faces : (m, 3) vertex ids, counter-clockwise seen from outside.
     solid : None takes a mesh that closes as a solid and any other as a surface; ``mesh.solid`` says which, and
         ``mesh.report`` why. True insists: a mesh without an inside is refused, with its defects and facet
@@ -38,7 +50,8 @@ class Mesh(Shape):
     a solid do not cross each other is not looked at here.
 
     Ids in results are rows of ``faces``, as given. Looking at a mesh takes about 0.3 µs a facet; its box-tree
-    (`tree`) is made when a query first needs it (about 0.6 µs a facet), kept, and saved by `save` and by pickle.
+    (`tree`) is made when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and
+    the choice of ``solid``; what proofs rest on is worked out anew from them.
     Raises InvalidShape for anything but finite vertices and at least one row of ids in range.
     """
 
@@ -56,7 +69,9 @@ class Mesh(Shape):
     _tree: MeshTree
     _hull: ConvexHull
 
-    def __init__(self, vertices, faces, *, solid: bool | None = None):
+    def __init__(self, vertices: ArrayLike | HasFacets, faces: ArrayLike | None = None, *, solid: bool | None = None):
+        if faces is None:
+            vertices, faces = _vertices_and_faces(vertices)
         vertices = _check_vertices(vertices)
         faces = _check_faces(faces, len(vertices))
         if solid is not None and not isinstance(solid, (bool, np.bool_)):
@@ -64,52 +79,40 @@ class Mesh(Shape):
         self._store(vertices=vertices, faces=faces, scale=1.0, solid=False, _copied=None)
         if solid is not None and not solid:
             return
-        report = make_report(len(vertices), True, self.survey)
-        spoilt = [str(defect) for defect in report.defects if defect.spoils] or (
-            [] if self.survey.edges else ["no facet has three distinct corners"]
-        )
+        spoilt = _what_spoils(len(vertices), self.survey)
         if solid and spoilt:
-            raise InvalidShape(
-                f"Mesh: no inside can be told: {'; '.join(spoilt)}. Repair the mesh, or leave out solid=True "
-                "and it is taken as a surface"
-            )
+            raise InvalidShape(spoilt)
         self._store(solid=not spoilt)
 
     @classmethod
-    def _from_fields(cls, vertices, faces, solid, scale=1.0, tree=None) -> Mesh:
-        """A mesh whose ``solid`` is known already: what pickles and files carry.
+    def _from_fields(cls, vertices, faces, solid, scale) -> Mesh:
+        """The mesh that a pickle or a file tells of: what it says is a solid must be one."""
+        return cls(vertices, faces, solid=bool(solid)).scaled(scale)
 
-        scale : of a scaled copy of it.   tree : what `_tree_arrays` gave, checked again.
-        """
+    @classmethod
+    def _known(cls, vertices, faces, solid: bool) -> Mesh:
+        """A mesh that was looked at before, as prepared input tells: it is looked at again when a query first needs it."""
         made = cls(vertices, faces, solid=False)
         made._store(solid=bool(solid))
-        if tree:
-            from collide.geometry.mesh_tree.layout import MeshTree
-
-            made._store(_tree=MeshTree.from_arrays(made.vertices, made.faces, tree))
-        return made if scale == 1.0 else made.scaled(scale)
+        return made
 
     def __reduce__(self):
         rebuild, _ = super().__reduce__()
-        return rebuild, (type(self), (self.base.vertices, self.base.faces, self.solid, self.scale, self._tree_arrays()))
-
-    def _tree_arrays(self) -> dict[str, np.ndarray]:
-        """The base's tree as plain arrays, where it has been made."""
-        tree = getattr(self.base, "_tree", None)
-        return {} if tree is None else tree.to_arrays()
+        return rebuild, (type(self), (self.base.vertices, self.base.faces, self.solid, self.scale))
 
     @property
     def tree(self) -> MeshTree:
         """The box-tree that queries walk: made when first asked for. A scaled copy's is its base's, boxes scaled."""
         if not hasattr(self, "_tree"):
-            if self._copied is None:
-                from collide.geometry.mesh_tree.build import build_mesh_tree
+            with journal.told("box-tree of a mesh of %d facets made", len(self.faces)):
+                if self._copied is None:
+                    from collide.geometry.mesh_tree.build import build_mesh_tree
 
-                self._store(_tree=build_mesh_tree(self.vertices, self.faces))
-            else:
-                from collide.geometry.mesh_tree.scaled import scaled_tree
+                    self._store(_tree=build_mesh_tree(self.vertices, self.faces))
+                else:
+                    from collide.geometry.mesh_tree.scaled import scaled_tree
 
-                self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
+                    self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree
 
     @property
@@ -117,11 +120,12 @@ class Mesh(Shape):
         """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
         if not hasattr(self, "_hull"):
             used = self.vertices[np.unique(self.faces)]
-            if len(used) > _MANY:
-                from collide.geometry.hulls.hull import convex_hull
+            with journal.told("convex hull around a mesh of %d facets made", len(self.faces)):
+                if len(used) > _MANY:
+                    from collide.geometry.hulls.hull import convex_hull
 
-                used = used[convex_hull(used).vertices]
-            self._store(_hull=ConvexHull(used))
+                    used = used[convex_hull(used).vertices]
+                self._store(_hull=ConvexHull(used))
         return self._hull
 
     @property
@@ -137,7 +141,11 @@ class Mesh(Shape):
         if self._copied is not None:
             return self._copied.survey
         if not hasattr(self, "_survey"):
-            survey = survey_surface(self.vertices, self.faces)
+            with journal.told("surface of a mesh of %d facets looked at", len(self.faces)):
+                survey = survey_surface(self.vertices, self.faces)
+            spoilt = self.solid and _what_spoils(len(self.vertices), survey)
+            if spoilt:
+                raise InvalidShape(spoilt)
             for array in (survey.corners, survey.flags, survey.shells, survey.volumes, survey.signs):
                 array.flags.writeable = False
             self._store(_survey=survey)
@@ -186,21 +194,19 @@ class Mesh(Shape):
         return tree_figures(self.tree, graded_tree(self.vertices, self.faces))
 
     def save(self, path) -> None:
-        """Write the mesh, and its tree where it has been made, to an ``.npz`` file."""
+        """Write the mesh to an ``.npz`` file."""
         arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
-        arrays.update(solid=np.array(self.solid), scale=np.array(self.scale), **self._tree_arrays())
+        arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
         write_arrays("Mesh", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> Mesh:
         """A mesh from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
-        arrays = read_arrays("Mesh", path, _FILE_FORMAT, {"vertices", "faces", "solid", "scale"})
-        tree = {name: array for name, array in arrays.items() if name.startswith("mesh_")}
+        arrays = read_arrays("Mesh", path, _FILE_FORMAT, _FILE_FIELDS, "mesh_")
         try:
-            scale = float(arrays["scale"])
-            return cls._from_fields(arrays["vertices"], arrays["faces"], arrays["solid"], scale, tree)
-        except (ValueError, TypeError) as error:
-            raise InvalidShape(f"Mesh.load: {path}: {error}; build the mesh anew") from None
+            return cls._from_fields(arrays["vertices"], arrays["faces"], arrays["solid"], float(arrays["scale"]))
+        except InvalidShape as error:
+            raise InvalidShape(f"Mesh.load: {path}: {error}") from None
 
     def _pack(self):
         raise UnsupportedQuery(
@@ -242,6 +248,31 @@ _MANY = 512
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
+_FILE_FIELDS = {
+    "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()), "scale": Field("f8", ()),
+}  # fmt: skip
+
+
+def _what_spoils(vertices: int, survey: Survey) -> str:
+    """Why a mesh of so many vertices is no solid, in words; empty where it is one."""
+    report = make_report(vertices, True, survey)
+    spoilt = [str(defect) for defect in report.defects if defect.spoils] or (
+        [] if survey.edges else ["no facet has three distinct corners"]
+    )
+    if not spoilt:
+        return ""
+    remedy = "Repair the mesh, or leave out solid=True and it is taken as a surface"
+    return f"Mesh: no inside can be told: {'; '.join(spoilt)}. {remedy}"
+
+
+def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
+    """Of an object that has them, such as a trimesh.Trimesh."""
+    try:
+        return mesh.vertices, mesh.faces
+    except AttributeError:
+        raise InvalidShape(
+            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and no faces"
+        ) from None
 
 
 def _check_vertices(vertices) -> np.ndarray:
@@ -256,34 +287,7 @@ def _check_vertices(vertices) -> np.ndarray:
 
 def _check_faces(faces, n: int) -> np.ndarray:
     """(m, 3) int32 ids, read-only, m ≥ 1."""
-    try:
-        array = np.array(faces)
-    except ValueError:
-        raise InvalidShape("Mesh: faces must be (m, 3) vertex ids, got rows of different lengths") from None
+    array = reading.plain_array("Mesh: faces", faces, "(m, 3)", InvalidShape)
     if array.size == 0:
         raise InvalidShape(f"Mesh: no facets: faces has shape {array.shape}; at least one row of three ids is needed")
-    if array.ndim != 2 or array.shape[1] != 3:
-        cut = "; cut polygons into triangles" if array.ndim == 2 and array.shape[1] > 3 else ""
-        raise InvalidShape(f"Mesh: faces must have shape (m, 3), got {array.shape}{cut}")
-    if not np.issubdtype(array.dtype, np.integer):
-        raise InvalidShape(f"Mesh: faces must be integers, got {_first_odd(array)}")
-    outside = ((array < 0) | (array >= n)).any(axis=1)
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise InvalidShape(
-            f"Mesh: faces[{row}] is {array[row].tolist()}, but there are vertices 0 … {n - 1}"
-            f" ({int(outside.sum())} such facet{'s' * (int(outside.sum()) != 1)})"
-        )
-    array = np.ascontiguousarray(array, dtype=np.int32)
-    array.flags.writeable = False
-    return array
-
-
-def _first_odd(array: np.ndarray) -> str:
-    """What is wrong with ids that are no integers: the first NaN or fraction with its facet, else the type."""
-    if np.issubdtype(array.dtype, np.floating):
-        odd = ~np.isfinite(array) | (array != np.floor(array))
-        if odd.any():
-            row, k = (int(i) for i in np.argwhere(odd)[0])
-            return f"faces[{row}, {k}] = {array[row, k]}"
-    return f"{array.dtype} (ids that are whole: faces.astype(int))"
+    return facet_ids("Mesh", array, n, np.int32, "vertices 0 … {last}")

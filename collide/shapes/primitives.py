@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +21,10 @@ from collide.geometry.packing import (
     pack_halfspace,
     pack_points,
 )
-from collide.shapes.base import Shape, alone, positive, rows, scalar, vector
+from collide.shapes.base import Shape, alone, positive, rows, scalar, three_lengths
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class Sphere(Shape):
@@ -43,28 +47,33 @@ class Sphere(Shape):
 class Box(Shape):
     """A box centred at the origin, its faces across the axes.
 
-    size : (3,) full edge lengths [m], each > 0.
+    size : (3,) full edge lengths [m], each > 0; or three numbers: ``Box(1, 2, 3)`` is ``Box((1, 2, 3))``.
     """
 
     __slots__ = ("size",)
     _fields = __slots__
     size: np.ndarray
 
-    def __init__(self, size):
-        size = vector("Box", "size", size)
-        for axis, length in zip("xyz", size):
-            positive("Box", f"size.{axis}", length)
-        self._store(size=size)
+    def __init__(self, size: ArrayLike, y: float | None = None, z: float | None = None):
+        self._store(size=three_lengths("Box", "size", size, y, z))
 
     def _pack(self):
         signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
         return alone(pack_points(signs * self.size))
 
 
+def _one_length(shape: str, length, height):
+    """The length, under one of its two names."""
+    if (length is None) == (height is None):
+        got = "neither" if length is None else "both"
+        raise InvalidShape(f"{shape}: give one of length and height, two names of one number; got {got}")
+    return height if length is None else length
+
+
 class Capsule(Shape):
     """All points within ``radius`` of a segment along z, centred at the origin.
 
-    radius : [m], > 0.   length : of the segment, without the caps [m], ≥ 0.
+    radius : [m], > 0.   length : of the segment, without the caps [m], ≥ 0; ``height=`` is another name for it.
     """
 
     __slots__ = ("radius", "length")
@@ -72,10 +81,10 @@ class Capsule(Shape):
     radius: float
     length: float
 
-    def __init__(self, radius: float, length: float):
+    def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
+        length = _one_length("Capsule", length, height)
         self._store(
-            radius=positive("Capsule", "radius", radius),
-            length=positive("Capsule", "length", length, zero=True),
+            radius=positive("Capsule", "radius", radius), length=positive("Capsule", "length", length, zero=True)
         )
 
     def _pack(self):
@@ -87,7 +96,7 @@ class Capsule(Shape):
 class Cylinder(Shape):
     """A solid cylinder along z, centred at the origin.
 
-    radius : [m], > 0.   length : full length [m], > 0.
+    radius : [m], > 0.   length : full length [m], > 0; ``height=`` is another name for it.
     """
 
     __slots__ = ("radius", "length")
@@ -95,7 +104,8 @@ class Cylinder(Shape):
     radius: float
     length: float
 
-    def __init__(self, radius: float, length: float):
+    def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
+        length = _one_length("Cylinder", length, height)
         self._store(
             radius=positive("Cylinder", "radius", radius), length=positive("Cylinder", "length", length)
         )
@@ -108,7 +118,7 @@ class Cylinder(Shape):
 class Cone(Shape):
     """A solid cone along z: apex at +z·length/2, base of ``radius`` at −z·length/2.
 
-    radius : of the base [m], > 0.   length : from base to apex [m], > 0.
+    radius : of the base [m], > 0.   length : from base to apex [m], > 0; ``height=`` is another name for it.
     """
 
     __slots__ = ("radius", "length")
@@ -116,7 +126,8 @@ class Cone(Shape):
     radius: float
     length: float
 
-    def __init__(self, radius: float, length: float):
+    def __init__(self, radius: float, length: float | None = None, *, height: float | None = None):
+        length = _one_length("Cone", length, height)
         self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
 
     def _pack(self):
@@ -127,18 +138,15 @@ class Cone(Shape):
 class Ellipsoid(Shape):
     """{x : Σ (x_k / radii_k)² ≤ 1}.
 
-    radii : (3,) semi-axes along x, y, z [m], each > 0.
+    radii : (3,) semi-axes along x, y, z [m], each > 0; or three numbers: ``Ellipsoid(1, 2, 3)``.
     """
 
     __slots__ = ("radii",)
     _fields = __slots__
     radii: np.ndarray
 
-    def __init__(self, radii):
-        radii = vector("Ellipsoid", "radii", radii)
-        for axis, length in zip("xyz", radii):
-            positive("Ellipsoid", f"radii.{axis}", length)
-        self._store(radii=radii)
+    def __init__(self, radii: ArrayLike, y: float | None = None, z: float | None = None):
+        self._store(radii=three_lengths("Ellipsoid", "radii", radii, y, z))
 
     def _pack(self):
         return alone(pack_curved(ELLIPSOID, tuple(self.radii), float(self.radii.max())))
@@ -156,7 +164,7 @@ class Halfspace(Shape):
     normal: np.ndarray
     offset: float
 
-    def __init__(self, normal, offset: float):
+    def __init__(self, normal: ArrayLike, offset: float):
         normal = rows("Halfspace", "normal", normal, (3,))
         length = float(np.linalg.norm(normal))
         if not 1e-6 <= length <= 1e6:

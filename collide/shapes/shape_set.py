@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide import reading
 from collide.errors import InvalidArgument, InvalidShape
 from collide.shapes.base import Shape, is_plain
 
@@ -40,14 +41,15 @@ class ShapeSet:
         return len(self.shapes)
 
     def __getitem__(self, rows):
-        if isinstance(rows, (int, np.integer)) and not isinstance(rows, bool):
+        if reading.is_whole(rows):
             if not -len(self) <= rows < len(self):
                 raise IndexError(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {rows}")
             return self.shapes[rows]
-        numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else np.asarray(rows)
+        rows = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
+        numbers = reading.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
         if numbers.size == 0 and numbers.ndim == 1:
             numbers = numbers.astype(np.int64)
-        if numbers.ndim != 1 or not np.issubdtype(numbers.dtype, np.integer):
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
             raise InvalidArgument(f"ShapeSet: pick by integers (N,), got {numbers.dtype} {numbers.shape}")
         if len(numbers) and not (0 <= numbers.min() and numbers.max() < len(self)):
             raise InvalidArgument(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}")

@@ -131,7 +131,7 @@ def _scaled(part: MeshPart, factors: np.ndarray) -> Shape:
     """What is known of the mesh at its own size stays known where nothing is rounded, or its tree can be shared."""
     facets = part.facets
     assert facets is not None
-    base = Mesh._from_fields(part.points, facets, part.closed)
+    base = Mesh._known(part.points, facets, part.closed)
     factor = float(factors[0])
     if (factors == factor).all() and factor > 0.0:
         mesh = base.scaled(factor)

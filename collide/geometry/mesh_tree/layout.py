@@ -19,8 +19,6 @@ import numpy as np
 
 from collide._jit import address_of, kernel, view_f32, view_f64, view_i32, view_i64
 
-#: Layout of the arrays of `MeshTree.to_arrays`; to be raised with every change of it.
-VERSION = 1
 #: Boxes of a node, and its words: six floats a box and a link.
 WIDTH = 8
 NODE = 7 * WIDTH
@@ -113,28 +111,6 @@ class MeshTree:
     def used(self) -> np.ndarray:
         """(k, 8) whether a slot holds a box."""
         return self.nodes[:, 3 * WIDTH : 4 * WIDTH].copy().view(np.float32) > NOTHING / 2
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """The tree without its triangles, which the mesh has: for saving."""
-        stamp = np.array([VERSION, self.exponent, self.depth], dtype=np.int64)
-        return {"mesh_tree": stamp, "mesh_nodes": self.nodes, "mesh_order": self.ids, "mesh_centre": self.centre}
-
-    @classmethod
-    def from_arrays(cls, vertices: np.ndarray, faces: np.ndarray, arrays) -> MeshTree:
-        """The tree that `to_arrays` gave, over the same vertices (n, 3) and faces (m, 3).
-
-        Raises ValueError where the arrays are of another version, damaged, or made for another mesh: links and
-        runs are checked here, that boxes enclose what is below them by `validate.validate_mesh_tree`.
-        """
-        for name in ("mesh_tree", "mesh_nodes", "mesh_order", "mesh_centre"):
-            _require(name in arrays, f"no array {name!r}")
-        stamp = np.asarray(arrays["mesh_tree"])
-        _require(stamp.shape == (3,) and stamp[0] == VERSION, f"version {stamp.tolist()}, not {VERSION}; build it anew")
-        order = np.asarray(arrays["mesh_order"])
-        _require(order.dtype == np.int32 and order.shape == (len(faces),), "an order that does not fit the faces")
-        _require(np.array_equal(np.sort(order), np.arange(len(faces))), "an order that is none of the faces")
-        triangles = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)[order]].reshape(-1, 9)
-        return cls(arrays["mesh_nodes"], triangles, order, arrays["mesh_centre"], stamp[1], stamp[2])
 
     def _radius(self) -> float:
         """Of a ball around the centre that holds the box of the whole mesh."""

@@ -16,8 +16,6 @@ import numpy as np
 from collide._jit import address_of
 from collide.geometry.packing import lowest_exponent
 
-#: Changes whenever arrays that were saved would be read wrongly.
-VERSION = 1
 #: Header entries: how many of what, then addresses.
 (POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,
  FLAT, AT_POINTS, HEADER) = range(14)  # fmt: skip
@@ -67,31 +65,6 @@ class SupportTree:
         """Bytes of the tree, with the coordinates given."""
         arrays = (self.points, self.header, self.list_coordinates, *(getattr(self, name) for name in _PARTS))
         return sum(array.nbytes for array in arrays)
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """The tree without its points, for saving."""
-        arrays = {name: getattr(self, name) for name in _PARTS}
-        return {"support_tree": np.array([VERSION, self.flat, self.depth]), "list_coordinates": self.list_coordinates, **arrays}
-
-    @classmethod
-    def from_arrays(cls, points: np.ndarray, arrays) -> SupportTree:
-        """The tree that `to_arrays` gave, over the same points.
-
-        Raises ValueError where the arrays are of another version, damaged, or made for other points.
-        What they cannot show, that the lists are complete, `validate_support_tree` measures.
-        """
-        missing = [name for name in ("support_tree", "list_coordinates", *_PARTS) if name not in arrays]
-        if missing:
-            raise ValueError(f"support tree: no array {missing[0]!r}")
-        stamp = np.asarray(arrays["support_tree"])
-        if stamp.shape != (3,) or stamp[0] != VERSION:
-            raise ValueError(f"support tree: version {stamp.tolist()}, not {VERSION}; build it anew")
-        for name in ("list_coordinates", *_PARTS):
-            wanted = np.float64 if name == "list_coordinates" else np.int32
-            if np.asarray(arrays[name]).dtype != wanted or np.asarray(arrays[name]).ndim != 1:
-                raise ValueError(f"support tree: {name} must be one-dimensional, of {np.dtype(wanted)}")
-        parts = (arrays[name] for name in ("nodes", "owners", "entries", "list_coordinates", "ring_starts", "ring"))
-        return cls(points, stamp[1], stamp[2], *parts)
 
     def _check_structure(self) -> None:
         """Everything that a kernel relies on to stay inside the arrays and to come to an end."""

@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 
+from collide import journal
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.support_tree.build import build_support_tree
 from collide.geometry.support_tree.layout import SupportTree
@@ -16,11 +17,11 @@ FEWEST_VERTICES = 32
 
 
 class PlantedTree:
-    """points : (n, 3).   arrays : a tree that was saved (`SupportTree.to_arrays`), to be used instead of building."""
+    """points : (n, 3)."""
 
-    def __init__(self, points: np.ndarray, arrays=None):
+    def __init__(self, points: np.ndarray):
         self._points = points
-        self._tree = SupportTree.from_arrays(points, arrays) if arrays is not None else None
+        self._tree: SupportTree | None = None
         self._hopeless = False
 
     @property
@@ -29,7 +30,8 @@ class PlantedTree:
         if self._tree is None and not self._hopeless:
             with _growing():
                 if self._tree is None and not self._hopeless:
-                    self._tree = _grown(self._points)
+                    with journal.told("support tree of a hull of %d points made", len(self._points)):
+                        self._tree = _grown(self._points)
                     self._hopeless = self._tree is None
         return self._tree
 
@@ -37,10 +39,6 @@ class PlantedTree:
     def address(self) -> int:
         """What kernels take: the tree's address, 0 where there is none."""
         return self.tree.address if self.tree is not None else 0
-
-    def to_arrays(self) -> dict[str, np.ndarray] | None:
-        """The tree as plain arrays, where it has been made already."""
-        return self._tree.to_arrays() if self._tree is not None else None
 
 
 _lock = threading.Lock()

@@ -1,0 +1,23 @@
+"""What the library says about its own work, by ``logging.getLogger("collide")``: what is slow, and what is done behind a call.
+
+INFO: kernels compiled or loaded, trees, surveys, hulls and tables made, each with its size and seconds. WARNING: what should be
+looked at, such as a cache that cannot be kept. Quiet by default: without a handler Python prints warnings alone.
+``logging.basicConfig(level=logging.INFO)`` shows the rest.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+log = logging.getLogger("collide")
+
+
+@contextmanager
+def told(what: str, *sizes: int) -> Iterator[None]:
+    """Say what was made within, and how long it took. what : a format of the sizes, as logging has them."""
+    started = time.perf_counter()
+    yield
+    log.info(f"{what}: %.3f s", *sizes, time.perf_counter() - started)

@@ -1,0 +1,102 @@
+"""Numbers, arrays and file paths as callers hand them in, read in one way: what is no number is refused by name.
+
+Anything that holds real numbers will do: Python's own, fractions and decimals, numpy's of any width, nested sequences, objects
+with ``__array__``. Not complex numbers (a part would be lost), masked entries (they would be unmasked), text, dates and
+times, None. A number too large for a double is refused as one that is not finite, not as an overflow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import reprlib
+from typing import Any
+
+import numpy as np
+
+from collide.errors import CollideError, InvalidArgument
+
+#: Array kinds that are read as they are; objects are read one by one.
+_REAL = "fiub"
+_KINDS = {
+    "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text", "O": "objects",
+}  # fmt: skip
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
+
+
+def told(value: Any) -> str:
+    """A value as an error message shows it: short, numpy's numbers as numbers."""
+    with contextlib.suppress(Exception):  # whoever's __repr__ fails is told by type
+        return _SHORT.repr(value.item() if isinstance(value, (np.number, np.bool_)) else value)
+    return f"an integer of some {int(value.bit_length() * 0.30103)} digits" if isinstance(value, int) else f"a {type(value).__name__}"
+
+
+def number(value: Any) -> float | None:
+    """A real number as a double, infinite where it is too large for one; None where it is no number."""
+    if isinstance(value, (str, bytes, bytearray, complex, np.complexfloating, np.timedelta64, np.datetime64, np.character)):
+        return None
+    if value is np.ma.masked or (isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in _REAL + "O")):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+    except (TypeError, ValueError, ArithmeticError, RecursionError):
+        return None
+
+
+def limit(what: str, value: Any, unit: str = " [m]") -> float:
+    """A limit: a number ≥ 0, infinity allowed where it is given as such. Raises InvalidArgument."""
+    read = number(value)
+    if read is None or not read >= 0.0 or (math.isinf(read) and value != read):
+        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {told(value)}")
+    return read
+
+
+def is_whole(value: Any) -> bool:
+    """Whether it is an integer: neither True nor a time span, which to numpy is one."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+
+
+def whole(what: str, value: Any, least: int) -> int:
+    """An integer. Raises InvalidArgument."""
+    if not is_whole(value) or value < least:
+        raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {told(value)}")
+    return int(value)
+
+
+def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
+    """Real numbers as a float64 array of whatever shape; the caller's own array where it is one already.
+
+    what : "Box: size", for messages.   wanted : the shape that is asked for, for messages.
+    Raises ``error`` for what does not consist of real numbers. Whether they are finite is the caller's to ask.
+    """
+    found = plain_array(what, value, wanted, error)
+    if found.dtype == np.float64:
+        return found
+    if found.dtype.kind in _REAL:
+        return found.astype(np.float64)
+    if found.dtype.kind != "O":
+        raise error(f"{what} must be real numbers {wanted}, got {_KINDS.get(found.dtype.kind, found.dtype)}: {told(value)}")
+    read = [number(entry) for entry in found.ravel().tolist()]
+    if None in read:
+        k = read.index(None)
+        where = list(map(int, np.unravel_index(k, found.shape))) if found.ndim else ""
+        raise error(f"{what}{where} must be a real number (all of it {wanted}), got {told(found.ravel()[k])}")
+    return np.array(read, dtype=np.float64).reshape(found.shape)
+
+
+def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
+    """Anything that is an array or can be one, of any type: nothing ragged, masked, or nested without end."""
+    if _is_masked(value) or (isinstance(value, (list, tuple)) and any(map(_is_masked, value))):
+        raise error(f"{what} has masked entries; fill them or leave them out ({wanted} is wanted)")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
+        # numpy's own words for rows of different lengths are long, and tell no more
+        raise error(f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {told(value)}") from None
+
+
+def _is_masked(value: Any) -> bool:
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.getmaskarray(value).any())
