@@ -151,8 +151,8 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
     left = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
     if len(left):
-        poses = (X if X.ndim == 2 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        results[left], marks[left] = _near(A, B, *poses, len(left), np.inf)
+        X_WO, X_WT = (X if X.ndim == 2 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
+        results[left], marks[left] = _near(A, B, X_WO, X_WT, len(left), np.inf)
     return SurfaceDistances(
         results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
         marks[:, 2] != 0, marks[:, 3:],
