@@ -193,7 +193,10 @@ def test_a_margin_is_inclusive():
     for x in (0.0, 1.5):
         world.add(collide.Box((1, 1, 1)), pose(t=(x, 0, 0)))
     assert len(world.distances(max_distance=0.5)) == 1
-    assert len(world.distances(max_distance=np.nextafter(0.5, 0))) == 0
+    lower = world.distances(max_distance=0.5)["lower"][0]
+    assert 0.5 - 2.0**-53 <= lower <= 0.5
+    assert len(world.distances(max_distance=lower)) == 1  # not proven to be farther
+    assert len(world.distances(max_distance=np.nextafter(lower, 0))) == 0
 
 
 def test_order_of_adding_and_moving_there_and_back_change_nothing():

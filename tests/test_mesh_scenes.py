@@ -254,7 +254,9 @@ def test_deep_touching_and_near_meshes_are_told_apart():
     assert deep.upper == 0.0 and 0 < deep.depth <= 0.75 and not deep.certified
     text = "\n".join("".join(t for t, _ in line) for line in terminal.render(r, width=140))
     assert f"≤ {deep.depth * 1e3:.3f} mm" in text and "a shorter one may do" in text
-    assert "MESHES  as they are" in text and "solid of 20 facets" in text
+    assert "4 as they are, triangle by triangle; all are solid" in text
+    everything = "\n".join("".join(t for t, _ in line) for line in terminal.render(r, everything=True, width=140))
+    assert "MESHES  as they are" in everything and "solid of 20 facets" in everything
 
 
 def test_pairs_that_cannot_be_answered_are_listed_and_the_rest_is_answered(tmp_path, monkeypatch):

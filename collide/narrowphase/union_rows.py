@@ -171,9 +171,16 @@ def find_way_out(score, at, out_at, ints, numbers, poses, shape_of, first_a, par
     row = view_f64(out_at, 12)
     words = view_i32(out_at, ROW // 4)
     marks = view_u8(out_at, ROW)
-    error_a, curved_a = _error_of(ints, numbers, poses, shape_of, first_a, parts_a)
-    error_b, curved_b = _error_of(ints, numbers, poses, shape_of, first_b, parts_b)
-    error = error_a + error_b
+    # Seen from between the bodies, whichever is A: where in the world the pair stands is no part of its size.
+    p = POSE * first_a + 9
+    q = POSE * first_b + 9
+    ox = 0.5 * poses[p] + 0.5 * poses[q]
+    oy = 0.5 * poses[p + 1] + 0.5 * poses[q + 1]
+    oz = 0.5 * poses[p + 2] + 0.5 * poses[q + 2]
+    size_a, slop_a, curved_a = _size_of(ints, numbers, poses, shape_of, first_a, parts_a, ox, oy, oz)
+    size_b, slop_b, curved_b = _size_of(ints, numbers, poses, shape_of, first_b, parts_b, ox, oy, oz)
+    size = size_a + size_b
+    error = ERROR * size + (slop_a + slop_b)
     best = math.inf
     upper = row[UPPER]
     for k in range(int(score[at + _OVERLAPS])):
@@ -181,8 +188,8 @@ def find_way_out(score, at, out_at, ints, numbers, poses, shape_of, first_a, par
         nx = score[tried + _VECTORS]
         ny = score[tried + _VECTORS + 1]
         nz = score[tried + _VECTORS + 2]
-        depth = _extent(ints, numbers, poses, shape_of, first_a, parts_a, nx, ny, nz)
-        depth += _extent(ints, numbers, poses, shape_of, first_b, parts_b, -nx, -ny, -nz)
+        depth = _extent(ints, numbers, poses, shape_of, first_a, parts_a, ox, oy, oz, nx, ny, nz)
+        depth += _extent(ints, numbers, poses, shape_of, first_b, parts_b, ox, oy, oz, -nx, -ny, -nz)
         if depth + error < best:
             best = depth + error
             for j in range(9):
@@ -201,7 +208,7 @@ def find_way_out(score, at, out_at, ints, numbers, poses, shape_of, first_a, par
             half = 0.5 * row[DISTANCE] * row[NORMAL + j]
             row[POINT_A + j] = middle - half
             row[POINT_B + j] = middle + half
-    promised = (PROMISE_CURVED if curved_a or curved_b else PROMISE_STORED) / ERROR * error
+    promised = (PROMISE_CURVED if curved_a or curved_b else PROMISE_STORED) * size
     if not upper - row[LOWER] <= promised:
         marks[CERTIFIED] = 0
 
@@ -212,8 +219,8 @@ def _is_halfspace(ints, shape_of, first, parts):
 
 
 @kernel
-def _error_of(ints, numbers, poses, shape_of, first, parts):
-    """(how far a body's extent may be off, whether one of its parts is no polytope)."""
+def _size_of(ints, numbers, poses, shape_of, first, parts, ox, oy, oz):
+    """(size of a body seen from a point o of the world, how far its points may be off besides, whether a part is no polytope)."""
     size = 0.0
     slop = 0.0
     pose_slop = 0.0
@@ -221,18 +228,17 @@ def _error_of(ints, numbers, poses, shape_of, first, parts):
     for part in range(first, first + parts):
         p = POSE * part
         at = NUMBERS * shape_of[part]
-        size = max(
-            size, 2 * numbers[at + REACH] + numbers[at + RADIUS] + (abs(poses[p + 9]) + abs(poses[p + 10]) + abs(poses[p + 11]))
-        )
+        away = abs(poses[p + 9] - ox) + abs(poses[p + 10] - oy) + abs(poses[p + 11] - oz)
+        size = max(size, 2 * numbers[at + REACH] + numbers[at + RADIUS] + away)
         slop = max(slop, numbers[at + SLOP])
         pose_slop = max(pose_slop, poses[p + POSE_SLOP])
         curved = curved or ints[INTS * shape_of[part] + KIND] != POINTS
-    return ERROR * size + (slop + pose_slop), curved
+    return size, slop + pose_slop, curved
 
 
 @kernel
-def _extent(ints, numbers, poses, shape_of, first, parts, nx, ny, nz):
-    """How far a body reaches along n, in the world."""
+def _extent(ints, numbers, poses, shape_of, first, parts, ox, oy, oz, nx, ny, nz):
+    """How far a body reaches along n from a point o of the world."""
     farthest = -math.inf
     for part in range(first, first + parts):
         shape = shape_of[part]
@@ -250,7 +256,7 @@ def _extent(ints, numbers, poses, shape_of, first, parts, nx, ny, nz):
             ints[INTS * shape + TREE], 0, -1, gx, gy, gz,
         )  # fmt: skip
         core = x * gx + y * gy + z * gz
-        shift = poses[p + 9] * nx + poses[p + 10] * ny + poses[p + 11] * nz
+        shift = (poses[p + 9] - ox) * nx + (poses[p + 10] - oy) * ny + (poses[p + 11] - oz) * nz
         farthest = max(farthest, core + shift + numbers[NUMBERS * shape + RADIUS])
     return farthest
 
