@@ -48,6 +48,8 @@ def number(value: Any) -> float | None:
 
 def limit(what: str, value: Any, unit: str = " [m]") -> float:
     """A limit: a number ≥ 0, infinity allowed where it is given as such. Raises InvalidArgument."""
+    if type(value) is float and value >= 0.0:  # what single calls come with
+        return value
     read = number(value)
     if read is None or not read >= 0.0 or (math.isinf(read) and value != read):
         raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {told(value)}")

@@ -153,3 +153,16 @@ def test_what_a_boolean_proves_a_distance_knows():
         g = X_WB[:3, :3].T @ n
         lowest = X_WB[:3, 3] @ n - B.length / 2 * abs(g[2]) - B.radius * math.hypot(g[0], g[1])
         assert r.upper >= lowest - highest - 1e-14, told
+
+
+def test_no_hull_is_made_where_nothing_is_open():
+    """Hulls settle what facets leave open; meshes that meet or are apart clear of rounding need none."""
+    points = naive.rng_of("no hull").normal(size=(100, 3))
+    mesh = meshed(points)
+    near, far = collide.pose((0.5, 0, 0)), collide.pose((9, 0, 0))
+    for other in (meshed(points), collide.Sphere(0.3), collide.Cylinder(0.3, 1)):
+        assert collide.collide(mesh, other, np.eye(4), near) and not collide.collide(mesh, other, np.eye(4), far)
+        assert collide.distance(mesh, other, np.eye(4), far).lower > 0.0
+    assert not hasattr(mesh, "_hull")
+    assert collide.distance(mesh, collide.Sphere(0.3), np.eye(4), near).hit
+    assert hasattr(mesh, "_hull")  # a depth begins with it

@@ -32,9 +32,10 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones
         states = union_states(A, B, X_WA, X_WB, open_ones=open_ones)
     else:
         states = mesh_states(A, B, X_WA, X_WB)
-    left, hulls = np.flatnonzero(states == OPEN), (convex_cover(A), convex_cover(B))
-    if len(left) and None not in hulls:
-        states[left[~ask(*hulls, _some(X_WA, left), _some(X_WB, left), True, 0.0, False, 1)]] = APART
+    left = np.flatnonzero(states == OPEN)
+    covers = _covers(A, B) if len(left) else None  # a mesh's hull is made when it is first needed
+    if covers is not None:
+        states[left[~ask(*covers, _some(X_WA, left), _some(X_WB, left), True, 0.0, False, 1)]] = APART
     return states
 
 
@@ -46,9 +47,10 @@ def pair_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: 
     """
     rows_of = union_rows if is_union(A) or is_union(B) else mesh_rows
     rows = rows_of(A, B, X_WA, X_WB, limit=limit, depths=depths)
-    left, hulls = np.flatnonzero(rows["how"] == UNDECIDED), (convex_cover(A), convex_cover(B))
-    if len(left) and None not in hulls:
-        told = ask(*hulls, _some(X_WA, left), _some(X_WB, left), False, math.inf, False, 1, depths=False)
+    left = np.flatnonzero(rows["how"] == UNDECIDED)
+    covers = _covers(A, B) if len(left) else None
+    if covers is not None:
+        told = ask(*covers, _some(X_WA, left), _some(X_WB, left), False, math.inf, False, 1, depths=False)
         apart = told["lower"] > 0.0
         _part(rows, left[apart], told[apart], limit)
     return rows
@@ -60,6 +62,11 @@ def convex_cover(shape: Shape) -> Shape | None:
     if isinstance(shape, Mesh):
         return shape.convex_hull
     return None if shape.meshed else shape
+
+
+def _covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
+    one, other = convex_cover(A), convex_cover(B)
+    return None if one is None or other is None else (one, other)
 
 
 def _some(X: np.ndarray, which: np.ndarray) -> np.ndarray:
