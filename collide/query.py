@@ -302,8 +302,8 @@ def _prepare(A, B) -> None:
         pair = UnionPair(A.laid_out(), B.laid_out())
     if pair is None:
         return
-    while len(prepared) >= _PARTNERS:
-        prepared.pop(next(iter(prepared)), None)
+    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _PARTNERS)]:  # a list: other threads add and finalizers take
+        prepared.pop(oldest, None)
     prepared[serial] = pair
     weakref.finalize(B, prepared.pop, serial, None)  # what is gone is not held by its partners
 
