@@ -14,7 +14,6 @@ from soak_pairs import CURVED, KINDS, draw, question
 import collide
 
 SEED, PAIRS, RATIO = 1, 180, 1e6
-#: Lines "seed case: promise" of failures that are known and not mended yet: to be emptied, and no others are forgiven.
 #: Pairs that found a failure once, (seed, case): 1, 3, 4, 11 and 13 of the attack on the engine, and later ones.
 FOUND = [
     *((2, k) for k in (1, 37, 95, 101, 137, 182, 225, 304, 322, 395, 539, 653, 921, 957, 1140, 1327, 1394, 1480, 2104)),
