@@ -221,10 +221,16 @@ def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bo
     row["certified"] = bool(decided and bound == 0.0)
 
 
+def reach_of(body: Body) -> float:
+    """How far the body reaches from its frame's origin [m]: never less than any of its points."""
+    x, y, z = body.tree.numbers[REACH : REACH + 3].tolist()
+    return math.sqrt(x * x + y * y + z * z) + body.radius
+
+
 def _size(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
-    """(n,) reaches of both from their frames' origins, the distance between these, and the radii."""
-    reaches = sum(float(body.tree.numbers[REACH : REACH + 3].sum()) + body.radius for body in (A, B))
-    return reaches + np.abs(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1)
+    """(n,) S of docs/conventions.md: reaches of both from their frames' origins, and the distance between these."""
+    x, y, z = (X_WB[:, :3, 3] - X_WA[:, :3, 3]).T
+    return (reach_of(A) + reach_of(B)) + np.sqrt(x * x + y * y + z * z)
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

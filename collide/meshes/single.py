@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.answers import NEAR, PROMISE
+from collide.meshes.answers import NEAR, PROMISE, reach_of
 from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
 from collide.meshes.hits import APART, HIT
 from collide.meshes.pair_queries import pair_states
@@ -39,7 +38,7 @@ class PreparedPair:
         self._pair = SingleMeshPair(*sides, exchanged, one.radius + other.radius)
         self.collide = self._pair.collide
         self._exchanged, self._radii = exchanged, (one.radius, other.radius)
-        self._reaches = sum(float(body.tree.numbers[REACH : REACH + 3].sum()) + body.radius for body in (one, other))
+        self._reaches = reach_of(one) + reach_of(other)
 
     def distance(self, X_WA, X_WB, _depths: bool) -> np.ndarray | None:
         """The row of one gap, bit by bit that of a batch (`answers.mesh_rows`); None of overlaps, and of what a batch
@@ -62,7 +61,8 @@ class PreparedPair:
             for at, side in ((POINT_A, self._radii[0]), (POINT_B, -self._radii[1]))
         ]
         facets = [marks[FACET_A], marks[FACET_B]]
-        away = abs(X_WB[0, 3] - X_WA[0, 3]) + abs(X_WB[1, 3] - X_WA[1, 3]) + abs(X_WB[2, 3] - X_WA[2, 3])
+        x, y, z = (float(X_WB[k, 3] - X_WA[k, 3]) for k in range(3))
+        away = math.sqrt(x * x + y * y + z * z)
         if numbers[DISTANCE] <= NEAR * (self._reaches + away):
             return None
         narrow = upper <= lower + PROMISE * (self._reaches + away)
