@@ -169,7 +169,7 @@ def judge_points(asked: Asked) -> Iterator[Failure]:
 def judge_move(asked: Asked) -> Iterator[Failure]:
     """Moving B by −distance · normal brings the pair to touch, and of unions parts them."""
     r, case = asked.r, asked.case
-    tolerance = 4 * POINTS * asked.coordinates + (r.upper - r.lower) * asked.one_convex
+    tolerance = 4 * POINTS * asked.coordinates + (r.upper - r.lower) * (asked.one_convex or r.distance > 0)
     parts_only = r.distance <= 0 and not asked.one_convex
     moved = case.X_WB.copy()
     moved[:3, 3] -= (r.distance - 1e-9 * asked.S * parts_only) * r.normal

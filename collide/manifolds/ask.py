@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     Shapes = Shape | Sequence[Shape]
 
 _U = 2.0**-53
+#: Contacts nearer to the margin than this share of the pair's size are looked at by their distance.
+_ROUNDING = 2.0**-40
 #: Margins beyond this are no margins, and would overflow squared.
 _LARGEST_MARGIN = 1e50
 
@@ -79,7 +81,8 @@ def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
     """Rows of two shapes at checked poses (4, 4): none where `distance` proves them farther apart than the margin."""
     rows = _rows_of_parts(A, B, X_WA, X_WB, margin, most)
     # Parts are asked a little beyond the margin, for what rounding may have moved; where that matters the distance tells.
-    near = not len(rows) or rows["upper"].min() <= margin
+    size = _reach(A) + _reach(B) + float(np.abs(X_WB[:3, 3] - X_WA[:3, 3]).sum())
+    near = not len(rows) or rows["upper"].min() <= margin - _ROUNDING * size
     if near or ask(A, B, X_WA[None], X_WB[None], False, math.inf, False, 1)["lower"][0] <= margin:
         return rows
     return no_rows()

@@ -210,7 +210,7 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
     none = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
     out["distance"][none] = np.maximum(out["upper"][none], 5e-324)
     out["upper"] = np.maximum(out["upper"], out["distance"])
-    lay_points_apart(out, np.flatnonzero(out["distance"] != rows["distance"][best]))
+    lay_points_apart(out, np.flatnonzero((out["distance"] != rows["distance"][best]) | (rows["how"][best] == UNDECIDED)))
     promise = PROMISE_STORED if E.packed.kind == POINTS else PROMISE_CURVED
     out["certified"] = certified | (out["upper"] - out["lower"] <= promise * _size(A, E, PA, PB))
     out["how"][out["how"] == UNDECIDED] = EXACT  # the polytope around it is apart from the mesh
