@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from collide.batches import ask
-from collide.geometry.mesh_tree.layout import REACH
-from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace
+from collide.meshes.bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace, reach_of
 from collide.meshes.curved import curved_rows, decide
 from collide.meshes.enclosures import enclosure_of
 from collide.meshes.facet_rows import Posed
@@ -219,12 +218,6 @@ def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bo
     row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
     row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
     row["certified"] = bool(decided and bound == 0.0)
-
-
-def reach_of(body: Body) -> float:
-    """How far the body reaches from its frame's origin [m]: never less than any of its points."""
-    x, y, z = body.tree.numbers[REACH : REACH + 3].tolist()
-    return math.sqrt(x * x + y * y + z * z) + body.radius
 
 
 def _size(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:

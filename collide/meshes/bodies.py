@@ -15,7 +15,7 @@ from collide import reading
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.geometry.mesh_tree.layout import MeshTree
+from collide.geometry.mesh_tree.layout import REACH, MeshTree
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.shapes.base import Shape, is_plain
 from collide.shapes.compound import Compound
@@ -104,6 +104,12 @@ def hull_of(body: Body) -> Shape:
 def farthest_told(A: Body, B: Body) -> float:
     """The largest gap [m] that box-trees tell: their boxes are floats, in units of the smaller body's size."""
     return _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
+
+
+def reach_of(body: Body) -> float:
+    """How far the body reaches from its frame's origin [m]: never less than any of its points."""
+    x, y, z = body.tree.numbers[REACH : REACH + 3].tolist()
+    return math.sqrt(x * x + y * y + z * z) + body.radius
 
 
 def _of_mesh(mesh: Mesh) -> Body:

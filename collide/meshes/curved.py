@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.batches import ask
-from collide.geometry.mesh_tree.layout import REACH
 from collide.geometry.packing import POINTS
-from collide.meshes.bodies import Body, farthest_told, hull_of
+from collide.meshes.bodies import Body, farthest_told, hull_of, reach_of
 from collide.meshes.enclosures import Enclosure
 from collide.meshes.facet_rows import Posed, facet_rows
 from collide.meshes.hits import APART, HIT, OPEN, core_hits, holds_points
@@ -219,8 +218,7 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
 
 def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
     """(n,) S of `narrowphase/bounds.py`."""
-    reach = float(np.sqrt(np.square(A.tree.numbers[REACH : REACH + 3]).sum())) + E.packed.reach
-    return reach + np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
+    return reach_of(A) + E.packed.reach + np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
 
 
 def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):

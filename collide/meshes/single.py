@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from collide.meshes.answers import NEAR, PROMISE, reach_of
-from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace
+from collide.meshes.answers import NEAR, PROMISE
+from collide.meshes.bodies import Body, body_of, has_facets, is_halfspace, reach_of
 from collide.meshes.hits import APART, HIT
 from collide.meshes.pair_queries import pair_states
 from collide.meshes.union_parts import is_union
