@@ -9,12 +9,12 @@ from threading import local
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.tables import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.geometry.union_table import BALL_IN_WORLD, LaidOut, UnionTable
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.narrowphase import run
 from collide.narrowphase.answer import DOUBLES, INTEGERS, answer_pairs
-from collide.narrowphase.array_objects import built_in, object_words
 from collide.narrowphase.single_unions import collide_single_union, distance_single_union
 from collide.narrowphase.union_poses import (
     ASKED,
@@ -54,7 +54,7 @@ class _Workspace:
 
     def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
         """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        return np.array((answer_pairs.address, *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
+        return np.array((code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
 
 
 class _SingleSpace(_Workspace):
@@ -135,18 +135,19 @@ class UnionPair:
         self.collide = self._distance = _long_way
         if self.unions.counts.prod() > _MOST_AT_ONCE:
             return
-        if UnionPair._space is None or UnionPair._space.room < self.unions.most:
-            UnionPair._space = _SingleSpace(self.unions.most)
-        self._held = space = UnionPair._space  # pairs made before have a smaller one
+        space = UnionPair._space  # read once: another thread may put a smaller one there
+        if space is None or space.room < self.unions.most:
+            space = UnionPair._space = _SingleSpace(self.unions.most)
+        self._held = space  # pairs made before have a smaller one
         header = space.header_of(self.unions, space.scratch)
-        words = np.array([*object_words(), answer_unions.address, address_of(space.byte), *header.tolist()])
-        self.collide, self._distance = built_in(collide_single_union, words), built_in(distance_single_union, words)
+        words = np.array([code_of(answer_unions), address_of(space.byte), *header.tolist()])
+        self.collide = prepared_boolean(collide_single_union, words)
+        self._distance = prepared_row(distance_single_union, words)
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        said = self._distance(X_WA, X_WB, rows) if depths else self._distance(X_WA, X_WB, rows, None)
-        return None if said is None else rows
+        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows
 
 
 #: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.

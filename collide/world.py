@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import _jit, journal, reading
+from collide import journal, reading
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
 from collide.margins import checked_margin, within
@@ -280,7 +280,7 @@ class World:
 
         bodies, static, pairs (of all bodies), skipped {reason: pairs}, narrowphase (pairs of bodies
         answered), convex_pairs (of their parts), mesh_pairs (of bodies, one a mesh or with one), hits, undecided, how {argument: pairs},
-        gjk_iterations, epa_iterations, seconds {compile, pack, broadphase, narrowphase}.
+        gjk_iterations, epa_iterations, seconds {pack, broadphase, narrowphase}.
         """
         if self._asked is not None:
             self._stats, self._asked = self._asked.stats(), None
@@ -288,7 +288,6 @@ class World:
 
     def _ask(self, limit: float, *, boolean: bool = False) -> np.ndarray:
         """Rows of all tested pairs within the limit; of a boolean, rows up to the first hit, without names of bodies."""
-        compiling = sum(_jit.seconds.values())
         started = time.perf_counter()
         packed = self._pack()
         ready = time.perf_counter()
@@ -296,24 +295,12 @@ class World:
         culled = time.perf_counter()
         rows, *answered = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=boolean)
         ended = time.perf_counter()
-        compiled = sum(_jit.seconds.values()) - compiling
-        seconds = {
-            "compile": compiled, "pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled,
-        }  # fmt: skip
-        self._take_compilation_out(seconds, compiled)
+        seconds = {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled}
         columns = rows["hit"].copy(), rows["how"].copy(), rows["iterations"].copy()
         self._asked = _Asked(packed, len(candidates), *columns, answered, seconds)
         if not boolean:
             rows["a"], rows["b"] = packed.ids[rows["a"]], packed.ids[rows["b"]]
         return rows
-
-    @staticmethod
-    def _take_compilation_out(seconds: dict, compiled: float) -> None:
-        """Kernels compile at their first call, within a stage: charge the stage for its own work only."""
-        for stage in ("narrowphase", "pack", "broadphase"):
-            own = min(compiled, seconds[stage])
-            seconds[stage] -= own
-            compiled -= own
 
     def _pack(self) -> PackedWorld:
         if self._packed is None:

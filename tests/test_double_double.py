@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide._jit import address_of, entry, view_f64
 from collide.geometry import double_double
 from collide.geometry.error_free import dekker_product, two_product, two_sum
 from collide.geometry.scan import (
@@ -17,6 +16,7 @@ from collide.geometry.scan import (
     least,
     least_one_by_one,
 )
+from collide.kernels import address_of, entry, view_f64
 
 
 @entry("void(int64, int64, int64)")

@@ -17,8 +17,8 @@ import pytest
 
 import collide
 from collide import _lean_compile
-from collide._jit import PLAIN_PYTHON, address_of, entry, view_f64
 from collide.geometry.tables import moved_pose
+from collide.kernels import PLAIN_PYTHON, address_of, entry, view_f64
 
 #: Asks for a bounding box: the smallest kernel, whose callee `support_vertex` stands in another file.
 CHILD = """

@@ -14,9 +14,9 @@ from naive import Case, random_pose, rng_of
 
 import collide
 from collide import batches, query, unions
-from collide._jit import address_of, entry, view_f64
 from collide.geometry.tables import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
 from collide.geometry.union_table import PART, lay_out
+from collide.kernels import address_of, entry, view_f64
 from collide.narrowphase import run
 from collide.narrowphase.parts import place_part, write_terms
 from collide.results import EXACT, SWEPT, UNDECIDED, flipped

@@ -13,8 +13,8 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
-from collide._jit import address_of, entry
 from collide.geometry.tables import ShapeTable, pose_table
+from collide.kernels import address_of, entry
 from collide.narrowphase import small_hulls
 from collide.narrowphase.portals import ROUNDS
 from collide.results import HOW, PAIR_DTYPE, flipped

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import collide
-from collide._jit import PLAIN_PYTHON
+from collide.kernels import PLAIN_PYTHON
 
 pytestmark = pytest.mark.skipif(PLAIN_PYTHON, reason="nothing is compiled")
 

@@ -13,8 +13,8 @@ import pytest
 from naive import rng_of
 
 from collide import _kernel_cache
-from collide._jit import PLAIN_PYTHON, entry, kernel_cache_folder
 from collide.cache_folder import TRUST, make_private, why_distrusted
+from collide.kernels import PLAIN_PYTHON, entry, kernel_cache_folder
 
 needs_modes = pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
 needs_compiler = pytest.mark.skipif(PLAIN_PYTHON, reason="nothing is compiled")

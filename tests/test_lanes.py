@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import collide
-from collide._jit import address_of, entry, kernel, view_f64
-from collide._lanes import LANES, any_of, root_of, select, transpose_eight, view_lanes
 from collide.geometry import double_double
 from collide.geometry.error_free import dekker_product, two_product, two_sum
+from collide.kernels import address_of, entry, kernel, view_f64
+from collide.kernels.lanes import LANES, any_of, root_of, select, transpose_eight, view_lanes
 from collide.narrowphase import fine, gap
 
 #: Numbers that go into one round of all operations, and that come out.

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import collide
-from collide._jit import address_of, entry, view_f64
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.support_tree.build import build_support_tree
 from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS, exact_sign_of_pairs
 from collide.geometry.support_tree.planted import PlantedTree
+from collide.kernels import address_of, entry, view_f64
 from collide.narrowphase.descent import MOST_NEIGHBOURS, descend, lowest_of_all
 
 EYE = np.eye(4)

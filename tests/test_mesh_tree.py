@@ -9,7 +9,6 @@ import pytest
 from mesh_families import grid, soup
 from mesh_shapes import bumpy_sphere
 
-from collide._jit import address_of, entry, view_f32
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.eight_boxes import (
     NEAR_PROBE,
@@ -24,6 +23,7 @@ from collide.geometry.mesh_tree.eight_boxes import (
 from collide.geometry.mesh_tree.graded import graded_tree
 from collide.geometry.mesh_tree.layout import NODE, NOTHING, SLAB, MeshTree
 from collide.geometry.mesh_tree.validate import validate_graded_tree, validate_mesh_tree
+from collide.kernels import address_of, entry, view_f32
 from collide.narrowphase.triangles.queries import all_hits
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from collide._jit import address_of, entry, view_f64, view_i64
 from collide.geometry.scan import farthest, farthest_listed, farthest_one_by_one
 from collide.geometry.supports import support_vertex
+from collide.kernels import address_of, entry, view_f64, view_i64
 
 COUNTS = (*range(8, 140), *range(144, 513, 8), 511, 1024, 2047, 2048)
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, view_f64, view_i64
+from collide.kernels import address_of, entry, view_f64, view_i64
 
 #: Bits of a Morton code along each axis.
 _BITS = 16

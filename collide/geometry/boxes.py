@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i64
 from collide.geometry.packing import HALFSPACE
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import (
@@ -24,6 +23,7 @@ from collide.geometry.tables import (
     TREE,
     ShapeTable,
 )
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
 #: derivation in `narrowphase/bounds.py` needs fewer.

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.error_free import two_sum
+from collide.kernels import kernel
 
 #: Bits of a digit.
 BITS = 26

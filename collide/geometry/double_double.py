@@ -10,9 +10,9 @@ A number is passed as two doubles, or as two `Lanes` for eight numbers at once, 
 
 from __future__ import annotations
 
-from collide._jit import kernel
-from collide._lanes import root_of, select
 from collide.geometry.error_free import two_product, two_sum
+from collide.kernels import kernel
+from collide.kernels.lanes import root_of, select
 
 #: Relative error of an operation of this file.
 ROUNDING = 2.0**-102

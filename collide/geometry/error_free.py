@@ -7,7 +7,7 @@ fused instruction instead of Dekker's sixteen.
 
 from __future__ import annotations
 
-from collide._jit import PLAIN_PYTHON, kernel
+from collide.kernels import WITH_NUMBA, kernel
 
 
 @kernel(inline=True)
@@ -31,10 +31,10 @@ def dekker_product(a, b):
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-if PLAIN_PYTHON:
+if not WITH_NUMBA:
     two_product = dekker_product
 else:
-    from collide._lanes import product_error
+    from collide.kernels.compiled_lanes import product_error
 
     @kernel(inline=True)
     def two_product(a, b):

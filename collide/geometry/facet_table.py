@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.packing import BLOCK, POINTS, PackedConvex, pack_points
 from collide.geometry.tables import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH
+from collide.kernels import address_of
 
 #: Exponent of the lowest bit of coordinates that are all 0, as in `packing.lowest_exponent`.
 _NO_BITS = 2000

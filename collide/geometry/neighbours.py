@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i64
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Points a leaf holds at most.
 _LEAF = 8

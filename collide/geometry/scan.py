@@ -7,7 +7,7 @@ a point does not depend on its place, on the processor, or on whether kernels ar
 
 from __future__ import annotations
 
-from collide._jit import PLAIN_PYTHON, kernel
+from collide.kernels import WITH_NUMBA, kernel
 
 
 @kernel
@@ -44,14 +44,14 @@ def count_level_one_by_one(coordinates, stride, count, gx, gy, gz, limit):
     return found
 
 
-if PLAIN_PYTHON:
+if not WITH_NUMBA:
     farthest = farthest_listed = farthest_one_by_one
     least, count_level = least_one_by_one, count_level_one_by_one
 else:
-    from collide._simd import farthest_of_blocks as farthest
-    from collide._simd import farthest_of_list as farthest_listed
-    from collide._simd import least_of_blocks as least
-    from collide._simd import level_in_blocks as count_level
+    from collide.kernels.vectors import farthest_of_blocks as farthest
+    from collide.kernels.vectors import farthest_of_list as farthest_listed
+    from collide.kernels.vectors import least_of_blocks as least
+    from collide.kernels.vectors import level_in_blocks as count_level
 
 #: ``farthest(coordinates, start, stride, count, gx, gy, gz) -> (index, value)``: the largest
 #: x·gx + y·gy + z·gz among ``count`` points, 8 or more. Point i has its x at

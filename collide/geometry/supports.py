@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.packing import COARSE, CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
 from collide.geometry.support_tree.query import extreme_vertex_listed
 from collide.geometry.support_tree.settle import settle_vertex
+from collide.kernels import kernel, view_f64, view_i64
 
 
 @kernel(inline=True)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.packing import PackedConvex
+from collide.kernels import address_of
 
 # One row of integers a shape.
 KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.packing import HALFSPACE, POINTS, PackedConvex
 from collide.geometry.tables import ShapeTable
+from collide.kernels import address_of
 
 # Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest its
 # core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept over it.

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i64, view_u8
-from collide._lanes import LANES
 from collide.geometry.double_double import add, bracket
 from collide.geometry.packing import POINTS
 from collide.geometry.supports import settled_vertex, support
 from collide.geometry.tables import NUMBERS, POSE, RADIUS
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels.lanes import LANES
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.cores import (
     FINE_AT,

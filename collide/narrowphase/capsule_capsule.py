@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 from collide.narrowphase.minkowski import POINT
 
 

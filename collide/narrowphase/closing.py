@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.rows import (
     BODY_B,
     CERTIFIED,

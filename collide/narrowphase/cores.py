@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
+from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import GJK_ROUNDS, PROMISE_DEPTH, ROOMY, TOLERANCE_CURVED
 from collide.narrowphase.capsule_capsule import across_segments, nearest_of_segments
 from collide.narrowphase.epa.expand import FLAT, epa, facet_of, height_over

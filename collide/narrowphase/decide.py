@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.kernels import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.epa.foot import weigh_corners
 from collide.narrowphase.exact.all_planes import ROOM
@@ -139,7 +139,7 @@ def _points_miss(row, size, distance):
     return miss > _NEAR_MISS * reach
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)", hasty=True)
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)")
 def decide_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.double_double import bracket
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.kernels import entry, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.decide import DIGITS
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE
@@ -21,7 +21,7 @@ from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, 
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)", hasty=True)
+@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)")
 def decide_planes(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):

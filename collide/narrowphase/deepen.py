@@ -5,11 +5,11 @@ An entry point of its own: one overlap in thousands needs it, and it takes secon
 
 from __future__ import annotations
 
-from collide._jit import entry, view_f64, view_i64, view_u8
 from collide.geometry.double_double import add, bracket
 from collide.geometry.error_free import two_sum
 from collide.geometry.packing import POINTS
 from collide.geometry.tables import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.kernels import entry, view_f64, view_i64, view_u8
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.decide import DIGITS, set_normal
 from collide.narrowphase.exact.all_planes import depth_by_all_planes
@@ -18,7 +18,7 @@ from collide.narrowphase.rows import LOWER, ROW, UPPER, write_verdict
 from collide.results import EXACT
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)", hasty=True)
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)")
 def deepen_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, open_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
 ):

@@ -21,12 +21,12 @@ less than `HEIGHT_ERROR`.
 
 from __future__ import annotations
 
-from collide._jit import kernel, view_i64
 from collide.geometry.double_double import product_of_vectors
 from collide.geometry.error_free import two_sum
 from collide.geometry.support_tree.exact_sign import exact_sign_of_pairs
 from collide.geometry.support_tree.layout import FLAT, HEADER
 from collide.geometry.support_tree.query import rings_of
+from collide.kernels import kernel, view_i64
 
 #: Neighbours that may be looked at on the way down; those left are for `lowest_of_all`.
 MOST_NEIGHBOURS = 768

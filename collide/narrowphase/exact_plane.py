@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import (
     BITS,
     add_double,
@@ -21,6 +20,7 @@ from collide.geometry.digits import (
     lowest_bit,
 )
 from collide.geometry.double_double import add, divide, square_root
+from collide.kernels import kernel
 from collide.narrowphase.exact.search import SEPARATE, TOUCHING, UNDONE
 from collide.narrowphase.exact.workspace import add_entry, exact_pose, lowest_and_largest, span_of_entries
 from collide.narrowphase.halfspace_convex import plane_in_world

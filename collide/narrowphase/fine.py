@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64
-from collide._lanes import any_of, root_of, select
 from collide.geometry.double_double import cross, multiply, product_of_vectors, square_root, subtract
 from collide.geometry.error_free import two_product, two_sum
 from collide.geometry.tables import LOW_PARTS, POSE_SLOP, POSE_TERMS, TERM_ROW
+from collide.kernels import kernel, view_f64
+from collide.kernels.lanes import any_of, root_of, select
 
 #: Doubles stored a point: three double-doubles.
 FINE = 6

@@ -17,10 +17,10 @@ height of a point is off by less than `HEIGHT_ERROR`.
 
 from __future__ import annotations
 
-from collide._jit import kernel
-from collide._lanes import select
 from collide.geometry.double_double import add, bracket, divide, loose_product
 from collide.geometry.error_free import two_product, two_sum
+from collide.kernels import kernel
+from collide.kernels.lanes import select
 from collide.narrowphase.fine import (
     FINE,
     HEIGHT_ERROR,

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.packing import POINTS
+from collide.kernels import kernel
 from collide.narrowphase.grown_simplex import pick, with_newest
 from collide.narrowphase.minkowski import (
     POINT,

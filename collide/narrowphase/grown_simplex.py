@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 from collide.narrowphase.simplex import height_behind
 
 #: How far, relatively, the square of a length may be from the least product of a corner with it.

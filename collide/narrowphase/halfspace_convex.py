@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.double_double import add, divide, multiply, product_of_vectors, square_root, subtract
 from collide.geometry.error_free import two_product, two_sum
+from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.fine import (
     HEIGHT_ERROR,
     LARGEST_FINE,

@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
 from collide.geometry.hierarchies.hierarchy import Hierarchy
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.simplex import nearest_in_simplex
 

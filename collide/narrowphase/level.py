@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64
 from collide.geometry.double_double import add
 from collide.geometry.scan import count_level
 from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
 from collide.geometry.support_tree.query import rings_of
+from collide.kernels import kernel, view_f64
 from collide.narrowphase.descent import descend, direction_in_body, lowest_of_all
 
 #: Most level vertices that `tied_vertices` lists.

@@ -20,8 +20,8 @@ rows. Triangle meshes are answered over their box-trees (`collide.meshes`), thei
 
 from __future__ import annotations
 
-from collide._jit import kernel
 from collide.geometry.packing import HALFSPACE, POINTS
+from collide.kernels import kernel
 
 CAPSULES, HALFSPACE_CONVEX, HALFSPACES, CONVEX = range(4)
 

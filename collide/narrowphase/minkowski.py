@@ -6,9 +6,9 @@ is closest where this set is nearest the origin, overlaps where it contains the 
 
 from __future__ import annotations
 
-from collide._jit import kernel
 from collide.geometry.support_tree.query import two_extreme_vertices
 from collide.geometry.supports import settled_vertex, support
+from collide.kernels import kernel
 
 #: Doubles stored a difference point: w, then a and b in W's axes from their own body's origin.
 POINT = 9

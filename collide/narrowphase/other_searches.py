@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of
+from collide.kernels import address_of
 from collide.narrowphase.answer import answer_pairs
 from collide.results import PAIR_DTYPE, UNDECIDED
 

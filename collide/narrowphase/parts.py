@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64
 from collide.geometry.error_free import two_product, two_sum
 from collide.geometry.tables import (
     LOW_PARTS,
@@ -21,6 +20,7 @@ from collide.geometry.tables import (
     TERMS,
 )
 from collide.geometry.union_table import MEASURE, TURNED
+from collide.kernels import kernel, view_f64
 
 #: Balls apart by more than this share of the bodies' sizes and distance hold parts that are apart: their centres and
 #: radii are good to 2⁻⁴⁵ of it, with all that rounding and slops of poses may add.

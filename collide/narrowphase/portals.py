@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
-from collide._lanes import any_of, root_of, select
+from collide.kernels import kernel
+from collide.kernels.lanes import any_of, root_of, select
 from collide.narrowphase.fine import smaller
 
 #: Most vertices of a small hull, of which a block goes together. For booleans of 64, GJK is as fast.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.packing import HALFSPACE
 from collide.geometry.tables import (
     ADDRESS,
@@ -29,6 +28,7 @@ from collide.geometry.tables import (
     SLOP,
     TREE,
 )
+from collide.kernels import kernel, view_f64, view_i64
 
 #: A matrix is said to stretch by the root of this at least, 3e-151.
 _LEAST_SQUARE = 2.0**-1000

@@ -7,8 +7,8 @@ compiled (`_jit.native_call`), not compiled once more.
 
 from __future__ import annotations
 
-from collide._jit import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.geometry.tables import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
+from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.narrowphase.answer import SIGNATURE
 from collide.narrowphase.posed_pair import stretch_of
 from collide.narrowphase.rows import HIT, HOW, NORMAL, ROW

@@ -6,7 +6,7 @@ facets are farther for certain, the number of facets, and of each the vertex pai
 
 from __future__ import annotations
 
-from collide._jit import kernel
+from collide.kernels import kernel
 
 #: Facets an entry may name: around a corner that touches a face there are a dozen.
 MOST_TIED = 24

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i32, view_u8
+from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.results import PAIR_DTYPE, UNDECIDED
 

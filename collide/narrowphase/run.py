@@ -7,11 +7,11 @@ from threading import local
 
 import numpy as np
 
-from collide._jit import PLAIN_PYTHON, address_of
 from collide.errors import UnsupportedQuery
 from collide.geometry.tables import NO_TERMS, POSE, PoseTable, ShapeTable
+from collide.kernels import PLAIN_PYTHON, address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.narrowphase.answer import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
-from collide.narrowphase.array_objects import built_in, layouts_are_known, object_words
 from collide.narrowphase.closing import close_rows
 from collide.narrowphase.decide import WORKSPACE, decide_pairs
 from collide.narrowphase.decide_planes import decide_planes
@@ -201,7 +201,7 @@ class _Workspace:
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `poses.py` reads first: addresses of the kernel, the tables and this workspace."""
         header = self._header.copy()
-        header[:POSES_AT] = answer_pairs.address, *table.addresses
+        header[:POSES_AT] = code_of(answer_pairs), *table.addresses
         return header
 
 
@@ -215,9 +215,8 @@ class _OfThread(local):
 _of_thread = _OfThread()
 
 
-@cache
 def single_calls_are_safe() -> bool:
-    return not PLAIN_PYTHON and layouts_are_known()  # plain Python lets go of its lock in mid-kernel
+    return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
 @cache
@@ -236,11 +235,10 @@ class SinglePair:
     def __init__(self, table: ShapeTable):
         table.plant(np.arange(2))
         self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
-        header = np.array([*object_words(), *self._space.header_of(table).tolist()])
-        self.collide, self._distance = built_in(collide_single, header), built_in(distance_single, header)
+        header = self._space.header_of(table)
+        self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
         rows = np.zeros(1, dtype=PAIR_DTYPE)
-        said = self._distance(X_WA, X_WB, rows) if depths else self._distance(X_WA, X_WB, rows, None)
-        return None if said is None else rows
+        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows

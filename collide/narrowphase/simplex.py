@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 from collide.narrowphase.minkowski import POINT
 
 #: How often a point within a tetrahedron is weighed at most, and by how much of its size it may be missed.

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
-from collide._lanes import LANES, transpose_eight, view_lanes
 from collide.geometry.packing import POINTS
 from collide.geometry.tables import ADDRESS, INTS, KIND, NUMBERS, PADDED, POSE, RADIUS
+from collide.kernels import kernel, view_f64, view_i64
+from collide.kernels.lanes import LANES, transpose_eight, view_lanes
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.portals import (
     ACROSS,

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.tables import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW
 from collide.geometry.union_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, COUNT, FIRST, PART, TURNED
+from collide.kernels import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.answer import SIGNATURE
 from collide.narrowphase.parts import BALL_MARGIN, gap_of_balls, place_ball, place_part, write_terms
 from collide.narrowphase.poses import set_pose

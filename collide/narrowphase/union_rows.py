@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.packing import HALFSPACE, POINTS
 from collide.geometry.supports import support
 from collide.geometry.tables import (
@@ -27,6 +26,7 @@ from collide.geometry.tables import (
     SLOP,
     TREE,
 )
+from collide.kernels import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.posed_pair import coordinates_of
 from collide.narrowphase.rows import (
@@ -261,7 +261,7 @@ def _extent(ints, numbers, poses, shape_of, first, parts, ox, oy, oz, nx, ny, nz
     return farthest
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)", hasty=True)
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at, shape_of_at, score_at, out_at):
     """Write one row for each of n pairs of bodies from rows of their parts.
 

@@ -10,11 +10,11 @@ of earlier ones, or zeros; what comes of them is not read.
 
 from __future__ import annotations
 
-from collide._jit import kernel, view_f64, view_i64, view_u8
-from collide._lanes import LANES, view_lanes
 from collide.geometry.double_double import bracket
 from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS
 from collide.geometry.tables import ADDRESS, COUNT, INTS, NUMBERS, PADDED, POSE, RADIUS, TREE
+from collide.kernels import kernel, view_f64, view_i64, view_u8
+from collide.kernels.lanes import LANES, view_lanes
 from collide.narrowphase.fine import FINE, LARGEST_FINE, SMALLEST_FINE, is_composed, scale_of, write_low_parts
 from collide.narrowphase.gap import (
     ALONG_A,

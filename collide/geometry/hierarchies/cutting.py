@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_i32, view_i64
 from collide.geometry.hierarchies.facets import cloud_at
 from collide.geometry.hierarchies.insertion import insert_near
 from collide.geometry.hierarchies.perturbed import side
@@ -49,6 +48,7 @@ from collide.geometry.hierarchies.surface import (
     read_ring,
 )  # fmt: skip
 from collide.geometry.hierarchies.thinning import STATE, mesh_at
+from collide.kernels import entry, kernel, view_i32, view_i64
 
 #: Integers of workspace for each neighbour of the vertex: ring, outer, fresh, and the most any way of cutting takes.
 SCRATCH = 20

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.geometry.hierarchies.perturbed import exact_side, rank_of, side
 from collide.geometry.hierarchies.surface import following, preceding
 from collide.geometry.hulls.hull import Hull
 from collide.geometry.hulls.orientation import DIGITS, WORK, survey
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
 
 #: Coordinates that are smaller than the largest by this power of two must not be left to expansions (`orientation`).
 SMALL = -280

@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of, entry, view_i64
 from collide.geometry.hierarchies.cutting import SCRATCH, cut
 from collide.geometry.hierarchies.facets import Cloud, Facets, cloud_at, named_in, true_facets
 from collide.geometry.hierarchies.perturbed import CENTRES, exact_side
@@ -37,6 +36,7 @@ from collide.geometry.hierarchies.thinning import (
     write_level,
 )  # fmt: skip
 from collide.geometry.hulls.hull import Hull
+from collide.kernels import address_of, entry, view_i64
 
 #: The bound c. The proof of Lemma 4.1 asks for more than 3^(2^17). Measured (benchmarks/hierarchies.py), any bound
 #: from 24 on gives the same depth; flat sides and cuts with k corners leave degrees of 2·log2 k + 5, to which 64 leaves room.

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import kernel
 from collide.geometry.hierarchies.perturbed import side
 from collide.geometry.hierarchies.surface import drop_triangle, following, join, new_triangle, preceding
+from collide.kernels import kernel
 
 
 @kernel

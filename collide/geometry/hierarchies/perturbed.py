@@ -15,8 +15,8 @@ random order that leaves O(log k) triangles at a corner of a facet with k.
 
 from __future__ import annotations
 
-from collide._jit import kernel
 from collide.geometry.hulls.orientation import orientation
+from collide.kernels import kernel
 
 #: Points the perturbation moves vertices towards.
 CENTRES = 4

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.hierarchies.facets import SMALL
 from collide.geometry.hierarchies.perturbed import exact_side
+from collide.kernels import kernel
 
 #: How far new vertices are moved towards s, as a part of the way along the edge: 2⁻³⁶, 2⁻²⁸, ...
 INSETS = 5

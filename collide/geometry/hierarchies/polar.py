@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32
 from collide.geometry.error_free import two_sum
 from collide.geometry.hierarchies.facets import Cloud, cloud_at, named_in, true_facets
 from collide.geometry.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
 from collide.geometry.hierarchies.perturbed import exact_side, rank_of
 from collide.geometry.hulls.hull import Hull, convex_hull
 from collide.geometry.hulls.orientation import pair_product, pair_sum
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32
 
 #: The most a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
 _MOST_DRAWN = 2.0**-10

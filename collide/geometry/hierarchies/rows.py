@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, entry, view_i32, view_i64
+from collide.kernels import address_of, entry, view_i32, view_i64
 
 
 def by_vertex(kept, points: int, parent: np.ndarray):

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import kernel
 from collide.geometry.hierarchies.perturbed import side
+from collide.kernels import kernel
 
 #: Places in the state: first free triangle or −1, triangles ever used.
 FREE, USED = 0, 1

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_i32, view_i64
 from collide.geometry.hierarchies.facets import cloud_at
 from collide.geometry.hierarchies.surface import (
     FREE,
@@ -24,6 +23,7 @@ from collide.geometry.hierarchies.surface import (
     preceding,
     read_ring,
 )
+from collide.kernels import entry, kernel, view_i32, view_i64
 
 #: Places in the state beyond `surface.FREE` and `USED`: the vertices that must stay, and how many left.
 ANCHORS = 2

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.hulls.orientation import orientation
+from collide.kernels import kernel
 
 #: Points written behind the cloud: the origin and one on each axis. No plane holds all four.
 APICES = 4

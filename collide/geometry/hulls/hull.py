@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.hulls.first_simplex import APICES
 from collide.geometry.hulls.orientation import DIGITS, WORK
 from collide.geometry.hulls.quickhull import FACET, PLANE, STATE, quickhull
+from collide.kernels import address_of
 
 
 class Hull(NamedTuple):

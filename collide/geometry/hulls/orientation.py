@@ -22,9 +22,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit
 from collide.geometry.error_free import two_product, two_sum
+from collide.kernels import kernel
 
 #: Doubles in ``work``: two numbers, nine differences in two parts, a minor (≤ 16) and a determinant (≤ 192).
 WORK = 256

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_i64
 from collide.geometry.hulls.first_simplex import APICES, before, first_simplex
 from collide.geometry.hulls.orientation import DIGITS, UNDERFLOW, WORK, orientation, survey
+from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
 
 #: Integers of a facet: three corners, counter-clockwise from outside; the facet across each edge
 #: (corner k to k + 1); the first point of its list; its neighbours in the queue; the round

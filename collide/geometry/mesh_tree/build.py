@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f32, view_f64, view_i32, view_i64
 from collide.geometry.mesh_tree.layout import MOST_FACETS, NODE, NOTHING, WIDTH, MeshTree, leaf_link
+from collide.kernels import address_of, entry, kernel, view_f32, view_f64, view_i32, view_i64
 
 #: Triangles of a leaf, at most.
 LEAF = 2

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import PLAIN_PYTHON
 from collide.geometry.mesh_tree.layout import WIDTH
+from collide.kernels import WITH_NUMBA
 
 #: Floats of a frame: the matrix from the node's frame to the probe's, row by row.
 FRAME = 9
@@ -107,11 +107,11 @@ def _along(rows, frame, probe, axis):
     return gap, reach
 
 
-if PLAIN_PYTHON:
+if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
 else:
-    from collide._simd import boxes_meeting, boxes_meeting_prism, boxes_nearest
+    from collide.kernels.vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis parts box k of the node whose
 #: first float is ``boxes[at]`` from the probe's box. Views of float32. `boxes_meeting_prism` looks at PRISM floats.

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i64
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Doubles of a facet while the tree is built: centroid, box.
 _FACET = 9

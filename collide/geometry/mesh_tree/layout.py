@@ -17,7 +17,7 @@ import threading
 
 import numpy as np
 
-from collide._jit import address_of, kernel, view_f32, view_f64, view_i32, view_i64
+from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
 
 #: Boxes of a node, and its words: six floats a box and a link.
 WIDTH = 8

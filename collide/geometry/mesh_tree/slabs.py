@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f32, view_f64
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
     EXPONENT,
@@ -24,6 +23,7 @@ from collide.geometry.mesh_tree.layout import (
     MeshTree,
     open_tree,
 )
+from collide.kernels import address_of, entry, kernel, view_f32, view_f64
 
 #: As in `build.py`: outward rounding to floats.
 _OUTWARD, _LEAST = 2.0**-22, 2.0**-120

@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.support_tree.layout import FEWEST, SupportTree, list_coordinates_of
 from collide.geometry.support_tree.lists import STACK, candidate_lists, order_rings
 from collide.geometry.support_tree.spread import nested_order
+from collide.kernels import address_of
 
 #: Vertices to one of the next coarser subset: at the finest level, where lists decide the memory, and above.
 #: Measured on spheres, where lists of 24 have 37 entries: 32 makes gaps 5 to 10 % slower and takes 3 bytes less, 16

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.error_free import two_product, two_sum
+from collide.kernels import kernel
 
 #: Each term goes through four roundings of relative size 2⁻⁵³: a difference, a product, two sums. Seven cover
 #: those of the bound itself, too, and the last summand products below the smallest normal double.

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.packing import lowest_exponent
+from collide.kernels import address_of
 
 #: Header entries: how many of what, then addresses.
 (POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import entry, kernel, view_f64, view_i32, view_i64
 from collide.geometry.support_tree.query import walk
+from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
 
 #: Arcs are followed between points this fraction inside their ends. At the ends themselves, which are facet
 #: normals, many coarse vertices may tie (those around the cap of a prism, say), and only the arc tells which

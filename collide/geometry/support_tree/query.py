@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
 from collide.geometry.scan import farthest_listed
 from collide.geometry.support_tree.layout import (
     AT_ENTRIES,
@@ -30,6 +29,7 @@ from collide.geometry.support_tree.layout import (
     SupportTree,
 )  # fmt: skip
 from collide.geometry.support_tree.settle import SCANNED, climb
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64
 
 #: Operations counted: see `extreme_vertices`.
 COUNTERS = 4

@@ -11,7 +11,6 @@ either side of g, certain by an error bound, leave only the edges between them t
 
 from __future__ import annotations
 
-from collide._jit import kernel, view_f64, view_i32, view_i64
 from collide.geometry.support_tree.exact_sign import exact_sign, product_and_bound, scaled_into_range
 from collide.geometry.support_tree.layout import (
     AT_POINTS,
@@ -23,6 +22,7 @@ from collide.geometry.support_tree.layout import (
     LINKS,
     POINTS,
 )  # fmt: skip
+from collide.kernels import kernel, view_f64, view_i32, view_i64
 
 #: What is counted: entries scanned, climbing steps, neighbours looked at, exact signs.
 SCANNED, STEPS, LOOKED_AT, EXACT_SIGNS = range(4)

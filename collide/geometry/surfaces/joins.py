@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collide._jit import kernel
+from collide.kernels import kernel
 
 
 @kernel

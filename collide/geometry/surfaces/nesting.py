@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
 from collide.geometry.surfaces.volumes import Shells, cross, exact_integers, inner, scaled_to_one
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64
 
 #: Of a determinant of differences: eight roundings deep, four times that; and all that underflows.
 _ERROR, _UNDERFLOW = 2.0**-48, 2.0**-960

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.surfaces import topology
 from collide.geometry.surfaces.nesting import inside_out
 from collide.geometry.surfaces.topology import COLLAPSED, COUNTS, ONE_SIDED, OPEN, TURNED, UNBALANCED
 from collide.geometry.surfaces.volumes import Shells, shell_volumes, without_area
 from collide.geometry.surfaces.weld import weld
+from collide.kernels import address_of
 
 # Further bits of what is said of a facet; the first ones stand in `topology`.
 NO_AREA = 1 << 16     # its corners lie on one line, or two of them are one point

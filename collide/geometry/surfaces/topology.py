@@ -9,8 +9,8 @@ Facets with two corners in the same place ("collapsed") add nothing to the chain
 
 from __future__ import annotations
 
-from collide._jit import entry, kernel, view_i32, view_i64
 from collide.geometry.surfaces.joins import join, join_turned, speaker, speaker_and_turn
+from collide.kernels import entry, kernel, view_i32, view_i64
 
 # What is said of a facet, as bits.
 COLLAPSED = 1      # two of its corners are the same point

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32
 
 #: A term of a volume is the product of three rounded differences, eight roundings deep at most; twice that.
 _TERM_ERROR = 2.0**-49

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, view_f64, view_i32, view_i64
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64
 
 #: Hashes are of 31 bits, so that no product leaves 63: plain Python and machine code agree.
 _MASK = (1 << 31) - 1

@@ -13,11 +13,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.hierarchies.facets import Cloud, label_patches, twins_of
 from collide.geometry.hierarchies.hierarchy import build_hierarchy
 from collide.geometry.hierarchies.polar import polar_of_hull
 from collide.geometry.hulls.hull import Hull, convex_hull
+from collide.kernels import address_of
 from collide.narrowphase.barba_langerman.flat import flat_hierarchy
 from collide.narrowphase.barba_langerman.ladder import Ladder
 from collide.narrowphase.hierarchy_distance import PackedHierarchy

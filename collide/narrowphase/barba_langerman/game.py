@@ -10,7 +10,7 @@ Solved by the simplex method on the condensed tableau (A. W. Tucker's), all in d
 
 from __future__ import annotations
 
-from collide._jit import kernel
+from collide.kernels import kernel
 
 #: Most points of P* or of Q*.
 MOST = 130

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import address_of, kernel, view_f64, view_i32, view_i64
+from collide.kernels import address_of, kernel, view_f64, view_i32, view_i64
 
 _POINTS_AT, _POINTS, _BIRTH_AT, _PARENT_AT, _ROW_AT, _ROWS = range(6)
 _NEIGHBOUR_START_AT, _NEIGHBOURS_AT, _NEIGHBOURS, _REMOVED_START_AT, _REMOVED_AT, _REMOVED = range(6, 12)

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from collide._jit import kernel, view_f64, view_i32, view_i64
+from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.narrowphase.minkowski import difference_point, has_trees, settle_point
 
 # Integers of what is kept of R: addresses of centre and radius (4 doubles), of where each facet's triangles start,

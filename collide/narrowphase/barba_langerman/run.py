@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.geometry.packing import PackedConvex
 from collide.geometry.tables import ShapeTable, pose_table
+from collide.kernels import address_of
 from collide.narrowphase.barba_langerman.bodies import WalkBody
 from collide.narrowphase.barba_langerman.steps import INVERSE, SEPARATED
 from collide.narrowphase.barba_langerman.walk import DOUBLES, INTEGERS, TRACE, TRACED_ROUNDS, WALK_DTYPE, walk_poses

@@ -16,7 +16,7 @@ Doubles throughout. What the walk says in the end is proven by `proof.py`; here 
 
 from __future__ import annotations
 
-from collide._jit import kernel, view_f64, view_i64
+from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.barba_langerman.game import LABELS, LOST, MEET, MOST, PART, TABLEAU, solve_game
 from collide.narrowphase.barba_langerman.ladder import lowest_at, lowest_of_level, one_level_finer
 

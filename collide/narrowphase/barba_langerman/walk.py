@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f64, view_i64
 from collide.geometry.tables import INTS, NUMBERS, POSE
+from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.narrowphase.barba_langerman.ladder import height_of, ladder_at
 from collide.narrowphase.barba_langerman.proof import BALL, CENTRE_AT, in_ball, planes_apart, shares_point
 from collide.narrowphase.barba_langerman.steps import (

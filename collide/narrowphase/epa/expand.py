@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.scan import least
+from collide.kernels import kernel
 from collide.narrowphase.bounds import EPA_VERTICES
 from collide.narrowphase.epa.prove import prove_facets
 from collide.narrowphase.epa.seed import capped_tetrahedron, extremal_tetrahedron

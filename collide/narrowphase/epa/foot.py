@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 from collide.narrowphase.epa.surface import FACET, number
 from collide.narrowphase.minkowski import POINT
 from collide.narrowphase.simplex import weigh_enclosed

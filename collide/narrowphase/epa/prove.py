@@ -6,8 +6,8 @@ runs ended so.
 
 from __future__ import annotations
 
-from collide._jit import kernel
 from collide.geometry.double_double import cross, divide, product_of_vectors, square_root, subtract
+from collide.kernels import kernel
 from collide.narrowphase.epa.surface import FACET
 from collide.narrowphase.minkowski import POINT
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
 from collide.geometry.double_double import divide, subtract
 from collide.geometry.scan import least
+from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.epa.surface import (
     FACET,
     MARKS,

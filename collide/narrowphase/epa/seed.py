@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 from collide.narrowphase.bounds import EPA_VERTICES
 from collide.narrowphase.minkowski import POINT, copy_point, difference_point
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64, view_i64
+from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import EPA_FACETS, EPA_VERTICES
 from collide.narrowphase.minkowski import POINT, copy_point
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel, view_f64
 from collide.geometry.digits import BITS, add_product, as_double_double, carry, clear
 from collide.geometry.double_double import add, cross, divide, square_root
+from collide.kernels import kernel, view_f64
 from collide.narrowphase.epa.foot import nearest_of_triangle
 from collide.narrowphase.exact.directions import scaled_by, set_normal, side_of
 from collide.narrowphase.exact.supports import support_pair

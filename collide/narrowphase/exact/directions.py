@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import add_number, add_product, as_double, carry, clear
+from collide.kernels import kernel
 from collide.narrowphase.exact.workspace import direction_at, point_at, scratch_at
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import BITS, add_number, add_product, as_double_double, carry, clear
 from collide.geometry.double_double import divide, square_root
+from collide.kernels import kernel
 from collide.narrowphase.exact.directions import scaled_by, set_normal, side_of
 from collide.narrowphase.exact.supports import support_pair
 from collide.narrowphase.exact.workspace import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collide._jit import kernel
 from collide.geometry.digits import add_number, add_product, carry, clear
+from collide.kernels import kernel
 from collide.narrowphase.bounds import EXACT_ROUNDS
 from collide.narrowphase.exact.directions import is_ahead, set_normal
 from collide.narrowphase.exact.johnson import compact, nearest_subset, set_delta, set_direction, set_gram, within_radius

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import add_double, add_product, carry, clear
 from collide.geometry.support_tree.query import extreme_vertex, rings_of
+from collide.kernels import kernel
 from collide.narrowphase.exact.directions import direction_double
 from collide.narrowphase.exact.workspace import direction_at, scratch_at
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import (
     LONGEST_FACTOR,
     add_double,
@@ -16,6 +15,7 @@ from collide.geometry.digits import (
     lowest_bit,
 )
 from collide.geometry.tables import POSE_TERMS, TERM_ROW, TERMS
+from collide.kernels import kernel
 
 #: Most digits of one coordinate: 2^1664 between the largest and the smallest bit of a pair, which is
 #: every double there is as long as the bodies are smaller than 2^500 m. The shorter factor of any

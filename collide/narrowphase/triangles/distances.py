@@ -14,7 +14,6 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, NEAR_PROBE, boxes_nearest
 from collide.geometry.mesh_tree.layout import (
     CENTRE,
@@ -27,6 +26,7 @@ from collide.geometry.mesh_tree.layout import (
     WIDTH,
     open_tree,
 )
+from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.narrowphase.triangles.exact_points import CORNERS, STATE, forget_poses
 from collide.narrowphase.triangles.nearest import beyond, common_point, nearest_points, slab, widest_slab
 from collide.narrowphase.triangles.placing import (

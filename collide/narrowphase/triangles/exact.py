@@ -7,7 +7,7 @@ everything comes down to segments against triangles and, where both have no area
 
 from __future__ import annotations
 
-from collide._jit import entry, kernel, native_call, view_f64, view_i64
+from collide.kernels import entry, kernel, native_call, view_f64, view_i64
 from collide.narrowphase.triangles.exact_points import (
     CORNERS,
     DIGITS,

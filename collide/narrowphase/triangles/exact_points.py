@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
 from collide.geometry.digits import (
     LONGEST_FACTOR,
     add_double,
@@ -20,6 +19,7 @@ from collide.geometry.digits import (
     grid_of,
     lowest_bit,
 )
+from collide.kernels import kernel
 from collide.narrowphase.triangles.filtered import TINY, orientation, sign_error
 from collide.narrowphase.triangles.placing import ERROR, PLAIN, SHIFT, M
 

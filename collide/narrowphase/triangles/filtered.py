@@ -11,7 +11,7 @@ normal of B: edges are off by 2E + uL: 24·L·D·E more. Orientation of any four
 
 from __future__ import annotations
 
-from collide._jit import kernel
+from collide.kernels import kernel
 
 APART, MEETING, UNSURE = 0, 1, -1
 

@@ -11,7 +11,6 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     EXPONENT,
@@ -20,6 +19,7 @@ from collide.geometry.mesh_tree.layout import (
     WIDTH,
     open_tree,
 )
+from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.narrowphase.triangles.exact_points import CORNERS, STATE, forget_poses
 from collide.narrowphase.triangles.nearest import beyond, common_point, nearest_points
 from collide.narrowphase.triangles.placing import (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from collide._jit import kernel
+from collide.kernels import kernel
 
 #: A slab is as wide as two points are apart where it is so but for rounding.
 _AS_WIDE = 1.0 - 2.0**-44

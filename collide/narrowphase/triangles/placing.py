@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from collide._jit import kernel
 from collide.geometry.mesh_tree.layout import CENTRE, EXPONENT, RADIUS, REACH
+from collide.kernels import kernel
 
 # A placing, doubles: M (9) and m (3) take B's frame to A's; N (9) and n (3) take A's to B's.
 M, SHIFT, N, N_SHIFT = 0, 9, 12, 21

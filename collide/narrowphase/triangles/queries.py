@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide._jit import address_of
 from collide.errors import InvalidPose
 from collide.geometry.mesh_tree.layout import WIDTH, MeshTree
 from collide.geometry.mesh_tree.slabs import make_slabs
+from collide.kernels import address_of, code_of
 from collide.narrowphase.triangles import distances, inside, near_pairs, rays, self_contact, surfaces
 from collide.narrowphase.triangles.exact import INTEGERS, decide_exactly
 from collide.narrowphase.triangles.surfaces import COUNTERS, FULL, SINGULAR, walk_surfaces
@@ -315,7 +315,7 @@ class Workspace:
         #: Stack, its length, doubles, integers, and where the exact stage stands.
         self.addresses = (
             address_of(self._stack), n_stack, address_of(self._doubles), address_of(self._integers),
-            decide_exactly.address,
+            code_of(decide_exactly),
         )  # fmt: skip
         self.heap_address = address_of(self._heap)
 

@@ -13,7 +13,6 @@ import math
 
 import numpy as np
 
-from collide._jit import entry, kernel, view_f32, view_f64, view_i64
 from collide.geometry.mesh_tree.eight_boxes import FRAME, PROBE, boxes_meeting
 from collide.geometry.mesh_tree.layout import (
     EXPONENT,
@@ -22,6 +21,7 @@ from collide.geometry.mesh_tree.layout import (
     WIDTH,
     open_tree,
 )
+from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.narrowphase.triangles.exact import MEET, OVERLAP, call_exactly
 from collide.narrowphase.triangles.exact_points import CORNERS, OWN_AT, STATE, forget_poses
 from collide.narrowphase.triangles.filtered import (

@@ -1,4 +1,4 @@
-"""The boolean of two bodies of facets at one pair of poses, from array objects to the answer inside one kernel.
+"""The boolean of two bodies of facets at one pair of poses, from matrices to the answer inside one kernel.
 
 What `meshes/hits.py` does for batches: surfaces first, then a point of every part of one body in the other. Python
 and numpy take fifty times as long over one pair as this does over two bodies that are far apart. Kernels are called
@@ -11,10 +11,9 @@ import math
 
 import numpy as np
 
-from collide._jit import address_of, entry, kernel, native_call, view_f64, view_i64
 from collide.geometry.mesh_tree.layout import WIDTH, MeshTree
 from collide.geometry.mesh_tree.slabs import make_slabs
-from collide.narrowphase.array_objects import OBJECT_WORDS, answered, built_in, data_at, matrix_at, object_words
+from collide.kernels import address_of, code_of, entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.narrowphase.poses import is_pose
 from collide.narrowphase.triangles import distances, inside, surfaces
 from collide.narrowphase.triangles.exact import decide_exactly
@@ -26,13 +25,13 @@ _walk = native_call(surfaces.SIGNATURE)
 _ask_inside = native_call(inside.SIGNATURE)
 _measure = native_call(distances.SIGNATURE)
 
-# Header, integers, after what `array_objects.py` reads: trees and kernels, both sides' solids and points, buffers.
+# Header, integers: trees and kernels, both sides' solids and points, buffers.
 (
     TREE_A, TREE_B, ALIKE, EXCHANGED, WALK_AT, INSIDE_AT, SOLID_A, SOLID_B, POINTS_A, POINTS_B, MANY_A, MANY_B, BALLS_AT,
     KEYS_AT, MARKS_AT, STACK_AT, N_STACK, DOUBLES_AT, INTEGERS_AT, DECIDE, SWEPT,
     DISTANCES_AT, ROOM_AT, HEAP_AT, N_HEAP,
-) = range(OBJECT_WORDS, OBJECT_WORDS + 25)  # fmt: skip
-HEADER = OBJECT_WORDS + 25
+) = range(25)  # fmt: skip
+HEADER = 25
 # Doubles of the room for distances: the sum of the radii, how far to look, the result.
 _RADIUS, _LIMIT, _RESULT = range(3)
 #: Room for facet pairs: what a walk that stops at the first asks for.
@@ -93,11 +92,9 @@ def _part_inside(header, tree_at, solid, ball, X_at, points_at, many, Y_at):
 
 
 @kernel
-def _posed(header, A_object, B_object):
-    """Addresses of both matrices, the bodies in the order of their contents; 0 where one is none for single calls."""
-    XA_at = matrix_at(A_object, header)
-    XB_at = matrix_at(B_object, header)
-    if XA_at == 0 or XB_at == 0 or not _checked(view_f64(XA_at, 16)) or not _checked(view_f64(XB_at, 16)):
+def _posed(header, XA_at, XB_at):
+    """Addresses of both matrices, the bodies in the order of their contents; 0 where one is no pose."""
+    if not _checked(view_f64(XA_at, 16)) or not _checked(view_f64(XB_at, 16)):
         return 0, 0
     if header[EXCHANGED] != 0:
         return XB_at, XA_at
@@ -129,31 +126,30 @@ def _cores_meet(header, XA_at, XB_at):
     return within
 
 
-@entry("int64(int64, int64, int64)", nogil=False)
-def meet_single(header_object, arguments_at, count):
-    """`array_objects.built_in` of two poses: whether the bodies meet; None where the long way answers, or says what is wrong.
+@entry(prepared.BOOLEAN, nogil=False)
+def meet_single(header_at, XA_at, XB_at):
+    """Whether the bodies meet, 0 or 1; −1 where the long way answers, or says what is wrong.
 
     All threads share the workspace: this keeps Python's lock.
     """
-    header = view_i64(data_at(header_object), HEADER)
-    said = -1
-    if count == 2:
-        arguments = view_i64(arguments_at, 2)
-        XA_at, XB_at = _posed(header, arguments[0], arguments[1])
-        if XA_at != 0:
-            said = _cores_meet(header, XA_at, XB_at)
-            if said == 0 and header[SWEPT] != 0:
-                said = _swept(header, XA_at, XB_at)
-    return answered(header, said)
-
-
-@entry("int64(int64, int64, int64, int64, int64)", nogil=False)
-def near_single(header_at, A_object, B_object, result_at, marks_at):
-    """1 where the cores are apart, with the row and the marks of `distances.near_surfaces`; else −1, as `meet_single`."""
     header = view_i64(header_at, HEADER)
-    XA_at, XB_at = _posed(header, A_object, B_object)
+    XA_at, XB_at = _posed(header, XA_at, XB_at)
+    if XA_at == 0:
+        return -1
+    said = _cores_meet(header, XA_at, XB_at)
+    if said == 0 and header[SWEPT] != 0:
+        said = _swept(header, XA_at, XB_at)
+    return said
+
+
+@entry(prepared.ROW, nogil=False)
+def near_single(header_at, XA_at, XB_at, result_at, _depths):
+    """1 where the cores are apart, with the row and then the marks of `distances.near_surfaces`; else −1, as `meet_single`."""
+    header = view_i64(header_at, HEADER)
+    XA_at, XB_at = _posed(header, XA_at, XB_at)
     if XA_at == 0 or _cores_meet(header, XA_at, XB_at) != 0:
         return -1
+    marks_at = result_at + 8 * distances.RESULT
     marks = view_i64(marks_at, distances.MARKS)
     for i in range(distances.MARKS):
         marks[i] = 0
@@ -215,15 +211,15 @@ class SingleMeshPair:
         self._balls = np.concatenate([A.ball, B.ball])
         self._keys, self._marks = np.zeros(_KEYS, dtype=np.int64), np.zeros(8, dtype=np.int64)
         header = self._header = np.zeros(HEADER, dtype=np.int64)
-        header[:OBJECT_WORDS] = object_words()
-        header[TREE_A:] = (
-            A.tree.address, B.tree.address, A.tree.content == B.tree.content, exchanged, surfaces.walk_surfaces.address,
-            inside.points_inside.address, A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
+        header[:] = (
+            A.tree.address, B.tree.address, A.tree.content == B.tree.content, exchanged, code_of(surfaces.walk_surfaces),
+            code_of(inside.points_inside), A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
             len(B.points), address_of(self._balls), address_of(self._keys), address_of(self._marks), *work.addresses[:4],
-            decide_exactly.address, radius > 0.0, distances.near_surfaces.address, address_of(self._room),
+            code_of(decide_exactly), radius > 0.0, code_of(distances.near_surfaces), address_of(self._room),
             self._heap_address if radius > 0.0 else 0, HEAP,
         )  # fmt: skip
-        self.collide = built_in(meet_single, header)
+        self.collide = prepared.prepared_boolean(meet_single, header)
+        self._near = prepared.prepared_row(near_single, header)
 
     @staticmethod
     def serves(A: Side, B: Side) -> bool:
@@ -243,6 +239,7 @@ class SingleMeshPair:
         if self._header[HEAP_AT] == 0:
             self._prepare_distances()
             self._header[HEAP_AT] = self._heap_address
-        row, marks = np.empty(distances.RESULT), np.empty(distances.MARKS, dtype=np.int64)
-        said = near_single.unchecked(address_of(self._header), id(X_WA), id(X_WB), row.ctypes.data, marks.ctypes.data)
-        return None if said < 1 else (row, marks)
+        found = np.empty(distances.RESULT + distances.MARKS)
+        if self._near(X_WA, X_WB, found, True) is None:
+            return None
+        return found[: distances.RESULT], found[distances.RESULT :].view(np.int64)

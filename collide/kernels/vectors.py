@@ -13,7 +13,8 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
+
+from collide.kernels.views import data_of, is_view_of
 
 #: Doubles to a vector.
 LANES = 8
@@ -39,15 +40,13 @@ def farthest_of_list(_context, coordinates, start, stride, count, gx, gy, gz):
 
 def _farthest(coordinates, scan):
     """Signature and code of a scan of products."""
-    if not (isinstance(coordinates, types.Array) and coordinates.ndim == 1 and coordinates.layout == "C"):
-        raise TypingError("coordinates must be a contiguous one-dimensional view")
-    if coordinates.dtype != types.float64:
-        raise TypingError("coordinates must be doubles")
+    if not is_view_of(coordinates, types.float64):
+        raise TypingError("coordinates must be a view of doubles")
     whole, real = types.int64, types.float64
     signature = _RESULT(coordinates, whole, whole, whole, real, real, real)
 
     def codegen(context, builder, signature, args):
-        data = make_array(signature.args[0])(context, builder, args[0]).data
+        data = data_of(context, builder, signature.args[0], args[0])
         value, index = scan(builder, _products(builder, data, *args[1:3], *args[4:]), args[3])
         return context.make_tuple(builder, signature.return_type, [index, value])
 
@@ -59,7 +58,7 @@ def least_of_blocks(_context, numbers, count):
     """Index of the least of the first ``count`` numbers, 8 or more, none of them NaN; the lowest of equals."""
 
     def codegen(context, builder, signature, args):
-        data = make_array(signature.args[0])(context, builder, args[0]).data
+        data = data_of(context, builder, signature.args[0], args[0])
         return _scan(builder, lambda at: builder.fneg(_load(builder, data, at)), args[1])[1]
 
     return types.int64(numbers, types.int64), codegen
@@ -72,7 +71,7 @@ def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
     signature = whole(coordinates, whole, whole, real, real, real, real)
 
     def codegen(context, builder, signature, args):
-        data = make_array(signature.args[0])(context, builder, args[0]).data
+        data = data_of(context, builder, signature.args[0], args[0])
         values = _products(builder, data, ir.Constant(_I64, 0), args[1], *args[3:6])
         limit = _splat(builder, args[6], _VALUES)
         begin = builder.block
@@ -377,14 +376,14 @@ def _apart(builder, data, frame, probe):
 
 def _check_floats(*views):
     for view in views:
-        if not (isinstance(view, types.Array) and view.ndim == 1 and view.layout == "C" and view.dtype == types.float32):
-            raise TypingError("boxes, frame and probe must be contiguous views of floats")
+        if not is_view_of(view, types.float32):
+            raise TypingError("boxes, frame and probe must be views of floats")
 
 
 def _float_data(context, builder, signature, args):
     """Pointers to the node's first float, to the frame and to the probe."""
     data, frame, probe = (
-        make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 2, 3)
+        data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 3)
     )  # fmt: skip
     return builder.gep(data, [args[1]]), frame, probe
 
@@ -414,7 +413,7 @@ def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
 
     def codegen(context, builder, signature, args):
         data, slab, frame, probe, result = (
-            make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 2, 4, 5, 6)
+            data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4, 5, 6)
         )
         best, centres = _gaps(builder, builder.gep(data, [args[1]]), builder.gep(slab, [args[3]]), frame, probe)
         for row, vector in enumerate((best, centres)):

@@ -1,0 +1,123 @@
+"""Kernels compiled at their first call, and kept on disk: for those who change them.
+
+The same front end and the same back end as of the library (`front_end.py`, `back_end.py`), for this very processor. An
+entry's machine code is an object file, kept under a hash of the sources that it can depend on: those of its own module and
+of all that this imports (`sources.py`). An edit makes stale what it touches.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Callable
+
+import llvmlite.binding as llvm
+from numba.core import sigutils, types
+from numba.extending import intrinsic
+
+from collide.journal import log
+from collide.kernels import object_cache, sources
+from collide.kernels.back_end import host, machine_code
+from collide.kernels.front_end import Lowered, c_function_type, dispatcher
+from collide.kernels.views import view_maker
+
+__all__ = ["Entry", "code_of", "entry", "kernel", "native_call", "view_maker"]
+
+_C_TYPES = {"int64": ctypes.c_int64, "float64": ctypes.c_double, "boolean": ctypes.c_bool, "bool": ctypes.c_bool, "none": None}
+#: One at a time: two threads' first calls compile an entry once.
+_compiling = threading.RLock()
+
+
+def kernel(function: Callable | None = None, *, inline: bool = False, seldom: bool = False) -> Callable:
+    if function is None:
+        return lambda wrapped: kernel(wrapped, inline=inline, seldom=seldom)
+    return dispatcher(function, inline=inline, seldom=seldom)
+
+
+class Entry:
+    """A kernel that Python calls; compiled, or read from the disk, at its first call."""
+
+    def __init__(self, function: Callable, signature: str, nogil: bool):
+        self.__doc__, self.__name__ = function.__doc__, function.__name__
+        self._function, self._signature, self._nogil = function, signature, nogil
+        self._ready: Callable | None = None
+        self._address = 0
+
+    def __call__(self, *args):
+        return (self._ready or self._made())(*args)
+
+    @property
+    def address(self) -> int:
+        if self._ready is None:
+            self._made()
+        return self._address
+
+    def _made(self) -> Callable:
+        with _compiling:
+            if self._ready is None:
+                begun = time.perf_counter()
+                self._address = _placed(self.__name__, self._object())
+                self._ready = self._c_function()
+                log.info("kernel %s compiled or loaded: %.3f s", self.__name__, time.perf_counter() - begun)
+            return self._ready
+
+    def _object(self) -> bytes:
+        """The entry's machine code."""
+
+        def compiled() -> bytes:
+            log.info("compiling kernel %s", self.__name__)
+            code = Lowered()
+            code.add(self.__name__, self._function, self._signature)
+            return machine_code(code.names, code.modules, host(position_independent=False))
+
+        return object_cache.kept(f"{self._function.__module__}.{self.__name__}", _key(self._function, self._signature), compiled)
+
+    def _c_function(self) -> Callable:
+        arguments, result = sigutils.normalize_signature(self._signature)
+        make = ctypes.CFUNCTYPE if self._nogil else ctypes.PYFUNCTYPE
+        return make(_C_TYPES[str(result)], *(_C_TYPES[str(kind)] for kind in arguments))(self._address)
+
+
+def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
+    return lambda function: Entry(function, signature, nogil)
+
+
+def code_of(entry: Entry) -> int:
+    return entry.address
+
+
+def _key(function: Callable, signature: str) -> str:
+    target = host(position_independent=False)
+    return repr((signature, sources.of_function(function), target, llvm.get_process_triple(), sources.compiler_versions()))
+
+
+_engines: list = []  # machine code lives as long as what holds it
+
+
+def _placed(name: str, code: bytes) -> int:
+    """Where the function of this name starts, of an object file brought into this process."""
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), host(position_independent=False).machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    _engines.append(engine)
+    return engine.get_function_address(name)
+
+
+def native_call(signature: str):
+    """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
+    arguments, result = sigutils.normalize_signature(signature)
+
+    def make(_context, address, given):
+        def codegen(context, builder, _signature, args):
+            manager = context.data_model_manager
+            unpacked = [
+                manager[kind].as_data(builder, builder.extract_value(args[1], k)) for k, kind in enumerate(arguments)
+            ]
+            place = builder.inttoptr(args[0], c_function_type(context, arguments, result).as_pointer())
+            value = builder.call(place, unpacked)
+            return context.get_dummy_value() if result == types.none else manager[result].from_data(builder, value)
+
+        return result(types.int64, types.Tuple(arguments)), codegen
+
+    return intrinsic(make)

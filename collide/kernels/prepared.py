@@ -1,0 +1,58 @@
+"""Kernels of single calls, bound to what they were prepared for: nothing is left to do in Python but the call.
+
+Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what is
+wrong with it, or converts it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.kernels.mode import COMPILED, MODE
+
+#: Signatures: addresses of the header and of two matrices; of rows, where they go, and a flag of the kernel's own. They
+#: return −1 where the answer is left to the long way.
+BOOLEAN = "int64(int64, int64, int64)"
+ROW = "int64(int64, int64, int64, int64, boolean)"
+
+if MODE == COMPILED:
+    from collide.kernels.library import glue
+
+    def prepared_boolean(entry, header: np.ndarray) -> Callable:
+        """A function of two poses: True, False, or None where the answer is left to the long way.
+
+        entry : of the signature `BOOLEAN`.   header : int64, held as long as the function lives.
+        """
+        return glue.prepared_boolean(entry, header)
+
+    def prepared_row(entry, header: np.ndarray) -> Callable:
+        """A function of two poses, an array that becomes the answer, and a flag: the kernel's boolean, or None."""
+        return glue.prepared_row(entry, header)
+else:
+
+    def prepared_boolean(entry, header: np.ndarray) -> Callable:
+        def asked(X_WA, X_WB):
+            if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
+                return None
+            said = entry(address_of(header), address_of(X_WA), address_of(X_WB))
+            return None if said < 0 else bool(said)
+
+        return asked
+
+    def prepared_row(entry, header: np.ndarray) -> Callable:
+        def asked(X_WA, X_WB, out, flag):
+            if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
+                return None
+            said = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
+            return None if said < 0 else bool(said)
+
+        return asked
+
+
+def _is_matrix(X) -> bool:
+    if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4):
+        return False
+    return X.flags.c_contiguous and X.flags.aligned
