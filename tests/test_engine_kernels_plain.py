@@ -17,7 +17,7 @@ import collide
 CHILD = """
 import pickle, sys
 import collide
-from collide import _jit
+from collide import kernels as _jit
 assert _jit.PLAIN_PYTHON
 rows = [(collide.distance(*case).rows, collide.collide(*case)) for case in pickle.load(sys.stdin.buffer)]
 world = collide.World()

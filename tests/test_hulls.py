@@ -406,7 +406,7 @@ CHILD = r"""
 import pickle, random, sys
 from fractions import Fraction
 import numpy as np
-from collide import _jit
+from collide import kernels as _jit
 from collide.geometry.hulls import orientation as O
 from collide.geometry.hulls import quickhull as Q
 from collide.geometry.hulls.hull import convex_hull

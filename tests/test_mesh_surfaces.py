@@ -179,7 +179,7 @@ def answers(cases) -> list[bytes]:
 CHILD = f"""
 import pickle, sys
 import numpy as np
-from collide import _jit
+from collide import kernels as _jit
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.graded import graded_tree
 from collide.narrowphase.triangles.queries import *

@@ -237,7 +237,7 @@ def test_wrong_input_is_refused():
 
 PLAIN = """
 import sys, numpy as np
-from collide import _jit
+from collide import kernels as _jit
 assert _jit.PLAIN_PYTHON
 from collide.geometry.support_tree.build import build_support_tree
 from collide.geometry.support_tree.query import extreme_vertices

@@ -33,7 +33,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from collide.kernels.mode import MODE, PLAIN_PYTHON, WITH_NUMBA
+from collide.kernels.mode import COMPILED, MODE, PLAIN_PYTHON, WITH_NUMBA
 
 if WITH_NUMBA:
     from numba import from_dtype
@@ -44,8 +44,13 @@ if WITH_NUMBA:
     def _view(_ctype, dtype) -> Callable:
         return _view_of_kind(from_dtype(np.dtype(dtype)))
 else:
-    from collide.kernels.plain import code_of, entry, kernel, native_call
+    from collide.kernels.plain import kernel, native_call
     from collide.kernels.plain import view_maker as _view
+
+    if MODE == COMPILED:
+        from collide.kernels.library import code_of, entry
+    else:
+        from collide.kernels.plain import code_of, entry
 
 __all__ = [
     "MODE", "PLAIN_PYTHON", "WITH_NUMBA", "address_of", "code_of", "entry", "kernel", "native_call", "view_f32", "view_f64",
@@ -59,8 +64,12 @@ view_f32 = _view(ctypes.c_float, np.float32)
 view_u8 = _view(ctypes.c_uint8, np.uint8)
 
 
-def address_of(array: np.ndarray) -> int:
-    """Address of a C-contiguous array's first element. The caller keeps the array alive."""
-    if not array.flags.c_contiguous:
-        raise ValueError("kernels read C-contiguous buffers")
-    return array.ctypes.data
+if MODE == COMPILED:
+    from collide.kernels.library import address_of
+else:
+
+    def address_of(array: np.ndarray) -> int:
+        """Address of a C-contiguous array's first element. The caller keeps the array alive."""
+        if not array.flags.c_contiguous:
+            raise ValueError("kernels read C-contiguous buffers")
+        return array.ctypes.data

@@ -63,11 +63,23 @@ def machine_code(names: Iterable[str], modules: Iterable[bytes], target: Target,
     machine = target.machine()
     whole = _linked(modules, target, machine)
     for name in names:
-        whole.get_function(name).name = prefix + name
+        entry = whole.get_function(name)
+        entry.name = prefix + name
+        if target.position_independent:
+            entry.visibility = "hidden"  # for the library's own modules
     _keep_inside(whole, {prefix + name for name in names})
     _optimise(whole, machine)
     _check(whole, {prefix + name for name in names})
     return machine.emit_object(whole)
+
+
+def joined(modules: Iterable[bytes]) -> bytes:
+    """All bitcode in one module's."""
+    whole = llvm.parse_assembly("")
+    whole.name = "collide"
+    for code in modules:
+        whole.link_in(llvm.parse_bitcode(code))
+    return whole.as_bitcode()
 
 
 def _linked(modules: Iterable[bytes], target: Target, machine) -> llvm.ModuleRef:

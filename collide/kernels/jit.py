@@ -40,7 +40,7 @@ class Entry:
 
     def __init__(self, function: Callable, signature: str, nogil: bool):
         self.__doc__, self.__name__ = function.__doc__, function.__name__
-        self._function, self._signature, self._nogil = function, signature, nogil
+        self.function, self.signature, self.nogil = function, signature, nogil
         self._ready: Callable | None = None
         self._address = 0
 
@@ -68,19 +68,27 @@ class Entry:
         def compiled() -> bytes:
             log.info("compiling kernel %s", self.__name__)
             code = Lowered()
-            code.add(self.__name__, self._function, self._signature)
+            code.add(self.__name__, self.function, self.signature)
             return machine_code(code.names, code.modules, host(position_independent=False))
 
-        return object_cache.kept(f"{self._function.__module__}.{self.__name__}", _key(self._function, self._signature), compiled)
+        return object_cache.kept(f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled)
 
     def _c_function(self) -> Callable:
-        arguments, result = sigutils.normalize_signature(self._signature)
-        make = ctypes.CFUNCTYPE if self._nogil else ctypes.PYFUNCTYPE
+        arguments, result = sigutils.normalize_signature(self.signature)
+        make = ctypes.CFUNCTYPE if self.nogil else ctypes.PYFUNCTYPE
         return make(_C_TYPES[str(result)], *(_C_TYPES[str(kind)] for kind in arguments))(self._address)
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
-    return lambda function: Entry(function, signature, nogil)
+    def made(function: Callable) -> Entry:
+        entries.append(Entry(function, signature, nogil))
+        return entries[-1]
+
+    return made
+
+
+#: All that were defined, for the build.
+entries: list[Entry] = []
 
 
 def code_of(entry: Entry) -> int:

@@ -26,11 +26,11 @@ if MODE == COMPILED:
 
         entry : of the signature `BOOLEAN`.   header : int64, held as long as the function lives.
         """
-        return glue.prepared_boolean(entry, header)
+        return glue.prepared(entry.__name__, header)
 
     def prepared_row(entry, header: np.ndarray) -> Callable:
         """A function of two poses, an array that becomes the answer, and a flag: the kernel's boolean, or None."""
-        return glue.prepared_row(entry, header)
+        return glue.prepared(entry.__name__, header)
 else:
 
     def prepared_boolean(entry, header: np.ndarray) -> Callable:

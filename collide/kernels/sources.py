@@ -17,8 +17,11 @@ from pathlib import Path
 
 #: The installed package.
 PACKAGE = Path(__file__).parent.parent
-#: Rooms and files of the package that hold kernels, or what kernels import.
-KERNEL_SOURCES = ("broadphase", "geometry", "kernels", "narrowphase", "results.py")
+#: Rooms and files of the package that hold kernels, what kernels import, and what makes code of them.
+KERNEL_SOURCES = (
+    "broadphase", "geometry", "kernels/__init__.py", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py",
+    "kernels/jit.py", "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
+)  # fmt: skip
 
 
 def fingerprint() -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from collide.geometry.hierarchies.perturbed import exact_side, rank_of, side
 from collide.geometry.hierarchies.surface import following, preceding
 from collide.geometry.hulls.hull import Hull
-from collide.geometry.hulls.orientation import DIGITS, WORK, survey
+from collide.geometry.hulls.orientation import DIGITS, WORK, one_of_four, survey
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
 
 #: Coordinates that are smaller than the largest by this power of two must not be left to expansions (`orientation`).
@@ -335,7 +335,8 @@ def flip_until_convex(
                 return -1
             flip(corners, twins, h)
             g = np.int64(twins[h])
-            for k in (following(h), preceding(h), following(g), preceding(g)):
+            for side in range(4):
+                k = one_of_four(side, following(h), preceding(h), following(g), preceding(g))
                 if depth < 6 * count:
                     stack[depth] = k
                     depth += 1

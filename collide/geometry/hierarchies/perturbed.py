@@ -15,7 +15,7 @@ random order that leaves O(log k) triangles at a corner of a facet with k.
 
 from __future__ import annotations
 
-from collide.geometry.hulls.orientation import orientation
+from collide.geometry.hulls.orientation import one_of_four, orientation
 from collide.kernels import kernel
 
 #: Points the perturbation moves vertices towards.
@@ -60,8 +60,8 @@ def tie(cloud, centres, a, b, c, d):
         before = 1 << 60
         for _ in range(4):
             most = -1
-            for i in (a, b, c, d):
-                rank = rank_of(i)
+            for corner in range(4):
+                rank = rank_of(one_of_four(corner, a, b, c, d))
                 if most < rank < before:
                     most = rank
             before = most

@@ -126,10 +126,21 @@ def apart(points, a, b):
     return total
 
 
+@kernel(inline=True)
+def one_of_four(k, a, b, c, d):
+    """Number k of four. A loop over a tuple asks whether it is left, and would raise."""
+    if k == 0:
+        return a
+    if k == 1:
+        return b
+    return c if k == 2 else d
+
+
 @kernel
 def too_wide(originals, threshold, a, b, c, d):
     """Whether one of the points has a coordinate too small for expansions."""
-    for point in (a, b, c, d):
+    for corner in range(4):
+        point = one_of_four(corner, a, b, c, d)
         for k in range(3 * point, 3 * point + 3):
             if 0.0 < abs(originals[k]) < threshold:
                 return True
@@ -248,7 +259,8 @@ def by_digits(originals, digits, a, b, c, d, axis):
     """Exact sign of the determinant of the differences, from the originals; row 3 may be a unit vector."""
     lowest = 2000
     highest = -2000
-    for point in (a, b, c, d):
+    for corner in range(4):
+        point = one_of_four(corner, a, b, c, d)
         for k in range(3 * point, 3 * point + 3):
             lowest = min(lowest, lowest_bit(originals[k]))
             if originals[k] != 0.0:
@@ -280,9 +292,8 @@ def by_digits(originals, digits, a, b, c, d, axis):
         j = ((k + 2) % 3) * n
         for t in range(minor, total):
             digits[t] = 0
-        for sign in (1, -1):
-            add_product(digits, minor, i, n, j + 3 * n, n, sign)
-            i, j = j, i
+        add_product(digits, minor, i, n, j + 3 * n, n, 1)
+        add_product(digits, minor, j, n, i + 3 * n, n, -1)
         carry(digits, minor, 2 * n)
         add_product(digits, total, (6 + k) * n, n, minor, 2 * n, 1)
     return carry(digits, total, 3 * n)

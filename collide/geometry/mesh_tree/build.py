@@ -187,8 +187,18 @@ def _measure(floats, first, last, work, slot):
         v1 = max(v1, b)
         w1 = max(w1, c)
     at = _ROW * slot
-    for k, value in enumerate((x0, y0, z0, x1, y1, z1, u0, v0, w0, u1, v1, w1)):
-        work[at + k] = float(value)
+    work[at] = float(x0)
+    work[at + 1] = float(y0)
+    work[at + 2] = float(z0)
+    work[at + 3] = float(x1)
+    work[at + 4] = float(y1)
+    work[at + 5] = float(z1)
+    work[at + 6] = float(u0)
+    work[at + 7] = float(v0)
+    work[at + 8] = float(w0)
+    work[at + 9] = float(u1)
+    work[at + 10] = float(v1)
+    work[at + 11] = float(w1)
 
 
 @kernel

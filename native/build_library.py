@@ -1,0 +1,189 @@
+"""`build_ext` of setuptools: kernels to object files, those and C to libcollide, and its Python module.
+
+Where there is no C compiler, or it cannot link, the package is installed without a library, and then needs numba and
+compiles kernels at their first call. ``COLLIDE_REQUIRE_COMPILED=1``, as for releases, makes that an error.
+
+    COLLIDE_REQUIRE_COMPILED=1    no library, no installation
+    COLLIDE_LEVELS="v3"           only these levels of processors, for a faster build on one's own machine
+    COLLIDE_NO_LIBRARY=1          none, on purpose: a pure wheel
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import zlib
+from pathlib import Path
+
+from setuptools import Extension
+from setuptools.command.build_ext import build_ext
+
+ROOT = Path(__file__).resolve().parent.parent
+NATIVE = ROOT / "native"
+BUILD = ROOT / "build" / "kernels"
+#: Modules of C in libcollide.
+C_SOURCES = ["kernels.c"]
+WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
+LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
+
+
+def _asked(name: str) -> bool:
+    return os.environ.get(name, "0") not in ("", "0")
+
+
+def why_not() -> str:
+    """Why no library can be made here; empty where one can. Raises SystemExit where one was required."""
+    if sysconfig.get_config_var("Py_GIL_DISABLED"):
+        raise SystemExit("collide: free-threaded builds of Python are not supported; use a build with the lock (python3.14, not 3.14t)")
+    reason = "COLLIDE_NO_LIBRARY is set" if _asked("COLLIDE_NO_LIBRARY") else _cannot_link()
+    if reason and _asked("COLLIDE_REQUIRE_COMPILED"):
+        raise SystemExit(
+            f"collide: kernels cannot be built: {reason}\nCOLLIDE_REQUIRE_COMPILED is set, so this is an error. Install a C compiler: "
+            "apt install gcc, dnf install gcc, xcode-select --install, or the Build Tools of Visual Studio"
+        )
+    if reason:
+        print(
+            f"\n*** collide: NO COMPILED KERNELS: {reason}.\n*** The package will need numba, and compile kernels at their first call "
+            "(half a minute). Install a C compiler and install again; `collide doctor` tells.\n", file=sys.stderr, flush=True,
+        )  # fmt: skip
+    return reason
+
+
+def _cannot_link() -> str:
+    """What goes wrong when a shared library of one line is made; empty where nothing does."""
+    from distutils.ccompiler import new_compiler  # setuptools' own
+    from distutils.sysconfig import customize_compiler
+
+    compiler = new_compiler()
+    customize_compiler(compiler)
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "probe.c"
+        source.write_text("int collide_probe(void) { return 1; }\n", encoding="utf-8")
+        quiet = os.open(os.devnull, os.O_WRONLY), os.dup(2)
+        try:
+            os.dup2(quiet[0], 2)
+            objects = compiler.compile([str(source)], output_dir=folder)
+            compiler.link_shared_object(objects, str(Path(folder) / "probe.so"))
+        except Exception as error:  # noqa: BLE001 - whatever a compiler's absence looks like here
+            tool = (getattr(compiler, "compiler_so", None) or ["the C compiler"])[0]
+            return f"no C compiler or linker ({tool}: {str(error).splitlines()[0] if str(error) else type(error).__name__})"
+        finally:
+            os.dup2(quiet[1], 2)
+            for handle in quiet:
+                os.close(handle)
+    return ""
+
+
+def extension() -> Extension:
+    """What makes wheels those of a platform; `BuildLibrary` knows what is in it."""
+    return Extension("collide.kernels._glue", [], py_limited_api=True)
+
+
+class BuildLibrary(build_ext):
+    """Makes the library, its Python module, and what tells of them, where setuptools collects the package's files."""
+
+    def build_extension(self, ext) -> None:
+        made = _compiled_kernels()
+        generated = BUILD / "generated"
+        _generate(generated, made["entries"], list(made["objects"]))
+        place = Path(self.build_lib) / "collide"
+        library, module = place / "lib" / LIBRARY, Path(self.get_ext_fullpath(ext.name))
+        for folder in (library.parent, module.parent):
+            folder.mkdir(parents=True, exist_ok=True)
+        _say(f"linking {LIBRARY}")
+        self._link([*self._compiled(C_SOURCES, generated), *made["objects"].values()], library, _exported())
+        self._link(self._compiled(["python_module.c"], generated), module, ["PyInit__glue"], calls_python=True)
+        _write_about(place, [library, module], made)
+
+    def copy_extensions_to_source(self) -> None:
+        """For editable installations: the same files in the checkout."""
+        for file in map(Path, self.get_outputs()):
+            target = ROOT / file.relative_to(self.build_lib)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            # A process may have the old file in use: it keeps it, and the new one takes its name.
+            shutil.copy(file, part := target.with_suffix(".part"))
+            part.replace(target)
+
+    def get_outputs(self) -> list[str]:
+        place = Path(self.build_lib) / "collide"
+        made = (*place.glob("lib/**/*"), *place.glob("include/*"), place / "kernels" / "built.py", *place.glob("kernels/_glue*"))
+        return [str(file) for file in made if file.is_file()]
+
+    def get_source_files(self) -> list[str]:
+        return [file.relative_to(ROOT).as_posix() for file in sorted(NATIVE.rglob("*")) if file.suffix in (".py", ".c", ".h", ".in")]
+
+    def _compiled(self, names: list[str], generated: Path) -> list[str]:
+        import numpy
+
+        flags = ["/O2"] if WINDOWS else ["-O2", "-g0", "-std=c99", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
+        include = [str(generated), str(NATIVE), numpy.get_include(), sysconfig.get_path("include")]
+        sources = [str(NATIVE / name) for name in names]
+        return self.compiler.compile(sources, output_dir=self.build_temp, include_dirs=include, extra_postargs=flags)
+
+    def _link(self, objects: list[str], out: Path, exported: list[str], calls_python: bool = False) -> None:
+        """A shared library that leaves nothing open but the C library's functions, and Python's where it calls them.
+
+        Not as Python links its modules: that writes paths of this machine into them.
+        """
+        if WINDOWS:
+            names = [f"/EXPORT:{name}" for name in exported]
+            names += [] if calls_python else [f"/IMPLIB:{out.with_suffix('.lib')}"]
+            self.compiler.link_shared_object(objects, str(out), extra_postargs=names)
+            return
+        compiler = self.compiler.compiler_so[0]
+        if MACOS:
+            kind = ["-bundle", "-undefined", "dynamic_lookup"] if calls_python else ["-dynamiclib", "-install_name", f"@rpath/{LIBRARY}"]
+            self.spawn([compiler, *kind, "-o", str(out), *objects])
+        else:
+            kind = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{LIBRARY}"]
+            self.spawn([compiler, "-shared", "-s", "-Wl,-z,relro", "-o", str(out), *objects, *kind])
+
+
+def _compiled_kernels() -> dict:
+    """As `compile_kernels.compile_kernels` makes them, in a process of its own: it imports the package."""
+    import json
+
+    levels = os.environ.get("COLLIDE_LEVELS", "").split()
+    command = [sys.executable, str(NATIVE / "compile_kernels.py"), "--out", str(BUILD), "--json", *(["--levels", *levels] if levels else [])]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    if done.returncode:
+        raise SystemExit("collide: kernels could not be compiled: see above")
+    return json.loads(done.stdout)
+
+
+def _generate(folder: Path, entries, levels: list[str]) -> None:
+    sys.path.insert(0, str(NATIVE))
+    import describe_kernels
+
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "kernels.h").write_text(describe_kernels.table(entries, levels), encoding="utf-8")
+    (folder / "entries.inc").write_text(describe_kernels.python_functions(entries), encoding="utf-8")
+
+
+def _exported() -> list[str]:
+    """Names of what leaves the library, for linkers that want a list."""
+    import re
+
+    text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h") if (NATIVE / name).exists())
+    return re.findall(r"COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", text)
+
+
+def _write_about(place: Path, files: list[Path], made: dict) -> None:
+    """built.py: what this library was made from, and what its files must be like."""
+    known = {file.relative_to(place).as_posix(): (file.stat().st_size, zlib.crc32(file.read_bytes())) for file in files}
+    (place / "kernels" / "built.py").write_text(
+        '"""What the library of this installation was made from. Written by the build."""\n\n'
+        f"#: Checksum of the kernels' sources (`sources.fingerprint`).\nSOURCES = {made['sources']}\n"
+        f"#: Levels of processors.\nLEVELS = {tuple(made['objects'])!r}\n"
+        f"#: Numba and LLVM, as they were.\nCOMPILER = {made['versions']!r}\n"
+        f"#: Sizes and checksums of files.\nFILES = {known!r}\n",
+        encoding="utf-8",
+    )
+
+
+def _say(what: str) -> None:
+    print(f"collide: {what} ...", file=sys.stderr, flush=True)
