@@ -7,7 +7,7 @@ from pathlib import Path
 from setuptools import setup
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "native"))
-from build_library import BuildLibrary, extension, why_not  # noqa: E402
+from build_library import BuildLibrary, extension, why_not
 
 os.environ.setdefault("SOURCE_DATE_EPOCH", "1577836800")  # the same sources give the same wheel, byte by byte
 compiled = not why_not()

@@ -211,7 +211,6 @@ def _make(args, **limits) -> list:
     scenes = _load(args, progress)
     trajectory = _trajectory(args, scenes)
     ignore = [_pair(scenes[0][1], words) for words in args.ignore]
-    _watch_compiler(progress)
     from collide.reports import report, states
     from collide.reports.trajectory import at_start, follow
 
@@ -266,13 +265,6 @@ def _progress(quiet: bool) -> Callable:
     return silent if quiet else Progress()
 
 
-def _watch_compiler(progress: Callable) -> None:
-    """Let the kernel compiler show its progress too; imports numba, so not before the scene is read."""
-    from collide import _jit
-
-    _jit.on_compile = lambda _kernel: progress("compiling kernels (once per version)")
-
-
 def _load(args, progress: Callable) -> list:
     """The scene in each state asked for: (label, Scene); one without a label where no state was named."""
     with progress("reading the scene"):
@@ -294,7 +286,6 @@ def _compare(args) -> int:
     scenes = _load(args, progress)
     if len(scenes) > 1:
         raise InvalidArgument("--state: compare takes one state")
-    _watch_compiler(progress)
     from collide.adapters.peers.compare import compare
 
     with progress("asking the engines"):
@@ -319,7 +310,6 @@ def _stress(args) -> int:
     from collide.reports.tables import Column, Table
 
     progress = _progress(args.quiet)
-    _watch_compiler(progress)
     with progress("asking the hard families"):
         table = run(args.family or None, n=args.cases, seed=args.seed, engine=args.engine)
     if args.json:
@@ -348,7 +338,6 @@ def _locality(args) -> int:
     for place in args.meshes:
         with progress(f"reading {place}"):
             meshes = read_meshes(place)
-        _watch_compiler(progress)
         for name, mesh in meshes:
 
             def about(label: str, name=name):
@@ -428,7 +417,6 @@ def _doctor(args) -> int:
 
     progress = _progress(False)
     with suppress(ImportError):  # what is not installed, the examination will say
-        _watch_compiler(progress)
     examination = doctor.examine(progress)
     for table in examination.tables():
         terminal.show_table(table)

@@ -21,7 +21,7 @@ def silent(label: str):
 
 
 class Progress:
-    """``progress = Progress()``, then ``with progress("compiling kernels (once per version)"): ...``
+    """``progress = Progress()``, then ``with progress("reading the scene"): ...``
 
     Stages nest: the innermost is shown. ``with`` gives a function that changes its label, None from a silent
     one. ``patience`` [s] is how long a stage may last unannounced

@@ -58,7 +58,7 @@ def _scene_line(report: Report) -> str:
 
 
 #: Stages in the order they run; any others follow.
-_STAGES = ("read", "meshes", "compile", "pack", "broadphase", "narrowphase", "report")
+_STAGES = ("read", "meshes", "pack", "broadphase", "narrowphase", "report")
 
 
 def _times(report: Report) -> list[str]:

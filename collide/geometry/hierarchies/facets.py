@@ -335,8 +335,8 @@ def flip_until_convex(
                 return -1
             flip(corners, twins, h)
             g = np.int64(twins[h])
-            for side in range(4):
-                k = one_of_four(side, following(h), preceding(h), following(g), preceding(g))
+            for edge in range(4):
+                k = one_of_four(edge, following(h), preceding(h), following(g), preceding(g))
                 if depth < 6 * count:
                     stack[depth] = k
                     depth += 1
