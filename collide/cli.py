@@ -15,7 +15,7 @@ import re
 import sys
 import time
 from collections.abc import Callable
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 from collide import arguments
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
@@ -416,7 +416,6 @@ def _doctor(args) -> int:
     from collide.reports import doctor, terminal
 
     progress = _progress(False)
-    with suppress(ImportError):  # what is not installed, the examination will say
     examination = doctor.examine(progress)
     for table in examination.tables():
         terminal.show_table(table)

@@ -11,6 +11,7 @@ import ctypes
 import threading
 import time
 from collections.abc import Callable
+from functools import cache
 
 import llvmlite.binding as llvm
 from numba.core import sigutils, types
@@ -66,6 +67,7 @@ class Entry:
         """The entry's machine code."""
 
         def compiled() -> bytes:
+            _say_once()
             log.info("compiling kernel %s", self.__name__)
             code = Lowered()
             code.add(self.__name__, self.function, self.signature)
@@ -77,6 +79,13 @@ class Entry:
         arguments, result = sigutils.normalize_signature(self.signature)
         make = ctypes.CFUNCTYPE if self.nogil else ctypes.PYFUNCTYPE
         return make(_C_TYPES[str(result)], *(_C_TYPES[str(kind)] for kind in arguments))(self._address)
+
+
+@cache
+def _say_once() -> None:
+    from collide.kernels.mode import WHY
+
+    log.warning("kernels are compiled at their first call (%s): half a minute once, then kept in %s", WHY, object_cache.kernel_folder())
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
