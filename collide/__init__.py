@@ -28,6 +28,8 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.kernels.library import include_folder as get_include
+    from collide.kernels.library import library_path as get_library
     from collide.manifolds.ask import contacts
     from collide.manifolds.rows import Contacts
     from collide.meshes.inside import contains
@@ -83,12 +85,15 @@ _HOMES = {
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
+#: Public functions under other names than those of the modules that have them.
+_RENAMED = {"get_include": ("collide.kernels.library", "include_folder"), "get_library": ("collide.kernels.library", "library_path")}
+
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
     "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
     "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
-    "distance", "facet_pairs", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
+    "distance", "facet_pairs", "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
     "walk",
 ]
 
@@ -101,9 +106,10 @@ if not TYPE_CHECKING:  # checkers are to know the names above, and no others
     def __getattr__(name: str):
         if name in _MODULES:
             return import_module(f"collide.{name}")
-        if name not in _HOME:
+        if name not in _HOME and name not in _RENAMED:
             raise AttributeError(f"module 'collide' has no attribute {name!r}")
-        value = getattr(import_module(_HOME[name]), name)
+        module, own = _RENAMED.get(name) or (_HOME[name], name)
+        value = getattr(import_module(module), own)
         globals()[name] = value
         return value
 

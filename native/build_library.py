@@ -97,6 +97,7 @@ class BuildLibrary(build_ext):
         _say(f"linking {LIBRARY}")
         self._link([*self._compiled(C_SOURCES, generated), *made["objects"].values()], library, _exported())
         self._link(self._compiled(["python_module.c"], generated), module, ["PyInit__glue"], calls_python=True)
+        self._write_interface(place)
         _write_about(place, [library, module], made)
 
     def copy_extensions_to_source(self) -> None:
@@ -115,6 +116,15 @@ class BuildLibrary(build_ext):
 
     def get_source_files(self) -> list[str]:
         return [file.relative_to(ROOT).as_posix() for file in sorted(NATIVE.rglob("*")) if file.suffix in (".py", ".c", ".h", ".in")]
+
+    def _write_interface(self, place: Path) -> None:
+        """What C programs need beside the library: the header, and the file that pkg-config reads."""
+        for folder in (place / "include", place / "lib" / "pkgconfig"):
+            folder.mkdir(parents=True, exist_ok=True)
+        shutil.copy(NATIVE / "collide.h", place / "include")
+        text = (NATIVE / "collide.pc.in").read_text(encoding="utf-8")
+        version = self.distribution.get_version()
+        (place / "lib" / "pkgconfig" / "collide.pc").write_text(text.replace("@VERSION@", version), encoding="utf-8")
 
     def _compiled(self, names: list[str], generated: Path) -> list[str]:
         import numpy

@@ -33,6 +33,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from collide.kernels import library
 from collide.kernels.mode import COMPILED, MODE, PLAIN_PYTHON, WITH_NUMBA
 
 if WITH_NUMBA:
@@ -65,7 +66,7 @@ view_u8 = _view(ctypes.c_uint8, np.uint8)
 
 
 if MODE == COMPILED:
-    from collide.kernels.library import address_of
+    address_of = library.glue.address_of
 else:
 
     def address_of(array: np.ndarray) -> int:

@@ -23,6 +23,7 @@ from numba.core.registry import CPUTarget
 from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, target_override, target_registry
 from numba.core.typed_passes import NopythonRewrites
 from numba.core.utils import threadsafe_cached_property
+from numba.extending import intrinsic
 
 from collide.kernels.back_end import FAILED
 
@@ -226,3 +227,22 @@ def _c_function(name: str, compiled, context) -> bytes:
     else:
         builder.ret(context.data_model_manager[result].as_data(builder, value))
     return llvm.parse_assembly(str(module)).as_bitcode()
+
+
+def native_call(signature: str):
+    """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
+    arguments, result = sigutils.normalize_signature(signature)
+
+    def make(_context, address, given):
+        def codegen(context, builder, _signature, args):
+            manager = context.data_model_manager
+            unpacked = [
+                manager[kind].as_data(builder, builder.extract_value(args[1], k)) for k, kind in enumerate(arguments)
+            ]
+            place = builder.inttoptr(args[0], c_function_type(context, arguments, result).as_pointer())
+            value = builder.call(place, unpacked)
+            return context.get_dummy_value() if result == types.none else manager[result].from_data(builder, value)
+
+        return result(types.int64, types.Tuple(arguments)), codegen
+
+    return intrinsic(make)

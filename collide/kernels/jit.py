@@ -14,16 +14,14 @@ from collections.abc import Callable
 from functools import cache
 
 import llvmlite.binding as llvm
-from numba.core import sigutils, types
-from numba.extending import intrinsic
+from numba.core import sigutils
 
 from collide.journal import log
 from collide.kernels import object_cache, sources
 from collide.kernels.back_end import host, machine_code
-from collide.kernels.front_end import Lowered, c_function_type, dispatcher
-from collide.kernels.views import view_maker
+from collide.kernels.front_end import Lowered, dispatcher, native_call
 
-__all__ = ["Entry", "code_of", "entry", "kernel", "native_call", "view_maker"]
+__all__ = ["Entry", "code_of", "entry", "kernel", "native_call"]
 
 _C_TYPES = {"int64": ctypes.c_int64, "float64": ctypes.c_double, "boolean": ctypes.c_bool, "bool": ctypes.c_bool, "none": None}
 #: One at a time: two threads' first calls compile an entry once.
@@ -119,22 +117,3 @@ def _placed(name: str, code: bytes) -> int:
     engine.finalize_object()
     _engines.append(engine)
     return engine.get_function_address(name)
-
-
-def native_call(signature: str):
-    """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
-    arguments, result = sigutils.normalize_signature(signature)
-
-    def make(_context, address, given):
-        def codegen(context, builder, _signature, args):
-            manager = context.data_model_manager
-            unpacked = [
-                manager[kind].as_data(builder, builder.extract_value(args[1], k)) for k, kind in enumerate(arguments)
-            ]
-            place = builder.inttoptr(args[0], c_function_type(context, arguments, result).as_pointer())
-            value = builder.call(place, unpacked)
-            return context.get_dummy_value() if result == types.none else manager[result].from_data(builder, value)
-
-        return result(types.int64, types.Tuple(arguments)), codegen
-
-    return intrinsic(make)

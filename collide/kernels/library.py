@@ -1,7 +1,7 @@
 """The library of kernels that was made when the package was built: looked at, loaded, and its functions.
 
 A library cut short ends the process when it is loaded, and one of other sources answers wrongly. So sizes and checksums of
-its files are compared with those that the build wrote down, and the sources with those that it was made from: three
+its files are compared with those that the build wrote down, and the sources with those that it was made from: a few
 milliseconds of a start.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Callable
+from typing import Any
 
 from collide.errors import InvalidArgument
 from collide.kernels import sources
@@ -18,9 +19,9 @@ from collide.kernels import sources
 LEVELS = ("v2", "v3", "v4", "arm64")
 #: The level in use; empty where there is no library in this process.
 level = ""
-#: Where the files stand; the module of C.
-FOLDER = str(sources.PACKAGE)
-glue = None
+#: The module of C, its functions those of the entries; None likewise.
+glue: Any = None
+_UNBUILT = "this installation was built without compiled kernels, for want of a C compiler"
 
 
 def load() -> str:
@@ -31,52 +32,85 @@ def load() -> str:
     global glue, level
     wanted = os.environ.get("COLLIDE_CPU", "")
     if wanted and wanted not in LEVELS:
-        raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: no such level of processors; levels are {', '.join(LEVELS)}, or leave it unset")
-    try:
-        from collide.kernels import built
-    except ImportError:
-        return "this installation was built without compiled kernels"
+        raise InvalidArgument(f"COLLIDE_CPU={wanted!r} is no level of processors: it may be {', '.join(LEVELS)}, or unset")
+    built = _built()
+    if built is None:
+        return _UNBUILT
     if sources.fingerprint() != built.SOURCES:
-        return "the sources of kernels differ from those that the library was made from"
+        return "its sources are not those that it was made from; `pip install -e .` makes it anew"
     for name, (size, checksum) in built.FILES.items():
-        if why := _why_damaged(os.path.join(FOLDER, name), size, checksum):
-            return f"the library is damaged: {why}; install collide-robotics again"
+        if why := _why_damaged(_path(name), size, checksum):
+            return f"it is damaged, {why}; install collide-robotics again"
     try:
         from collide.kernels import _glue
 
-        level = _glue.load(_library(built.FILES), wanted)
-    except ValueError as error:
+        level = _glue.load(_path(_library_of(built.FILES)), wanted)
+    except ValueError as error:  # no such level
         if wanted:
-            raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: {error}; this library has {', '.join(built.LEVELS)}") from None
+            raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: {error}; levels of this library: {', '.join(built.LEVELS)}") from None
         return str(error)
     except (ImportError, OSError) as error:
-        return f"the library cannot be loaded: {error}"
+        return f"it cannot be loaded: {error}"
     glue = _glue
     return ""
 
 
+def exists() -> bool:
+    """Whether this installation has a library, to be used or not."""
+    return _built() is not None
+
+
+def about() -> dict[str, str]:
+    """What it was made from: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; empty where there is none."""
+    built = _built()
+    if built is None:
+        return {}
+    return {
+        "level": level, "levels": ", ".join(built.LEVELS), "compiler": built.COMPILER, "sources": f"{built.SOURCES:08x}",
+        "path": library_path(),
+    }  # fmt: skip
+
+
 def library_path() -> str:
     """Where libcollide stands, whether or not this process uses it. Raises FileNotFoundError where there is none."""
+    built = _built()
+    if built is None:
+        raise FileNotFoundError(f"there is no libcollide: {_UNBUILT}")
+    return _path(_library_of(built.FILES))
+
+
+def include_folder() -> str:
+    """Where collide.h stands. Raises FileNotFoundError where there is no library."""
+    library_path()
+    return _path("include")
+
+
+def _built() -> Any:
     try:
         from collide.kernels import built
     except ImportError:
-        raise FileNotFoundError("this installation was built without libcollide: see `collide doctor`") from None
-    return _library(built.FILES)
+        return None
+    return built
 
 
-def _library(files: dict) -> str:
-    (found,) = (name for name in files if name.startswith("lib/"))
-    return os.path.join(FOLDER, *found.split("/"))
+def _library_of(files: dict) -> str:
+    (found,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
+    return found
+
+
+def _path(name: str) -> str:
+    return os.path.join(sources.PACKAGE, *name.split("/"))
 
 
 def _why_damaged(path: str, size: int, checksum: int) -> str:
     try:
-        if os.stat(path).st_size != size:
-            return f"{path} has {os.stat(path).st_size} bytes, not {size}"
         with open(path, "rb") as file:
-            return "" if zlib.crc32(file.read()) == checksum else f"{path} has another checksum"
+            content = file.read()
     except OSError as error:
         return str(error)
+    if len(content) != size:
+        return f"{path} has {len(content)} bytes, not {size}"
+    return "" if zlib.crc32(content) == checksum else f"{path} has another checksum"
 
 
 def entry(_signature: str, *, nogil: bool = True) -> Callable[[Callable], Callable]:
@@ -85,7 +119,7 @@ def entry(_signature: str, *, nogil: bool = True) -> Callable[[Callable], Callab
 
 
 class _Absent:
-    """An entry that the library does not have: of tests, say, or typed in by hand."""
+    """An entry that the library does not have: of a test, or typed in by hand."""
 
     def __init__(self, function: Callable):
         self.__name__ = function.__name__
@@ -95,11 +129,5 @@ class _Absent:
 
 
 def code_of(entry) -> int:
-    return glue.code_of(entry.__name__)  # type: ignore[attr-defined]
-
-
-def __getattr__(name: str):
-    """``address_of``, as the module of C has it."""
-    if name == "address_of" and glue is not None:
-        return glue.address_of
-    raise AttributeError(name)
+    """Address of an entry's machine code."""
+    return glue.code_of(entry.__name__)

@@ -9,20 +9,32 @@ PYTHON : as the Python that they are written in: ``NUMBA_DISABLE_JIT=1``, for co
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 
+from collide.errors import MissingExtra
+from collide.journal import log
 from collide.kernels import library
 
 COMPILED, JUST_IN_TIME, PYTHON = "compiled", "just in time", "python"
 
 
+def _asked(name: str) -> bool:
+    return os.environ.get(name, "0") not in ("", "0")
+
+
 def _chosen() -> tuple[str, str]:
-    """(mode, why)."""
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    """(mode, why). Raises MissingExtra where there is neither a library that can be used nor a compiler."""
+    if _asked("NUMBA_DISABLE_JIT"):
         return PYTHON, "NUMBA_DISABLE_JIT is set"
-    if os.environ.get("COLLIDE_JIT", "0") not in ("", "0"):
-        return JUST_IN_TIME, "COLLIDE_JIT is set"
-    why_not = library.load()
-    return (JUST_IN_TIME, why_not) if why_not else (COMPILED, "")
+    forced = _asked("COLLIDE_JIT")
+    why = "COLLIDE_JIT is set" if forced else library.load()
+    if not why:
+        return COMPILED, ""
+    if find_spec("numba") is None:
+        raise MissingExtra("numba", extra="jit", purpose=f"compile kernels: {why}. Either mend that, or install it")
+    if not forced and library.exists():
+        log.warning("kernels of the library are not used: %s", why)
+    return JUST_IN_TIME, why
 
 
 #: How kernels run, and why they are not `COMPILED`.
@@ -30,3 +42,8 @@ MODE, WHY = _chosen()
 #: Whether kernels are what Numba makes of them: their own types and intrinsics are there.
 WITH_NUMBA = MODE == JUST_IN_TIME
 PLAIN_PYTHON = MODE == PYTHON
+
+
+def told() -> str:
+    """The mode in words: ``library, v4``."""
+    return f"library, {library.level}" if MODE == COMPILED else MODE

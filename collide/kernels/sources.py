@@ -19,8 +19,8 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent.parent
 #: Rooms and files of the package that hold kernels, what kernels import, and what makes code of them.
 KERNEL_SOURCES = (
-    "broadphase", "geometry", "kernels/__init__.py", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py",
-    "kernels/jit.py", "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
+    "broadphase", "geometry", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py", "kernels/plain_lanes.py",
+    "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
 )  # fmt: skip
 
 
@@ -88,7 +88,14 @@ def _imported(module: str) -> tuple[str, ...]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
     # `collide` itself imports everything, and no kernel takes anything from there.
-    return tuple(name for name in found if name.startswith("collide.") and _file(name) is not None)
+    return tuple(name for name in found if name.startswith("collide.") and _may_matter(name))
+
+
+def _may_matter(module: str) -> bool:
+    """Whether it is a module at all, and none that only decides how kernels run."""
+    if _file(module) is None or module == "collide.kernels":
+        return False
+    return not module.startswith("collide.kernels.") or f"{module[8:].replace('.', '/')}.py" in KERNEL_SOURCES
 
 
 @cache

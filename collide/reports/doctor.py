@@ -25,6 +25,7 @@ OPTIONAL = (
     ("scipy", "robots", "hulls of mesh vertices"),
     ("rich", "robots", "colours in the terminal"),
     ("example-robot-data", "demo", "the panda of the shipped scene"),
+    ("numba", "jit", "changing kernels: COLLIDE_JIT=1"),
     ("coacd", "decompose", "meshes as unions of convex pieces"),
     ("matplotlib", "plots", "collide locality --plot"),
     ("coal", "peers", "collide compare"),
@@ -100,9 +101,28 @@ def _installed() -> list[Check]:
         Check("collide", str(known["collide"])),
         Check("Python", python, sys.version_info >= (3, 10)),
     ]
-    checks += [Check(name, known[name] or "missing", known[name] is not None) for name in ("numpy", "numba")]
+    checks += [Check("numpy", known["numpy"] or "missing", known["numpy"] is not None), *_kernels()]
     machine = f"{platform.system()} {known['machine']}, {count(os.cpu_count() or 1, 'processor')}"
     return [*checks, Check("machine", machine)]
+
+
+def _kernels() -> list[Check]:
+    """How kernels run here, and what of."""
+    from collide.kernels import library, mode
+
+    about = library.about()
+    if mode.MODE == mode.COMPILED:
+        checks = [Check("kernels", f"compiled, level {about['level']} of {about['levels']}")]
+    else:
+        numba = f" (numba {package_version('numba')}, kept on disk)" if mode.MODE == mode.JUST_IN_TIME else ", very slow"
+        told = "NO COMPILED KERNELS" if not about else "FALLING BACK"
+        checks = [Check("kernels", f"{told}: run {mode.MODE}{numba}: {mode.WHY}", None)]
+    if about:
+        checks += [
+            Check("library", f"{about['path']}"),
+            Check("built by", f"{about['compiler']}, from sources {about['sources']}"),
+        ]
+    return checks
 
 
 def _optional() -> list[Check]:
@@ -114,18 +134,25 @@ def _optional() -> list[Check]:
 
 
 def _caches() -> list[Check]:
+    from collide.cache_folder import cache_folder
+    from collide.kernels import mode
+
+    kernels = _kernel_cache() if mode.MODE == mode.JUST_IN_TIME else []
+    return [*kernels, _cache("prepared inputs", cache_folder("scenes"))]
+
+
+def _kernel_cache() -> list[Check]:
+    """Of kernels compiled just in time."""
     from collide.cache_folder import cache_folder, why_distrusted
 
-    kernels = cache_folder("kernels")
+    folder = cache_folder("kernels")
     try:
-        why = why_distrusted(kernels)
+        why = why_distrusted(folder)
     except OSError:  # told below
         why = None
     if why is not None:
-        told = f"{kernels} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR"
-        return [Check("kernels", told, None), _cache("prepared inputs", cache_folder("scenes"))]
-    checks = [_cache("kernels", kernels), _cache("prepared inputs", cache_folder("scenes"))]
-    return [*checks, Check("kernels are code", "who can write in their folder decides what runs: only its user may")]
+        return [Check("kernels", f"{folder} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR", None)]
+    return [_cache("kernels", folder), Check("kernels are code", "who can write in their folder decides what runs: only its user may")]
 
 
 def _cache(what: str, folder: Path) -> Check:

@@ -277,12 +277,13 @@ def _seconds(scene, stats: dict, begun: float, tested: float, started: float | N
 def versions() -> dict[str, str | None]:
     """What gave the answer; None for a package whose version cannot be told."""
     import collide
+    from collide.kernels import mode
 
     return {
         "collide": collide.__version__,
         "python": platform.python_version(),
         "numpy": package_version("numpy"),
-        "numba": package_version("numba"),
+        "kernels": mode.told(),
         "machine": platform.machine() or None,
     }
 
