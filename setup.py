@@ -15,5 +15,5 @@ setup(
     ext_modules=[extension()] if compiled else [],
     cmdclass={"build_ext": BuildLibrary},
     options={"bdist_wheel": {"py_limited_api": "cp310"}} if compiled else {},
-    install_requires=["numpy>=1.24", *([] if compiled else ["numba>=0.60"])],
+    install_requires=["numpy>=1.24", *([] if compiled else ["numba==0.68.*", "llvmlite==0.50.*"])],
 )

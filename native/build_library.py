@@ -17,6 +17,7 @@ import sys
 import sysconfig
 import tempfile
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 from setuptools import Extension
@@ -46,10 +47,10 @@ def why_not() -> str:
             "apt install gcc, dnf install gcc, xcode-select --install, or the Build Tools of Visual Studio"
         )
     if reason:
-        print(
-            f"\n*** collide: NO COMPILED KERNELS: {reason}.\n*** The package will need numba, and compile kernels at their first call "
-            "(half a minute). Install a C compiler and install again; `collide doctor` tells.\n", file=sys.stderr, flush=True,
-        )  # fmt: skip
+        _say_loudly(
+            f"*** collide: NO COMPILED KERNELS: {reason}. The package will need numba, and compile kernels at their first call "
+            "(half a minute). Install a C compiler, then collide-robotics again; `collide doctor` tells. ***"
+        )
     return reason
 
 
@@ -193,6 +194,14 @@ def _write_about(place: Path, files: list[Path], made: dict) -> None:
         f"#: Sizes and checksums of files.\nFILES = {known!r}\n",
         encoding="utf-8",
     )
+
+
+def _say_loudly(what: str) -> None:
+    """On stderr, and where that is not shown to anybody, as pip does, on the terminal itself."""
+    print(what, file=sys.stderr, flush=True)
+    if not sys.stderr.isatty():
+        with suppress(OSError), open("/dev/tty", "w", encoding="utf-8") as terminal:
+            terminal.write(f"\n{what}\n")
 
 
 def _say(what: str) -> None:

@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# One wheel, every Python that is on this machine: built once, then installed and tested under each of them, away from the checkout.
+#
+#   bash tests/matrix.sh                 # the engine's tests that need no extras, a minute or two a Python
+#   bash tests/matrix.sh tests/test_engine_closed_forms.py     # other tests
+#   WHEEL=dist/….whl PYTHONS="3.10 3.13" bash tests/matrix.sh
+set -euo pipefail
+cd "$(dirname "$0")/.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+chosen=("$@")
+[ ${#chosen[@]} -gt 0 ] || chosen=(
+    tests/test_engine_closed_forms.py tests/test_engine_batches.py tests/test_engine_exact.py tests/test_engine_symmetry.py
+    tests/test_hulls.py tests/test_support_tree.py tests/test_mesh_distances.py tests/test_mesh_contacts.py
+)
+if [ -z "${WHEEL:-}" ]; then
+    echo "building the wheel (two minutes)"
+    COLLIDE_REQUIRE_COMPILED=1 python -m pip wheel --quiet --no-deps --wheel-dir "$work" .
+    WHEEL=$(echo "$work"/*.whl)
+fi
+cp -r tests "$work/tests"
+echo "wheel: $(basename "$WHEEL"), $(stat -c %s "$WHEEL" 2>/dev/null || stat -f %z "$WHEEL") bytes"
+
+# Every python3.X on the path, and those of pyenv.
+found() {
+    for version in ${PYTHONS:-3.10 3.11 3.12 3.13 3.14}; do
+        for candidate in "python$version" "${PYENV_ROOT:-$HOME/.pyenv}"/versions/"$version".*/bin/python; do
+            if "$candidate" -c 'import sys; sys.exit("%d.%d" % sys.version_info[:2] != "'"$version"'")' 2>/dev/null; then
+                echo "$candidate"
+                break
+            fi
+        done
+    done
+}
+failed=0
+for python in $(found); do
+    name=$("$python" -c 'import platform; print(platform.python_version())')
+    environment="$work/$name"
+    "$python" -m venv "$environment"
+    "$environment/bin/python" -m pip install --quiet --disable-pip-version-check "$WHEEL" pytest hypothesis
+    (
+        cd "$work"
+        "$environment/bin/python" - <<'PYTHON'
+import sys, time
+started = time.perf_counter()
+import collide
+box = collide.Box((1, 1, 1))
+hit = collide.collide(box, box, collide.pose(), collide.pose((1.5, 0, 0)))
+seconds = time.perf_counter() - started
+import numpy
+from collide.kernels import mode
+compilers = [name for name in sys.modules if name.startswith(("numba", "llvmlite"))]
+assert hit is False and not compilers, (hit, compilers)
+print(f"Python {sys.version.split()[0]}, numpy {numpy.__version__}: kernels {mode.told()}, import to first boolean {seconds:.3f} s")
+PYTHON
+        # Not `python -m pytest`: that would put this folder on the path.
+        "$environment/bin/pytest" -q --import-mode=importlib -p no:cacheprovider "${chosen[@]}" | tail -n 1
+    ) || failed=1
+done
+exit $failed
