@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 import reprlib
+import sys
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def number(value: Any) -> float | None:
     """A real number as a double, infinite where it is too large for one; None where it is no number."""
     if isinstance(value, (str, bytes, bytearray, complex, np.complexfloating, np.timedelta64, np.datetime64, np.character)):
         return None
-    if value is np.ma.masked or (isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in _REAL + "O")):
+    if _is_masked(value) or (isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in _REAL + "O")):
         return None
     try:
         return float(value)
@@ -101,4 +102,5 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
 
 
 def _is_masked(value: Any) -> bool:
-    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.getmaskarray(value).any())
+    masks = sys.modules.get("numpy.ma")  # whoever has a masked array has imported it; it is a tenth of numpy's own start
+    return masks is not None and isinstance(value, masks.MaskedArray) and bool(masks.getmaskarray(value).any())

@@ -11,14 +11,16 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
-import zipfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from collide import reading
 from collide.errors import InvalidShape
+
+if TYPE_CHECKING:
+    import zipfile
 
 
 class Field(NamedTuple):
@@ -51,6 +53,8 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     dropped : prefix of arrays that older files have besides; they count for the digest alone.
     Raises InvalidShape where the file is another one, of another version, or damaged.
     """
+    import zipfile  # here, and below: a start of the library need not load it
+
     named = f"{who}.load: {reading.told(path) if not isinstance(path, (str, Path)) else path}"
     other = f"{named} is of another format; save the shape again"
     try:
@@ -90,6 +94,8 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
 
 def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None, other: str) -> np.ndarray:
     """One array, once its header and its length are what they should be. field : None for any array of numbers."""
+    import zipfile
+
     if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 or not member.filename.endswith(".npy"):
         raise InvalidShape(other)  # nothing we write is compressed or encrypted
     with members.open(member) as file:
