@@ -113,7 +113,8 @@ def _entries() -> list:
         package = importlib.import_module(f"collide.{room}")
         for found in sorted(pkgutil.walk_packages(package.__path__, f"collide.{room}."), key=lambda found: found.name):
             importlib.import_module(found.name)
-    entries = sorted(jit.entries, key=lambda entry: (entry.function.__module__, entry.function.__code__.co_firstlineno))
+    own = [entry for entry in jit.entries if entry.function.__module__.startswith("collide.")]
+    entries = sorted(own, key=lambda entry: (entry.function.__module__, entry.function.__code__.co_firstlineno))
     names = [entry.__name__ for entry in entries]
     if twice := {name for name in names if names.count(name) > 1}:
         raise SystemExit(f"two entries have one name: {', '.join(sorted(twice))}")

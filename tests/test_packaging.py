@@ -24,7 +24,7 @@ import collide
 ROOT = Path(__file__).resolve().parent.parent
 #: Folder of the repository → folder of the installed package.
 FOLDERS = {"collide": "collide", "adapters": "collide/adapters", "scenes": "collide/scenes"}
-LITTER = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+LITTER = shutil.ignore_patterns("__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib")
 #: The backend that pyproject.toml asks for.
 SETUPTOOLS = 77
 
@@ -36,21 +36,45 @@ def _setuptools() -> int:
         return 0
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory) -> Iterator[zipfile.ZipFile]:
+#: What the build makes, and no folder of the repository holds.
+LIBRARY = {"so": "collide/lib/libcollide.so", "dylib": "collide/lib/libcollide.dylib", "dll": "collide/lib/collide.dll"}
+MADE = re.compile(r"collide/(lib/.+|include/.+|kernels/built\.py|kernels/_glue\..+)")
+
+
+def _built(tree: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Make a wheel of a copy of the checkout; object files of kernels that lie there need not be compiled again."""
     if _setuptools() < SETUPTOOLS:
         pytest.skip(f"building a wheel needs setuptools>={SETUPTOOLS}; pip install 'setuptools>={SETUPTOOLS}'")
-    tree = tmp_path_factory.mktemp("tree")
-    for folder in FOLDERS:
+    tree.mkdir(exist_ok=True)
+    for folder in (*FOLDERS, "native"):
         shutil.copytree(ROOT / folder, tree / folder, ignore=LITTER)
+    if (ROOT / "build" / "kernels").is_dir():
+        shutil.copytree(ROOT / "build" / "kernels", tree / "build" / "kernels")
     for file in ROOT.iterdir():
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, tree)
     build = "from setuptools.build_meta import build_wheel; build_wheel('dist')"
-    done = subprocess.run([sys.executable, "-c", build], cwd=tree, check=False, capture_output=True, text=True, timeout=120)
+    own = {name: value for name, value in os.environ.items() if not name.startswith("COLLIDE_") and name != "NUMBA_DISABLE_JIT"}
+    return subprocess.run(
+        [sys.executable, "-c", build], cwd=tree, env={**own, **environment}, check=False, capture_output=True, text=True, timeout=400
+    )
+
+
+@pytest.fixture(scope="module")
+def wheel_file(tmp_path_factory) -> Path:
+    pytest.importorskip("numba", reason="kernels are compiled by numba: pip install 'collide-robotics[jit]'")
+    tree = tmp_path_factory.mktemp("one") / "tree"
+    done = _built(tree)
     assert done.returncode == 0, done.stdout + done.stderr
     (made,) = (tree / "dist").glob("*.whl")
-    with zipfile.ZipFile(made) as opened:
+    if made.name.endswith("-none-any.whl"):
+        pytest.skip(f"no C compiler here: {[line for line in done.stderr.splitlines() if '***' in line]}")
+    return made
+
+
+@pytest.fixture(scope="module")
+def wheel(wheel_file) -> Iterator[zipfile.ZipFile]:
+    with zipfile.ZipFile(wheel_file) as opened:
         yield opened
 
 
@@ -67,14 +91,15 @@ def _folder_files() -> set[str]:
         for folder, package in FOLDERS.items()
         for file in (ROOT / folder).rglob("*")
         if file.is_file() and file.suffix != ".pyc" and not any(part.startswith(".") for part in file.parts[-2:])
-    }
+    } - {f"{package}/{file.relative_to(ROOT / folder).as_posix()}" for folder, package in FOLDERS.items()
+         for file in (ROOT / folder).rglob("*") if MADE.fullmatch(f"{package}/{file.relative_to(ROOT / folder).as_posix()}")}
 
 
 # --- the wheel ----------------------------------------------------------------------------------
 
 
 def test_wheel_holds_the_folders_and_nothing_else(wheel):
-    installed = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    installed = {name for name in wheel.namelist() if ".dist-info/" not in name and not MADE.fullmatch(name)}
     missing, extra = sorted(_folder_files() - installed), sorted(installed - _folder_files())
     assert not missing, f"not in the wheel; name their package in pyproject.toml: {missing}"
     assert not extra, f"in the wheel, but not in the folders: {extra}"
@@ -93,9 +118,69 @@ def test_files_are_the_folders_own(wheel):
         assert inner == (ROOT / folder / "__init__.py").read_bytes()
 
 
-def test_engine_alone_needs_numpy_and_numba(metadata):
+def _required(metadata) -> list[str]:
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
-    assert sorted(re.match(r"[\w-]+", line).group() for line in required) == ["numba", "numpy"]
+    return sorted(re.match(r"[\w-]+", line).group() for line in required)
+
+
+def test_engine_alone_needs_numpy(metadata):
+    assert _required(metadata) == ["numpy"]
+
+
+def test_wheel_is_of_its_platform_and_of_every_python(wheel_file):
+    """cp310-abi3: one wheel for Python 3.10 and all that come after it."""
+    assert "-cp310-abi3-" in wheel_file.name
+    assert wheel_file.stat().st_size < 4_000_000
+
+
+def test_wheel_has_the_library_and_what_c_programs_need(wheel):
+    made = sorted(name for name in wheel.namelist() if MADE.fullmatch(name))
+    assert "collide/include/collide.h" in made and "collide/kernels/built.py" in made
+    assert "collide/lib/pkgconfig/collide.pc" in made and set(LIBRARY.values()) & set(made)
+    assert f"Version: {collide.__version__}\n".encode() in wheel.read("collide/lib/pkgconfig/collide.pc")
+
+
+def test_library_leaves_nothing_open_but_the_c_library(wheel, tmp_path):
+    """No Python, no numba, no C++; and no path of the machine that built it."""
+    if not shutil.which("readelf") or LIBRARY["so"] not in wheel.namelist():
+        pytest.skip("for Linux, with readelf: apt install binutils")
+    file = wheel.extract(LIBRARY["so"], tmp_path)
+    dynamic = subprocess.run(["readelf", "-d", file], capture_output=True, text=True, check=True).stdout
+    needed = set(re.findall(r"NEEDED.*\[([^.\]]+)", dynamic))
+    assert needed <= {"libc", "libm", "libpthread"} and "RPATH" not in dynamic and "RUNPATH" not in dynamic, dynamic
+    assert "TEXTREL" not in dynamic
+    symbols = subprocess.run(["readelf", "--dyn-syms", "-W", file], capture_output=True, text=True, check=True).stdout
+    undefined = set(re.findall(r" UND ([\w.]+)", symbols))
+    assert not [name for name in undefined if name.startswith(("Py", "_Py", "numba", "NRT"))], undefined
+    assert str(ROOT).encode() not in Path(file).read_bytes()
+
+
+def test_same_sources_give_the_same_bytes(wheel_file, tmp_path):
+    """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the object
+    files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""
+    again = tmp_path / "elsewhere"
+    done = _built(again)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (again / "dist" / wheel_file.name).read_bytes() == wheel_file.read_bytes()
+
+
+def test_without_a_compiler_the_wheel_needs_numba_and_says_so(tmp_path):
+    done = _built(tmp_path / "tree", CC=str(tmp_path / "no-such-compiler"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    (line,) = (line for line in done.stderr.splitlines() if "***" in line)
+    assert "NO COMPILED KERNELS" in line and "collide doctor" in line and "no-such-compiler" in line
+    (made,) = (tmp_path / "tree" / "dist").glob("*.whl")
+    assert made.name.endswith("-py3-none-any.whl")
+    with zipfile.ZipFile(made) as opened:
+        assert not [name for name in opened.namelist() if MADE.fullmatch(name)]
+        (name,) = (name for name in opened.namelist() if name.endswith(".dist-info/METADATA"))
+        assert _required(email.message_from_bytes(opened.read(name))) == ["llvmlite", "numba", "numpy"]
+
+
+def test_releases_never_lack_kernels(tmp_path):
+    done = _built(tmp_path / "tree", CC=str(tmp_path / "no-such-compiler"), COLLIDE_REQUIRE_COMPILED="1")
+    assert done.returncode != 0 and not list((tmp_path / "tree").glob("dist/*.whl"))
+    assert "COLLIDE_REQUIRE_COMPILED is set" in done.stderr and "apt install gcc" in done.stderr
 
 
 def test_metadata_names_version_python_and_licence(metadata):
@@ -106,7 +191,7 @@ def test_metadata_names_version_python_and_licence(metadata):
 
 
 def test_extras(metadata):
-    assert {"robots", "demo", "decompose", "peers", "plots", "dev"} <= set(metadata.get_all("Provides-Extra"))
+    assert {"robots", "demo", "decompose", "peers", "plots", "jit", "dev"} <= set(metadata.get_all("Provides-Extra"))
     (pybullet,) = (line for line in metadata.get_all("Requires-Dist") if line.startswith("pybullet"))
     assert re.search(r"python_version < ['\"]3\.12['\"]", pybullet), "pybullet has no wheels from Python 3.12 on"
 

@@ -120,6 +120,5 @@ def _text(module: str) -> bytes:
 def compiler_versions() -> str:
     import llvmlite
     import numba
-    import numpy
 
-    return f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {numpy.__version__} python {sys.version_info[:2]}"
+    return f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {sys.version_info[0]}.{sys.version_info[1]}"
