@@ -1,11 +1,12 @@
-"""How long a user waits, and how much memory it takes: start-up, first report, later reports.
+"""How long a user waits, and how much memory it takes: start-up, first answers, reports.
 
     python benchmarks/startup.py                 # everything; a few minutes
     python benchmarks/startup.py --runs 1 --cold-runs 1 --no-csv
+    python benchmarks/startup.py --against ../older/.venv/bin/python      # another installation, in turns with this one
 
-Each case runs in processes of its own. Cold means an empty cache folder: the kernels are compiled and
-the meshes are read. Warm means a folder that one run has filled. Wall time is taken from outside, the
-interpreter's own start included; peak memory is the process's largest resident set.
+Each case runs in processes of its own. Cold means an empty cache folder: meshes are read, and kernels compiled where they come
+in no library. Warm means a folder that one run has filled. Wall time is taken from outside, the interpreter's own start
+included; peak memory is the process's largest resident set.
 """
 
 from __future__ import annotations
@@ -38,10 +39,17 @@ class Case(NamedTuple):
     needs: str | None = None
 
 
+_BOXES = "import collide; box = collide.Box((1, 1, 1)); X_WA, X_WB = collide.pose(), collide.pose((1.5, 0, 0)); "
+_HULL = (
+    "import collide, numpy; hull = collide.ConvexHull(numpy.random.default_rng(1).normal(size=(500, 3))); "
+    "collide.distance(hull, hull, collide.pose(), collide.pose((9, 0, 0)))"
+)
 CASES = (
     Case("python alone", ("-c", "pass")),
-    Case("import numpy, numba", ("-c", "import numpy, numba")),
+    Case("import numpy", ("-c", "import numpy")),
     Case("import collide", ("-c", "import collide")),
+    Case("first boolean", ("-c", f"{_BOXES}collide.collide(box, box, X_WA, X_WB)"), cached=True),
+    Case("first distance, hulls of 500 points", ("-c", _HULL), cached=True),
     Case("collide --help", ("-m", "collide", "--help")),
     Case("collide report workcell", ("-m", "collide", "report", "workcell"), cached=True),
     Case("collide report panda_workbench", ("-m", "collide", "report", "panda_workbench"), True, "example-robot-data"),
@@ -54,10 +62,10 @@ class Run(NamedTuple):
     """Largest resident set [MiB], NaN where the system does not tell."""
 
 
-def run(case: Case, cache: str) -> Run:
+def run(case: Case, cache: str, python: str) -> Run:
     """One process from start to end; its output is thrown away."""
     environment = {**os.environ, "COLLIDE_CACHE_DIR": cache}
-    command = [sys.executable, *case.arguments]
+    command = [python, *case.arguments]
     started = time.perf_counter()
     # Away from the checkout, so that the installed package is what is measured.
     with subprocess.Popen(
@@ -82,24 +90,31 @@ def _wait(process: subprocess.Popen) -> float:
     return usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
-def measure(case: Case, runs: int, cold_runs: int) -> dict[str, list[Run]]:
-    """Runs of a case by the state of the cache: "-" where it does not matter, else "cold" and "warm"."""
+def measure(case: Case, runs: int, cold_runs: int, pythons: list[str]) -> dict[tuple[str, str], list[Run]]:
+    """Runs of a case by interpreter and by the state of the cache: "-" where it does not matter, else "cold" and "warm".
+
+    Interpreters take turns, so that what else the machine does meets all of them.
+    """
+    taken: dict[tuple[str, str], list[Run]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        if not case.cached:
-            run(case, folder)  # fills the file system's cache
-            return {"-": [run(case, folder) for _ in range(runs)]}
-        cold = []
-        for k in range(cold_runs):
-            fresh = Path(folder) / str(k)
-            fresh.mkdir()
-            cold.append(run(case, str(fresh)))
-        return {"cold": cold, "warm": [run(case, str(fresh)) for _ in range(runs)]}
+        last = {python: folder for python in pythons}
+        for k in range(cold_runs if case.cached else 1):
+            for j, python in enumerate(pythons):
+                last[python] = fresh = str(Path(folder) / f"{j}-{k}")
+                Path(fresh).mkdir(mode=0o700)
+                one = run(case, fresh, python)  # where the cache does not matter, this fills the file system's
+                if case.cached:
+                    taken.setdefault((python, "cold"), []).append(one)
+        for _ in range(runs):
+            for python in pythons:
+                taken.setdefault((python, "warm" if case.cached else "-"), []).append(run(case, last[python], python))
+    return taken
 
 
 def machine() -> dict[str, str]:
     """What the numbers depend on, without the machine's name."""
     versions = {name: metadata.version(package) for name, package in
-                (("collide", "collide-robotics"), ("numpy", "numpy"), ("numba", "numba"))}  # fmt: skip
+                (("collide", "collide-robotics"), ("numpy", "numpy"))}  # fmt: skip
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {"cpu": _cpu(), "cores": str(cores), "system": platform.system(), "python": platform.python_version(), **versions}
 
@@ -120,17 +135,17 @@ def _installed(distribution: str) -> bool:
     return True
 
 
-def rows(runs: int, cold_runs: int) -> list[dict[str, str]]:
+def rows(runs: int, cold_runs: int, pythons: list[str]) -> list[dict[str, str]]:
     """One row per case and state of the cache; cases whose package is missing are left out, with a word."""
     found = []
     for case in CASES:
         if case.needs and not _installed(case.needs):
             print(f"left out: {case.name} ({case.needs} is not installed)", file=sys.stderr)
             continue
-        for state, taken in measure(case, runs, cold_runs).items():
+        for (python, state), taken in measure(case, runs, cold_runs, pythons).items():
             seconds = [one.seconds for one in taken]
             found.append({
-                "case": case.name, "cache": state, "runs": str(len(taken)),
+                "case": case.name, "of": "this" if python == sys.executable else "other", "cache": state, "runs": str(len(taken)),
                 "median_s": f"{statistics.median(seconds):.3f}", "min_s": f"{min(seconds):.3f}",
                 "max_s": f"{max(seconds):.3f}", "peak_MiB": f"{max(one.peak for one in taken):.0f}",
             })  # fmt: skip
@@ -140,7 +155,7 @@ def rows(runs: int, cold_runs: int) -> list[dict[str, str]]:
 def show(table: list[dict[str, str]]) -> None:
     widths = {key: max(len(key), *(len(row[key]) for row in table)) for key in table[0]}
     for line in [{key: key for key in widths}, *table]:
-        left = {"case", "cache"}
+        left = {"case", "of", "cache"}
         print("  ".join(line[k].ljust(w) if k in left else line[k].rjust(w) for k, w in widths.items()).rstrip())
 
 
@@ -160,13 +175,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=7, help="runs of each case, of the warm ones too (default: 7)")
     parser.add_argument("--cold-runs", type=int, default=3, help="runs with an empty cache (default: 3)")
+    parser.add_argument("--against", metavar="PYTHON", help="an interpreter that has another version of collide installed")
     parser.add_argument("--no-csv", action="store_true", help="print the table alone")
     args = parser.parse_args()
     if min(args.runs, args.cold_runs) < 1:
         parser.error("at least one run of each kind is needed")
     about = machine()
     print(", ".join(f"{name} {value}" for name, value in about.items()))
-    table = rows(args.runs, args.cold_runs)
+    table = rows(args.runs, args.cold_runs, [sys.executable, *([args.against] if args.against else [])])
     show(table)
     if not args.no_csv:
         print("written to", write(table, about).relative_to(RESULTS.parent.parent))

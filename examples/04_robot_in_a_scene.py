@@ -1,4 +1,4 @@
-"""The shipped work cell: an arm over a bench, its joints moved; numpy and numba are enough."""
+"""The shipped work cell: an arm over a bench, its joints moved; numpy is enough."""
 
 import numpy as np
 
