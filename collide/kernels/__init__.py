@@ -30,13 +30,17 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.kernels import library
 from collide.kernels.mode import COMPILED, MODE, PLAIN_PYTHON, WITH_NUMBA
 
-if WITH_NUMBA:
+if TYPE_CHECKING or PLAIN_PYTHON:
+    from collide.kernels.plain import code_of, entry, kernel, native_call
+    from collide.kernels.plain import view_maker as _view
+elif WITH_NUMBA:
     from numba import from_dtype
 
     from collide.kernels.jit import code_of, entry, kernel, native_call
@@ -45,13 +49,9 @@ if WITH_NUMBA:
     def _view(_ctype, dtype) -> Callable:
         return _view_of_kind(from_dtype(np.dtype(dtype)))
 else:
+    from collide.kernels.library import code_of, entry
     from collide.kernels.plain import kernel, native_call
     from collide.kernels.plain import view_maker as _view
-
-    if MODE == COMPILED:
-        from collide.kernels.library import code_of, entry
-    else:
-        from collide.kernels.plain import code_of, entry
 
 __all__ = [
     "MODE", "PLAIN_PYTHON", "WITH_NUMBA", "address_of", "code_of", "entry", "kernel", "native_call", "view_f32", "view_f64",

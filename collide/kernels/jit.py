@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core import sigutils
@@ -23,7 +24,7 @@ from collide.kernels.front_end import Lowered, dispatcher, native_call
 
 __all__ = ["Entry", "code_of", "entry", "kernel", "native_call"]
 
-_C_TYPES = {"int64": ctypes.c_int64, "float64": ctypes.c_double, "boolean": ctypes.c_bool, "bool": ctypes.c_bool, "none": None}
+_C_TYPES: dict[str, Any] = {"int64": ctypes.c_int64, "float64": ctypes.c_double, "boolean": ctypes.c_bool, "bool": ctypes.c_bool, "none": None}
 #: One at a time: two threads' first calls compile an entry once.
 _compiling = threading.RLock()
 

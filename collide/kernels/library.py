@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from collide.errors import InvalidArgument
@@ -42,16 +43,15 @@ def load() -> str:
         if why := _why_damaged(_path(name), size, checksum):
             return f"it is damaged, {why}; install collide-robotics again"
     try:
-        from collide.kernels import _glue
-
-        level = _glue.load(_path(_library_of(built.FILES)), wanted)
+        functions = import_module("collide.kernels._glue")
+        level = functions.load(_path(_library_of(built.FILES)), wanted)
     except ValueError as error:  # no such level
         if wanted:
             raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: {error}; levels of this library: {', '.join(built.LEVELS)}") from None
         return str(error)
     except (ImportError, OSError) as error:
         return f"it cannot be loaded: {error}"
-    glue = _glue
+    glue = functions
     return ""
 
 
