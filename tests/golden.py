@@ -1,0 +1,206 @@
+"""The bytes of the engine's answers, hashed: what a rewrite must not change.
+
+    python tests/golden.py                # compares with tests/golden.json; tells the groups that moved
+    python tests/golden.py --write        # after a change that is meant: a commit of its own that says which rows moved, and why
+
+A group is a kind of question about one family of pairs, in one way of asking. Inputs are hashed as well: they come from
+random generators and from the C library's sines, and where they are others the answers cannot be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import collide
+from collide.scenes.families import generate, mesh_names, names
+
+FILE = Path(__file__).with_name("golden.json")
+#: Cases of a family, and random pairs of all kinds of shapes.
+EACH, DRAWN = 3, 240
+SEED = 19
+
+
+class Pair(NamedTuple):
+    A: collide.Shape
+    B: collide.Shape
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+
+
+class Digest:
+    """Of arrays, records field by field (what pads them is nobody's), numbers and text."""
+
+    def __init__(self) -> None:
+        self._sha = hashlib.sha256()
+
+    def add(self, value) -> None:
+        if hasattr(value, "dtype") and value.dtype.names:
+            for name in value.dtype.names:
+                self.add(value[name])
+        elif isinstance(value, (np.ndarray, np.generic)):
+            self._sha.update(f"{value.dtype.str}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+        elif isinstance(value, (list, tuple)):
+            for one in value:
+                self.add(one)
+        else:
+            self._sha.update(repr(value).encode())
+
+    def text(self) -> str:
+        return self._sha.hexdigest()[:16]
+
+
+def hashed(*values) -> str:
+    digest = Digest()
+    digest.add(values)
+    return digest.text()
+
+
+# --- pairs --------------------------------------------------------------------------------------
+
+
+def families() -> Iterator[tuple[str, list[Pair]]]:
+    """(name, pairs) of every family of the study, and of random pairs by kinds of shapes."""
+    for name in (*names(), *mesh_names()):
+        yield name, [Pair(*case.shapes()) for case in generate(name, EACH, SEED)]
+    import soak_pairs
+
+    drawn = [soak_pairs.draw(SEED, number, 1e3) for number in range(DRAWN)]
+    meshed, curved = set(soak_pairs.MESHES), set(soak_pairs.CURVED)
+    groups: dict[str, list[Pair]] = {}
+    for case in drawn:
+        kinds = set(case.kinds)
+        name = "meshes" if kinds & meshed else "compounds" if "compound" in kinds else "curved" if kinds & curved else "polytopes"
+        groups.setdefault(f"drawn: {name}", []).append(Pair(case.A, case.B, case.X_WA, case.X_WB))
+    yield from groups.items()
+
+
+def _asked_of(pairs: list[Pair]) -> str:
+    """A hash of the questions, by what shapes are made from."""
+    digest = Digest()
+    for pair in pairs:
+        for shape in (pair.A, pair.B):
+            digest.add([_made_from(shape)])
+        digest.add([pair.X_WA, pair.X_WB])
+    return digest.text()
+
+
+def _made_from(shape) -> list:
+    if isinstance(shape, (list, tuple)):
+        return [_made_from(one) for one in shape]
+    if isinstance(shape, collide.Shape):
+        return [type(shape).__name__, *(_made_from(getattr(shape, field)) for field in shape._fields)]
+    return shape
+
+
+# --- ways of asking -----------------------------------------------------------------------------
+
+
+def _answer(ask: Callable, *arguments, **options):
+    """What is answered, or the kind of error."""
+    try:
+        found = ask(*arguments, **options)
+    except collide.CollideError as error:
+        return type(error).__name__
+    return found.rows if hasattr(found, "rows") else np.asarray(found)
+
+
+def _batch(pair: Pair) -> tuple[np.ndarray, np.ndarray]:
+    """Five pairs of poses about the one given."""
+    shifts = np.array([0.0, 1.0, -1.0, 1e-9, 3.0])[:, None] * (pair.X_WB[:3, 3] - pair.X_WA[:3, 3])
+    X_WB = np.repeat(pair.X_WB[None], len(shifts), axis=0)
+    X_WB[:, :3, 3] += shifts
+    return pair.X_WA[None], X_WB
+
+
+def _single(pair):
+    yield _answer(collide.collide, *pair)
+    yield _answer(collide.distance, *pair)
+    yield _answer(collide.distance, *pair, signed=False)
+
+
+def _swapped(pair):
+    yield _answer(collide.collide, pair.B, pair.A, pair.X_WB, pair.X_WA)
+    yield _answer(collide.distance, pair.B, pair.A, pair.X_WB, pair.X_WA)
+
+
+def _batched(pair):
+    X_WA, X_WB = _batch(pair)
+    for threads in (1, 2):
+        yield _answer(collide.collide, pair.A, pair.B, X_WA, X_WB, threads=threads)
+        yield _answer(collide.distance, pair.A, pair.B, X_WA, X_WB, threads=threads)
+    yield _answer(collide.distance, pair.A, pair.B, X_WA, X_WB, max_distance=0.01)
+
+
+def _contacts(pair):
+    yield _answer(collide.contacts, *pair)
+    yield _answer(collide.contacts, *pair, margin=0.01)
+
+
+def _certificates(pair):
+    try:
+        certificate = collide.distance(*pair).certificate
+    except collide.CollideError as error:
+        certificate = type(error).__name__
+    yield repr(certificate)
+
+
+WAYS: dict[str, Callable] = {
+    "single": _single, "swapped": _swapped, "batch": _batched, "contacts": _contacts, "certificate": _certificates,
+}  # fmt: skip
+
+
+def _in_a_list(pairs: list[Pair]) -> Iterator:
+    """All pairs of a family in one call, and as bodies of one World."""
+    A, B = [pair.A for pair in pairs], [pair.B for pair in pairs]
+    X_WA, X_WB = np.array([pair.X_WA for pair in pairs]), np.array([pair.X_WB for pair in pairs])
+    yield _answer(collide.collide, A, B, X_WA, X_WB)
+    yield _answer(collide.distance, A, B, X_WA, X_WB)
+    world = collide.World()
+    for pair in pairs[:12]:
+        world.add(pair.A, pair.X_WA)
+        world.add(pair.B, pair.X_WB)
+    for ask in (world.collides, world.collisions, lambda: world.distances(max_distance=0.1)):
+        yield _answer(ask)
+
+
+def groups() -> Iterator[tuple[str, str, str]]:
+    """(name, hash of the questions, hash of the answers)."""
+    for family, pairs in families():
+        asked = _asked_of(pairs)
+        for way, answers in WAYS.items():
+            digest = Digest()
+            for pair in pairs:
+                digest.add(list(answers(pair)))
+            yield f"{family}: {way}", asked, digest.text()
+        yield f"{family}: list and World", asked, hashed(*_in_a_list(pairs))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="keep what the engine answers now")
+    given = parser.parse_args()
+    sys.path.insert(0, str(Path(__file__).parent))
+    found = {name: [asked, told] for name, asked, told in groups()}
+    if given.write:
+        FILE.write_text(json.dumps(found, indent=0) + "\n", encoding="utf-8")
+        print(f"{len(found)} groups written")
+        return
+    kept = json.loads(FILE.read_text(encoding="utf-8"))
+    others = [name for name in found if kept.get(name, [""])[0] != found[name][0]]
+    moved = [name for name in found if name not in others and kept[name] != found[name]]
+    for name in moved:
+        print(f"moved: {name}")
+    print(f"{len(found)} groups, {len(moved)} moved, {len(others)} with other questions, {len(set(kept) - set(found))} gone")
+    sys.exit(bool(moved))
+
+
+if __name__ == "__main__":
+    main()
