@@ -322,7 +322,8 @@ def _find_corners(pair, room_at, ids, nx, ny, nz, depth, error):
                 away, _, _, _ = nearest_of_triangle(corners, 5 * i, 5 * j, 5 * k, 0.0, 0.0, 0.0)
                 if away < best:
                     best = away
-                    for corner, at in ((0, 5 * i), (1, 5 * j), (2, 5 * k)):
+                    for corner in range(3):
+                        at = 5 * (i if corner == 0 else j if corner == 1 else k)
                         ids[2 * corner] = int(corners[at + 3])
                         ids[2 * corner + 1] = int(corners[at + 4])
 

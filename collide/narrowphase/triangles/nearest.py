@@ -99,7 +99,7 @@ def common_point(T, length, out):
     plane. Elsewhere an edge of one goes through the inside of the other.
     """
     best = -_INSIDE
-    for face in (0, 9):
+    for face in range(0, 18, 9):
         ux = T[face + 3] - T[face]
         uy = T[face + 4] - T[face + 1]
         uz = T[face + 5] - T[face + 2]
