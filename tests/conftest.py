@@ -39,6 +39,7 @@ _register("soak_pairs")
 _register("soak_judges")
 _register("soak")
 _register("slider_scene")
+_register("installed_copy")
 
 OWN_KERNELS = "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"
 
