@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from collide.kernels.mode import COMPILED, MODE
+from collide.kernels import library
+from collide.kernels.mode import COMPILED, MODE, WHY
 
 
 def _register(name: str) -> None:
@@ -42,6 +43,10 @@ _register("slider_scene")
 _register("installed_copy")
 
 OWN_KERNELS = "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"
+
+
+def pytest_report_header() -> str:
+    return f"kernels: {MODE} ({WHY or library.level})"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -101,9 +101,12 @@ def as_built(site: Path) -> None:
 # --- as the build left it ---------------------------------------------------------------------------
 
 
-def test_a_copy_elsewhere_is_used_and_says_nothing(ask):
-    told, said = ask()
-    assert told["mode"] == "compiled" and told["why"] == "" and told["box"] == RIGHT and said == ""
+@pytest.mark.parametrize("named", ["site", "a site of Zoë's, with spaces"])
+def test_a_copy_elsewhere_is_used_and_says_nothing(tmp_path, named):
+    done = child(["-c", TOLD], environment(copied(tmp_path / named)))
+    assert done.returncode == 0 and done.stderr == "", done.stderr[-3000:]
+    told = json.loads(done.stdout)
+    assert told["mode"] == "compiled" and told["why"] == "" and told["box"] == RIGHT and named in told["at"]
 
 
 def digests(site: Path, *names: str, **more: str) -> dict:
