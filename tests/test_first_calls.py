@@ -284,11 +284,22 @@ def test_what_handlers_of_signals_compile_meanwhile_is_compiled_as_well(tmp_path
     assert run_just_in_time(NESTED, tmp_path) == "[162.0, 14.0] 162.0 []\n"
 
 
-#: Ctrl-C, or its like, at any moment of compiling.
+#: Ctrl-C, or its like, at any moment of compiling, or just when LLVM's lock has been taken.
 INTERRUPTED = (
     NUMBAS
     + """
 import time
+from numba.core import event
+
+start_event, at_the_lock = event.start_event, []
+
+def interrupting(kind, data=None):
+    if kind == "numba:llvm_lock" and at_the_lock:
+        at_the_lock.clear()
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+    return start_event(kind, data)
+
+event.start_event = interrupting
 
 def entry_of(k):
     @entry("float64(float64, int64)")
@@ -313,7 +324,10 @@ rng, interrupted = np.random.default_rng(1), 0
 for k in range(60):
     asked = entry_of(k)
     try:
-        signal.setitimer(signal.ITIMER_REAL, rng.uniform(1e-5, 0.9 * usual))
+        if sys.argv[1] == "at the lock":
+            at_the_lock.append(k)
+        else:
+            signal.setitimer(signal.ITIMER_REAL, rng.uniform(1e-5, 0.9 * usual))
         try:
             asked(1.0, 2)
         finally:
@@ -334,9 +348,10 @@ print(interrupted >= 20, changed(before))
 
 @pytest.mark.own_kernels
 @needs_signals
-def test_interrupts_leave_all_sound(tmp_path):
+@pytest.mark.parametrize("when", ["at any moment", "at the lock"])
+def test_interrupts_leave_all_sound(tmp_path, when):
     """Within LLVM's and Numba's own code they left locks held, and other threads waiting for ever."""
-    assert run_just_in_time(INTERRUPTED, tmp_path) == "True []\n"
+    assert run_just_in_time(INTERRUPTED, tmp_path, when) == "True []\n"
 
 
 # --- workspaces of single calls ---------------------------------------------------------------------
