@@ -33,7 +33,7 @@ def fake_scene(*rows):
     stats = {
         "bodies": 3, "static": 0, "pairs": 3, "skipped": {"broadphase": 3 - len(rows)}, "narrowphase": len(rows),
         "convex_pairs": len(rows), "hits": 0, "undecided": 0, "how": {HOW[PLANE]: len(rows)},
-        "gjk_iterations": 0, "epa_iterations": 0, "seconds": {"compile": 0.0, "narrowphase": 0.0},
+        "gjk_iterations": 0, "epa_iterations": 0, "seconds": {"narrowphase": 0.0},
     }
     world = SimpleNamespace(
         distances=lambda max_distance: WorldResult(
@@ -62,7 +62,6 @@ def scene(monkeypatch):
             return made
 
         monkeypatch.setattr(collide.scenes, "load", load, raising=False)
-        monkeypatch.setattr(cli, "_watch_compiler", lambda progress: None)
 
     return answer_with
 

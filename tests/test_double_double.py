@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 from collide.geometry import double_double
 from collide.geometry.error_free import dekker_product, two_product, two_sum
@@ -17,6 +18,8 @@ from collide.geometry.scan import (
     least_one_by_one,
 )
 from collide.kernels import address_of, entry, view_f64
+
+pytestmark = pytest.mark.own_kernels
 
 
 @entry("void(int64, int64, int64)")

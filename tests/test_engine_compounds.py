@@ -250,6 +250,7 @@ def _rows_of_part(one, X, other, Y, X_WA, X_WB) -> np.ndarray:
     return run.run_pairs(ShapeTable([one, other]), poses, np.repeat([0, 1], n), pairs, boolean=False, limit=np.inf)
 
 
+@pytest.mark.own_kernels
 def test_poses_of_parts_are_those_of_the_pose_table():
     """Bit by bit, low parts too: a part placed in the kernel of unions and one of a World."""
     rng = np.random.default_rng(9)

@@ -239,7 +239,7 @@ def test_flat_hulls_that_are_almost_straight(thin):
 
 
 def test_two_threads_may_make_their_first_calls_at_once(tmp_path):
-    """What is replaced in numba while an entry is compiled was read by another thread as numba's own: a crash."""
+    """What one thread had made for its first call was let go of by another's: a crash. See test_first_calls.py."""
     code = (
         "import threading, numpy as np, collide\n"
         "points = np.random.default_rng(0).normal(size=(500, 3))\n"
@@ -251,7 +251,7 @@ def test_two_threads_may_make_their_first_calls_at_once(tmp_path):
         "threads = [threading.Thread(target=ask, args=(k,)) for k in range(6)]\n"
         "[t.start() for t in threads]\n[t.join() for t in threads]\nassert out == [True] * 6, out\n"
     )
-    for _ in range(4):  # kernels come from the disk cache that the other tests have filled
+    for _ in range(4):
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
         assert run.returncode == 0, (run.returncode, run.stderr[-2000:])
 

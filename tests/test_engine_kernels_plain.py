@@ -17,8 +17,8 @@ import collide
 CHILD = """
 import pickle, sys
 import collide
-from collide import kernels as _jit
-assert _jit.PLAIN_PYTHON
+from collide import kernels
+assert kernels.PLAIN_PYTHON
 rows = [(collide.distance(*case).rows, collide.collide(*case)) for case in pickle.load(sys.stdin.buffer)]
 world = collide.World()
 for shape, X in pickle.load(sys.stdin.buffer):

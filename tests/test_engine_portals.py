@@ -79,6 +79,7 @@ def decided(rows: np.ndarray) -> np.ndarray:
     return rows["how"] != HOW.index("undecided")
 
 
+@pytest.mark.own_kernels
 def test_what_portals_decide_is_right_and_proven():
     cases = asked(520, "right")
     rows = rows_of(cases)
@@ -112,6 +113,7 @@ def test_batches_answer_as_single_calls_and_exact_arithmetic_do():
     assert 0.3 < naive.share(hits) < 0.7
 
 
+@pytest.mark.own_kernels
 def test_gaps_are_right_and_common_points_are_common():
     """Without depths: brackets against exact arithmetic, points on both bodies, certificates."""
     cases = asked(260, "gaps")
@@ -141,6 +143,7 @@ def test_gaps_are_right_and_common_points_are_common():
     assert naive.share(of_portals[deep]) > 0.9 and not of_portals[~gaps.hit].any()
 
 
+@pytest.mark.own_kernels
 def test_portals_are_mostly_the_nearest_face():
     """What gaps are given to begin with leaves them one or two rounds near touching, where GJK alone takes five."""
     cases = [case for case in asked(390, "nearest") if 0.0 < collide.distance(*case).distance < 1e-3]
@@ -155,6 +158,7 @@ def test_portals_are_mostly_the_nearest_face():
     assert with_portals.iterations[named].mean() < 2.0 and without.iterations[named].mean() > 4.0
 
 
+@pytest.mark.own_kernels
 def test_no_row_depends_on_its_neighbours():
     cases = asked(96, "neighbours")
     gaps = rows_of(cases, boolean=False)
@@ -172,6 +176,7 @@ def test_no_row_depends_on_its_neighbours():
     assert naive.share(decided(rows)) > 0.5
 
 
+@pytest.mark.own_kernels
 def test_few_pairs_and_other_shapes_are_left_alone():
     cases = [case for case in asked(60, "few") if abs(collide.distance(*case).distance) < 0.1]
     assert not decided(rows_of(cases[:2])).any()
@@ -193,6 +198,7 @@ def test_sizes_that_portals_cannot_multiply_are_answered_all_the_same(scale):
             assert hit == naive.exact_hit(case)
 
 
+@pytest.mark.own_kernels
 def test_a_limit_leaves_open_what_is_nearer():
     cases = asked(104, "limit")
     rows = rows_of(cases, limit=0.05)
@@ -223,6 +229,7 @@ for boolean in (True, False):
 """
 
 
+@pytest.mark.own_kernels
 def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CHILD, str(Path(__file__).parent)], env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

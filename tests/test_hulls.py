@@ -406,12 +406,12 @@ CHILD = r"""
 import pickle, random, sys
 from fractions import Fraction
 import numpy as np
-from collide import kernels as _jit
+from collide import kernels
 from collide.geometry.hulls import orientation as O
 from collide.geometry.hulls import quickhull as Q
 from collide.geometry.hulls.hull import convex_hull
 from collide.geometry.hulls.validate import validate_hull
-assert _jit.PLAIN_PYTHON
+assert kernels.PLAIN_PYTHON
 
 def sign(x):
     return (x > 0) - (x < 0)

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 import collide
+from collide.kernels.sources import KERNEL_SOURCES
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "collide.scenes"}
@@ -26,22 +27,18 @@ FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "coll
 ROOMS = {
     "errors": set(),
     "cache_folder": set(),
-    "_jit": {"cache_folder", "journal", "_kernel_cache", "_lean_compile"},
-    "_kernel_cache": {"cache_folder"},
-    "_lanes": set(),
-    "_lean_compile": set(),
-    "_simd": set(),
     "journal": set(),
+    "kernels": {"cache_folder", "errors", "journal"},
     "reading": {"errors"},
     "transforms": {"errors", "reading"},
     "results": {"errors"},
-    "geometry": {"_jit", "_lanes", "_simd", "errors", "journal"},
+    "geometry": {"errors", "journal", "kernels"},
     "shapes": {"errors", "journal", "reading", "transforms", "geometry"},
-    "broadphase": {"_jit", "errors", "geometry"},
-    "narrowphase": {"_jit", "_lanes", "errors", "transforms", "geometry", "results"},
+    "broadphase": {"errors", "geometry", "kernels"},
+    "narrowphase": {"errors", "kernels", "transforms", "geometry", "results"},
     "certificates": {"errors", "transforms", "geometry", "results"},
     "mesh_certificates": {"certificates", "geometry"},
-    "unions": {"_jit", "geometry", "narrowphase", "results"},
+    "unions": {"geometry", "kernels", "narrowphase", "results"},
     "workers": {"errors", "reading"},
     "batches": {"errors", "transforms", "geometry", "shapes", "narrowphase", "results", "unions", "workers"},
     "walks": {"errors", "geometry", "shapes", "narrowphase", "results"},
@@ -55,16 +52,17 @@ ROOMS = {
     "manifolds": {
         "errors", "reading", "transforms", "geometry", "shapes", "narrowphase", "results", "batches", "questions", "meshes",
     },
-    "packed_world": {"_jit", "errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
-    "world": {"_jit", "errors", "journal", "reading", "transforms", "shapes", "broadphase", "results", "margins", "packed_world"},
+    "packed_world": {"errors", "geometry", "broadphase", "narrowphase", "results", "unions"},
+    "world": {"errors", "journal", "reading", "transforms", "shapes", "broadphase", "results", "margins", "packed_world"},
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "shapes", "cache_folder", ""},
     "arguments": {"errors", "reports", ""},
-    "cli": {"_jit", "arguments", "errors", "reports", ""},
+    "cli": {"arguments", "errors", "reports", ""},
     "__main__": {"cli"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
+    "kernels": {"numba", "llvmlite"},
     "world": {"manifolds"},
     "certificates": {"mesh_certificates"},
     "query": {"meshes", "walks"},
@@ -83,14 +81,13 @@ BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal"
 COMPILERS = {
     "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
 }  # fmt: skip
-#: The files that make code, and what they need for it: everything else goes through them.
-COMPILER_PACKAGES = {
-    "collide/_jit.py": {"numba"},
-    "collide/_kernel_cache.py": {"numba", "llvmlite"},
-    "collide/_lean_compile.py": {"numba", "llvmlite"},
-    "collide/_simd.py": {"numba", "llvmlite"},
-    "collide/_lanes.py": {"numba", "llvmlite"},
-}
+COMPILER_PACKAGES = {"numba", "llvmlite"}
+#: The files that make code. They are imported where kernels are compiled just in time, and by nothing else.
+MAKERS = {
+    f"collide.kernels.{name}" for name in ("back_end", "compiled_lanes", "front_end", "jit", "vectors", "views")
+}  # fmt: skip
+#: Under what they and the compilers' packages are imported otherwise.
+GUARD = "WITH_NUMBA"
 BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
 
 
@@ -113,10 +110,12 @@ def dotted(file: Path) -> str:
     return ".".join([FOLDERS[folder], *(part for part in rest if part != "__init__")])
 
 
+@cache
 def modules() -> dict[str, Path]:
     return {dotted(file): file for file in sources()}
 
 
+@cache
 def imports(file: Path) -> list[tuple[str, bool, int]]:
     """(module, whether inside a function, line) of every import; names that are modules count as such."""
     known, found = modules(), []
@@ -166,7 +165,7 @@ def decorators(function: ast.FunctionDef) -> set[str]:
 
 def kernels(file: Path) -> list[ast.FunctionDef]:
     found = [node for node in ast.walk(tree(file)) if isinstance(node, ast.FunctionDef)]
-    return [f for f in found if decorators(f) & {"kernel", "entry", "_jit.kernel", "_jit.entry"}]
+    return [f for f in found if decorators(f) & {"kernel", "entry"}]
 
 
 # --- who imports whom ---------------------------------------------------------------------------
@@ -201,16 +200,43 @@ def test_rooms_have_no_cycle():
         done |= ready
 
 
-def test_engine_needs_numpy_and_numba_only():
+def test_engine_needs_numpy_only():
     wrong = []
     for file in sources("collide"):
         optional = LATE.get(room(dotted(file)), set())
         for package, late, line in foreign(file):
-            if package in COMPILER_PACKAGES.get(shown(file), ()):
+            if package in COMPILER_PACKAGES and (dotted(file) in MAKERS or line in guarded(file)):
                 continue
             if package not in optional or not late:
                 wrong.append(f"{shown(file)}:{line}: the engine must not need {package} here")
     none_of(wrong)
+
+
+@cache
+def guarded(file: Path, otherwise: bool = False) -> set[int]:
+    """Lines of a file that run only where kernels are compiled just in time; otherwise : only where they are not."""
+    found: set[int] = set()
+    for node in ast.walk(tree(file)):
+        if isinstance(node, ast.If) and ast.unparse(node.test) in (GUARD, f"not {GUARD}"):
+            branch = node.body if (ast.unparse(node.test) == GUARD) != otherwise else node.orelse
+            found.update(line for inner in branch for line in range(inner.lineno, (inner.end_lineno or inner.lineno) + 1))
+    return found
+
+
+def test_what_makes_code_is_imported_only_where_it_is_wanted():
+    """Otherwise a process whose kernels come from the library would load a compiler, or fail where there is none."""
+    none_of(
+        f"{shown(file)}:{line}: import {module} under `if {GUARD}:`"
+        for file in sources()
+        if dotted(file) not in MAKERS
+        for module, late, line in imports(file)
+        if module in MAKERS and line not in guarded(file)
+    )
+    assert {dotted(file) for file in sources("collide") if foreign(file) and room(dotted(file)) == "kernels"} >= MAKERS - {
+        "collide.kernels.jit"
+    }, "a file that makes no code any more"
+    guards = [file for file in sources("collide") if guarded(file)]
+    assert len(guards) >= 4, "the rule would pass on nothing"
 
 
 def test_outer_rooms_import_packages_where_they_use_them():
@@ -260,6 +286,7 @@ def test_kernels_are_found():
     assert sum(len(kernels(file)) for file in sources("collide")) > 30
 
 
+@cache
 def _of_typing(file: Path) -> set[str]:
     """Names that a file has from typing, whose ``overload`` compiles nothing."""
     return {
@@ -271,9 +298,9 @@ def _of_typing(file: Path) -> set[str]:
 
 def test_one_way_to_compile():
     none_of(
-        f"{shown(file)}:{node.lineno}: {name} belongs in collide/_jit.py"
+        f"{shown(file)}:{node.lineno}: {name} belongs in collide/kernels"
         for file in sources()
-        if shown(file) not in COMPILER_PACKAGES
+        if dotted(file) not in MAKERS
         for node in ast.walk(tree(file))
         if isinstance(node, (ast.Name, ast.Attribute))
         for name in [node.id if isinstance(node, ast.Name) else node.attr]
@@ -282,12 +309,93 @@ def test_one_way_to_compile():
 
 
 def test_kernels_live_where_their_sources_are_hashed():
-    """`_jit.source_hash` reads these folders; a kernel elsewhere could be stale and answer wrongly."""
+    """`sources.fingerprint` reads these; a kernel elsewhere could be stale in the library and answer wrongly."""
     none_of(
         f"{shown(file)}:{kernel.lineno}: kernel {kernel.name}"
         for file in sources()
         for kernel in kernels(file)
-        if not shown(file).startswith(("collide/geometry/", "collide/broadphase/", "collide/narrowphase/"))
+        if not is_hashed(file)
+    )
+
+
+@cache
+def is_hashed(file: Path) -> bool:
+    """Whether an edit of a file changes the library's checksum."""
+    name = shown(file).removeprefix("collide/")
+    return any(name == known or name.startswith(f"{known}/") for known in KERNEL_SOURCES)
+
+
+@cache
+def given(file: Path) -> dict[str, tuple[str, str, ast.expr | None]]:
+    """Names that a file has for kernels: (module it comes from, name there, what it is made of where this file makes it)."""
+    found: dict = {}
+    for node in ast.walk(tree(file)):
+        if isinstance(node, ast.ImportFrom) and node.lineno not in guarded(file, otherwise=True):
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                found[alias.asname or alias.name] = (whole if whole in modules() else node.module, alias.name, None)
+    for node in tree(file).body:
+        if isinstance(node, ast.Assign):
+            for name in (name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)):
+                found[name] = (dotted(file), name, node.value)
+    return found
+
+
+def origins(file: Path, name: str, seen: set) -> set[str]:
+    """Modules of the package that decide what a name stands for in a kernel of this file."""
+    if (file, name) in seen or name not in given(file):
+        return set()
+    seen.add((file, name))
+    module, original, value = given(file)[name]
+    if value is not None:
+        return {module}.union(*(origins(file, used.id, seen) for used in ast.walk(value) if isinstance(used, ast.Name)))
+    return {module} | origins(modules()[module], original, seen) if module in modules() else set()
+
+
+def test_what_kernels_see_is_hashed_as_well():
+    """A constant of another file, compiled into the library, would keep its old value there."""
+    wrong: dict[str, str] = {}
+    seen_from = set()
+    for file in sources("collide"):
+        for kernel in kernels(file):
+            for name in {node.id for node in ast.walk(kernel) if isinstance(node, ast.Name)}:
+                for module in origins(file, name, set()):
+                    seen_from.add(module)
+                    if not is_hashed(modules()[module]):
+                        wrong[module] = f"{module}: {name} in kernels of {shown(file)}; add it to sources.KERNEL_SOURCES"
+    assert len(seen_from) > 40 and "collide.results" in seen_from, "the rule would pass on nothing"
+    none_of(wrong.values())
+
+
+def test_no_entry_has_the_name_of_another():
+    """The library knows entries by their names alone, beside a few functions of its own."""
+    names = [kernel.name for file in sources("collide") for kernel in kernels(file) if "entry" in decorators(kernel)]
+    own = re.findall(r'^    \{"(\w+)", \w+, METH_', (ROOT / "native" / "python_module.c").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(names) > 50 and {"load", "prepared", "address_of", "code_of"} <= set(own)
+    twice = sorted({name for name in names if names.count(name) > 1} | (set(names) & set(own)))
+    assert not twice, twice
+
+
+def test_kernels_outside_the_package_have_names_of_their_own():
+    """Where kernels come from the library, an entry of a test of the same name would be the library's."""
+    names = {kernel.name for file in sources("collide") for kernel in kernels(file) if "entry" in decorators(kernel)}
+    none_of(
+        f"{shown(file)}:{kernel.lineno}: the library has a {kernel.name} too"
+        for file in sources("tests", "benchmarks", "examples")
+        for kernel in kernels(file)
+        if kernel.name in names
+    )
+
+
+def test_nothing_speaks_of_what_is_gone():
+    """Rooms that kernels had before they had one of their own."""
+    gone = re.compile(r"\b(_jit|_lean_compile|_kernel_cache|_simd)\b")
+    none_of(
+        f"{shown(file)}:{number}: {line.strip()}"
+        for file in sources("collide", "adapters", "scenes", "tests", "examples", "benchmarks", "native")
+        if file != Path(__file__)
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+        if gone.search(line)
     )
 
 
@@ -380,7 +488,7 @@ def test_names_in_all_are_the_lazy_ones():
 
 
 def test_every_module_says_what_it_is():
-    for file in sources():
+    for file in [*sources(), *sources("native")]:
         assert ast.get_docstring(tree(file)), f"{shown(file)}: no docstring"
 
 

@@ -1,42 +1,42 @@
-"""Compiled kernels on disk are code: nobody else may write them, and what is damaged is noticed before it is run."""
+"""Compiled kernels on disk are code: nobody else may write them, and what is damaged is noticed before it is run.
+
+What is kept here is any bytes, for the cache looks at none of them; tests of kernels that are kept stand in
+test_first_calls.py.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
-import pickle
 import stat
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from naive import rng_of
 
-from collide import _kernel_cache
 from collide.cache_folder import TRUST, make_private, why_distrusted
-from collide.kernels import PLAIN_PYTHON, entry, kernel_cache_folder
+from collide.kernels import object_cache
 
 needs_modes = pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
-needs_compiler = pytest.mark.skipif(PLAIN_PYTHON, reason="nothing is compiled")
+
+CODE = rng_of("machine code").bytes(3000)
 
 
-def doubled(x):
-    return 2.0 * x
-
-
-def answer(function=doubled) -> bool:
-    """Ask an entry made anew; whether its kernel came from the disk."""
-    asked = entry("float64(float64)")(function)
-    assert asked(1.5) == 3.0
-    return sum(asked.ready.stats.cache_hits.values()) == 1
+def came_from_disk(name: str = "collide.a_kernel", key: str = "all it depends on", code: bytes = CODE) -> bool:
+    """Ask for a kernel; whether it need not be compiled."""
+    compiled = []
+    assert object_cache.kept(name, key, lambda: compiled.append(name) or code) == code
+    return not compiled
 
 
 @pytest.fixture()
 def folder(tmp_path, monkeypatch, caplog) -> Path:
     """Where kernels are kept."""
     monkeypatch.setenv("COLLIDE_CACHE_DIR", str(tmp_path / "cache"))
-    _kernel_cache.say_once.cache_clear()
-    return kernel_cache_folder()
+    object_cache.say_once.cache_clear()
+    return object_cache.kernel_folder()
 
 
 def kept(folder: Path) -> Path:
@@ -45,60 +45,55 @@ def kept(folder: Path) -> Path:
     return file
 
 
+def test_a_kernel_is_compiled_once_and_another_key_is_another_kernel(folder, caplog):
+    assert not came_from_disk() and came_from_disk() and not list(folder.parent.parent.glob("*.o"))
+    assert not came_from_disk(key="another source", code=b"other code") and came_from_disk(key="another source", code=b"other code")
+    assert not came_from_disk(name="collide.another", code=b"another") and came_from_disk()
+    assert len(list(folder.iterdir())) == 3 and not caplog.records
+
+
 # --- damage -----------------------------------------------------------------------------------------
 
 
-@needs_compiler
 def test_flipped_bits_and_cut_files_are_noticed_and_healed(folder, caplog):
-    assert not answer() and answer()
+    assert not came_from_disk() and came_from_disk()
     content, rng = kept(folder).read_bytes(), rng_of("damaged kernels")
-    assert len(content) > 1000
-    damaged = [b"", content[:20], content[:-1], content + b"\0", content[:500], os.urandom(len(content))]
-    for at in rng.integers(len(content), size=10).tolist():
+    assert len(content) > len(CODE)
+    damaged = [b"", content[:20], content[:-1], content + b"\0", content[:500], rng.bytes(len(content)), content[::-1]]
+    for at in rng.integers(len(content), size=30).tolist():
         damaged.append(content[:at] + bytes([content[at] ^ 1 << int(rng.integers(8))]) + content[at + 1 :])
     for harm in damaged:
         kept(folder).write_bytes(harm)
         caplog.clear()
-        assert not answer(), "a damaged kernel was used"
+        assert not came_from_disk(), "a damaged kernel was used"
         assert [record.getMessage().count("damaged") for record in caplog.records] == [1]
         caplog.clear()
-        assert answer() and not caplog.records, "it was not healed"
+        assert came_from_disk() and not caplog.records, "it was not healed"
 
 
-@needs_compiler
 def test_a_kernel_under_the_name_of_another_is_not_used(folder, caplog):
-    def tripled_and_more(x):
-        return 3.0 * x - x
-
-    assert not answer()
+    assert not came_from_disk()
     own = kept(folder)
-    assert not answer(tripled_and_more)
+    assert not came_from_disk(key="another", code=b"code of another")
     (other,) = (file for file in folder.iterdir() if file != own)
     own.write_bytes(other.read_bytes())
-    assert not answer() and "damaged" in caplog.text
+    assert not came_from_disk() and "damaged" in caplog.text
 
 
-@needs_compiler
-@pytest.mark.parametrize(
-    "error",
-    [
-        AttributeError, EOFError, ImportError, IndexError, KeyError, MemoryError, NotImplementedError, OSError, OverflowError,
-        RecursionError, SystemError, TypeError, UnicodeDecodeError, ValueError, pickle.UnpicklingError,
-    ],
-)  # fmt: skip
-def test_whatever_a_pickle_raises_is_healed(folder, caplog, monkeypatch, error):
-    def fails(_content):
-        raise error(*(("utf-8", b"", 0, 1, "") if error is UnicodeDecodeError else ("of a pickle",)))
-
-    assert not answer()
-    with monkeypatch.context() as patch:
-        patch.setattr(_kernel_cache, "pickle", SimpleNamespace(loads=fails))
-        assert not answer() and caplog.text.count("damaged") == 1
-    assert answer()
+def test_a_folder_in_the_place_of_a_file_is_said_and_done_without(folder, caplog):
+    assert not came_from_disk()
+    file = kept(folder)
+    file.unlink()
+    file.mkdir()
+    for _ in range(2):
+        assert not came_from_disk()
+    assert file.is_dir() and "damaged" in caplog.text and "cannot be kept" in caplog.text
 
 
-@needs_compiler
-@pytest.mark.parametrize("how", ["full disk", "no file", "a file of that name", "error without number"])
+# --- nothing can be kept ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["full disk", "no file", "a file of that name", "no name", "read-only"])
 def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypatch, how):
     def full(handle, mode):
         os.close(handle)
@@ -106,79 +101,116 @@ def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypat
             return open("/dev/full", mode)  # the error comes when it is closed
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    def none(**_given):
-        raise OSError(errno.ENOSPC, "No space left on device") if how == "no file" else RuntimeError("who knows")
+    def refuse(number):
+        def none(*_given, **_named):
+            raise OSError(number, os.strerror(number))
+
+        return none
 
     if how == "full disk":
-        monkeypatch.setattr(_kernel_cache.os, "fdopen", full)
+        monkeypatch.setattr(object_cache.os, "fdopen", full)
     elif how == "a file of that name":
         folder.parent.mkdir(parents=True)
         folder.write_text("no folder")
+    elif how == "no file":
+        monkeypatch.setattr(object_cache.tempfile, "mkstemp", refuse(errno.EDQUOT))
+    elif how == "no name":
+        monkeypatch.setattr(object_cache.os, "replace", refuse(errno.EIO))
     else:
-        monkeypatch.setattr(_kernel_cache.tempfile, "mkstemp", none)
-    assert not answer() and not answer()
+        monkeypatch.setattr(Path, "mkdir", refuse(errno.EROFS))  # as root nothing is
+    assert not came_from_disk() and not came_from_disk()
     (record,) = caplog.records
     assert "cannot be kept" in record.getMessage() and "COLLIDE_CACHE_DIR" in record.getMessage()
+    assert "\n" not in record.getMessage()
     assert not folder.is_dir() or not list(folder.iterdir()), "half a file was left"
+
+
+def test_an_interrupt_while_a_kernel_is_kept_leaves_no_half_file(folder, monkeypatch):
+    def interrupted(_from, _to):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(object_cache.os, "replace", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            came_from_disk()
+    assert not list(folder.iterdir())
+    assert not came_from_disk() and came_from_disk()
+
+
+def test_what_a_compiler_raises_is_the_askers(folder):
+    """And nothing is kept of it."""
+
+    def fails():
+        raise NotImplementedError("of a compiler")
+
+    with pytest.raises(NotImplementedError, match="of a compiler"):
+        object_cache.kept("collide.a_kernel", "key", fails)
+    assert not list(folder.iterdir())
+
+
+def test_threads_that_keep_the_same_kernel_at_once(folder, caplog):
+    """Each writes a file of its own and gives it the name: readers see one whole."""
+    together, told = threading.Barrier(6, timeout=60), []
+
+    def ask():
+        for k in range(30):
+            together.wait()
+            told.append(object_cache.kept("collide.a_kernel", str(k), lambda: CODE) == CODE)
+
+    threads = [threading.Thread(target=ask) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert told == [True] * 180 and not caplog.records
+    assert len(list(folder.iterdir())) == 30
 
 
 # --- whose folder it is -----------------------------------------------------------------------------
 
 
-class Planted:
-    """A pickle that runs code when it is read."""
-
-    def __init__(self, mark: Path):
-        self.mark = mark
-
-    def __reduce__(self):
-        return os.mkdir, (str(self.mark),)
-
-
-def plant(file: Path, mark: Path, monkeypatch) -> None:
-    """Replace a kept kernel by code, with a digest that fits: whoever may write in the folder can do as much."""
-    keys = []
-    digest = _kernel_cache._digest
+def plant(file: Path, monkeypatch) -> bytes:
+    """Replace a kept kernel by other code, with a digest that fits: whoever may write in the folder can do as much."""
+    identities, digest, planted = [], object_cache._digest, b"planted code"
     with monkeypatch.context() as patch:
-        patch.setattr(_kernel_cache, "_digest", lambda key, body: keys.append(key) or digest(key, body))
-        assert answer()
-    body = pickle.dumps(Planted(mark))
-    file.write_bytes(digest(keys[0], body) + body)
+        patch.setattr(object_cache, "_digest", lambda identity, code: identities.append(identity) or digest(identity, code))
+        assert came_from_disk()
+    file.write_bytes(digest(identities[0], planted) + planted)
+    return planted
 
 
-@needs_compiler
 @needs_modes
 @pytest.mark.parametrize("shared", ["the folder", "a folder above", "the file", None])
 def test_what_others_may_write_is_not_run(folder, caplog, monkeypatch, tmp_path, shared):
-    mark = tmp_path / "planted code was run"
-    assert not answer()
+    assert not came_from_disk()
     file = kept(folder)
-    plant(file, mark, monkeypatch)
+    planted = plant(file, monkeypatch)
     before = file.read_bytes()
     if shared is not None:
         {"the folder": folder, "a folder above": tmp_path / "cache", "the file": file}[shared].chmod(0o777)
-    assert not answer()
-    assert answer() == (shared in ("the file", None)), "kept anew where it may be, and nowhere else"
-    assert mark.exists() == (shared is None), "this test can fail: in a folder of one's own it is believed"
-    if shared in ("the folder", "a folder above"):
-        (record,) = caplog.records
-        told = record.getMessage()
-        assert "may be written by others (mode 777)" in told and str(folder) in told and "COLLIDE_CACHE_DIR" in told
-        assert "\n" not in told and file.read_bytes() == before
-    else:
-        assert "damaged" in caplog.text
+    if shared is None:
+        assert came_from_disk(code=planted), "this test can fail: in a folder of one's own it is believed"
+        return
+    assert not came_from_disk()
+    assert came_from_disk() == (shared == "the file"), "kept anew where it may be, and nowhere else"
+    if shared == "the file":
+        assert "others may have written it" in caplog.text
+        return
+    (record,) = caplog.records
+    told = record.getMessage()
+    assert "may be written by others (mode 777)" in told and str(folder) in told and "COLLIDE_CACHE_DIR" in told
+    assert "\n" not in told and file.read_bytes() == before
 
 
-@needs_compiler
 @needs_modes
 def test_folders_and_files_are_made_for_their_user_alone(folder):
     mask = os.umask(0)
     try:
-        assert not answer()
+        assert not came_from_disk()
     finally:
         os.umask(mask)
-    modes = [stat.S_IMODE(place.stat().st_mode) for place in (folder, folder.parent, folder.parent.parent, kept(folder))]
-    assert modes == [0o700, 0o700, 0o700, 0o600]
+    modes = [stat.S_IMODE(place.stat().st_mode) for place in (folder, folder.parent, kept(folder))]
+    assert modes == [0o700, 0o700, 0o600]
 
 
 @needs_modes

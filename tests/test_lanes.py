@@ -95,6 +95,7 @@ def _transpose(addresses_at, target_at):
     transpose_eight(addresses_at, target_at)
 
 
+@pytest.mark.own_kernels
 def test_eight_rows_from_anywhere_become_lanes():
     numbers = np.random.default_rng(12).normal(size=1000)
     for first in (0, 1, 3, 8, 100):
@@ -137,6 +138,7 @@ def _run(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return _columns(eight), ones
 
 
+@pytest.mark.own_kernels
 def test_lanes_have_the_bits_of_doubles():
     x = _numbers()
     eight, ones = _run(x)
@@ -146,6 +148,7 @@ def test_lanes_have_the_bits_of_doubles():
     assert np.isfinite(ones).mean() > 0.6
 
 
+@pytest.mark.own_kernels
 def test_lanes_do_not_see_each_other():
     x = _numbers()
     turned, _ = _run(x[:, :, np.roll(np.arange(LANES), 3)])
@@ -155,12 +158,13 @@ def test_lanes_do_not_see_each_other():
     assert np.array_equal(_bits(np.roll(eight, -1, axis=0)), _bits(mixed))
 
 
+@pytest.mark.own_kernels
 def test_without_compilation_the_bits_are_the_same():
     """Only where nothing over- or underflows: there Dekker's products have not the error that a fused one has."""
     x = np.ascontiguousarray(_numbers()[:200])
     code = (
         f"import sys, numpy as np; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_lanes\n"
-        "from collide import _jit; assert _jit.PLAIN_PYTHON\n"
+        "from collide import kernels; assert kernels.PLAIN_PYTHON\n"
         "x = np.frombuffer(sys.stdin.buffer.read()).reshape(200, test_lanes.IN, test_lanes.LANES)\n"
         "sys.stdout.buffer.write(np.stack(test_lanes._run(x)).tobytes())\n"
     )
@@ -193,6 +197,7 @@ def _polish_one(room_at, out_at, n, parts):
     )  # fmt: skip
 
 
+@pytest.mark.own_kernels
 @pytest.mark.parametrize("parts", [1, 2])
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_gaps_eight_at_a_time_are_those_one_by_one(n, parts):

@@ -265,6 +265,7 @@ def exact_heights(points, g, first):
     return [sum((Fraction(c) - Fraction(d)) * e for c, d, e in zip(p, start, g)) for p in points.tolist()]
 
 
+@pytest.mark.own_kernels
 @pytest.mark.parametrize("turned", [False, True])
 def test_the_lowest_of_level_vertices(turned):
     """Exactly the lowest, for a number of neighbours that grows as the logarithm of the number of vertices."""
@@ -297,6 +298,7 @@ def test_the_lowest_of_level_vertices(turned):
     assert costs[32768][0] < 4 * costs[400][0], costs
 
 
+@pytest.mark.own_kernels
 def test_a_vertex_in_the_middle_of_a_facet_is_left_open():
     """All its neighbours are level, and edges do not lead to the other side. `quickhull` hardly makes any: this one does."""
     m = 20
@@ -316,6 +318,7 @@ def test_a_vertex_in_the_middle_of_a_facet_is_left_open():
             assert code < 0 if first == 2 * m else heights[code & ((1 << 40) - 1)] == min(heights)
 
 
+@pytest.mark.own_kernels
 def test_products_that_vanish_are_left_open():
     points = prism(400)
     points[200:, :2] *= 1.0 - 2.0**-30
@@ -331,6 +334,7 @@ def test_products_that_vanish_are_left_open():
         assert code < 0 or heights[code & ((1 << 40) - 1)] == min(heights), g
 
 
+@pytest.mark.own_kernels
 def test_exact_signs_of_sums_that_cancel():
     rng = np.random.default_rng(5)
     zeros = 0

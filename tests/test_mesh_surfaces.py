@@ -179,12 +179,12 @@ def answers(cases) -> list[bytes]:
 CHILD = f"""
 import pickle, sys
 import numpy as np
-from collide import kernels as _jit
+from collide import kernels
 from collide.geometry.mesh_tree.build import build_mesh_tree
 from collide.geometry.mesh_tree.graded import graded_tree
 from collide.narrowphase.triangles.queries import *
 {inspect.getsource(answers)}
-assert _jit.PLAIN_PYTHON
+assert kernels.PLAIN_PYTHON
 pickle.dump(answers(pickle.load(sys.stdin.buffer)), sys.stdout.buffer)
 """
 

@@ -145,6 +145,7 @@ def _nearest(node_at, slab_at, frame_at, probe_at, out_at):
     )  # fmt: skip
 
 
+@pytest.mark.own_kernels
 def test_eight_boxes_are_eight_boxes():
     """Compiled vectors say what plain numbers say, bit by bit, with infinities and slots that are not used."""
     rng = np.random.default_rng(2)

@@ -9,6 +9,8 @@ from collide.geometry.scan import farthest, farthest_listed, farthest_one_by_one
 from collide.geometry.supports import support_vertex
 from collide.kernels import address_of, entry, view_f64, view_i64
 
+pytestmark = pytest.mark.own_kernels
+
 COUNTS = (*range(8, 140), *range(144, 513, 8), 511, 1024, 2047, 2048)
 
 

@@ -55,6 +55,7 @@ def _settle_from(tree_at, points_at, n, starts_at, directions_at, m, out_at):
 settle_from = entry("void(int64, int64, int64, int64, int64, int64, int64)")(_settle_from)
 
 
+@pytest.mark.own_kernels
 @pytest.mark.parametrize("name", ["sphere", "pancake", "prism", "bipyramid", "cone", "polygon", "gridded box", "gridded square", "lattice"])
 def test_climbing_from_anywhere_is_exact(name):
     """From vertices that are far from right, apexes of thousands of neighbours and hubs of flat fans among them."""
@@ -73,6 +74,7 @@ def test_climbing_from_anywhere_is_exact(name):
         assert int(found) in farthest_of(whole, g), f"from {start}: {snippet(name, g)}"
 
 
+@pytest.mark.own_kernels
 def test_coordinates_come_with_the_vertex():
     points, _, tree = made("sphere")
     directions = np.random.default_rng(5).normal(size=(200, 3))
@@ -101,6 +103,7 @@ def test_what_cannot_be_proven_is_said():
         build_support_tree(points * 1e200, np.arange(100), hull_of(points), hull_of)
 
 
+@pytest.mark.own_kernels
 def test_no_number_is_no_proof_and_no_endless_loop():
     points, _, tree = made("small sphere")
     starts, out = np.zeros(3), np.zeros((3, 4))
@@ -113,6 +116,7 @@ def test_no_number_is_no_proof_and_no_endless_loop():
         extreme_vertices(tree, directions)
 
 
+@pytest.mark.own_kernels
 def test_a_point_inside_proves_nothing():
     points, _, tree = made("points inside")
     inside = int(np.flatnonzero(np.diff(tree.ring_starts) == 0)[0])
@@ -136,6 +140,7 @@ def _signs(rows_at, n, out_at):
 signs = entry("void(int64, int64, int64)")(_signs)
 
 
+@pytest.mark.own_kernels
 def test_exact_sign_against_fractions():
     """Ties, near ties, cancellation, and differences of points that are no doubles."""
     rng = np.random.default_rng(6)
