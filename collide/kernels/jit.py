@@ -11,6 +11,7 @@ import ctypes
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from functools import cache
 from typing import Any
 
@@ -54,6 +55,11 @@ class Entry:
         return self._address
 
     def _made(self) -> Callable:
+        if threading.current_thread() is threading.main_thread():
+            return _out_of_reach_of_signals(self._make)
+        return self._make()
+
+    def _make(self) -> Callable:
         with _compiling:
             if self._ready is None:
                 begun = time.perf_counter()
@@ -78,6 +84,24 @@ class Entry:
         arguments, result = sigutils.normalize_signature(self.signature)
         make = ctypes.CFUNCTYPE if self.nogil else ctypes.PYFUNCTYPE
         return make(_C_TYPES[str(result)], *(_C_TYPES[str(kind)] for kind in arguments))(self._address)
+
+
+def _out_of_reach_of_signals(work: Callable) -> Any:
+    """What ``work`` gives, done in another thread.
+
+    Handlers of signals run in the main thread, at any moment. What they raise within LLVM's and Numba's code, as Ctrl-C does,
+    leaves locks of theirs held for ever; and what they compile would be compiled for our target.
+    """
+    done: Future = Future()
+
+    def run() -> None:
+        try:
+            done.set_result(work())
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it is the asker's
+            done.set_exception(error)
+
+    threading.Thread(target=run, name="collide: compiling").start()
+    return done.result()
 
 
 @cache

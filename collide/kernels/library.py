@@ -37,7 +37,7 @@ def load() -> str:
     built = _built()
     if built is None:
         return _UNBUILT
-    if sources.fingerprint() != built.SOURCES:
+    if not _fits(built):
         return "its sources are not those that it was made from; `pip install -e .` makes it anew"
     for name, (size, checksum) in built.FILES.items():
         if why := _why_damaged(_path(name), size, checksum):
@@ -50,7 +50,7 @@ def load() -> str:
             raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: {error}; levels of this library: {', '.join(built.LEVELS)}") from None
         return str(error)
     except (ImportError, OSError) as error:
-        return f"it cannot be loaded: {error}"
+        return f"it cannot be loaded: {error}; install collide-robotics again"
     glue = functions
     return ""
 
@@ -91,6 +91,15 @@ def _built() -> Any:
     except ImportError:
         return None
     return built
+
+
+def _fits(built: Any) -> bool:
+    """Whether the library was made from the sources that are here. Where there are none, as in frozen programs, nobody can have
+    changed them."""
+    try:
+        return sources.fingerprint() == built.SOURCES
+    except OSError:
+        return True
 
 
 def _library_of(files: dict) -> str:

@@ -7,7 +7,6 @@ imported there, and so on: read from the sources, nothing is imported for it.
 from __future__ import annotations
 
 import ast
-import hashlib
 import os
 import sys
 import zlib
@@ -19,13 +18,14 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent.parent
 #: Rooms and files of the package that hold kernels, what kernels import, and what makes code of them.
 KERNEL_SOURCES = (
-    "broadphase", "geometry", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py", "kernels/plain_lanes.py",
-    "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
+    "broadphase", "geometry", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py", "kernels/lanes.py",
+    "kernels/plain_lanes.py", "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
+    "transforms.py",
 )  # fmt: skip
 
 
 def fingerprint() -> int:
-    """A checksum of all sources that the library is compiled from. Two milliseconds."""
+    """A checksum of all sources that the library is compiled from. Two milliseconds. Raises OSError where they are not there."""
     found = 0
     for name in KERNEL_SOURCES:
         for path in _files(os.path.join(PACKAGE, name)):
@@ -50,14 +50,23 @@ def _files(path: str) -> list[str]:
 
 def of_function(function: Callable) -> str:
     """A hash of what a function's machine code can depend on: its own code, and the sources that its module reaches."""
+    import hashlib  # here: a start from the library need not load it
+
     digest = hashlib.sha256()
     code = function.__code__
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    digest.update(repr((function.__qualname__, code.co_code.hex(), code.co_names, _constants(code), cells)).encode())
-    for module in sorted(_reached(function.__module__)):
+    cells = [_named(cell.cell_contents) for cell in function.__closure__ or ()]
+    given = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
+    digest.update(repr((function.__qualname__, *given)).encode())
+    for module in sorted(_reached(function.__module__ or "")):
         digest.update(module.encode())
         digest.update(_text(module))
     return digest.hexdigest()
+
+
+def _named(value):
+    """A value, or what a kernel is called: its own text would tell where it stands in memory."""
+    function = getattr(value, "py_func", value)
+    return f"{function.__module__}.{function.__qualname__}" if hasattr(function, "__qualname__") else value
 
 
 def _constants(code) -> list:
@@ -104,9 +113,11 @@ def _file(module: str) -> Path | None:
     if loaded is not None:
         place = getattr(loaded, "__file__", None)
         return Path(place) if place else None
+    if not module.startswith("collide."):
+        return None
     relative = Path(*module.split(".")[1:])
     for place in (PACKAGE / relative.with_suffix(".py"), PACKAGE / relative / "__init__.py"):
-        if module.startswith("collide.") and place.is_file():
+        if place.is_file():
             return place
     return None
 

@@ -2,7 +2,7 @@
 
 Checking a pose, laying out a row and reading a boolean took numpy five times as long as a pair of boxes
 takes GJK. Poses go through in blocks that stay in the cache; the narrowphase is called where it was
-compiled (`_jit.native_call`), not compiled once more.
+compiled (`kernels.native_call`), not compiled once more.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ those that may be nearer than its answer, or may overlap; of booleans, those who
 nor where no depth is wanted.
 What is asked of a pose depends on that pose alone, and so does its answer.
 
-Pairs of parts are put on a list, which the narrowphase answers where it was compiled (`_jit.native_call`). A list goes
+Pairs of parts are put on a list, which the narrowphase answers where it was compiled (`kernels.native_call`). A list goes
 over many poses, since gaps are finished eight at a time. Where rows of it are left open, Python has the exact stage
 settle them and calls again: the header holds how far things have come.
 """
