@@ -69,9 +69,12 @@ collide_status plant_tree(const struct collide_kernels *kernels, const double *p
 int64_t tree_address(const struct support_tree *tree);
 void fell_tree(struct support_tree *tree);
 
-/* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE. */
+/* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
+   room : ROOM_OF_HALFSPACES bytes. */
 collide_status settle_halfspaces(const collide_shape *A, const double *pose_a, const collide_shape *B, const double *pose_b,
-                                 collide_pair *row);
+                                 collide_pair *row, void *room);
+/* Bytes of room that it takes: numbers of up to 20,000 bits. */
+enum { ROOM_OF_HALFSPACES = 1 << 20 };
 
 /* --- kernels and workspaces ---------------------------------------------------------------------------------------- */
 
@@ -99,6 +102,7 @@ struct collide_workspace {
     collide_pair *told;
     int64_t *asked;    /* BLOCK pairs */
     int64_t *left;     /* BLOCK */
+    void *room; /* of half-spaces */
     void *held[2];
 };
 

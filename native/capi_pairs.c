@@ -52,7 +52,7 @@ static int furnish(collide_workspace *space)
     int64_t *integers, *digits;
     rooms_of(space->kernels, measures);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]), &space->held[1]);
+    doubles = cache_lines(8 * (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]) + ROOM_OF_HALFSPACES, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
@@ -68,6 +68,7 @@ static int furnish(collide_workspace *space)
     space->header[INTEGERS_AT] = address_of(integers);
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
     space->digits_at = address_of(digits);
+    space->room = digits + measures[M_WORKSPACE];
     begin_pairs(space);
     return 1;
 }

@@ -26,7 +26,8 @@ static collide_status settle_half_spaces(collide_workspace *space, const struct 
         const collide_shape *A = shape_at(space, asked, parts[0]), *B = shape_at(space, asked, parts[1]);
         collide_status status;
         if (A->ints[KIND] != HALFSPACE || B->ints[KIND] != HALFSPACE) continue;
-        status = settle_halfspaces(A, space->poses + POSE * parts[0], B, space->poses + POSE * parts[1], rows + space->left[k]);
+        status = settle_halfspaces(A, space->poses + POSE * parts[0], B, space->poses + POSE * parts[1], rows + space->left[k],
+                                   space->room);
         if (status != COLLIDE_OK) return status;
     }
     return COLLIDE_OK;
