@@ -64,8 +64,10 @@ struct collide_shape_set {
 /* capi_shapes.c: the hull of n points as given, swept; slop : how far stored points may be from those meant. */
 collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree, collide_shape **out);
 
-/* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for one. */
-collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, struct support_tree **tree);
+/* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
+   one. lowest : exponent of the lowest bit of the coordinates. */
+collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
+                          struct support_tree **tree);
 int64_t tree_address(const struct support_tree *tree);
 void fell_tree(struct support_tree *tree);
 

@@ -90,7 +90,7 @@ static collide_status plant(collide_shape *shape, size_t n)
     const struct collide_kernels *kernels = kernels_here();
     collide_status status;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    status = plant_tree(kernels, shape->points, n, &shape->tree);
+    status = plant_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
     if (shape->tree != NULL) shape->ints[TREE] = tree_address(shape->tree);
     return status;
 }
