@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import math
 import os
-from ctypes import POINTER, c_char_p, c_double, c_int, c_size_t, c_uint, c_uint8, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import cache
 
 import numpy as np
