@@ -121,7 +121,8 @@ static struct whole minor(struct arena *arena, const struct row *const *r, int i
     sum = whole_of(arena, 0.0);
     for (turn = 0; turn < 3; turn++) {
         int x = c[turn], y = c[(turn + 1) % 3], z = c[(turn + 2) % 3];
-        part = whole_difference(arena, whole_product(arena, r[1]->at[y], r[2]->at[z]), whole_product(arena, r[1]->at[z], r[2]->at[y]));
+        part = whole_product(arena, r[1]->at[y], r[2]->at[z]);
+        part = whole_difference(arena, part, whole_product(arena, r[1]->at[z], r[2]->at[y]));
         sum = whole_sum(arena, sum, whole_product(arena, r[0]->at[x], part));
     }
     return sum;
@@ -210,7 +211,8 @@ static int are_adjacent(const struct work *work, const struct rays *rays, const 
 }
 
 /* The ray between two on either side of a row: inside * outside ray - outside * inside ray. */
-static struct row between(struct work *work, const struct ray *out, struct whole side_out, const struct ray *in, struct whole side_in)
+static struct row between(struct work *work, const struct ray *out, struct whole side_out, const struct ray *in,
+                          struct whole side_in)
 {
     struct row ray;
     int k;

@@ -45,7 +45,8 @@ struct hull hull_of(const struct collide_kernels *kernels, struct arena *arena, 
         ids = address_of(rows);
         scaled = work + 8 * m[M_WORK];
         row = 4 * room;
-        /* In rows of one int32 a point: following, orphans, starting, owner, order, region (2), rim (2), fan, surface (6), facets. */
+        /* In rows of one int32 a point: following, orphans, starting, owner, order, region (2), rim (2), fan, surface (6),
+           facets. */
         hull.dimension = kernels->quickhull(
             n, address_of(originals), scaled, work, digits, ids + 16 * row, scaled + 24 * room, ids, ids + row, ids + 2 * row,
             ids + 3 * row, ids + 4 * row, ids + 5 * row, ids + 7 * row, ids + 9 * row, ids + 10 * row,

@@ -62,7 +62,8 @@ struct collide_shape_set {
 };
 
 /* capi_shapes.c: the hull of n points as given, swept; slop : how far stored points may be from those meant. */
-collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree, collide_shape **out);
+collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                               collide_shape **out);
 
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. lowest : exponent of the lowest bit of the coordinates. */

@@ -50,9 +50,11 @@ static int furnish(collide_workspace *space)
     struct buffers *buffers;
     double *doubles;
     int64_t *integers, *digits;
+    size_t words;
     rooms_of(space->kernels, measures);
+    words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]) + ROOM_OF_HALFSPACES, &space->held[1]);
+    doubles = cache_lines(8 * words + ROOM_OF_HALFSPACES, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
@@ -132,7 +134,8 @@ static size_t first_bad(collide_workspace *space, const struct question *asked, 
 }
 
 /* Answer all poses into booleans, or into rows that are zeroed. */
-static collide_status answer(collide_workspace *space, const struct question *asked, uint8_t *hits, collide_pair *pairs, size_t *failed)
+static collide_status answer(collide_workspace *space, const struct question *asked, uint8_t *hits, collide_pair *pairs,
+                             size_t *failed)
 {
     void *out = asked->boolean ? (void *)hits : (void *)pairs;
     size_t done = 0;

@@ -18,9 +18,9 @@ static int64_t order(const struct collide_kernels *kernels, struct arena *arena,
     place = arena_take(arena, (size_t)n * 4);
     rings->n_normals = many;
     if (arena->failed) return -1;
-    said = kernels->order_rings(address_of(points), n, address_of(facets), many, address_of(rings->starts), address_of(rings->ring),
-                                address_of(rings->ring_facets), address_of(following), address_of(place),
-                                address_of(rings->normals));
+    said = kernels->order_rings(address_of(points), n, address_of(facets), many, address_of(rings->starts),
+                                address_of(rings->ring), address_of(rings->ring_facets), address_of(following),
+                                address_of(place), address_of(rings->normals));
     for (k = 0; k < n; k++) rings->corner[k] = place[k] >= 3;
     return said;
 }

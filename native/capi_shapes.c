@@ -107,7 +107,8 @@ static collide_status made_of_points(collide_shape *shape, const double *points,
     return plant(shape, n);
 }
 
-collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree, collide_shape **out)
+collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                               collide_shape **out)
 {
     collide_shape *shape = calloc(1, sizeof *shape);
     collide_status status;
@@ -226,7 +227,10 @@ collide_status collide_cylinder(double radius, double length, collide_shape **sh
     return round_shape(CYLINDER, radius, length, shape);
 }
 
-collide_status collide_cone(double radius, double length, collide_shape **shape) { return round_shape(CONE, radius, length, shape); }
+collide_status collide_cone(double radius, double length, collide_shape **shape)
+{
+    return round_shape(CONE, radius, length, shape);
+}
 
 collide_status collide_ellipsoid(const double radii[3], collide_shape **shape)
 {

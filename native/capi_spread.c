@@ -46,7 +46,8 @@ static void sort_stably(const int64_t *keys, int64_t n, int64_t *order, int64_t 
     for (k = 0; k < n; k++) order[k] = k;
     for (width = 1; width < n; width *= 2) {
         for (k = 0; k < n; k += 2 * width) {
-            int64_t i = k, middle = k + width < n ? k + width : n, j = middle, end = k + 2 * width < n ? k + 2 * width : n, at = k;
+            int64_t middle = k + width < n ? k + width : n, end = k + 2 * width < n ? k + 2 * width : n;
+            int64_t i = k, j = middle, at = k;
             while (i < middle || j < end)
                 room[at++] = j == end || (i < middle && keys[order[i]] <= keys[order[j]]) ? order[i++] : order[j++];
         }

@@ -283,7 +283,7 @@ static int64_t put(unsigned char **at, const void *bytes, int64_t n)
 /* One block of memory that holds the tree. */
 static struct support_tree *kept(const struct growing *tree, const struct rings *rings, const double *points, int64_t lowest)
 {
-    int64_t links = rings->starts[tree->n], bytes = 24 * tree->n_entries + 4 * tree->n_entries + 4 * tree->n_nodes + 4 * tree->n + 4 * links;
+    int64_t links = rings->starts[tree->n], bytes = 28 * tree->n_entries + 4 * (tree->n_nodes + tree->n + links);
     struct support_tree *made = malloc(sizeof *made + (size_t)bytes + 64);
     unsigned char *at = (unsigned char *)(made + 1);
     int64_t *header;
@@ -359,7 +359,8 @@ static void build(struct growing *tree, const double *points, struct hull *hull,
     }
 }
 
-collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest, struct support_tree **tree)
+collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
+                          struct support_tree **tree)
 {
     struct arena arena;
     struct growing growing;

@@ -242,7 +242,7 @@ static size_t make_odd(uint32_t *limbs, size_t n)
     return shift_right(limbs, n, bits);
 }
 
-/* Greatest common divisor of two odd numbers, by subtraction and halving: both become it, and have as many limbs as is returned. */
+/* Greatest common divisor of two odd numbers, by subtraction and halving: both become it, of as many limbs as is returned. */
 static size_t common_divisor(uint32_t *x, size_t n, uint32_t *y, size_t m)
 {
     for (;;) {

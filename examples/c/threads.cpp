@@ -88,7 +88,8 @@ int main() try {
     answer(set.get(), asked, 0, asked.count(), alone.data());
     std::vector<std::thread> threads;
     for (int t = 0; t < 4; ++t)
-        threads.emplace_back(answer, set.get(), std::cref(asked), asked.count() * t / 4, asked.count() * (t + 1) / 4, together.data());
+        threads.emplace_back(answer, set.get(), std::cref(asked), asked.count() * t / 4, asked.count() * (t + 1) / 4,
+                             together.data());
     for (auto &thread : threads) thread.join();
 
     std::size_t hits = 0, same = 0;
