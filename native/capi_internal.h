@@ -29,10 +29,17 @@ enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };
 /* A pair that the kernels refuse to measure (collide/results.py). */
 enum { REFUSED = 255 };
 
+/* Pairs of boxes that wait on the way down two meshes' trees, and those that wait in order (collide/narrowphase/triangles/queries.py):
+   a tree is 136 nodes deep at most. */
+enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
+
 /* What `tell_measures` tells (collide/narrowphase/measures.py). */
 enum {
     M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE, M_APICES,
-    M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK, MEASURES
+    M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK,
+    M_NODE, M_SLAB, M_WIDTH, M_TREE_INTS, M_TREE_NUMBERS, M_RECORD, M_TREE_WORK, M_DEEPEST_SPLIT,
+    M_COUNTS, M_EDGES, M_SHELLS, M_NOT_CLOSED,
+    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_RESULT, M_MARKS, MEASURES
 };
 
 /* Sizes of things: nothing is larger, or a product of such would overflow. */
@@ -44,6 +51,7 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
 struct support_tree;
+struct mesh_room;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -106,8 +114,14 @@ struct collide_workspace {
     int64_t *asked;    /* BLOCK pairs */
     int64_t *left;     /* BLOCK */
     void *room; /* of half-spaces */
+    struct mesh_room *mesh;
     void *held[2];
 };
+
+/* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what is to
+   be set in them, which are zeros. */
+size_t mesh_room_bytes(const int64_t *measures);
+void furnish_meshes(collide_workspace *space, void *place, const int64_t *measures);
 
 /* A question about poses: as `answer_poses` takes it. */
 struct question {

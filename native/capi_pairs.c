@@ -50,11 +50,12 @@ static int furnish(collide_workspace *space)
     struct buffers *buffers;
     double *doubles;
     int64_t *integers, *digits;
-    size_t words;
+    size_t words, meshes;
     rooms_of(space->kernels, measures);
+    meshes = mesh_room_bytes(measures);
     words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * words + ROOM_OF_HALFSPACES, &space->held[1]);
+    doubles = cache_lines(8 * words + ROOM_OF_HALFSPACES + meshes, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
@@ -71,6 +72,7 @@ static int furnish(collide_workspace *space)
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
     space->digits_at = address_of(digits);
     space->room = digits + measures[M_WORKSPACE];
+    furnish_meshes(space, (char *)space->room + ROOM_OF_HALFSPACES, measures);
     begin_pairs(space);
     return 1;
 }
@@ -121,16 +123,12 @@ static void take_pair(collide_workspace *space, const collide_shape *A, const co
 }
 
 /* Number of the first pair from `first` on at which a matrix is no pose. */
-static size_t first_bad(collide_workspace *space, const struct question *asked, size_t first, void *out)
+static size_t first_bad(collide_workspace *space, const struct question *asked, size_t first)
 {
-    size_t k;
-    for (k = first; k + 1 < asked->n; k++)
-        if (space->kernels->answer_poses(
-                address_of(space->header), address_of(asked->which), address_of(asked->X_WA), asked->step_a,
-                address_of(asked->X_WB), asked->step_b, (int64_t)k, (int64_t)k + 1, (uint8_t)asked->boolean, 0, asked->limit,
-                (uint8_t)asked->check, 0, address_of(out)) == BAD_POSE)
-            break;
-    return k;
+    int64_t room = address_of(space->poses), from = (int64_t)first, n = (int64_t)asked->n;
+    int64_t a = space->kernels->first_bad_pose(address_of(asked->X_WA), asked->step_a, from, n, (uint8_t)asked->check, room);
+    int64_t b = space->kernels->first_bad_pose(address_of(asked->X_WB), asked->step_b, from, n, (uint8_t)asked->check, room);
+    return (size_t)(a < b ? a : b);
 }
 
 /* Answer all poses into booleans, or into rows that are zeroed. */
@@ -147,7 +145,7 @@ static collide_status answer(collide_workspace *space, const struct question *as
             address_of(out));
         done = (size_t)space->header[ANSWERED];
         if (said == BAD_POSE) {
-            *failed = first_bad(space, asked, done, out);
+            *failed = first_bad(space, asked, done);
             return COLLIDE_INVALID_POSE;
         }
         if (said == OPEN) {

@@ -1,6 +1,6 @@
 /* Shapes from numbers: what collide/shapes checks and collide/geometry/packing.py lays out. */
 #include "capi_blake2b.h"
-#include "capi_internal.h"
+#include "capi_mesh.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -189,21 +189,34 @@ static double product(double a, double b, double *low)
     return high;
 }
 
-/* The root of x*x + y*y as Python's math.hypot has it, which is correctly rounded: x, y >= 0, not both 0. */
-static double hypotenuse(double x, double y)
+/* The sum of two numbers, and what it is too large by, taken into *rest. */
+static double sum(double a, double b, double *rest)
 {
-    double larger = x > y ? x : y, smaller = x > y ? y : x;
-    double high, low, other, other_low, root, square, square_low;
+    double total = a + b, other = total - a;
+    *rest += (a - (total - other)) + (b - other);
+    return total;
+}
+
+/* As Python's math.hypot has it, which is correctly rounded: a root, and what it misses in twice the precision. */
+double root_of_squares(double x, double y, double z)
+{
+    double largest = fabs(x), rest = 0.0, low, total, root, square;
     int exponent;
-    frexp(larger, &exponent);
-    larger = ldexp(larger, -exponent);
-    smaller = ldexp(smaller, -exponent);
-    high = product(larger, larger, &low);
-    other = product(smaller, smaller, &other_low);
-    root = sqrt(high + other);
-    square = product(root, root, &square_low);
-    /* (larger^2 + smaller^2 - root^2) / (2 root), of which the first differences are exact. */
-    root += ((((high - square) + other) - square_low) + (low + other_low)) / (2.0 * root);
+    if (fabs(y) > largest) largest = fabs(y);
+    if (fabs(z) > largest) largest = fabs(z);
+    if (largest == 0.0) return 0.0;
+    frexp(largest, &exponent);
+    x = ldexp(x, -exponent);
+    y = ldexp(y, -exponent);
+    z = ldexp(z, -exponent);
+    total = product(x, x, &rest);
+    total = sum(total, product(y, y, &low), &rest);
+    rest += low;
+    total = sum(total, product(z, z, &low), &rest);
+    rest += low;
+    root = sqrt(total);
+    square = product(root, root, &low);
+    root += ((total - square) + (rest - low)) / (2.0 * root);
     return ldexp(root, exponent);
 }
 
@@ -217,7 +230,7 @@ static collide_status round_shape(int kind, double radius, double length, collid
     given = round_as_kernels_do();
     params[0] = radius;
     params[1] = 0.5 * length;
-    length = hypotenuse(params[0], params[1]) * UPWARDS;
+    length = root_of_squares(params[0], params[1], 0.0) * UPWARDS;
     round_as_before(given);
     return shape_of_numbers(kind, params, 2, length, shape);
 }

@@ -198,6 +198,42 @@ COLLIDE_API collide_status collide_distance_each(collide_workspace *workspace, c
                                                  const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
                                                  double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
 
+/* --- meshes --------------------------------------------------------------------------------------------------------
+
+   Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers: whether
+   two such bodies meet, and how far they are apart. Everything else of meshes is COLLIDE_UNSUPPORTED, never a guess: depths, gaps
+   below 6e-8 of the pair's size, curved shapes, half-spaces, unions, solids of very many parts. */
+typedef struct collide_mesh collide_mesh;
+
+enum {
+    COLLIDE_SURFACE = 0,        /* the facets alone */
+    COLLIDE_SOLID = 1,          /* with what they wind around; facets that do not close are COLLIDE_INVALID_SHAPE */
+    COLLIDE_SOLID_IF_CLOSED = 2 /* a solid where an inside can be told, else a surface */
+};
+
+/* A mesh of n vertices, x y z of each, and m facets, three numbers of vertices each, counter-clockwise from outside. Equal vertices
+   count as one. solid : one of the above. COLLIDE_UNSUPPORTED: a solid with a part that runs the other way round, perhaps a
+   cavity. m <= 2^28. */
+COLLIDE_API collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid,
+                                               collide_mesh **mesh);
+
+/* The surface and the inside of a sphere, box, capsule or hull, to be asked about with meshes. COLLIDE_UNSUPPORTED: shapes that are
+   curved otherwise, without end, or whose corners are rounded (collide_hpolytope). */
+COLLIDE_API collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **mesh);
+
+/* Frees a mesh; NULL is fine. A mesh never changes and any number of threads may use it. */
+COLLIDE_API void collide_mesh_free(collide_mesh *mesh);
+
+/* Whether A and B, of which one at least was made of facets, share a point; flags as of collide_collide. */
+COLLIDE_API collide_status collide_mesh_collide(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
+                                                const double X_WA[16], const double X_WB[16], unsigned flags, int *hit);
+
+/* How far A and B are apart; part_a and part_b are facets. COLLIDE_UNSUPPORTED where they meet, or nearly: ask
+   collide_mesh_collide which. */
+COLLIDE_API collide_status collide_mesh_distance(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
+                                                 const double X_WA[16], const double X_WB[16], unsigned flags,
+                                                 collide_pair *pair);
+
 #ifdef __cplusplus
 }
 #endif

@@ -53,6 +53,11 @@ _TYPES = {
     "collide_distance_each": [
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
     ],
+    "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
+    "collide_mesh_of_shape": [c_void_p, c_void_p],
+    "collide_mesh_free": [c_void_p],
+    "collide_mesh_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
+    "collide_mesh_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
 }  # fmt: skip
 _TEXTS = {"collide_status_text", "collide_version"}
 
@@ -108,6 +113,35 @@ def _made_by(shape) -> tuple:
     return "collide_hull", _doubles(shape.points), len(shape.points), shape.radius
 
 
+#: How a mesh is taken.
+SURFACE, SOLID, SOLID_IF_CLOSED = range(3)
+
+
+def raw_mesh(vertices, faces, solid: int) -> tuple[int, int | None]:
+    """(status, handle) of a mesh."""
+    vertices, faces, out = _doubles(vertices), np.ascontiguousarray(faces, dtype=np.int32), c_void_p()
+    status = library().collide_mesh_create(
+        vertices.ctypes.data, len(vertices), faces.ctypes.data, len(faces), solid, ctypes.byref(out)
+    )
+    return status, out.value
+
+
+class CMesh:
+    """A mesh, or a convex shape, of Python made once more in C, to be asked about as facets."""
+
+    def __init__(self, shape: collide.Shape):
+        if isinstance(shape, collide.Mesh):
+            status, self.handle = raw_mesh(shape.vertices, shape.faces, SOLID if shape.solid else SURFACE)
+        else:
+            convex = CShape(shape)  # held until the mesh is made
+            status, self.handle = raw_shape("collide_mesh_of_shape", convex.handle)
+        assert status == OK, (shape, library().collide_status_text(status))
+
+    def __del__(self):
+        if getattr(self, "handle", None):
+            library().collide_mesh_free(self.handle)
+
+
 class CSet:
     """A set of shapes."""
 
@@ -142,6 +176,18 @@ class Asker:
         rows, X_WA, X_WB = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
         status = library().collide_distance(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, limit, flags, rows.ctypes.data
+        )
+        return status, rows
+
+    def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
+        hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_mesh_collide(self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit)
+        return status, bool(hit.value)
+
+    def mesh_gap(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, np.ndarray]:
+        rows, X_WA, X_WB = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_mesh_distance(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, rows.ctypes.data
         )
         return status, rows
 

@@ -14,14 +14,17 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import c_library as c
 import hull_families
+import mesh_corruptions
 import numpy as np
 import pytest
 import soak_pairs
+import surfaces
 
 import collide
 from collide.kernels import mode
@@ -464,6 +467,108 @@ def test_polytopes_of_halfspaces_are_pythons():
         c.library().collide_shape_free(handle)
         assert numbers == [0.0, packed.reach, packed.slop] and content == packed.content, number
     assert 20 < refused < 180, refused
+
+
+# --- meshes ------------------------------------------------------------------------------------------------------------
+
+FACETED = ("solid", "surface", "solid", "surface", "box", "capsule", "sphere", "hull", "swept hull", "flat hull")
+
+
+def test_meshes_have_pythons_bits_or_are_left_to_python():
+    asker, told, meshes = c.Asker(), Counter(), Counter()
+    for number in range(2000):
+        case = soak_pairs.draw(77, number, 1e4, FACETED)
+        if not (case.A.meshed or case.B.meshed):
+            continue
+        status = [_status_of_mesh(shape) for shape in (case.A, case.B)]
+        meshes.update(status)
+        if any(status):
+            continue
+        A, B = c.CMesh(case.A), c.CMesh(case.B)
+        for (one, other), (shape, partner), poses in (
+            ((A, B), (case.A, case.B), (case.X_WA, case.X_WB)), ((B, A), (case.B, case.A), (case.X_WB, case.X_WA)),
+        ):  # fmt: skip
+            status, hit = asker.meshes_meet(one, other, *poses)
+            wanted = collide.collide(shape, partner, *poses)
+            assert status == c.UNSUPPORTED or (status, hit) == (c.OK, wanted), f"draw(77, {number}): {case.kinds}"
+            status_of_gap, row = asker.mesh_gap(one, other, *poses)
+            if status_of_gap == c.OK:
+                gap = collide.distance(shape, partner, *poses).rows
+                assert row.tobytes() == gap.tobytes(), f"draw(77, {number}): {case.kinds}: {row}, {gap}"
+            else:
+                assert status_of_gap == c.UNSUPPORTED and row.tobytes() == bytes(PAIR_DTYPE.itemsize)
+            told[status, wanted, status_of_gap] += 1
+    answered = sum(count for (status, _, _), count in told.items() if status == c.OK)
+    gaps = sum(count for (status, hit, gap), count in told.items() if gap == c.OK)
+    assert answered > 0.95 * sum(told.values()) and answered > 1500, told
+    assert gaps > 800 and gaps > 0.8 * sum(count for (_, hit, _), count in told.items() if not hit), told
+    assert set(meshes) <= {c.OK, c.UNSUPPORTED} and meshes[c.UNSUPPORTED] < 0.2 * meshes.total(), meshes
+
+
+def _status_of_mesh(shape) -> int:
+    if not shape.meshed:
+        return c.OK
+    status, handle = c.raw_mesh(shape.vertices, shape.faces, c.SOLID if shape.solid else c.SURFACE)
+    c.library().collide_mesh_free(handle)
+    return status
+
+
+def _surfaces() -> list:
+    cavity, flat = surfaces.box((0.25, 0.25, 0.25), (0.5, 0.5, 0.5)), np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    return [
+        surfaces.box(), surfaces.torus(), surfaces.ball(), surfaces.loosened(*surfaces.torus()),
+        surfaces.joined(surfaces.box(), surfaces.box((3, 0, 0), (4, 1, 1))), (flat, np.array([[0, 1, 2], [0, 2, 1]])),
+        surfaces.joined(surfaces.box(), (cavity[0], cavity[1][:, ::-1])),
+    ]  # fmt: skip
+
+
+def test_what_is_a_solid_is_what_python_takes_for_one():
+    """Spoilt meshes: refused alike, or the same solid or surface; parts that run the other way round are Python's alone."""
+    random, told = np.random.default_rng(78), Counter()
+    asker, probe = c.Asker(), collide.Box(0.01, 0.01, 0.01)
+    own = c.CMesh(probe)
+    for number in range(600):
+        spoilt = mesh_corruptions.spoil(random, *_surfaces()[number % 7], mesh_corruptions.KINDS[number % 15])
+        for asked, solid in ((c.SOLID_IF_CLOSED, None), (c.SOLID, True), (c.SURFACE, False)):
+            try:
+                mesh = collide.Mesh(spoilt.vertices, spoilt.faces, solid=solid)
+            except collide.InvalidShape:
+                mesh = None
+            status, handle = c.raw_mesh(spoilt.vertices, spoilt.faces, asked)
+            told[asked, status, mesh is not None and mesh.solid] += 1
+            if status == c.UNSUPPORTED:
+                assert asked != c.SURFACE and handle is None
+                continue
+            assert (status == c.OK) == (mesh is not None), (number, spoilt.kind, asked, status)
+            if mesh is None:
+                assert status == c.INVALID_SHAPE and handle is None
+                continue
+            made = c.CMesh.__new__(c.CMesh)
+            made.handle = handle
+            # A probe at the middle, where only an inside is met, tells a solid from a surface.
+            for where in (spoilt.vertices.mean(axis=0), spoilt.vertices[0]):
+                said = asker.meshes_meet(made, own, np.eye(4), identity_at(*where))
+                wanted = collide.collide(mesh, probe, np.eye(4), identity_at(*where))
+                assert said in ((c.OK, wanted), (c.UNSUPPORTED, False)), (number, spoilt.kind, asked)
+    assert told[c.SOLID_IF_CLOSED, c.OK, True] > 50 and told[c.SOLID_IF_CLOSED, c.OK, False] > 50, told
+    assert told[c.SOLID, c.INVALID_SHAPE, False] > 50, told
+
+
+def test_mesh_arguments_are_checked():
+    vertices, faces = surfaces.box()
+    assert c.raw_mesh(vertices, faces, 3) == (c.INVALID_ARGUMENT, None)
+    assert c.raw_mesh(vertices, faces[:0], c.SURFACE) == (c.INVALID_SHAPE, None)
+    normals = np.vstack([3.0 * np.eye(3), [[-1.0, -1.0, -3.0]]])  # corners at thirds
+    for shape in (c.CShape(collide.Cone(1.0, 1.0)), c.CShape(collide.HPolytope(normals, [1, 1, 1, 1]))):
+        assert c.raw_shape("collide_mesh_of_shape", shape.handle) == (c.UNSUPPORTED, None)
+    asker, box, mesh = c.Asker(), c.CMesh(collide.Box(1, 1, 1)), c.CMesh(collide.Mesh(vertices, faces))
+    X = np.eye(4)
+    assert asker.meshes_meet(box, box, X, X)[0] == c.INVALID_ARGUMENT, "two convex shapes are asked about as such"
+    assert asker.meshes_meet(box, mesh, X, X, 4)[0] == c.INVALID_ARGUMENT
+    for bad in _odd_poses():
+        for poses in ((bad, X), (X, bad)):
+            assert asker.meshes_meet(box, mesh, *poses)[0] == c.INVALID_POSE
+            assert asker.mesh_gap(box, mesh, *poses)[0] == c.INVALID_POSE
 
 
 # --- what is refused ---------------------------------------------------------------------------------------------------
