@@ -126,6 +126,14 @@ def test_examples_are_built_by_make_and_run(tmp_path):
     assert "1838 of 4000 pairs meet" in told and "4000 answers of four threads are those of one" in told
 
 
+def test_the_page_says_what_runs(tmp_path):
+    (snippet,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "c-interface.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    includes = "".join(f"#include <{name}>\n" for name in ("collide.h", "math.h", "stdio.h"))
+    ending = '    printf("%.17g %d\\n", pair.distance, status);\n    return 0;\n'
+    text = f"{includes}int main(void)\n{{\n{snippet}{ending}}}\n"
+    assert run(built(tmp_path, text)).split() == ["1.25", "0"]
+
+
 def test_rounding_of_the_caller_changes_nothing(tmp_path):
     """Rounding upwards, and small numbers flushed to 0 where the processor can."""
     told = run(built(tmp_path, _ROUNDING)).splitlines()
