@@ -28,7 +28,7 @@ BUILD = ROOT / "build" / "kernels"
 #: Modules of C in libcollide.
 C_SOURCES = [
     "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c", "capi_mesh.c",
-    "capi_mesh_pairs.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c", "capi_shapes.c", "capi_spread.c", "capi_status.c",
+    "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c", "capi_shapes.c", "capi_spread.c", "capi_status.c",
     "capi_surface.c", "capi_tree.c", "capi_whole.c",
 ]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"

@@ -29,8 +29,8 @@ enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };
 /* A pair that the kernels refuse to measure (collide/results.py). */
 enum { REFUSED = 255 };
 
-/* Pairs of boxes that wait on the way down two meshes' trees, and those that wait in order (collide/narrowphase/triangles/queries.py):
-   a tree is 136 nodes deep at most. */
+/* Pairs of boxes that wait on the way down two meshes' trees, and those that wait in order: as in
+   collide/narrowphase/triangles/queries.py. A tree is 136 nodes deep at most. */
 enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
 
 /* What `tell_measures` tells (collide/narrowphase/measures.py). */
@@ -118,8 +118,8 @@ struct collide_workspace {
     void *held[2];
 };
 
-/* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what is to
-   be set in them, which are zeros. */
+/* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what
+   is to be set in them, which are zeros. */
 size_t mesh_room_bytes(const int64_t *measures);
 void furnish_meshes(collide_workspace *space, void *place, const int64_t *measures);
 

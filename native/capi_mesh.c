@@ -187,7 +187,6 @@ static collide_status take_parts(const struct surface *surface, const double *ve
 static collide_status take_inside(const struct surface *surface, int solid, collide_mesh *mesh)
 {
     if (solid == COLLIDE_SURFACE) return COLLIDE_OK;
-    if (surface->solid < 0) return COLLIDE_UNSUPPORTED;
     if (solid == COLLIDE_SOLID && !surface->solid) return COLLIDE_INVALID_SHAPE;
     mesh->solid = surface->solid;
     return COLLIDE_OK;
@@ -228,7 +227,8 @@ static int are_facets(const double *vertices, size_t n, const int32_t *faces, si
     return largest == 0.0 || largest >= SMALLEST;
 }
 
-collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid, collide_mesh **mesh)
+collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid,
+                                   collide_mesh **mesh)
 {
     collide_mesh *made;
     collide_status status = COLLIDE_INVALID_SHAPE;

@@ -2,6 +2,7 @@
 #ifndef COLLIDE_CAPI_MESH_H
 #define COLLIDE_CAPI_MESH_H
 
+#include "capi_arena.h"
 #include "capi_internal.h"
 
 /* Facets under a box-tree, the points of which one lies in every part, and a ball swept over all. */
@@ -22,11 +23,16 @@ struct collide_mesh {
 struct surface {
     int32_t *corners, *shells;
     int64_t many, n_shells;
-    int solid; /* 1 where an inside can be told, 0 where not, -1 where a part may be a cavity */
+    int solid; /* whether an inside can be told */
 };
 
 collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
                                int64_t many, struct surface *surface);
+
+/* Whether all shells of negative volume are walls of cavities (capi_nesting.c). scaled : the vertices times a power of two,
+   below 1. signs : of the shells' volumes. */
+int are_cavities(const struct collide_kernels *kernels, struct arena *arena, const struct surface *surface,
+                 const double *vertices, const double *scaled, int64_t n, const int8_t *signs);
 
 /* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
 double root_of_squares(double x, double y, double z);

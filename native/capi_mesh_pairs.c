@@ -30,7 +30,8 @@ struct mesh_room {
 size_t mesh_room_bytes(const int64_t *m)
 {
     if (m[M_MESH_HEADER] != MESH_HEADER || m[M_RESULT] != RESULT || m[M_MARKS] != MARKS) return 0;
-    return sizeof(struct mesh_room) + 8 * (size_t)(2 * STACK_OF_MESHES + 32 + 2 * HEAP_OF_MESHES + m[M_MESH_DOUBLES] + m[M_MESH_INTEGERS]);
+    return sizeof(struct mesh_room) + 8 * (size_t)(2 * STACK_OF_MESHES + 32 + 2 * HEAP_OF_MESHES) +
+           8 * (size_t)(m[M_MESH_DOUBLES] + m[M_MESH_INTEGERS]);
 }
 
 #define CODE(space, name) code_at(&(space)->kernels->name)
@@ -136,7 +137,8 @@ collide_status collide_mesh_collide(collide_workspace *workspace, const collide_
 static double larger(double a, double b) { return b > a ? b : a; }
 
 /* The row of a gap, of bodies in the order of their contents; 0 where Python's batches know better. */
-static int write_gap(const struct mesh_room *room, const collide_mesh *one, const collide_mesh *other, double away, collide_pair *row)
+static int write_gap(const struct mesh_room *room, const collide_mesh *one, const collide_mesh *other, double away,
+                     collide_pair *row)
 {
     const double *r = room->found;
     double radius = one->radius + other->radius, size = (one->reach + other->reach) + away;

@@ -1,5 +1,5 @@
-/* Whether facets close and enclose something: `survey_surface` of collide/geometry/surfaces/survey.py, as far as a solid needs it. */
-#include "capi_arena.h"
+/* Whether facets close and enclose something: `survey_surface` of collide/geometry/surfaces/survey.py, so far as a solid needs
+   it. */
 #include "capi_mesh.h"
 #include "capi_whole.h"
 
@@ -62,6 +62,7 @@ static int encloses(const struct collide_kernels *kernels, struct arena *arena, 
     double *scaled = arena_take(arena, (size_t)(3 * n) * 8), largest = 0.0;
     double *six = arena_take(arena, (size_t)many * 8), *sizes = arena_take(arena, (size_t)many * 8);
     int32_t *first = arena_take(arena, (size_t)many * 4), *members = arena_take(arena, (size_t)many * 4);
+    int8_t *signs = arena_take(arena, (size_t)many);
     int exponent, positive = 0, negative = 0;
     if (arena->failed) return 0;
     for (k = 0; k < 3 * n; k++)
@@ -79,11 +80,11 @@ static int encloses(const struct collide_kernels *kernels, struct arena *arena, 
         double margin = sizes[k] * 2.0 * (TERM_ERROR + UNIT * members[k]) + UNDERFLOW_OF_TERMS * members[k];
         int sign = six[k] > 0.0 ? 1 : six[k] < 0.0 ? -1 : 0;
         if (fabs(six[k]) <= margin) sign = exact_sign(arena, vertices, surface, (int32_t)k);
+        signs[k] = (int8_t)sign;
         positive = positive || sign > 0;
         negative = negative || sign < 0;
     }
-    if (negative) return positive ? -1 : 0; /* a cavity's wall, or inside out */
-    return positive;
+    return positive && (!negative || are_cavities(kernels, arena, surface, vertices, scaled, n, signs));
 }
 
 static void look(const struct collide_kernels *kernels, struct arena *arena, const double *vertices, int64_t n,

@@ -200,9 +200,9 @@ COLLIDE_API collide_status collide_distance_each(collide_workspace *workspace, c
 
 /* --- meshes --------------------------------------------------------------------------------------------------------
 
-   Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers: whether
-   two such bodies meet, and how far they are apart. Everything else of meshes is COLLIDE_UNSUPPORTED, never a guess: depths, gaps
-   below 6e-8 of the pair's size, curved shapes, half-spaces, unions, solids of very many parts. */
+   Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers:
+   whether two such bodies meet, and how far they are apart. Everything else of meshes is COLLIDE_UNSUPPORTED, never a guess:
+   depths, gaps below 6e-8 of the pair's size, curved shapes, half-spaces, unions, solids against bodies of more than 64 parts. */
 typedef struct collide_mesh collide_mesh;
 
 enum {
@@ -211,14 +211,14 @@ enum {
     COLLIDE_SOLID_IF_CLOSED = 2 /* a solid where an inside can be told, else a surface */
 };
 
-/* A mesh of n vertices, x y z of each, and m facets, three numbers of vertices each, counter-clockwise from outside. Equal vertices
-   count as one. solid : one of the above. COLLIDE_UNSUPPORTED: a solid with a part that runs the other way round, perhaps a
-   cavity. m <= 2^28. */
+/* A mesh of n vertices, x y z of each, and m facets, three numbers of vertices each, counter-clockwise from outside. Equal
+   vertices count as one; a part that runs the other way round within another is a cavity. solid : one of the above.
+   m <= 2^28. */
 COLLIDE_API collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid,
                                                collide_mesh **mesh);
 
-/* The surface and the inside of a sphere, box, capsule or hull, to be asked about with meshes. COLLIDE_UNSUPPORTED: shapes that are
-   curved otherwise, without end, or whose corners are rounded (collide_hpolytope). */
+/* The surface and the inside of a sphere, box, capsule or hull, to be asked about with meshes. COLLIDE_UNSUPPORTED: shapes that
+   are curved otherwise, without end, or whose corners are rounded (collide_hpolytope). */
 COLLIDE_API collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **mesh);
 
 /* Frees a mesh; NULL is fine. A mesh never changes and any number of threads may use it. */
