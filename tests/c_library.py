@@ -206,3 +206,28 @@ class Asker:
         poses = Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB))
         status = function(self.handle, *first, *poses, *rest, out.ctypes.data, failed)
         return status, out.astype(bool) if boolean else out, failed.value
+
+
+# --- poses ----------------------------------------------------------------------------------------------------------
+
+
+def identity_at(*xyz: float) -> np.ndarray:
+    """A pose that is a shift [m]."""
+    X = np.eye(4)
+    X[:3, 3] = xyz
+    return X
+
+
+def odd_poses() -> list[np.ndarray]:
+    """Matrices that are no poses, or only with ``check_poses=False``."""
+    poses = [np.eye(4) for _ in range(9)]
+    poses[0][0, 0] = math.nan
+    poses[1][2, 3] = math.inf
+    poses[2][3, 3] = 2.0
+    poses[3][3, 0] = 1e-300
+    poses[4][0, 0] = -1.0  # mirrors
+    poses[5][0, 1] = 1.01e-4
+    poses[6][1, 3] = 1.1e50
+    poses[7][:3, :3] *= 2.0
+    poses[8][:3, :3] = 0.0
+    return poses

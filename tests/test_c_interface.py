@@ -14,17 +14,14 @@ import re
 import shutil
 import subprocess
 import sys
-from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import c_library as c
 import hull_families
-import mesh_corruptions
 import numpy as np
 import pytest
 import soak_pairs
-import surfaces
 
 import collide
 from collide.kernels import mode
@@ -195,12 +192,6 @@ int main(void)
 # --- the same bits -----------------------------------------------------------------------------------------------------
 
 
-def identity_at(*xyz: float) -> np.ndarray:
-    X = np.eye(4)
-    X[:3, 3] = xyz
-    return X
-
-
 @functools.cache
 def drawn() -> list[tuple[str, collide.Shape, collide.Shape, np.ndarray, np.ndarray]]:
     """Pairs of all kinds, sizes up to 1 : 10⁶, most of them near touching; (name, A, B, X_WA, X_WB)."""
@@ -224,7 +215,7 @@ def _touching() -> list:
         axis = int(random.integers(3))
         where[axis] = reach[axis]
         where[axis] = [where[axis], np.nextafter(where[axis], 9e9), np.nextafter(where[axis], 0.0)][number % 4 % 3]
-        pairs.append((f"touching {number}", A, B, np.eye(4), identity_at(*where)))
+        pairs.append((f"touching {number}", A, B, np.eye(4), c.identity_at(*where)))
     for number in range(60):
         normal = 1.0 * random.integers(-3, 4, 3)
         normal[2] += 0.5
@@ -433,7 +424,7 @@ def test_large_hulls_have_pythons_bits():
         X_WA, X_WB = soak_pairs.rotation(random), soak_pairs.rotation(random)
         X_WB[:3, 3] = random.normal(size=3) * random.choice([0.5, 2.0, 10.0])
         if number % 4 == 0:
-            X_WA, X_WB = np.eye(4), identity_at(*np.round(random.normal(size=3)))
+            X_WA, X_WB = np.eye(4), c.identity_at(*np.round(random.normal(size=3)))
         status, found = asker.distance(own_a, own_b, X_WA, X_WB)
         wanted = collide.distance(A, B, X_WA, X_WB).rows
         assert status == c.OK and found.tobytes() == wanted.tobytes(), (number, A, B, found, wanted)
@@ -475,112 +466,6 @@ def test_polytopes_of_halfspaces_are_pythons():
         c.library().collide_shape_free(handle)
         assert numbers == [0.0, packed.reach, packed.slop] and content == packed.content, number
     assert 20 < refused < 180, refused
-
-
-# --- meshes ------------------------------------------------------------------------------------------------------------
-
-FACETED = ("solid", "surface", "solid", "surface", "box", "capsule", "sphere", "hull", "swept hull", "flat hull")
-
-
-def test_meshes_have_pythons_bits_or_are_left_to_python():
-    asker, told = c.Asker(), Counter()
-    for number in range(2000):
-        case = soak_pairs.draw(77, number, 1e4, FACETED)
-        if not (case.A.meshed or case.B.meshed):
-            continue
-        A, B = c.CMesh(case.A), c.CMesh(case.B)
-        for (one, other), (shape, partner), poses in (
-            ((A, B), (case.A, case.B), (case.X_WA, case.X_WB)), ((B, A), (case.B, case.A), (case.X_WB, case.X_WA)),
-        ):  # fmt: skip
-            status, hit = asker.meshes_meet(one, other, *poses)
-            wanted = collide.collide(shape, partner, *poses)
-            assert status == c.UNSUPPORTED or (status, hit) == (c.OK, wanted), f"draw(77, {number}): {case.kinds}"
-            status_of_gap, row = asker.mesh_gap(one, other, *poses)
-            if status_of_gap == c.OK:
-                gap = collide.distance(shape, partner, *poses).rows
-                assert row.tobytes() == gap.tobytes(), f"draw(77, {number}): {case.kinds}: {row}, {gap}"
-            else:
-                assert status_of_gap == c.UNSUPPORTED and row.tobytes() == bytes(PAIR_DTYPE.itemsize)
-            told[status, wanted, status_of_gap] += 1
-    answered = sum(count for (status, _, _), count in told.items() if status == c.OK)
-    gaps = sum(count for (status, hit, gap), count in told.items() if gap == c.OK)
-    assert answered > 0.95 * sum(told.values()) and answered > 1500, told
-    assert gaps > 800 and gaps > 0.8 * sum(count for (_, hit, _), count in told.items() if not hit), told
-
-
-def _surfaces() -> list:
-    cavity, flat = surfaces.box((0.25, 0.25, 0.25), (0.5, 0.5, 0.5)), np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    return [
-        surfaces.box(), surfaces.torus(), surfaces.ball(), surfaces.loosened(*surfaces.torus()),
-        surfaces.joined(surfaces.box(), surfaces.box((3, 0, 0), (4, 1, 1))), (flat, np.array([[0, 1, 2], [0, 2, 1]])),
-        surfaces.joined(surfaces.box(), (cavity[0], cavity[1][:, ::-1])),
-    ]  # fmt: skip
-
-
-def test_what_is_a_solid_is_what_python_takes_for_one():
-    """Spoilt meshes: refused alike, or the same solid or surface."""
-    random, told = np.random.default_rng(78), Counter()
-    asker, probe = c.Asker(), collide.Box(0.01, 0.01, 0.01)
-    own = c.CMesh(probe)
-    for number in range(600):
-        spoilt = mesh_corruptions.spoil(random, *_surfaces()[number % 7], mesh_corruptions.KINDS[number % 15])
-        for asked, solid in ((c.SOLID_IF_CLOSED, None), (c.SOLID, True), (c.SURFACE, False)):
-            try:
-                mesh = collide.Mesh(spoilt.vertices, spoilt.faces, solid=solid)
-            except collide.InvalidShape:
-                mesh = None
-            status, handle = c.raw_mesh(spoilt.vertices, spoilt.faces, asked)
-            told[asked, status, mesh is not None and mesh.solid] += 1
-            assert (status == c.OK) == (mesh is not None), (number, spoilt.kind, asked, status)
-            if mesh is None:
-                assert status == c.INVALID_SHAPE and handle is None
-                continue
-            made = c.CMesh.__new__(c.CMesh)
-            made.handle = handle
-            # A probe at the middle, where only an inside is met, tells a solid from a surface.
-            for where in (spoilt.vertices.mean(axis=0), spoilt.vertices[0]):
-                said = asker.meshes_meet(made, own, np.eye(4), identity_at(*where))
-                wanted = collide.collide(mesh, probe, np.eye(4), identity_at(*where))
-                assert said in ((c.OK, wanted), (c.UNSUPPORTED, False)), (number, spoilt.kind, asked)
-    assert told[c.SOLID_IF_CLOSED, c.OK, True] > 50 and told[c.SOLID_IF_CLOSED, c.OK, False] > 50, told
-    assert told[c.SOLID, c.INVALID_SHAPE, False] > 50, told
-
-
-def test_cavities_are_what_python_takes_for_them():
-    """A large box and others on a coarse grid, some turned inside out: within it and each other, touching, crossing."""
-    random, told = np.random.default_rng(79), Counter()
-    for number in range(1500):
-        boxes = []
-        for k in range(int(random.integers(2, 6))):
-            low = random.integers(0, 4, 3) if k else np.zeros(3)
-            vertices, faces = surfaces.box(low, low + (random.integers(1, 4, 3) if k else 6))
-            turned = bool(random.random() < (0.4 if k else 0.1))
-            boxes.append((vertices, faces[:, ::-1] if turned else faces, turned))
-        vertices, faces = surfaces.joined(*(box[:2] for box in boxes))
-        vertices = vertices * random.choice([1.0, 0.1, 1e-30], 3)
-        status, handle = c.raw_mesh(vertices, faces, c.SOLID)
-        c.library().collide_mesh_free(handle)
-        solid = collide.Mesh(vertices, faces).solid
-        assert status == (c.OK if solid else c.INVALID_SHAPE), number
-        told[solid] += any(turned for *_, turned in boxes)
-    assert told[True] > 500 and told[False] > 100, told
-
-
-def test_mesh_arguments_are_checked():
-    vertices, faces = surfaces.box()
-    assert c.raw_mesh(vertices, faces, 3) == (c.INVALID_ARGUMENT, None)
-    assert c.raw_mesh(vertices, faces[:0], c.SURFACE) == (c.INVALID_SHAPE, None)
-    normals = np.vstack([3.0 * np.eye(3), [[-1.0, -1.0, -3.0]]])  # corners at thirds
-    for shape in (c.CShape(collide.Cone(1.0, 1.0)), c.CShape(collide.HPolytope(normals, [1, 1, 1, 1]))):
-        assert c.raw_shape("collide_mesh_of_shape", shape.handle) == (c.UNSUPPORTED, None)
-    asker, box, mesh = c.Asker(), c.CMesh(collide.Box(1, 1, 1)), c.CMesh(collide.Mesh(vertices, faces))
-    X = np.eye(4)
-    assert asker.meshes_meet(box, box, X, X)[0] == c.INVALID_ARGUMENT, "two convex shapes are asked about as such"
-    assert asker.meshes_meet(box, mesh, X, X, 4)[0] == c.INVALID_ARGUMENT
-    for bad in _odd_poses():
-        for poses in ((bad, X), (X, bad)):
-            assert asker.meshes_meet(box, mesh, *poses)[0] == c.INVALID_POSE
-            assert asker.mesh_gap(box, mesh, *poses)[0] == c.INVALID_POSE
 
 
 # --- what is refused ---------------------------------------------------------------------------------------------------
@@ -628,24 +513,10 @@ def test_what_is_no_shape_is_refused_as_python_does():
         assert c.raw_shape(name, None) == (c.INVALID_ARGUMENT, None)
 
 
-def _odd_poses() -> list[np.ndarray]:
-    poses = [np.eye(4) for _ in range(9)]
-    poses[0][0, 0] = _NAN
-    poses[1][2, 3] = _INF
-    poses[2][3, 3] = 2.0
-    poses[3][3, 0] = 1e-300
-    poses[4][0, 0] = -1.0  # mirrors
-    poses[5][0, 1] = 1.01e-4
-    poses[6][1, 3] = 1.1e50
-    poses[7][:3, :3] *= 2.0
-    poses[8][:3, :3] = 0.0
-    return poses
-
-
 def test_what_is_no_pose_is_refused_as_python_does():
     shape, asker, good = collide.Box(1, 1, 1), c.Asker(), np.eye(4)
     own = c.CShape(shape)
-    for number, bad in enumerate(_odd_poses()):
+    for number, bad in enumerate(c.odd_poses()):
         for flags, check in ((0, True), (c.TRUST_POSES, False)):
             for poses in ((bad, good), (good, bad)):
                 try:
@@ -663,12 +534,12 @@ def test_what_is_no_pose_is_refused_as_python_does():
 def test_too_small_pairs_and_endless_depths_are_told():
     asker = c.Asker()
     speck, floor = c.CShape(collide.ConvexHull([[0.0, 0.0, 0.0]])), c.CShape(collide.Halfspace((0, 0, 1), 0.0))
-    near = identity_at(1e-60, 0, 0)
+    near = c.identity_at(1e-60, 0, 0)
     with pytest.raises(collide.UnsupportedQuery):
         collide.distance(collide.ConvexHull([[0.0, 0.0, 0.0]]), collide.ConvexHull([[0.0, 0.0, 0.0]]), np.eye(4), near)
     assert asker.distance(speck, speck, np.eye(4), near)[0] == c.OUT_OF_RANGE
     assert asker.collide(speck, speck, np.eye(4), near)[0] == c.OUT_OF_RANGE
-    many = np.stack([identity_at(1.0, 0, 0)] * 100)
+    many = np.stack([c.identity_at(1.0, 0, 0)] * 100)
     many[77] = near
     assert asker.batch((speck, speck), np.eye(4), many, boolean=True)[::2] == (c.OUT_OF_RANGE, 77)
     assert asker.distance(floor, floor, np.eye(4), np.eye(4))[0] == c.ENDLESS_DEPTH
