@@ -27,7 +27,11 @@ ROOT = Path(__file__).resolve().parent.parent
 NATIVE = ROOT / "native"
 BUILD = ROOT / "build" / "kernels"
 #: Modules of C in libcollide.
-C_SOURCES = ["kernels.c"]
+C_SOURCES = [
+    "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c", "capi_mesh.c",
+    "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c", "capi_shapes.c", "capi_spread.c", "capi_status.c",
+    "capi_surface.c", "capi_tree.c", "capi_whole.c",
+]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
 LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
 
@@ -180,7 +184,7 @@ def _exported() -> list[str]:
     import re
 
     text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h") if (NATIVE / name).exists())
-    return re.findall(r"COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", text)
+    return re.findall(r"^COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", text, re.MULTILINE)
 
 
 def _write_about(place: Path, files: list[Path], made: dict) -> None:

@@ -55,3 +55,4 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items:
             if item.get_closest_marker("own_kernels"):
                 item.add_marker(pytest.mark.skip(reason=OWN_KERNELS))
+_register("c_library")

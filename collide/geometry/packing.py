@@ -12,20 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.geometry.coarse_points import COARSE, choose_coarse
+from collide.kernels import address_of
+
 #: Kinds of core. POINTS is the hull of points; the others are the sets of their names.
 POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
 
-#: As many points stand for many in a first, coarse look: those farthest along a spiral of directions.
-COARSE = 32
+#: A cloud of so many points has a coarse look: a few points that stand for all.
 _FEWEST_COARSE = 2 * COARSE
-_HEIGHTS = (2 * np.arange(COARSE) + 1) / COARSE - 1
-_ANGLES = np.pi * (3 - 5**0.5) * np.arange(COARSE)  # the golden angle
-_DIRECTIONS = np.stack(
-    [np.sqrt(1 - _HEIGHTS**2) * np.cos(_ANGLES), np.sqrt(1 - _HEIGHTS**2) * np.sin(_ANGLES), _HEIGHTS], axis=1
-)
 
 
 class PackedConvex(NamedTuple):
@@ -100,15 +97,8 @@ def _coarse(points: np.ndarray) -> np.ndarray | None:
     """Points that are farthest in COARSE directions, of their cloud stretched to a cube; None for few points."""
     if len(points) < _FEWEST_COARSE:
         return None
-    low, high = points.min(axis=0), points.max(axis=0)
-    stretched = (points - 0.5 * (low + high)) / np.where(high > low, high - low, 1.0)
-    found: list[int] = []
-    for x, y, z in _DIRECTIONS:
-        found.append(int(np.argmax(x * stretched[:, 0] + y * stretched[:, 1] + z * stretched[:, 2])))
-    ids = np.array([*dict.fromkeys(found), *found][:COARSE], dtype=np.int64)
-    block = on_cache_lines(4 * COARSE)
-    block[: 3 * COARSE] = points[ids].T.ravel()
-    block[3 * COARSE :].view(np.int64)[:] = ids
+    block, points = on_cache_lines(4 * COARSE), np.ascontiguousarray(points)
+    choose_coarse(address_of(points), len(points), address_of(block))
     return _frozen(block)
 
 

@@ -7,10 +7,13 @@ open row asks the other two searches, so that `collide` and `distance`, signed o
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from collide.kernels import address_of
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64, view_u8
 from collide.narrowphase.answer import answer_pairs
+from collide.narrowphase.rows import BEYOND, CERTIFIED, DISTANCE, HIT, HOW, LOWER, NORMAL, POINT_A, POINT_B, ROW, UPPER
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 #: (boolean, depths) of `answer_pairs`: the search for the sign, for a depth, and for a gap.
@@ -33,27 +36,57 @@ def settle_by_other_searches(
             continue
         told, asked = np.zeros(len(left), dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[left])
         answer_pairs(*tables, address_of(asked), len(asked), *search, False, limit, address_of(told), *workspace)
-        proven = told["how"] != UNDECIDED
-        left, told = left[proven], told[proven]
-        whole = (search != _SIGN) & ~told["hit"]  # a gap, with all that is known of one
-        rows[left[whole]] = told[whole]
-        _take_sign(rows, left[~whole], told[~whole], limit)
+        take_told(address_of(rows), address_of(left), address_of(told), len(left), search == _SIGN, limit)
 
 
-def _take_sign(rows: np.ndarray, at: np.ndarray, told: np.ndarray, limit: float) -> None:
-    """Take over from rows ``told`` whether the bodies meet, and what follows for the bracket."""
-    if not len(at):
-        return
-    row = rows[at]
-    row["how"], row["hit"] = told["how"], told["hit"]
-    row["lower"] = np.where(told["hit"], row["lower"], np.maximum(row["lower"], told["lower"]))
-    row["upper"] = np.where(told["hit"], np.minimum(row["upper"], 0.0), np.maximum(row["upper"], row["lower"]))
-    row["beyond"] = row["lower"] > limit
-    row["certified"] |= row["beyond"]
-    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(row["distance"], row["lower"], row["upper"])) + 0.0
-    row["upper"][row["beyond"]] = np.inf
-    lay_points_apart(row, np.arange(len(row)))
-    rows[at] = row
+@entry("int64(int64, int64, int64, int64, boolean, float64)")
+def take_told(rows_at, left_at, told_at, n, sign, limit):
+    """Take over what another search has proven of n open rows; returns how many it has.
+
+    left : int64, the numbers of the rows.   told : rows of `answer_pairs`.   sign : the search was for the sign alone.
+    """
+    left = view_i64(left_at, n)
+    proven = 0
+    for k in range(n):
+        told = view_i64(told_at + ROW * k, ROW // 8)
+        marks = view_u8(told_at + ROW * k, ROW)
+        if marks[HOW] == UNDECIDED:
+            continue
+        proven += 1
+        row_at = rows_at + ROW * left[k]
+        if sign or marks[HIT] != 0:
+            _take_sign(view_f64(row_at, 12), view_u8(row_at, ROW), view_f64(told_at + ROW * k, 12), marks, limit)
+        else:  # a gap, with all that is known of one
+            row = view_i64(row_at, ROW // 8)
+            for i in range(ROW // 8):
+                row[i] = told[i]
+    return proven
+
+
+@kernel
+def _take_sign(row, marks, told, told_marks, limit):
+    """Take over whether the bodies meet, and what follows for the bracket; the points stay about their middle."""
+    hit = told_marks[HIT] != 0
+    marks[HOW] = told_marks[HOW]
+    marks[HIT] = told_marks[HIT]
+    if hit:
+        row[UPPER] = min(row[UPPER], 0.0)
+    else:
+        row[LOWER] = max(row[LOWER], told[LOWER])
+        row[UPPER] = max(row[UPPER], row[LOWER])
+    beyond = row[LOWER] > limit
+    marks[BEYOND] = 1 if beyond else 0
+    if beyond:
+        marks[CERTIFIED] = 1
+        row[DISTANCE] = row[LOWER] + 0.0
+        row[UPPER] = math.inf
+    else:
+        row[DISTANCE] = min(max(row[DISTANCE], row[LOWER]), row[UPPER]) + 0.0
+    for axis in range(3):
+        gap = row[DISTANCE] * row[NORMAL + axis]
+        missing = 0.5 * (gap - (row[POINT_B + axis] - row[POINT_A + axis]))
+        row[POINT_A + axis] -= missing
+        row[POINT_B + axis] += missing
 
 
 def lay_points_apart(rows: np.ndarray, moved: np.ndarray) -> None:

@@ -167,3 +167,16 @@ def answer_poses(
         if left_open:
             return OPEN
     return 0
+
+
+@entry("int64(int64, int64, int64, int64, boolean, int64)")
+def first_bad_pose(X_at, step, first, n, check, room_at):
+    """The number of the first matrix from ``first`` on, of n, that is no pose as `answer_poses` judges; n where all are.
+
+    step : 16, or 0.   room : POSE doubles.
+    """
+    room = view_f64(room_at, POSE)
+    for k in range(first, n):
+        if not set_pose(room, 0, view_f64(X_at + 8 * step * k, 16), check):
+            return k
+    return n

@@ -1,0 +1,176 @@
+/* What the files of the C interface share. */
+#ifndef COLLIDE_CAPI_INTERNAL_H
+#define COLLIDE_CAPI_INTERNAL_H
+
+#define COLLIDE_BUILDING
+#include "collide.h"
+#include "kernels.h"
+#include "kernels_of_level.h"
+
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF /* products and sums round separately, as in the kernels */
+#endif
+
+#include <math.h>
+#define INFINITE HUGE_VAL
+
+/* --- layouts, as Python's modules have them; `rooms_of` compares them with what the kernels say ---------------------- */
+
+/* A row of integers a shape (collide/geometry/tables.py), a row of doubles, and a posed part. */
+enum { KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT, INTS };
+enum { RADIUS, REACH, SLOP, PARAMS, NUMBERS = PARAMS + 4 };
+enum { POSE = 15 };
+/* Kinds (collide/geometry/packing.py), doubles of a block of coordinates, and the exponent where no bit is set. */
+enum { POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE };
+enum { COORDINATES = 8, NO_BITS = 2000 };
+/* Header of queries (collide/narrowphase/poses.py), poses that go through together, and what `answer_poses` says. */
+enum { CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED, HEADER };
+enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };
+/* A pair that the kernels refuse to measure (collide/results.py). */
+enum { REFUSED = 255 };
+
+/* Pairs of boxes that wait on the way down two meshes' trees, and those that wait in order: as in
+   collide/narrowphase/triangles/queries.py. A tree is 136 nodes deep at most. */
+enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
+
+/* What `tell_measures` tells (collide/narrowphase/measures.py). */
+enum {
+    M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE, M_APICES,
+    M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK,
+    M_NODE, M_SLAB, M_WIDTH, M_TREE_INTS, M_TREE_NUMBERS, M_RECORD, M_TREE_WORK, M_DEEPEST_SPLIT,
+    M_COUNTS, M_EDGES, M_SHELLS, M_NOT_CLOSED,
+    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_RESULT, M_MARKS, MEASURES
+};
+
+/* Sizes of things: nothing is larger, or a product of such would overflow. */
+#define LARGEST 1e50
+#define SMALLEST 1e-50
+
+static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)place; }
+
+/* --- shapes -------------------------------------------------------------------------------------------------------- */
+
+struct support_tree;
+struct mesh_room;
+
+struct collide_shape {
+    int64_t ints[INTS];
+    double numbers[NUMBERS];
+    unsigned char content[16]; /* digest of the numbers: it orders the bodies of a pair */
+    double *points;            /* (n, 3), of hulls; else NULL */
+    void *block;               /* holds coordinates and coarse points */
+    struct support_tree *tree; /* NULL where there is none */
+};
+
+struct collide_shape_set {
+    int64_t *ints;
+    double *numbers;
+    const collide_shape **shapes;
+    size_t count;
+};
+
+/* capi_shapes.c: the hull of n points as given, swept; slop : how far stored points may be from those meant. */
+collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                               collide_shape **out);
+
+/* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
+   one. lowest : exponent of the lowest bit of the coordinates. */
+collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
+                          struct support_tree **tree);
+int64_t tree_address(const struct support_tree *tree);
+void fell_tree(struct support_tree *tree);
+
+/* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
+   room : ROOM_OF_HALFSPACES bytes. */
+collide_status settle_halfspaces(const collide_shape *A, const double *pose_a, const collide_shape *B, const double *pose_b,
+                                 collide_pair *row, void *room);
+/* Bytes of room that it takes: numbers of up to 20,000 bits. */
+enum { ROOM_OF_HALFSPACES = 1 << 20 };
+
+/* --- kernels and workspaces ---------------------------------------------------------------------------------------- */
+
+/* The kernels for this processor; NULL where there are none. */
+const struct collide_kernels *kernels_here(void);
+
+/* The measures; 0 where the library's parts do not fit each other. */
+int rooms_of(const struct collide_kernels *kernels, int64_t measures[MEASURES]);
+
+/* Zeroed memory that begins where a cache line does; *held is what to free. NULL where there is none. */
+void *cache_lines(size_t bytes, void **held);
+
+struct collide_workspace {
+    int64_t header[HEADER];
+    int64_t ints[2 * INTS]; /* the table of a single pair */
+    double numbers[2 * NUMBERS];
+    const collide_shape *shapes[2];
+    const struct collide_kernels *kernels;
+    int64_t requests_at; /* addresses */
+    int64_t digits_at;
+    double *poses;     /* 2 * BLOCK rows */
+    int64_t *shape_of; /* 2 * BLOCK */
+    int64_t *pairs;    /* BLOCK pairs of parts */
+    collide_pair *rows;
+    collide_pair *told;
+    int64_t *asked;    /* BLOCK pairs */
+    int64_t *left;     /* BLOCK */
+    void *room; /* of half-spaces */
+    struct mesh_room *mesh;
+    void *held[2];
+};
+
+/* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what
+   is to be set in them, which are zeros. */
+size_t mesh_room_bytes(const int64_t *measures);
+void furnish_meshes(collide_workspace *space, void *place, const int64_t *measures);
+
+/* A question about poses: as `answer_poses` takes it. */
+struct question {
+    const int64_t *which; /* pairs of rows of the table, or NULL for rows 0 and 1 throughout */
+    const double *X_WA, *X_WB;
+    int64_t step_a, step_b; /* 16, or 0 for one pose throughout */
+    size_t n;
+    int boolean, depths, check;
+    double limit;
+    double *axes;
+    const collide_shape *const *shapes; /* rows of the table */
+};
+
+/* capi_settle.c: settles what doubles left open of n rows of the block before. */
+collide_status settle_rows(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n, size_t *failed);
+
+/* --- how the processor rounds -------------------------------------------------------------------------------------- */
+
+/* Rounding to nearest, small numbers kept, nothing trapped: for the length of a call. */
+#if defined(__x86_64__) || defined(_M_X64)
+#include <xmmintrin.h>
+typedef unsigned rounding;
+static inline rounding round_as_kernels_do(void)
+{
+    rounding given = _mm_getcsr();
+    if ((given & 0xffc0u) != 0x1f80u) _mm_setcsr(0x1f80u);
+    return given;
+}
+static inline void round_as_before(rounding given)
+{
+    if ((given & 0xffc0u) != 0x1f80u) _mm_setcsr(given);
+}
+#elif defined(__aarch64__) && defined(__GNUC__)
+typedef uint64_t rounding;
+static inline rounding round_as_kernels_do(void)
+{
+    rounding given;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(given));
+    if (given != 0) __asm__ volatile("msr fpcr, %0" : : "r"((uint64_t)0) : "memory");
+    return given;
+}
+static inline void round_as_before(rounding given)
+{
+    if (given != 0) __asm__ volatile("msr fpcr, %0" : : "r"(given) : "memory");
+}
+#else
+typedef int rounding;
+static inline rounding round_as_kernels_do(void) { return 0; }
+static inline void round_as_before(rounding given) { (void)given; }
+#endif
+
+#endif

@@ -1,0 +1,325 @@
+/* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/meshes/bodies.py and the tree of
+   collide/geometry/mesh_tree/build.py. */
+#include "capi_blake2b.h"
+#include "capi_mesh.h"
+#include "capi_tree.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The header of a box-tree (collide/geometry/mesh_tree/layout.py), its numbers, and the most facets that it holds. */
+enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, TREE_INTS };
+enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
+static const size_t MOST_FACETS = (size_t)1 << 28;
+
+typedef char headers_fit[TREE_INTS == 9 && TREE_NUMBERS == 7 ? 1 : -1];
+
+/* What `fill_tree` makes. */
+struct filled {
+    int32_t *nodes, *ids;
+    double *triangles;
+    int64_t n_nodes;
+};
+
+static struct filled fill(const struct collide_kernels *kernels, struct arena *arena, const int64_t *m, const double *vertices,
+                          int64_t n, const int64_t *faces, int64_t many, collide_mesh *mesh)
+{
+    struct filled made;
+    int64_t most = many > 2 ? many : 2, n_stack = 3 * m[M_WIDTH] * (m[M_DEEPEST_SPLIT] + 40), counts[2] = {0, 0};
+    double numbers[4];
+    void *records = arena_take(arena, (size_t)(m[M_RECORD] * many) * 4), *work = arena_take(arena, (size_t)m[M_TREE_WORK] * 8);
+    void *stack = arena_take(arena, (size_t)n_stack * 8);
+    made.nodes = arena_take(arena, (size_t)(m[M_NODE] * most) * 4);
+    made.triangles = arena_take(arena, (size_t)(9 * many) * 8);
+    made.ids = arena_take(arena, (size_t)many * 4);
+    made.n_nodes = 0;
+    if (arena->failed) return made;
+    kernels->fill_tree(address_of(vertices), n, address_of(faces), many, address_of(records), address_of(made.nodes), most,
+                       address_of(made.triangles), address_of(made.ids), address_of(numbers), address_of(work),
+                       address_of(stack), n_stack, address_of(counts));
+    made.n_nodes = counts[0];
+    mesh->depth = mesh->tree[DEPTH] = counts[1];
+    mesh->tree[EXPONENT] = (int64_t)numbers[3];
+    memcpy(mesh->numbers, numbers, 3 * sizeof *numbers);
+    return made;
+}
+
+/* Largest coordinates, and balls around the centre: of the root's box, and of the facets. */
+static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t many)
+{
+    float box[6];
+    double squares = 0.0;
+    int64_t k;
+    int axis;
+    for (k = 0; k < 3 * many; k++) {
+        const double *p = made->triangles + 3 * k;
+        double x = p[0] - mesh->numbers[0], y = p[1] - mesh->numbers[1], z = p[2] - mesh->numbers[2];
+        double square = x * x + y * y + z * z;
+        if (square > squares) squares = square;
+        for (axis = 0; axis < 3; axis++)
+            if (fabs(p[axis]) > mesh->numbers[CORNER + axis]) mesh->numbers[CORNER + axis] = fabs(p[axis]);
+    }
+    for (k = 0; k < 6; k++) memcpy(&box[k], made->nodes + k * m[M_WIDTH], sizeof box[k]);
+    mesh->numbers[BALL] = ldexp(root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
+                                                fabs((double)box[2]) + (double)box[5]),
+                                (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
+    memcpy(mesh->ball, mesh->numbers, 3 * sizeof *mesh->ball);
+    mesh->ball[3] = sqrt(squares) * (1 + 1e-12);
+    mesh->reach = sqrt(mesh->numbers[CORNER] * mesh->numbers[CORNER] + mesh->numbers[CORNER + 1] * mesh->numbers[CORNER + 1] +
+                       mesh->numbers[CORNER + 2] * mesh->numbers[CORNER + 2]) + mesh->radius;
+}
+
+static void digest(collide_mesh *mesh, const struct filled *made, int64_t many)
+{
+    struct blake2b hash;
+    int64_t k;
+    blake2b_begin(&hash);
+    for (k = 0; k < 9 * many; k++) {
+        double value = made->triangles[k] + 0.0;
+        blake2b_add(&hash, &value, sizeof value);
+    }
+    blake2b_add(&hash, made->ids, (size_t)many * sizeof *made->ids);
+    blake2b_end(&hash, mesh->content);
+}
+
+/* Everything that kernels read, in one block, and the slabs that distances need. */
+static void keep(const struct collide_kernels *kernels, struct arena *arena, const int64_t *m, collide_mesh *mesh,
+                 const struct filled *made, int64_t many)
+{
+    size_t nodes = (size_t)(m[M_NODE] * made->n_nodes) * 4, slabs = (size_t)(m[M_SLAB] * made->n_nodes) * 4;
+    size_t triangles = (size_t)(9 * many) * 8, ids = (size_t)many * 4;
+    char *block = cache_lines(nodes + slabs + triangles + ids, &mesh->held);
+    void *work = arena_take(arena, (size_t)(5 * made->n_nodes) * 8);
+    if (block == NULL || work == NULL) {
+        arena->failed = 1;
+        return;
+    }
+    /* Nodes of 224 bytes and slabs of 160 keep what follows on boundaries of doubles. */
+    mesh->tree[NODES_AT] = address_of(memcpy(block, made->nodes, nodes));
+    mesh->tree[SLABS_AT] = address_of(block + nodes);
+    mesh->tree[TRIANGLES_AT] = address_of(memcpy(block + nodes + slabs, made->triangles, triangles));
+    mesh->tree[IDS_AT] = address_of(memcpy(block + nodes + slabs + triangles, made->ids, ids));
+    mesh->tree[TREE_NUMBERS_AT] = address_of(mesh->numbers);
+    mesh->tree[N_NODES] = made->n_nodes;
+    mesh->tree[N_FACETS] = many;
+    kernels->fill_slabs(address_of(mesh->tree), mesh->tree[SLABS_AT], address_of(work));
+}
+
+/* The tree of facets, and a ball around them; mesh->radius is set. */
+static collide_status plant(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int64_t *faces,
+                            int64_t many, collide_mesh *mesh)
+{
+    struct arena arena;
+    struct filled made;
+    int64_t m[MEASURES];
+    rooms_of(kernels, m);
+    if (m[M_TREE_INTS] != TREE_INTS || m[M_TREE_NUMBERS] != TREE_NUMBERS) return COLLIDE_NO_KERNELS;
+    arena_begin(&arena, NULL, 0);
+    made = fill(kernels, &arena, m, vertices, n, faces, many, mesh);
+    if (!arena.failed) {
+        measure(mesh, m, &made, many);
+        digest(mesh, &made, many);
+        keep(kernels, &arena, m, mesh, &made, many);
+    }
+    arena_end(&arena);
+    return arena.failed ? COLLIDE_NO_MEMORY : COLLIDE_OK;
+}
+
+void collide_mesh_free(collide_mesh *mesh)
+{
+    if (mesh == NULL) return;
+    free(mesh->points);
+    free(mesh->held);
+    free(mesh);
+}
+
+/* --- meshes of facets ----------------------------------------------------------------------------------------------- */
+
+static int by_number(const void *one, const void *other)
+{
+    int32_t a = *(const int32_t *)one, b = *(const int32_t *)other;
+    return (a > b) - (a < b);
+}
+
+/* A vertex of every shell, and those of collapsed facets that no other facet uses: numbers of vertices, at most n and shells. */
+static int64_t one_of_each_part(const struct surface *surface, int64_t n, int32_t *ids, uint8_t *used)
+{
+    int64_t f, many = 0, shells, next = 0;
+    int k;
+    memset(used, 0, (size_t)n);
+    for (f = 0; f < surface->many; f++) {
+        if (surface->shells[f] < 0) continue;
+        if (surface->shells[f] == next) { /* numbered by their first facets */
+            ids[many++] = surface->corners[3 * f];
+            next++;
+        }
+        for (k = 0; k < 3; k++) used[surface->corners[3 * f + k]] = 1;
+    }
+    shells = many;
+    for (f = 0; f < surface->many; f++)
+        for (k = 0; surface->shells[f] < 0 && k < 3; k++) {
+            int32_t vertex = surface->corners[3 * f + k];
+            if (used[vertex]) continue;
+            used[vertex] = 1;
+            ids[many++] = vertex;
+        }
+    qsort(ids + shells, (size_t)(many - shells), sizeof *ids, by_number);
+    return many;
+}
+
+static collide_status take_parts(const struct surface *surface, const double *vertices, int64_t n, collide_mesh *mesh)
+{
+    int32_t *ids = malloc((size_t)(n + surface->n_shells) * sizeof *ids);
+    uint8_t *used = malloc((size_t)n);
+    int64_t k;
+    if (ids != NULL && used != NULL) {
+        mesh->n_points = one_of_each_part(surface, n, ids, used);
+        mesh->points = malloc((size_t)(3 * mesh->n_points + 1) * sizeof *mesh->points);
+        for (k = 0; mesh->points != NULL && k < mesh->n_points; k++)
+            memcpy(mesh->points + 3 * k, vertices + 3 * (int64_t)ids[k], 3 * sizeof *vertices);
+    }
+    free(ids);
+    free(used);
+    return mesh->points != NULL ? COLLIDE_OK : COLLIDE_NO_MEMORY;
+}
+
+/* What a solid must be, as asked for. */
+static collide_status take_inside(const struct surface *surface, int solid, collide_mesh *mesh)
+{
+    if (solid == COLLIDE_SURFACE) return COLLIDE_OK;
+    if (solid == COLLIDE_SOLID && !surface->solid) return COLLIDE_INVALID_SHAPE;
+    mesh->solid = surface->solid;
+    return COLLIDE_OK;
+}
+
+static collide_status mesh_of_facets(const double *vertices, int64_t n, const int32_t *faces, int64_t many, int solid,
+                                     collide_mesh *mesh)
+{
+    const struct collide_kernels *kernels = kernels_here();
+    struct surface surface;
+    collide_status status;
+    int64_t *wide, k;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
+    status = look_at_surface(kernels, vertices, n, faces, many, &surface);
+    if (status == COLLIDE_OK) status = take_inside(&surface, solid, mesh);
+    if (status == COLLIDE_OK) status = take_parts(&surface, vertices, n, mesh);
+    free(surface.corners);
+    free(surface.shells);
+    if (status != COLLIDE_OK) return status;
+    if ((wide = malloc((size_t)(3 * many) * sizeof *wide)) == NULL) return COLLIDE_NO_MEMORY;
+    for (k = 0; k < 3 * many; k++) wide[k] = faces[k];
+    status = plant(kernels, vertices, n, wide, many, mesh);
+    free(wide);
+    return status;
+}
+
+static int are_facets(const double *vertices, size_t n, const int32_t *faces, size_t m)
+{
+    double largest = 0.0;
+    size_t k;
+    if (n == 0 || n > (size_t)INT32_MAX || m == 0 || m > MOST_FACETS) return 0;
+    for (k = 0; k < 3 * n; k++) {
+        if (!(fabs(vertices[k]) <= LARGEST)) return 0;
+        if (fabs(vertices[k]) > largest) largest = fabs(vertices[k]);
+    }
+    for (k = 0; k < 3 * m; k++)
+        if (faces[k] < 0 || (size_t)faces[k] >= n) return 0;
+    return largest == 0.0 || largest >= SMALLEST;
+}
+
+collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid,
+                                   collide_mesh **mesh)
+{
+    collide_mesh *made;
+    collide_status status = COLLIDE_INVALID_SHAPE;
+    rounding given;
+    if (mesh == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *mesh = NULL;
+    if (vertices == NULL || faces == NULL || solid < COLLIDE_SURFACE || solid > COLLIDE_SOLID_IF_CLOSED)
+        return COLLIDE_INVALID_ARGUMENT;
+    if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->given = 1;
+    given = round_as_kernels_do();
+    if (are_facets(vertices, n, faces, m)) status = mesh_of_facets(vertices, (int64_t)n, faces, (int64_t)m, solid, made);
+    round_as_before(given);
+    if (status == COLLIDE_OK) *mesh = made;
+    else collide_mesh_free(made);
+    return status;
+}
+
+/* --- surfaces of polytopes ------------------------------------------------------------------------------------------ */
+
+/* Whether point a comes before point b: by z, then by y, then by x. */
+static int comes_before(const double *a, const double *b)
+{
+    int axis;
+    for (axis = 2; axis >= 0; axis--)
+        if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return 0;
+}
+
+/* Facets of a hull: one side of a flat one, a facet without area of a segment or a point. */
+static int64_t facets_of(const struct hull *hull, const double *points, int64_t *faces)
+{
+    int64_t many = hull->dimension == 3 ? hull->many : hull->many / 2, k;
+    int32_t first = hull->vertices[0], last = hull->vertices[0];
+    if (hull->dimension >= 2) {
+        for (k = 0; k < 3 * many; k++) faces[k] = hull->facets[k];
+        return many;
+    }
+    for (k = 0; k < hull->n_vertices; k++) {
+        int32_t vertex = hull->vertices[k];
+        if (comes_before(points + 3 * (int64_t)vertex, points + 3 * (int64_t)first)) first = vertex;
+        if (comes_before(points + 3 * (int64_t)last, points + 3 * (int64_t)vertex)) last = vertex;
+    }
+    faces[0] = first;
+    faces[1] = faces[2] = last;
+    return 1;
+}
+
+static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mesh)
+{
+    const struct collide_kernels *kernels = kernels_here();
+    const double *coordinates = (const double *)(intptr_t)shape->ints[ADDRESS];
+    int64_t n = shape->ints[COUNT], padded = shape->ints[PADDED], k, *faces;
+    collide_status status = COLLIDE_NO_MEMORY;
+    struct arena arena;
+    struct hull hull;
+    double *points;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
+    arena_begin(&arena, NULL, 0);
+    points = arena_take(&arena, (size_t)(3 * n) * 8);
+    for (k = 0; points != NULL && k < 3 * n; k++) points[k] = coordinates[k % 3 * padded + k / 3];
+    if (points != NULL) {
+        hull = hull_of(kernels, &arena, points, n);
+        faces = arena_take(&arena, (size_t)(3 * (hull.many + 1)) * 8);
+        mesh->points = malloc(3 * sizeof *mesh->points);
+        if (!arena.failed && mesh->points != NULL) {
+            mesh->solid = hull.dimension == 3;
+            mesh->radius = shape->numbers[RADIUS];
+            mesh->n_points = 1;
+            memcpy(mesh->points, points + 3 * (int64_t)hull.vertices[0], 3 * sizeof *points);
+            status = plant(kernels, points, n, faces, facets_of(&hull, points, faces), mesh);
+        }
+    }
+    arena_end(&arena);
+    return status;
+}
+
+collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **mesh)
+{
+    collide_mesh *made;
+    collide_status status;
+    rounding given;
+    if (mesh == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *mesh = NULL;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (shape->ints[KIND] != POINTS || shape->numbers[SLOP] != 0.0) return COLLIDE_UNSUPPORTED;
+    if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    given = round_as_kernels_do();
+    status = mesh_of_hull(shape, made);
+    round_as_before(given);
+    if (status == COLLIDE_OK) *mesh = made;
+    else collide_mesh_free(made);
+    return status;
+}

@@ -1,0 +1,40 @@
+/* Between the files of meshes: collide/geometry/surfaces, collide/geometry/mesh_tree and collide/meshes/bodies.py in C. */
+#ifndef COLLIDE_CAPI_MESH_H
+#define COLLIDE_CAPI_MESH_H
+
+#include "capi_arena.h"
+#include "capi_internal.h"
+
+/* Facets under a box-tree, the points of which one lies in every part, and a ball swept over all. */
+struct collide_mesh {
+    int64_t tree[9];           /* the tree's header */
+    double numbers[7];         /* the tree's numbers */
+    unsigned char content[16]; /* digest of the facets */
+    double ball[4];            /* centre and reach */
+    double radius, reach;      /* reach : from the frame's origin */
+    double *points;
+    int64_t n_points, depth;
+    int solid, given; /* given : as facets, not as a convex shape */
+    void *held;       /* nodes, triangles, ids, slabs */
+};
+
+/* Which facets a surface is of and what it encloses (capi_surface.c). corners, shells : of `many` facets; equal vertices have one
+   number. Both are freed by the caller. */
+struct surface {
+    int32_t *corners, *shells;
+    int64_t many, n_shells;
+    int solid; /* whether an inside can be told */
+};
+
+collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
+                               int64_t many, struct surface *surface);
+
+/* Whether all shells of negative volume are walls of cavities (capi_nesting.c). scaled : the vertices times a power of two,
+   below 1. signs : of the shells' volumes. */
+int are_cavities(const struct collide_kernels *kernels, struct arena *arena, const struct surface *surface,
+                 const double *vertices, const double *scaled, int64_t n, const int8_t *signs);
+
+/* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
+double root_of_squares(double x, double y, double z);
+
+#endif

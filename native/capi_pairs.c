@@ -1,0 +1,367 @@
+/* Workspaces and queries: as `run_poses` of collide/narrowphase/run.py and `distance` of collide/query.py. */
+#include "capi_internal.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Longest axis to begin with: its square is far from overflow. */
+static const double LONGEST_AXIS = 1e100;
+
+/* A collide_pair is what kernels write. */
+typedef char pairs_are_rows[sizeof(collide_pair) == 160 ? 1 : -1];
+typedef char marks_stand_last[offsetof(collide_pair, exact) == 156 ? 1 : -1];
+
+/* --- workspaces ---------------------------------------------------------------------------------------------------- */
+
+/* Everything of a fixed size, in one piece. */
+struct buffers {
+    double poses[2 * BLOCK * POSE];
+    int64_t shape_of[2 * BLOCK], pairs[2 * BLOCK], asked[2 * BLOCK], left[BLOCK];
+    collide_pair rows[BLOCK], told[BLOCK];
+};
+
+static void begin_header(collide_workspace *space)
+{
+    int64_t code = 0;
+    memcpy(&code, &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
+    space->header[CORE] = code;
+    space->header[POSES_AT] = address_of(space->poses);
+    space->header[SHAPE_OF_AT] = address_of(space->shape_of);
+    space->header[PAIRS_AT] = address_of(space->pairs);
+    space->header[ROWS_AT] = address_of(space->rows);
+}
+
+/* Parts 0 and BLOCK, shapes 0 and 1: what single calls ask about, and `answer_poses` leaves. */
+static void begin_pairs(collide_workspace *space)
+{
+    int64_t k;
+    for (k = 0; k < BLOCK; k++) {
+        space->pairs[2 * k] = k;
+        space->pairs[2 * k + 1] = BLOCK + k;
+        space->shape_of[k] = 0;
+        space->shape_of[BLOCK + k] = 1;
+    }
+}
+
+static int furnish(collide_workspace *space)
+{
+    int64_t measures[MEASURES];
+    struct buffers *buffers;
+    double *doubles;
+    int64_t *integers, *digits;
+    size_t words, meshes;
+    rooms_of(space->kernels, measures);
+    meshes = mesh_room_bytes(measures);
+    words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
+    buffers = cache_lines(sizeof *buffers, &space->held[0]);
+    doubles = cache_lines(8 * words + ROOM_OF_HALFSPACES + meshes, &space->held[1]);
+    if (buffers == NULL || doubles == NULL) return 0;
+    integers = (int64_t *)(doubles + measures[M_DOUBLES]);
+    digits = integers + measures[M_INTEGERS];
+    space->poses = buffers->poses;
+    space->shape_of = buffers->shape_of;
+    space->pairs = buffers->pairs;
+    space->asked = buffers->asked;
+    space->left = buffers->left;
+    space->rows = buffers->rows;
+    space->told = buffers->told;
+    begin_header(space);
+    space->header[DOUBLES_AT] = address_of(doubles);
+    space->header[INTEGERS_AT] = address_of(integers);
+    space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
+    space->digits_at = address_of(digits);
+    space->room = digits + measures[M_WORKSPACE];
+    furnish_meshes(space, (char *)space->room + ROOM_OF_HALFSPACES, measures);
+    begin_pairs(space);
+    return 1;
+}
+
+collide_status collide_workspace_create(collide_workspace **workspace)
+{
+    collide_workspace *made;
+    const struct collide_kernels *kernels;
+    if (workspace == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *workspace = NULL;
+    if ((kernels = kernels_here()) == NULL) return COLLIDE_NO_KERNELS;
+    if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    made->kernels = kernels;
+    if (!furnish(made)) {
+        collide_workspace_free(made);
+        return COLLIDE_NO_MEMORY;
+    }
+    *workspace = made;
+    return COLLIDE_OK;
+}
+
+void collide_workspace_free(collide_workspace *workspace)
+{
+    if (workspace == NULL) return;
+    free(workspace->held[0]);
+    free(workspace->held[1]);
+    free(workspace);
+}
+
+/* --- questions ----------------------------------------------------------------------------------------------------- */
+
+/* The table of a single pair. */
+static void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B)
+{
+    int order = A == B ? 0 : memcmp(A->content, B->content, sizeof A->content);
+    memcpy(space->ints, A->ints, sizeof A->ints);
+    memcpy(space->ints + INTS, B->ints, sizeof B->ints);
+    memcpy(space->numbers, A->numbers, sizeof A->numbers);
+    memcpy(space->numbers + NUMBERS, B->numbers, sizeof B->numbers);
+    space->ints[RANK] = order > 0;
+    space->ints[INTS + RANK] = order < 0;
+    space->shapes[0] = A;
+    space->shapes[1] = B;
+    space->header[INTS_AT] = address_of(space->ints);
+    space->header[NUMBERS_AT] = address_of(space->numbers);
+    space->shape_of[0] = 0; /* a batch of a set may have left others */
+    space->shape_of[BLOCK] = 1;
+}
+
+/* Number of the first pair from `first` on at which a matrix is no pose. */
+static size_t first_bad(collide_workspace *space, const struct question *asked, size_t first)
+{
+    int64_t room = address_of(space->poses), from = (int64_t)first, n = (int64_t)asked->n;
+    int64_t a = space->kernels->first_bad_pose(address_of(asked->X_WA), asked->step_a, from, n, (uint8_t)asked->check, room);
+    int64_t b = space->kernels->first_bad_pose(address_of(asked->X_WB), asked->step_b, from, n, (uint8_t)asked->check, room);
+    return (size_t)(a < b ? a : b);
+}
+
+/* Answer all poses into booleans, or into rows that are zeroed. */
+static collide_status answer(collide_workspace *space, const struct question *asked, uint8_t *hits, collide_pair *pairs,
+                             size_t *failed)
+{
+    void *out = asked->boolean ? (void *)hits : (void *)pairs;
+    size_t done = 0;
+    while (done < asked->n) {
+        int64_t said = space->kernels->answer_poses(
+            address_of(space->header), address_of(asked->which), address_of(asked->X_WA), asked->step_a,
+            address_of(asked->X_WB), asked->step_b, (int64_t)done, (int64_t)asked->n, (uint8_t)asked->boolean,
+            (uint8_t)(asked->depths && !asked->boolean), asked->limit, (uint8_t)asked->check, address_of(asked->axes),
+            address_of(out));
+        done = (size_t)space->header[ANSWERED];
+        if (said == BAD_POSE) {
+            *failed = first_bad(space, asked, done);
+            return COLLIDE_INVALID_POSE;
+        }
+        if (said == OPEN) {
+            size_t start = done - 1 - (done - 1) % BLOCK, k, row = 0;
+            collide_pair *rows = asked->boolean ? space->rows : pairs + start;
+            collide_status status = settle_rows(space, asked, rows, done - start, &row);
+            if (status != COLLIDE_OK) {
+                *failed = start + row;
+                return status;
+            }
+            for (k = start; asked->boolean && k < done; k++) hits[k] = rows[k - start].hit;
+        }
+    }
+    return COLLIDE_OK;
+}
+
+/* Body numbers into rows, and out with depths that nobody asked for; a depth without end is told. */
+static collide_status close_pairs(collide_workspace *space, const struct question *asked, collide_pair *pairs, size_t *failed)
+{
+    size_t k;
+    if (!space->kernels->close_rows(address_of(pairs), (int64_t)asked->n, (uint8_t)asked->depths)) return COLLIDE_OK;
+    for (k = 0; k < asked->n && pairs[k].distance != -INFINITE; k++) {}
+    *failed = k;
+    return COLLIDE_ENDLESS_DEPTH;
+}
+
+/* --- single calls -------------------------------------------------------------------------------------------------- */
+
+static int are_none(unsigned flags) { return (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0; }
+
+/* One pair at one pair of poses. */
+static struct question single(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags, int boolean)
+{
+    struct question asked;
+    asked.which = NULL;
+    asked.X_WA = X_WA;
+    asked.X_WB = X_WB;
+    asked.step_a = asked.step_b = 0;
+    asked.n = 1;
+    asked.boolean = boolean;
+    asked.depths = !boolean && !(flags & COLLIDE_UNSIGNED);
+    asked.check = !(flags & COLLIDE_TRUST_POSES);
+    asked.limit = 0.0;
+    asked.axes = NULL;
+    asked.shapes = space->shapes;
+    return asked;
+}
+
+collide_status collide_collide(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                               const double X_WA[16], const double X_WB[16], unsigned flags, int *hit)
+{
+    collide_status status = COLLIDE_OK;
+    rounding given;
+    int64_t said;
+    if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *hit = 0;
+    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags))
+        return COLLIDE_INVALID_ARGUMENT;
+    given = round_as_kernels_do();
+    take_pair(workspace, A, B);
+    said = workspace->kernels->collide_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB));
+    if (said < 0) {
+        struct question asked = single(workspace, X_WA, X_WB, flags, 1);
+        uint8_t found = 0;
+        size_t failed;
+        status = answer(workspace, &asked, &found, NULL, &failed);
+        said = found;
+    }
+    round_as_before(given);
+    if (status == COLLIDE_OK) *hit = (int)said;
+    return status;
+}
+
+collide_status collide_distance(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                const double X_WA[16], const double X_WB[16], double max_distance, unsigned flags,
+                                collide_pair *pair)
+{
+    collide_status status = COLLIDE_OK;
+    rounding given;
+    int64_t said = -1;
+    if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
+    memset(pair, 0, sizeof *pair);
+    if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags) || !(max_distance >= 0.0))
+        return COLLIDE_INVALID_ARGUMENT;
+    given = round_as_kernels_do();
+    take_pair(workspace, A, B);
+    if (max_distance == INFINITE)
+        said = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
+                                                   address_of(pair), !(flags & COLLIDE_UNSIGNED));
+    if (said < 0) {
+        struct question asked = single(workspace, X_WA, X_WB, flags, 0);
+        size_t failed;
+        asked.limit = max_distance;
+        memset(pair, 0, sizeof *pair);
+        status = answer(workspace, &asked, NULL, pair, &failed);
+        if (status == COLLIDE_OK) status = close_pairs(workspace, &asked, pair, &failed);
+    }
+    round_as_before(given);
+    return status;
+}
+
+/* --- batches ------------------------------------------------------------------------------------------------------- */
+
+/* Poses of one body in a question of n pairs: whether they fit. */
+static int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *step)
+{
+    *matrices = poses.matrices;
+    *step = poses.count == 1 ? 0 : 16;
+    return poses.count == n || poses.count == 1 ? poses.matrices != NULL || n == 0 : 0;
+}
+
+static int are_axes(const double *axes, size_t n)
+{
+    size_t k;
+    for (k = 0; axes != NULL && k < 3 * n; k++)
+        if (!(fabs(axes[k]) <= LONGEST_AXIS)) return 0;
+    return 1;
+}
+
+/* A batch, its arguments but poses, flags and axes checked; the table is taken already. */
+static collide_status ask(collide_workspace *space, struct question *asked, collide_poses X_WA, collide_poses X_WB,
+                          unsigned flags, uint8_t *hits, collide_pair *pairs, size_t *failed)
+{
+    collide_status status;
+    rounding given;
+    size_t blamed = 0;
+    asked->boolean = pairs == NULL;
+    asked->depths = !asked->boolean && !(flags & COLLIDE_UNSIGNED);
+    asked->check = !(flags & COLLIDE_TRUST_POSES);
+    if (are_none(flags) || !take_poses(X_WA, asked->n, &asked->X_WA, &asked->step_a) ||
+        !take_poses(X_WB, asked->n, &asked->X_WB, &asked->step_b) || !are_axes(asked->axes, asked->n))
+        return COLLIDE_INVALID_ARGUMENT;
+    if (asked->n == 0) return COLLIDE_OK;
+    if (asked->boolean) memset(hits, 0, asked->n);
+    else memset(pairs, 0, asked->n * sizeof *pairs);
+    given = round_as_kernels_do();
+    status = answer(space, asked, hits, pairs, &blamed);
+    if (status == COLLIDE_OK && !asked->boolean) status = close_pairs(space, asked, pairs, &blamed);
+    round_as_before(given);
+    if (failed != NULL) *failed = blamed;
+    return status;
+}
+
+/* How many pairs two batches of poses make; 0 where one is empty. */
+static size_t longer(collide_poses A, collide_poses B)
+{
+    if (A.count == 0 || B.count == 0) return 0;
+    return A.count > B.count ? A.count : B.count;
+}
+
+static collide_status ask_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B, collide_poses X_WA,
+                                collide_poses X_WB, double limit, unsigned flags, double *axes, uint8_t *hits,
+                                collide_pair *pairs, size_t *failed)
+{
+    struct question asked;
+    if (failed != NULL) *failed = 0;
+    if (workspace == NULL || A == NULL || B == NULL || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
+    take_pair(workspace, A, B);
+    asked.which = NULL;
+    asked.n = longer(X_WA, X_WB);
+    asked.limit = limit;
+    asked.axes = axes;
+    asked.shapes = workspace->shapes;
+    if (asked.n == 0) return X_WA.count > 1 || X_WB.count > 1 ? COLLIDE_INVALID_ARGUMENT : COLLIDE_OK;
+    if (hits == NULL && pairs == NULL) return COLLIDE_INVALID_ARGUMENT;
+    return ask(workspace, &asked, X_WA, X_WB, flags, hits, pairs, failed);
+}
+
+collide_status collide_collide_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                     collide_poses X_WA, collide_poses X_WB, unsigned flags, double *axes, uint8_t *hits,
+                                     size_t *failed)
+{
+    return ask_batch(workspace, A, B, X_WA, X_WB, 0.0, flags, axes, hits, NULL, failed);
+}
+
+collide_status collide_distance_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                      collide_poses X_WA, collide_poses X_WB, double max_distance, unsigned flags,
+                                      collide_pair *pairs, size_t *failed)
+{
+    return ask_batch(workspace, A, B, X_WA, X_WB, max_distance, flags, NULL, NULL, pairs, failed);
+}
+
+static collide_status ask_each(collide_workspace *workspace, const collide_shape_set *set, const int64_t *which, size_t n,
+                               collide_poses X_WA, collide_poses X_WB, double limit, unsigned flags, double *axes,
+                               uint8_t *hits, collide_pair *pairs, size_t *failed)
+{
+    struct question asked;
+    size_t k;
+    if (failed != NULL) *failed = 0;
+    if (workspace == NULL || set == NULL || !(limit >= 0.0)) return COLLIDE_INVALID_ARGUMENT;
+    if (n > 0 && (which == NULL || (hits == NULL && pairs == NULL))) return COLLIDE_INVALID_ARGUMENT;
+    for (k = 0; k < 2 * n; k++)
+        if (which[k] < 0 || (uint64_t)which[k] >= set->count) {
+            if (failed != NULL) *failed = k / 2;
+            return COLLIDE_INVALID_ARGUMENT;
+        }
+    workspace->header[INTS_AT] = address_of(set->ints);
+    workspace->header[NUMBERS_AT] = address_of(set->numbers);
+    asked.which = which;
+    asked.n = n;
+    asked.limit = limit;
+    asked.axes = axes;
+    asked.shapes = set->shapes;
+    return ask(workspace, &asked, X_WA, X_WB, flags, hits, pairs, failed);
+}
+
+collide_status collide_collide_each(collide_workspace *workspace, const collide_shape_set *set, const int64_t *which, size_t n,
+                                    collide_poses X_WA, collide_poses X_WB, unsigned flags, double *axes, uint8_t *hits,
+                                    size_t *failed)
+{
+    return ask_each(workspace, set, which, n, X_WA, X_WB, 0.0, flags, axes, hits, NULL, failed);
+}
+
+collide_status collide_distance_each(collide_workspace *workspace, const collide_shape_set *set, const int64_t *which, size_t n,
+                                     collide_poses X_WA, collide_poses X_WB, double max_distance, unsigned flags,
+                                     collide_pair *pairs, size_t *failed)
+{
+    return ask_each(workspace, set, which, n, X_WA, X_WB, max_distance, flags, NULL, NULL, pairs, failed);
+}

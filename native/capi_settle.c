@@ -1,0 +1,94 @@
+/* What doubles leave open goes to the exact stage: as `_finish` of collide/narrowphase/run.py. */
+#include "capi_internal.h"
+
+#include <string.h>
+
+/* Rows that stand open. */
+static size_t open_rows(const collide_pair *rows, size_t n, int64_t *left)
+{
+    size_t k, many = 0;
+    for (k = 0; k < n; k++)
+        if (rows[k].how == COLLIDE_HOW_UNDECIDED) left[many++] = (int64_t)k;
+    return many;
+}
+
+/* Row of the table that a part of the block is. */
+static const collide_shape *shape_at(const collide_workspace *space, const struct question *asked, int64_t part)
+{
+    return asked->shapes[space->shape_of[part]];
+}
+
+static collide_status settle_half_spaces(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
+{
+    size_t many = open_rows(rows, n, space->left), k;
+    for (k = 0; k < many; k++) {
+        const int64_t *parts = space->pairs + 2 * space->left[k];
+        const collide_shape *A = shape_at(space, asked, parts[0]), *B = shape_at(space, asked, parts[1]);
+        collide_status status;
+        if (A->ints[KIND] != HALFSPACE || B->ints[KIND] != HALFSPACE) continue;
+        status = settle_halfspaces(A, space->poses + POSE * parts[0], B, space->poses + POSE * parts[1], rows + space->left[k],
+                                   space->room);
+        if (status != COLLIDE_OK) return status;
+    }
+    return COLLIDE_OK;
+}
+
+/* A boolean, a gap and a depth are searched for differently: open rows ask the other two searches. */
+static void settle_by_other_searches(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
+{
+    static const int booleans[3] = {1, 0, 0}, depths[3] = {0, 1, 0};
+    int search;
+    for (search = 0; search < 3; search++) {
+        size_t many = open_rows(rows, n, space->left), k;
+        if (many == 0) return;
+        if (booleans[search] == asked->boolean && depths[search] == (asked->depths && !asked->boolean)) continue;
+        for (k = 0; k < many; k++) memcpy(space->asked + 2 * k, space->pairs + 2 * space->left[k], 2 * sizeof *space->asked);
+        memset(space->told, 0, many * sizeof *space->told);
+        space->kernels->answer_pairs(
+            space->header[INTS_AT], space->header[NUMBERS_AT], space->header[POSES_AT], 0, space->header[SHAPE_OF_AT],
+            address_of(space->asked), (int64_t)many, (uint8_t)booleans[search], (uint8_t)depths[search], 0, asked->limit,
+            address_of(space->told), space->header[DOUBLES_AT], space->header[INTEGERS_AT]);
+        space->kernels->take_told(address_of(rows), address_of(space->left), address_of(space->told), (int64_t)many,
+                                  (uint8_t)booleans[search], asked->limit);
+    }
+}
+
+/* Overlaps that the exact stage has settled without a depth are measured by all planes. */
+static void deepen(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
+{
+    uint8_t shallow[BLOCK];
+    size_t k;
+    int any = 0;
+    for (k = 0; k < n; k++) {
+        shallow[k] = rows[k].how == COLLIDE_HOW_EXACT_ARITHMETIC && rows[k].hit && !rows[k].certified;
+        any = any || shallow[k];
+    }
+    if (!any) return;
+    space->kernels->deepen_pairs(
+        space->header[INTS_AT], space->header[NUMBERS_AT], space->header[POSES_AT], space->header[SHAPE_OF_AT],
+        space->header[PAIRS_AT], address_of(shallow), (int64_t)n, asked->limit, address_of(rows), 0, 0, space->digits_at);
+}
+
+collide_status settle_rows(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n, size_t *failed)
+{
+    const struct collide_kernels *kernels = space->kernels;
+    const int64_t *header = space->header;
+    int depths = asked->depths && !asked->boolean;
+    collide_status status;
+    size_t k;
+    for (k = 0; k < n; k++)
+        if (rows[k].how == REFUSED) {
+            *failed = k;
+            return COLLIDE_OUT_OF_RANGE;
+        }
+    if (open_rows(rows, n, space->left) == 0) return COLLIDE_OK;
+    if (kernels->decide_pairs(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
+                              (int64_t)n, (uint8_t)asked->boolean, (uint8_t)depths, asked->limit, address_of(rows), 0, 0,
+                              space->requests_at, space->digits_at) > 0)
+        kernels->decide_planes(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
+                               (int64_t)n, (uint8_t)asked->boolean, asked->limit, address_of(rows), 0, 0, space->digits_at);
+    if (depths) deepen(space, asked, rows, n);
+    status = settle_half_spaces(space, asked, rows, n);
+    if (status == COLLIDE_OK) settle_by_other_searches(space, asked, rows, n);
+    return status;
+}

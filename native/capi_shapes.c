@@ -1,0 +1,374 @@
+/* Shapes from numbers: what collide/shapes checks and collide/geometry/packing.py lays out. */
+#include "capi_blake2b.h"
+#include "capi_mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* As many points have a few that stand for all; from as many on there is a support tree. */
+enum { FEWEST_COARSE = 64, FEWEST_FOR_TREE = 224 };
+/* Rounds a root of a sum of squares upwards: it is good to 4 units in the last place. */
+static const double UPWARDS = 1 + 1e-15;
+
+static int is_length(double value) { return value >= SMALLEST && value <= LARGEST; }
+static int is_coordinate(double value) { return fabs(value) <= LARGEST; }
+
+/* Exponent of the lowest bit set among doubles. */
+static int64_t lowest_exponent(const double *values, size_t n)
+{
+    int64_t lowest = NO_BITS;
+    size_t k;
+    for (k = 0; k < n; k++) {
+        uint64_t bits, mantissa;
+        int64_t exponent;
+        memcpy(&bits, &values[k], 8);
+        exponent = (int64_t)(bits >> 52 & 0x7ff);
+        mantissa = (bits & 0xfffffffffffffu) | (exponent ? (uint64_t)1 << 52 : 0);
+        if (mantissa == 0) continue;
+        exponent = (exponent ? exponent : 1) - 1075;
+        while (!(mantissa & 1)) {
+            mantissa >>= 1;
+            exponent++;
+        }
+        if (exponent < lowest) lowest = exponent;
+    }
+    return lowest;
+}
+
+/* Digest of kind, radius and parameters, then of the points; -0.0 and 0.0 are one number among these. */
+static void digest(collide_shape *shape, const double *points, size_t n)
+{
+    struct blake2b hash;
+    double head[6];
+    size_t k;
+    head[0] = (double)shape->ints[KIND];
+    head[1] = shape->numbers[RADIUS];
+    for (k = 0; k < 4; k++) head[2 + k] = shape->numbers[PARAMS + k];
+    blake2b_begin(&hash);
+    blake2b_add(&hash, head, sizeof head);
+    for (k = 0; k < 3 * n; k++) {
+        double value = points[k] + 0.0;
+        blake2b_add(&hash, &value, sizeof value);
+    }
+    blake2b_end(&hash, shape->content);
+}
+
+/* Coordinates axis by axis, filled up with the first point, then coarse points. */
+static collide_status lay_out(collide_shape *shape, const double *points, size_t n)
+{
+    size_t padded = (n + COORDINATES - 1) / COORDINATES * COORDINATES, axis, k, coarse = n >= FEWEST_COARSE;
+    const struct collide_kernels *kernels = NULL;
+    int64_t measures[MEASURES];
+    double *block, squares = 0.0;
+    measures[M_COARSE] = 0;
+    if (coarse) {
+        if ((kernels = kernels_here()) == NULL || !rooms_of(kernels, measures)) return COLLIDE_NO_KERNELS;
+    }
+    block = cache_lines((3 * padded + 4 * (size_t)measures[M_COARSE]) * sizeof *block, &shape->block);
+    if (block == NULL) return COLLIDE_NO_MEMORY;
+    for (axis = 0; axis < 3; axis++)
+        for (k = 0; k < padded; k++) block[axis * padded + k] = points[3 * (k < n ? k : 0) + axis];
+    for (k = 0; k < n; k++) {
+        const double *p = points + 3 * k;
+        double square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+        if (square > squares) squares = square;
+    }
+    shape->numbers[REACH] = sqrt(squares) * UPWARDS;
+    shape->ints[COUNT] = (int64_t)n;
+    shape->ints[PADDED] = (int64_t)padded;
+    shape->ints[ADDRESS] = address_of(block);
+    shape->ints[LOWEST] = lowest_exponent(points, 3 * n);
+    if (!coarse) return COLLIDE_OK;
+    shape->ints[COARSE_AT] = address_of(block + 3 * padded);
+    kernels->choose_coarse(address_of(points), (int64_t)n, shape->ints[COARSE_AT]);
+    return COLLIDE_OK;
+}
+
+static collide_status plant(collide_shape *shape, size_t n)
+{
+    const struct collide_kernels *kernels = kernels_here();
+    collide_status status;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
+    status = plant_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
+    if (shape->tree != NULL) shape->ints[TREE] = tree_address(shape->tree);
+    return status;
+}
+
+/* The same where the processor rounds as kernels want it. */
+static collide_status made_of_points(collide_shape *shape, const double *points, size_t n, int may_have_tree)
+{
+    collide_status status = lay_out(shape, points, n);
+    if (status != COLLIDE_OK) return status;
+    digest(shape, points, n);
+    if (!may_have_tree || n < FEWEST_FOR_TREE) return COLLIDE_OK;
+    if ((shape->points = malloc(3 * n * sizeof *points)) == NULL) return COLLIDE_NO_MEMORY;
+    memcpy(shape->points, points, 3 * n * sizeof *points);
+    return plant(shape, n);
+}
+
+collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                               collide_shape **out)
+{
+    collide_shape *shape = calloc(1, sizeof *shape);
+    collide_status status;
+    rounding given;
+    if (shape == NULL) return COLLIDE_NO_MEMORY;
+    shape->ints[KIND] = POINTS;
+    shape->numbers[RADIUS] = radius;
+    shape->numbers[SLOP] = slop;
+    given = round_as_kernels_do();
+    status = made_of_points(shape, points, n, may_have_tree);
+    round_as_before(given);
+    if (status == COLLIDE_OK) *out = shape;
+    else collide_shape_free(shape);
+    return status;
+}
+
+static collide_status shape_of_numbers(int kind, const double *params, size_t n, double reach, collide_shape **out)
+{
+    collide_shape *shape = calloc(1, sizeof *shape);
+    if (shape == NULL) return COLLIDE_NO_MEMORY;
+    shape->ints[KIND] = kind;
+    shape->ints[LOWEST] = NO_BITS;
+    shape->numbers[REACH] = reach;
+    memcpy(shape->numbers + PARAMS, params, n * sizeof *params);
+    digest(shape, NULL, 0);
+    *out = shape;
+    return COLLIDE_OK;
+}
+
+void collide_shape_free(collide_shape *shape)
+{
+    if (shape == NULL) return;
+    fell_tree(shape->tree);
+    free(shape->points);
+    free(shape->block);
+    free(shape);
+}
+
+collide_status collide_sphere(double radius, collide_shape **shape)
+{
+    static const double centre[3] = {0.0, 0.0, 0.0};
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (!is_length(radius)) return COLLIDE_INVALID_SHAPE;
+    return shape_of_points(centre, 1, radius, 0.0, 0, shape);
+}
+
+collide_status collide_box(const double size[3], collide_shape **shape)
+{
+    double corners[24];
+    int k;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (size == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!is_length(size[0]) || !is_length(size[1]) || !is_length(size[2])) return COLLIDE_INVALID_SHAPE;
+    for (k = 0; k < 24; k++) corners[k] = (k / 3 >> (2 - k % 3) & 1 ? 0.5 : -0.5) * size[k % 3];
+    return shape_of_points(corners, 8, 0.0, 0.0, 0, shape);
+}
+
+collide_status collide_capsule(double radius, double length, collide_shape **shape)
+{
+    double ends[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (!is_length(radius) || !(length == 0.0 || is_length(length))) return COLLIDE_INVALID_SHAPE;
+    ends[2] = -(0.5 * length);
+    ends[5] = 0.5 * length;
+    return shape_of_points(ends, length > 0.0 ? 2 : 1, radius, 0.0, 0, shape);
+}
+
+/* High and low part of a product (Dekker 1971). */
+static double product(double a, double b, double *low)
+{
+    double high = a * b, p = 134217729.0 * a, q = 134217729.0 * b;
+    double a_high = p - (p - a), b_high = q - (q - b);
+    double a_low = a - a_high, b_low = b - b_high;
+    *low = ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    return high;
+}
+
+/* The sum of two numbers, and what it is too large by, taken into *rest. */
+static double sum(double a, double b, double *rest)
+{
+    double total = a + b, other = total - a;
+    *rest += (a - (total - other)) + (b - other);
+    return total;
+}
+
+/* As Python's math.hypot has it, which is correctly rounded: a root, and what it misses in twice the precision. */
+double root_of_squares(double x, double y, double z)
+{
+    double largest = fabs(x), rest = 0.0, low, total, root, square;
+    int exponent;
+    if (fabs(y) > largest) largest = fabs(y);
+    if (fabs(z) > largest) largest = fabs(z);
+    if (largest == 0.0) return 0.0;
+    frexp(largest, &exponent);
+    x = ldexp(x, -exponent);
+    y = ldexp(y, -exponent);
+    z = ldexp(z, -exponent);
+    total = product(x, x, &rest);
+    total = sum(total, product(y, y, &low), &rest);
+    rest += low;
+    total = sum(total, product(z, z, &low), &rest);
+    rest += low;
+    root = sqrt(total);
+    square = product(root, root, &low);
+    root += ((total - square) + (rest - low)) / (2.0 * root);
+    return ldexp(root, exponent);
+}
+
+static collide_status round_shape(int kind, double radius, double length, collide_shape **shape)
+{
+    double params[2];
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (!is_length(radius) || !is_length(length)) return COLLIDE_INVALID_SHAPE;
+    given = round_as_kernels_do();
+    params[0] = radius;
+    params[1] = 0.5 * length;
+    length = root_of_squares(params[0], params[1], 0.0) * UPWARDS;
+    round_as_before(given);
+    return shape_of_numbers(kind, params, 2, length, shape);
+}
+
+collide_status collide_cylinder(double radius, double length, collide_shape **shape)
+{
+    return round_shape(CYLINDER, radius, length, shape);
+}
+
+collide_status collide_cone(double radius, double length, collide_shape **shape)
+{
+    return round_shape(CONE, radius, length, shape);
+}
+
+collide_status collide_ellipsoid(const double radii[3], collide_shape **shape)
+{
+    double largest = 0.0;
+    int k;
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (radii == NULL) return COLLIDE_INVALID_ARGUMENT;
+    for (k = 0; k < 3; k++) {
+        if (!is_length(radii[k])) return COLLIDE_INVALID_SHAPE;
+        if (radii[k] > largest) largest = radii[k];
+    }
+    given = round_as_kernels_do();
+    largest *= UPWARDS;
+    round_as_before(given);
+    return shape_of_numbers(ELLIPSOID, radii, 3, largest, shape);
+}
+
+collide_status collide_halfspace(const double normal[3], double offset, collide_shape **shape)
+{
+    double params[4], length;
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (normal == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (!is_coordinate(normal[0]) || !is_coordinate(normal[1]) || !is_coordinate(normal[2])) return COLLIDE_INVALID_SHAPE;
+    given = round_as_kernels_do();
+    length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    round_as_before(given);
+    if (!(length >= 1e-6 && length <= 1e6) || !is_coordinate(offset)) return COLLIDE_INVALID_SHAPE;
+    memcpy(params, normal, 3 * sizeof *params);
+    params[3] = offset;
+    return shape_of_numbers(HALFSPACE, params, 4, 0.0, shape);
+}
+
+/* Whether n points are finite, not too large, and not all too small. */
+static int are_points(const double *points, size_t n)
+{
+    double largest = 0.0;
+    size_t k;
+    for (k = 0; k < 3 * n; k++) {
+        if (!is_coordinate(points[k])) return 0;
+        if (fabs(points[k]) > largest) largest = fabs(points[k]);
+    }
+    return largest == 0.0 || largest >= SMALLEST;
+}
+
+collide_status collide_hull(const double *points, size_t n, double radius, collide_shape **shape)
+{
+    int good;
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (points == NULL) return COLLIDE_INVALID_ARGUMENT;
+    given = round_as_kernels_do();
+    good = n > 0 && n < (size_t)1 << 26 && (radius == 0.0 || is_length(radius)) && are_points(points, n);
+    round_as_before(given);
+    if (!good) return COLLIDE_INVALID_SHAPE;
+    return shape_of_points(points, n, radius == 0.0 ? 0.0 : radius, 0.0, 1, shape);
+}
+
+/* --- sets ---------------------------------------------------------------------------------------------------------- */
+
+struct placed {
+    const collide_shape *shape;
+    size_t number;
+};
+
+static int by_content(const void *one, const void *other)
+{
+    return memcmp(((const struct placed *)one)->shape->content, ((const struct placed *)other)->shape->content, 16);
+}
+
+/* Rows of shapes with ranks by content: equal shapes have one rank. */
+static void fill_set(collide_shape_set *set, struct placed *order)
+{
+    size_t k;
+    int64_t rank = 0;
+    for (k = 0; k < set->count; k++) {
+        memcpy(set->ints + INTS * k, set->shapes[k]->ints, sizeof set->shapes[k]->ints);
+        memcpy(set->numbers + NUMBERS * k, set->shapes[k]->numbers, sizeof set->shapes[k]->numbers);
+        order[k].shape = set->shapes[k];
+        order[k].number = k;
+    }
+    qsort(order, set->count, sizeof *order, by_content);
+    for (k = 0; k < set->count; k++) {
+        if (k > 0 && by_content(&order[k - 1], &order[k]) != 0) rank++;
+        set->ints[INTS * order[k].number + RANK] = rank;
+    }
+}
+
+collide_status collide_shape_set_create(const collide_shape *const *shapes, size_t n, collide_shape_set **set)
+{
+    collide_shape_set *made;
+    struct placed *order;
+    size_t k;
+    if (set == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *set = NULL;
+    if (shapes == NULL || n == 0 || n > (size_t)1 << 40 || n > (size_t)-1 / 64) return COLLIDE_INVALID_ARGUMENT;
+    for (k = 0; k < n; k++)
+        if (shapes[k] == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
+    order = malloc(n * sizeof *order);
+    made->count = n;
+    made->ints = malloc(n * INTS * sizeof *made->ints);
+    made->numbers = malloc(n * NUMBERS * sizeof *made->numbers);
+    made->shapes = malloc(n * sizeof *made->shapes);
+    if (order == NULL || made->ints == NULL || made->numbers == NULL || made->shapes == NULL) {
+        free(order);
+        collide_shape_set_free(made);
+        return COLLIDE_NO_MEMORY;
+    }
+    memcpy(made->shapes, shapes, n * sizeof *made->shapes);
+    fill_set(made, order);
+    free(order);
+    *set = made;
+    return COLLIDE_OK;
+}
+
+void collide_shape_set_free(collide_shape_set *set)
+{
+    if (set == NULL) return;
+    free(set->ints);
+    free(set->numbers);
+    free((void *)set->shapes);
+    free(set);
+}

@@ -1,0 +1,241 @@
+/* collide: distances and overlaps of rigid bodies, proven against rounding. The interface for C and C++.
+
+   The answers are those of the Python package of the same version, bit by bit, and so is what is refused. No Python is
+   needed, and none is loaded.
+
+   Units and frames. Lengths are metres. A pose X_WA is the pose of body A in the world W: 16 doubles, a 4x4 matrix row by
+   row, p_W = X_WA * p_A, whose last row is 0 0 0 1. Matrices are used as they stand, entry by entry, and are never made
+   orthonormal; one whose R^T R is off the identity by more than 1e-4, or that mirrors, is refused (COLLIDE_TRUST_POSES
+   skips that check). Numbers are finite and of a size of at most 1e50; positive lengths are at least 1e-50.
+
+   Errors. Every function that can fail returns a collide_status and, unless that is COLLIDE_OK, leaves the objects that it
+   was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
+
+   Memory. Shapes, sets of shapes and workspaces are made by functions of this header and freed by the caller with
+   collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing.
+
+   Threads. A shape or a set never changes: any number of threads may use one at once. A workspace is for one thread at a
+   time: give each thread its own. Nothing else is shared. The answers do not depend on the caller's rounding mode, nor on
+   whether it flushes small numbers to 0: both are set for the length of a call, and put back.
+
+   Processors. The kernels are those of the best level that the processor has; the environment's variable COLLIDE_CPU names
+   another one ("v2", "v3", "v4"), read when a workspace, a mesh or a shape of many points is made. */
+#ifndef COLLIDE_H
+#define COLLIDE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* The version of this header; `collide_version` tells the library's. */
+#define COLLIDE_VERSION "0.1.0"
+
+#if defined(_WIN32) && defined(COLLIDE_BUILDING)
+#define COLLIDE_LINKAGE __declspec(dllexport)
+#elif defined(_WIN32)
+#define COLLIDE_LINKAGE __declspec(dllimport)
+#elif defined(__GNUC__)
+#define COLLIDE_LINKAGE __attribute__((visibility("default")))
+#else
+#define COLLIDE_LINKAGE
+#endif
+#define COLLIDE_API COLLIDE_LINKAGE
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What a function has to say. Values never change their meaning. */
+typedef enum collide_status {
+    COLLIDE_OK = 0,
+    COLLIDE_NO_MEMORY = 1,        /* an allocation failed; whatever was begun is freed */
+    COLLIDE_INVALID_ARGUMENT = 2, /* a NULL where none may be, a distance below 0, a number outside its range */
+    COLLIDE_INVALID_SHAPE = 3,    /* the numbers make no such shape: not finite, too large, too small, empty, unbounded */
+    COLLIDE_INVALID_POSE = 4,     /* a matrix is no pose */
+    COLLIDE_OUT_OF_RANGE = 5,     /* shapes and distance of a pair together measure less than 1e-50 m: scale the scene */
+    COLLIDE_ENDLESS_DEPTH = 6,    /* two half-spaces overlap without end: there is no depth; the boolean has an answer */
+    COLLIDE_UNSUPPORTED = 7,      /* Python answers this, this interface does not */
+    COLLIDE_NO_KERNELS = 8        /* the processor is too old, or COLLIDE_CPU names a level that is not to be had */
+} collide_status;
+
+/* A sentence about a status, in English; of an unknown one, too. Never NULL. */
+COLLIDE_API const char *collide_status_text(collide_status status);
+
+/* The version of the library, "0.1.0". */
+COLLIDE_API const char *collide_version(void);
+
+/* The level of processors that the kernels are compiled for, into *level: "v2", "v3", "v4", "arm64". */
+COLLIDE_API collide_status collide_level(const char **level);
+
+/* --- shapes --------------------------------------------------------------------------------------------------------
+
+   A closed convex set in its own frame, centred at the frame's origin where it is given by lengths, its axis along z. Full
+   lengths, not half ones. A shape is made, asked about and freed; *shape becomes NULL where it cannot be made. */
+typedef struct collide_shape collide_shape;
+
+/* A ball. radius > 0. */
+COLLIDE_API collide_status collide_sphere(double radius, collide_shape **shape);
+
+/* A box of full edge lengths size[0], size[1], size[2] > 0 along x, y, z. */
+COLLIDE_API collide_status collide_box(const double size[3], collide_shape **shape);
+
+/* All points within radius > 0 of a segment along z; length >= 0 is the segment's, without the caps. */
+COLLIDE_API collide_status collide_capsule(double radius, double length, collide_shape **shape);
+
+/* A solid cylinder along z: radius > 0, full length > 0. */
+COLLIDE_API collide_status collide_cylinder(double radius, double length, collide_shape **shape);
+
+/* A solid cone along z: base of radius > 0 at -length/2, apex at +length/2, length > 0. */
+COLLIDE_API collide_status collide_cone(double radius, double length, collide_shape **shape);
+
+/* An ellipsoid with semi-axes radii[0], radii[1], radii[2] > 0 along x, y, z. */
+COLLIDE_API collide_status collide_ellipsoid(const double radii[3], collide_shape **shape);
+
+/* {x : normal . x <= offset}. normal points out of the solid; its length is kept as given, and lies within [1e-6, 1e6]. */
+COLLIDE_API collide_status collide_halfspace(const double normal[3], double offset, collide_shape **shape);
+
+/* The convex hull of n >= 1 points, x y z of each, in any order, swept by a ball of radius >= 0. Doubled, collinear, coplanar
+   and inner points are fine. From 224 points on a support tree is made: 4 to 6 microseconds a point. n < 2^26. */
+COLLIDE_API collide_status collide_hull(const double *points, size_t n, double radius, collide_shape **shape);
+
+/* {x : normals[k] . x <= offsets[k] for all k < m}, bounded and not empty: both are decided exactly. normals : 3 * m doubles, no
+   normal 0. The vertices are worked out exactly and rounded once, which every bracket counts in. For m up to a few hundred. */
+COLLIDE_API collide_status collide_hpolytope(const double *normals, const double *offsets, size_t m, collide_shape **shape);
+
+/* Frees a shape that no query and no set uses any more; NULL is fine. */
+COLLIDE_API void collide_shape_free(collide_shape *shape);
+
+/* Shapes under numbers, for batches that ask about a different pair at every pose. */
+typedef struct collide_shape_set collide_shape_set;
+
+/* A set of n >= 1 shapes, number k the one at shapes[k]; one may stand there repeatedly. They are not copied: free the set before
+   them. */
+COLLIDE_API collide_status collide_shape_set_create(const collide_shape *const *shapes, size_t n, collide_shape_set **set);
+COLLIDE_API void collide_shape_set_free(collide_shape_set *set);
+
+/* --- queries ------------------------------------------------------------------------------------------------------- */
+
+/* Scratch memory of queries, one a thread: 4 MB of addresses, of which most are never touched. */
+typedef struct collide_workspace collide_workspace;
+
+COLLIDE_API collide_status collide_workspace_create(collide_workspace **workspace);
+COLLIDE_API void collide_workspace_free(collide_workspace *workspace);
+
+/* Which argument decided a pair (collide_pair.how). */
+enum {
+    COLLIDE_HOW_UNDECIDED = 0,        /* the bracket reaches to both sides of 0: touching within rounding; hit is then 1 */
+    COLLIDE_HOW_SEPARATING_PLANE = 1, /* a plane with all of A on one side and all of B on the other */
+    COLLIDE_HOW_COMMON_POINT = 2,     /* a simplex of points of A - B around the origin, clear of rounding */
+    COLLIDE_HOW_SWEPT_OVERLAP = 3,    /* two core points nearer than the sum of the radii */
+    COLLIDE_HOW_CLOSED_FORM = 4,      /* a formula with an error bound: spheres, capsules, half-spaces */
+    COLLIDE_HOW_EXACT_ARITHMETIC = 5  /* integers, where doubles leave the sign open or the last digit */
+};
+
+/* What is known of a pair of bodies at one pair of poses: a row of Python's PAIR_DTYPE, byte by byte. */
+typedef struct collide_pair {
+    double distance;       /* signed [m]: the gap, or minus the depth */
+    double lower, upper;   /* lower <= true signed distance <= upper, proven against rounding [m] */
+    double normal[3];      /* unit vector from A to B, in W: moving B by -distance * normal brings the pair to touch */
+    double point_a[3];     /* witness points in W [m]: point_b - point_a = distance * normal */
+    double point_b[3];
+    int32_t a, b;          /* 0 and 1 */
+    int32_t part_a, part_b; /* 0 and 0: bodies are convex here */
+    int32_t vertices_a[4]; /* ids of the vertices that span the deciding feature, pair by pair; -1 for curved bodies */
+    int32_t vertices_b[4];
+    int32_t iterations;    /* rounds of GJK (low half) and of EPA (high half), for diagnosis */
+    int32_t count;         /* how many pairs of vertices there are */
+    int32_t how;           /* COLLIDE_HOW_... */
+    uint8_t exact;         /* rounds of the exact stage, 0 where doubles decided */
+    uint8_t hit;           /* 1 where the closed sets share a point: touching is a hit */
+    uint8_t certified;     /* 1 where the sign is proven and the bracket as narrow as is promised */
+    uint8_t beyond;        /* 1 where the pair is farther apart than max_distance: distance and lower are then a proven lower
+                              bound, and upper is infinite */
+} collide_pair;
+
+/* Flags of queries, to be joined by |; 0 for none. */
+enum {
+    COLLIDE_TRUST_POSES = 1, /* matrices need be no rotations; that they are finite and end in 0 0 0 1 is still checked */
+    COLLIDE_UNSIGNED = 2     /* of distances: gaps are all that is wanted. Bodies that meet are at distance 0, with normal 0 */
+};
+
+/* Whether A and B share a point: *hit becomes 1 or 0. Where rounding of curved shapes leaves that open it is 1. */
+COLLIDE_API collide_status collide_collide(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                           const double X_WA[16], const double X_WB[16], unsigned flags, int *hit);
+
+/* The signed distance of A and B. max_distance >= 0, or infinite: beyond it only a proven lower bound is worked out.
+   COLLIDE_ENDLESS_DEPTH: *pair tells all but a depth. */
+COLLIDE_API collide_status collide_distance(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                            const double X_WA[16], const double X_WB[16], double max_distance,
+                                            unsigned flags, collide_pair *pair);
+
+/* Poses of a batch: `count` matrices one behind another. A count of 1 stands for a pose that goes with all of the other body's.
+
+   Batches answer as single calls do, bit by bit, and several times faster. Where one fails, *failed, unless failed is NULL,
+   becomes the number of the pair that is to blame (0 where none is), and the answers are of no use but after
+   COLLIDE_ENDLESS_DEPTH, which leaves them as single calls do. */
+typedef struct collide_poses {
+    const double *matrices; /* 16 * count doubles */
+    size_t count;
+} collide_poses;
+
+/* Booleans of A and B at n pairs of poses, hits[k] of the poses k; n is the larger of the counts.
+   axes : NULL; or 3 * n doubles, for each pair an axis in W that may part the bodies, 0 0 0 where none is known, finite, none
+   longer than 1e100: tried first, and replaced by one that does, where the bodies are apart. Saves time only. */
+COLLIDE_API collide_status collide_collide_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                                 collide_poses X_WA, collide_poses X_WB, unsigned flags, double *axes,
+                                                 uint8_t *hits, size_t *failed);
+
+/* Distances of A and B at n pairs of poses. */
+COLLIDE_API collide_status collide_distance_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                                  collide_poses X_WA, collide_poses X_WB, double max_distance,
+                                                  unsigned flags, collide_pair *pairs, size_t *failed);
+
+/* The same of a set's shapes: pair k is of the shapes which[2 * k] and which[2 * k + 1]. n : how many pairs there are; a count of
+   poses is n or 1. */
+COLLIDE_API collide_status collide_collide_each(collide_workspace *workspace, const collide_shape_set *set,
+                                                const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
+                                                unsigned flags, double *axes, uint8_t *hits, size_t *failed);
+COLLIDE_API collide_status collide_distance_each(collide_workspace *workspace, const collide_shape_set *set,
+                                                 const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
+                                                 double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
+
+/* --- meshes --------------------------------------------------------------------------------------------------------
+
+   Triangles, as a solid or as a surface, asked about with each other and with polytopes. This is less than Python answers:
+   whether two such bodies meet, and how far they are apart. Everything else of meshes is COLLIDE_UNSUPPORTED, never a guess:
+   depths, gaps below 6e-8 of the pair's size, curved shapes, half-spaces, unions, solids against bodies of more than 64 parts. */
+typedef struct collide_mesh collide_mesh;
+
+enum {
+    COLLIDE_SURFACE = 0,        /* the facets alone */
+    COLLIDE_SOLID = 1,          /* with what they wind around; facets that do not close are COLLIDE_INVALID_SHAPE */
+    COLLIDE_SOLID_IF_CLOSED = 2 /* a solid where an inside can be told, else a surface */
+};
+
+/* A mesh of n vertices, x y z of each, and m facets, three numbers of vertices each, counter-clockwise from outside. Equal
+   vertices count as one; a part that runs the other way round within another is a cavity. solid : one of the above.
+   m <= 2^28. */
+COLLIDE_API collide_status collide_mesh_create(const double *vertices, size_t n, const int32_t *faces, size_t m, int solid,
+                                               collide_mesh **mesh);
+
+/* The surface and the inside of a sphere, box, capsule or hull, to be asked about with meshes. COLLIDE_UNSUPPORTED: shapes that
+   are curved otherwise, without end, or whose corners are rounded (collide_hpolytope). */
+COLLIDE_API collide_status collide_mesh_of_shape(const collide_shape *shape, collide_mesh **mesh);
+
+/* Frees a mesh; NULL is fine. A mesh never changes and any number of threads may use it. */
+COLLIDE_API void collide_mesh_free(collide_mesh *mesh);
+
+/* Whether A and B, of which one at least was made of facets, share a point; flags as of collide_collide. */
+COLLIDE_API collide_status collide_mesh_collide(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
+                                                const double X_WA[16], const double X_WB[16], unsigned flags, int *hit);
+
+/* How far A and B are apart; part_a and part_b are facets. COLLIDE_UNSUPPORTED where they meet, or nearly: ask
+   collide_mesh_collide which. */
+COLLIDE_API collide_status collide_mesh_distance(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
+                                                 const double X_WA[16], const double X_WB[16], unsigned flags,
+                                                 collide_pair *pair);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,233 @@
+"""libcollide through ctypes, for tests: its functions with their types, and Python's shapes made by them.
+
+No Python of collide is between: what a program in C calls is called here.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+from ctypes import POINTER, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import cache
+
+import numpy as np
+
+import collide
+from collide.kernels.library import library_path
+from collide.results import PAIR_DTYPE
+
+OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDLESS_DEPTH, UNSUPPORTED, NO_KERNELS = range(9)
+TRUST_POSES, UNSIGNED = 1, 2
+
+
+class Poses(ctypes.Structure):
+    _fields_ = [("matrices", c_void_p), ("count", c_size_t)]
+
+
+_TYPES = {
+    "collide_status_text": [c_int],
+    "collide_version": [],
+    "collide_level": [POINTER(c_char_p)],
+    "collide_sphere": [c_double, c_void_p],
+    "collide_box": [c_void_p, c_void_p],
+    "collide_capsule": [c_double, c_double, c_void_p],
+    "collide_cylinder": [c_double, c_double, c_void_p],
+    "collide_cone": [c_double, c_double, c_void_p],
+    "collide_ellipsoid": [c_void_p, c_void_p],
+    "collide_halfspace": [c_void_p, c_double, c_void_p],
+    "collide_hull": [c_void_p, c_size_t, c_double, c_void_p],
+    "collide_hpolytope": [c_void_p, c_void_p, c_size_t, c_void_p],
+    "collide_shape_free": [c_void_p],
+    "collide_shape_set_create": [c_void_p, c_size_t, c_void_p],
+    "collide_shape_set_free": [c_void_p],
+    "collide_workspace_create": [c_void_p],
+    "collide_workspace_free": [c_void_p],
+    "collide_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
+    "collide_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p],
+    "collide_collide_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t)],
+    "collide_distance_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t)],
+    "collide_collide_each": [
+        c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_distance_each": [
+        c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
+    "collide_mesh_of_shape": [c_void_p, c_void_p],
+    "collide_mesh_free": [c_void_p],
+    "collide_mesh_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
+    "collide_mesh_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
+}  # fmt: skip
+_TEXTS = {"collide_status_text", "collide_version"}
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """The library of this installation. Raises FileNotFoundError where there is none."""
+    found = ctypes.CDLL(os.environ.get("COLLIDE_TEST_LIBRARY") or library_path())
+    for name, types in _TYPES.items():
+        function = getattr(found, name)
+        function.argtypes = types
+        function.restype = c_char_p if name in _TEXTS else None if name.endswith("_free") else c_int
+    return found
+
+
+def _doubles(values) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def raw_shape(function: str, *arguments) -> tuple[int, int | None]:
+    """(status, handle) of a function that makes a shape; arrays are handed over as addresses."""
+    out = c_void_p()
+    given = [a.ctypes.data if isinstance(a, np.ndarray) else a for a in arguments]
+    return getattr(library(), function)(*given, ctypes.byref(out)), out.value
+
+
+class CShape:
+    """A shape of Python made once more in C."""
+
+    def __init__(self, shape: collide.Shape):
+        status, self.handle = raw_shape(*_made_by(shape))
+        assert status == OK, (shape, library().collide_status_text(status))
+
+    def __del__(self):
+        library().collide_shape_free(self.handle)
+
+
+def _made_by(shape) -> tuple:
+    kind = type(shape).__name__
+    if kind == "Sphere":
+        return "collide_sphere", shape.radius
+    if kind == "Box":
+        return "collide_box", _doubles(shape.size)
+    if kind in ("Capsule", "Cylinder", "Cone"):
+        return f"collide_{kind.lower()}", shape.radius, shape.length
+    if kind == "Ellipsoid":
+        return "collide_ellipsoid", _doubles(shape.radii)
+    if kind == "Halfspace":
+        return "collide_halfspace", _doubles(shape.normal), shape.offset
+    if kind == "HPolytope":
+        return "collide_hpolytope", _doubles(shape.normals), _doubles(shape.offsets), len(shape.offsets)
+    assert kind == "ConvexHull", kind
+    return "collide_hull", _doubles(shape.points), len(shape.points), shape.radius
+
+
+#: How a mesh is taken.
+SURFACE, SOLID, SOLID_IF_CLOSED = range(3)
+
+
+def raw_mesh(vertices, faces, solid: int) -> tuple[int, int | None]:
+    """(status, handle) of a mesh."""
+    vertices, faces, out = _doubles(vertices), np.ascontiguousarray(faces, dtype=np.int32), c_void_p()
+    status = library().collide_mesh_create(
+        vertices.ctypes.data, len(vertices), faces.ctypes.data, len(faces), solid, ctypes.byref(out)
+    )
+    return status, out.value
+
+
+class CMesh:
+    """A mesh, or a convex shape, of Python made once more in C, to be asked about as facets."""
+
+    def __init__(self, shape: collide.Shape):
+        if isinstance(shape, collide.Mesh):
+            status, self.handle = raw_mesh(shape.vertices, shape.faces, SOLID if shape.solid else SURFACE)
+        else:
+            convex = CShape(shape)  # held until the mesh is made
+            status, self.handle = raw_shape("collide_mesh_of_shape", convex.handle)
+        assert status == OK, (shape, library().collide_status_text(status))
+
+    def __del__(self):
+        if getattr(self, "handle", None):
+            library().collide_mesh_free(self.handle)
+
+
+class CSet:
+    """A set of shapes."""
+
+    def __init__(self, shapes: list[CShape]):
+        self._shapes = shapes
+        handles, out = (c_void_p * len(shapes))(*(shape.handle for shape in shapes)), c_void_p()
+        status = library().collide_shape_set_create(handles, len(shapes), ctypes.byref(out))
+        assert status == OK, status
+        self.handle = out.value
+
+    def __del__(self):
+        library().collide_shape_set_free(self.handle)
+
+
+class Asker:
+    """A workspace and questions to it; each answers (status, answer)."""
+
+    def __init__(self):
+        out = c_void_p()
+        assert library().collide_workspace_create(ctypes.byref(out)) == OK
+        self.handle = out.value
+
+    def __del__(self):
+        library().collide_workspace_free(self.handle)
+
+    def collide(self, A: CShape, B: CShape, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
+        hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_collide(self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit)
+        return status, bool(hit.value)
+
+    def distance(self, A: CShape, B: CShape, X_WA, X_WB, flags: int = 0, limit: float = math.inf) -> tuple[int, np.ndarray]:
+        rows, X_WA, X_WB = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_distance(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, limit, flags, rows.ctypes.data
+        )
+        return status, rows
+
+    def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
+        hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_mesh_collide(self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit)
+        return status, bool(hit.value)
+
+    def mesh_gap(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, np.ndarray]:
+        rows, X_WA, X_WB = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_mesh_distance(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, rows.ctypes.data
+        )
+        return status, rows
+
+    def batch(self, asked, X_WA, X_WB, *, boolean: bool, flags: int = 0, limit: float = math.inf, axes=None):
+        """(status, answers, number of the pair to blame). asked : (A, B), or (set, (n, 2) numbers)."""
+        X_WA, X_WB, failed = _doubles(X_WA).reshape(-1, 4, 4), _doubles(X_WB).reshape(-1, 4, 4), c_size_t(0)
+        one, other = asked
+        if isinstance(one, CSet):
+            which = np.ascontiguousarray(other, dtype=np.int64)
+            n, first, name = len(which), [one.handle, which.ctypes.data, len(which)], "each"
+        else:
+            n, first, name = max(len(X_WA), len(X_WB)), [one.handle, other.handle], "batch"
+        out = np.zeros(n, dtype=np.uint8 if boolean else PAIR_DTYPE)
+        rest = [flags, None if axes is None else axes.ctypes.data] if boolean else [limit, flags]
+        function = getattr(library(), f"collide_{'collide' if boolean else 'distance'}_{name}")
+        poses = Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB))
+        status = function(self.handle, *first, *poses, *rest, out.ctypes.data, failed)
+        return status, out.astype(bool) if boolean else out, failed.value
+
+
+# --- poses ----------------------------------------------------------------------------------------------------------
+
+
+def identity_at(*xyz: float) -> np.ndarray:
+    """A pose that is a shift [m]."""
+    X = np.eye(4)
+    X[:3, 3] = xyz
+    return X
+
+
+def odd_poses() -> list[np.ndarray]:
+    """Matrices that are no poses, or only with ``check_poses=False``."""
+    poses = [np.eye(4) for _ in range(9)]
+    poses[0][0, 0] = math.nan
+    poses[1][2, 3] = math.inf
+    poses[2][3, 3] = 2.0
+    poses[3][3, 0] = 1e-300
+    poses[4][0, 0] = -1.0  # mirrors
+    poses[5][0, 1] = 1.01e-4
+    poses[6][1, 3] = 1.1e50
+    poses[7][:3, :3] *= 2.0
+    poses[8][:3, :3] = 0.0
+    return poses
