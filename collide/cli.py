@@ -74,7 +74,7 @@ def _fail(error: Exception) -> int:
         what = str(error)
     elif isinstance(error, OSError) and error.strerror is not None:
         what = f"{error.filename}: {error.strerror}" if error.filename is not None else f"writing: {error.strerror}"
-    elif isinstance(error, ModuleNotFoundError) and error.name in ("numpy", "numba", "llvmlite"):
+    elif isinstance(error, ModuleNotFoundError) and error.name == "numpy":
         what = f"{error.name} is not installed: pip install collide-robotics"
     elif isinstance(error, MemoryError):
         what = "out of memory"

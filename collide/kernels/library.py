@@ -38,7 +38,7 @@ def load() -> str:
     if built is None:
         return _UNBUILT
     if not _fits(built):
-        return "its sources are not those that it was made from; `pip install -e .` makes it anew"
+        return "the sources of kernels differ from those that it was made from; `pip install -e .` makes it anew"
     for name, (size, checksum) in built.FILES.items():
         if why := _why_damaged(_path(name), size, checksum):
             return f"it is damaged, {why}; install collide-robotics again"

@@ -9,7 +9,6 @@ PYTHON : as the Python that they are written in: ``NUMBA_DISABLE_JIT=1``, for co
 from __future__ import annotations
 
 import os
-from importlib.util import find_spec
 
 from collide.errors import MissingExtra
 from collide.journal import log
@@ -30,8 +29,10 @@ def _chosen() -> tuple[str, str]:
     why = "COLLIDE_JIT is set" if forced else library.load()
     if not why:
         return COMPILED, ""
-    if find_spec("numba") is None:
-        raise MissingExtra("numba", extra="jit", purpose=f"compile kernels: {why}. Either mend that, or install it")
+    try:
+        import numba  # noqa: F401
+    except ImportError as error:
+        raise MissingExtra("numba", extra="jit", purpose=f"compile kernels at their first call ({why})") from error
     if not forced and library.exists():
         log.warning("kernels of the library are not used: %s", why)
     return JUST_IN_TIME, why

@@ -137,11 +137,11 @@ def _caches() -> list[Check]:
     from collide.cache_folder import cache_folder
     from collide.kernels import mode
 
-    kernels = _kernel_cache() if mode.MODE == mode.JUST_IN_TIME else []
+    kernels = _kept_kernels() if mode.MODE == mode.JUST_IN_TIME else []
     return [*kernels, _cache("prepared inputs", cache_folder("scenes"))]
 
 
-def _kernel_cache() -> list[Check]:
+def _kept_kernels() -> list[Check]:
     """Of kernels compiled just in time."""
     from collide.cache_folder import cache_folder, why_distrusted
 
