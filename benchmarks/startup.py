@@ -135,10 +135,10 @@ def _installed(distribution: str) -> bool:
     return True
 
 
-def rows(runs: int, cold_runs: int, pythons: list[str]) -> list[dict[str, str]]:
+def rows(runs: int, cold_runs: int, pythons: list[str], only: str) -> list[dict[str, str]]:
     """One row per case and state of the cache; cases whose package is missing are left out, with a word."""
     found = []
-    for case in CASES:
+    for case in [case for case in CASES if only in case.name]:
         if case.needs and not _installed(case.needs):
             print(f"left out: {case.name} ({case.needs} is not installed)", file=sys.stderr)
             continue
@@ -176,13 +176,14 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=7, help="runs of each case, of the warm ones too (default: 7)")
     parser.add_argument("--cold-runs", type=int, default=3, help="runs with an empty cache (default: 3)")
     parser.add_argument("--against", metavar="PYTHON", help="an interpreter that has another version of collide installed")
+    parser.add_argument("--only", default="", help="cases whose names hold this")
     parser.add_argument("--no-csv", action="store_true", help="print the table alone")
     args = parser.parse_args()
     if min(args.runs, args.cold_runs) < 1:
         parser.error("at least one run of each kind is needed")
     about = machine()
     print(", ".join(f"{name} {value}" for name, value in about.items()))
-    table = rows(args.runs, args.cold_runs, [sys.executable, *([args.against] if args.against else [])])
+    table = rows(args.runs, args.cold_runs, [sys.executable, *([args.against] if args.against else [])], args.only)
     show(table)
     if not args.no_csv:
         print("written to", write(table, about).relative_to(RESULTS.parent.parent))

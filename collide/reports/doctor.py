@@ -10,10 +10,11 @@ import platform
 import sys
 import tempfile
 from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
 
 from collide.reports.progress import silent
-from collide.reports.report import package_version, versions
+from collide.reports.report import versions
 from collide.reports.tables import Column, Table
 from collide.reports.units import count, widths
 
@@ -123,6 +124,14 @@ def _kernels() -> list[Check]:
             Check("built by", f"{about['compiler']}, from sources {about['sources']}"),
         ]
     return checks
+
+
+def package_version(package: str) -> str | None:
+    """The installed version of a distribution, without importing it; None where there is none."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def _optional() -> list[Check]:

@@ -11,7 +11,6 @@ import platform
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from importlib import metadata
 
 import numpy as np
 
@@ -282,15 +281,7 @@ def versions() -> dict[str, str | None]:
     return {
         "collide": collide.__version__,
         "python": platform.python_version(),
-        "numpy": package_version("numpy"),
+        "numpy": np.__version__,
         "kernels": mode.told(),
         "machine": platform.machine() or None,
     }
-
-
-def package_version(package: str) -> str | None:
-    """The installed version of a distribution, without importing it; None where there is none."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
