@@ -137,14 +137,15 @@ def main() -> None:
         for k, contestant in enumerate(contestants):
             found[k].append(run(*contestant, args.only))
         print(f"round {round_ + 1} of {args.rounds}", file=sys.stderr, flush=True)
-    print("ns a pair, medians (spread) of processes; × is against the last column\n")
-    print(f"{'case':34}", *(f"{name:>22}" for name in names))
+    print("ns a pair: median of the processes (their spread), × against the last column by medians and by least times\n")
+    print(f"{'case':34}", *(f"{name:>27}" for name in names))
     for case in found[0][0]:
         medians = [statistics.median(one[case][0] for one in runs) for runs in found]
         spreads = [(max(one[case][0] for one in runs) / min(one[case][0] for one in runs) - 1) * 100 for runs in found]
-        cells = [f"{m:9.0f} ±{s:3.0f} % ×{m / medians[-1]:5.2f}" for m, s in zip(medians, spreads)]
+        least = [min(one[case][0] for one in runs) for runs in found]
+        cells = [f"{m:7.0f} ±{s:2.0f} % ×{m / medians[-1]:5.2f} ×{b / least[-1]:5.2f}" for m, s, b in zip(medians, spreads, least)]
         bits = {one[case][1] for runs in found for one in runs}
-        print(f"{case:34}", *(f"{cell:>22}" for cell in cells), "" if len(bits) == 1 else "  OTHER BITS")
+        print(f"{case:34}", *(f"{cell:>27}" for cell in cells), "" if len(bits) == 1 else "  OTHER BITS")
 
 
 if __name__ == "__main__":
