@@ -134,7 +134,7 @@ class BuildLibrary(build_ext):
     def _compiled(self, names: list[str], generated: Path) -> list[str]:
         import numpy
 
-        flags = ["/O2"] if WINDOWS else ["-O2", "-g0", "-std=c99", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
+        flags = ["/O2"] if WINDOWS else ["-O2", "-g0", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
         include = [str(generated), str(NATIVE), numpy.get_include(), sysconfig.get_path("include")]
         sources = [str(NATIVE / name) for name in names]
         return self.compiler.compile(sources, output_dir=self.build_temp, include_dirs=include, extra_postargs=flags)
