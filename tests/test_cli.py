@@ -169,11 +169,9 @@ def failing(monkeypatch, error):
          "collide: error: pyyaml is needed to read YAML: pip install 'collide-robotics[robots]'"),
         (FileNotFoundError(2, "No such file or directory", "m.stl"),
          "collide: error: m.stl: No such file or directory"),
-        (ModuleNotFoundError("no", name="numba"),
-         "collide: error: numba is not installed: pip install collide-robotics"),
         (ZeroDivisionError("oh"), f"collide: error: this is a bug in collide: ZeroDivisionError: oh {BUG}"),
     ],
-    ids=["scene", "multi-line", "extra", "file", "numba", "bug"],
+    ids=["scene", "multi-line", "extra", "file", "bug"],
 )
 @pytest.mark.parametrize("command", ["report", "check", "compare"])
 def test_every_error_is_one_line_and_status_two(monkeypatch, capsys, command, error, line):

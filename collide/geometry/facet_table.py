@@ -32,7 +32,7 @@ class FacetTable:
         self.ints[:k, ADDRESS] = first + self.coordinates.strides[0] * np.arange(k)
         self.ints[:k, LOWEST] = _lowest_exponents(corners.reshape(k, 9))
         self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
-        coarse = address_of(packed.coarse) if packed.coarse is not None else 0
+        coarse = packed.coarse.address if packed.coarse is not None else 0
         self.ints[k] = (
             packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest, 1,
             0, coarse,

@@ -12,17 +12,38 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.geometry.coarse_points import COARSE, choose_coarse
-from collide.kernels import address_of
-
 #: Kinds of core. POINTS is the hull of points; the others are the sets of their names.
 POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
 
-#: A cloud of so many points has a coarse look: a few points that stand for all.
+#: As many points stand for many in a first, coarse look.
+COARSE = 32
 _FEWEST_COARSE = 2 * COARSE
+
+
+class CoarsePoints:
+    """Points that are farthest in COARSE directions, of their cloud (n, 3) stretched to a cube.
+
+    A kernel chooses them: imported when first asked for, since `verify` packs shapes and needs no kernel.
+    """
+
+    def __init__(self, points: np.ndarray):
+        self._points = points
+        self._blocks: list[np.ndarray] = []  # of two threads that ask at once both may make one: the first counts
+
+    @property
+    def address(self) -> int:
+        """Of 4·COARSE doubles: x, y, z of each, and their ids as int64 bits."""
+        from collide.geometry.coarse_points import choose_coarse
+        from collide.kernels import address_of
+
+        if not self._blocks:
+            block, points = on_cache_lines(4 * COARSE), np.ascontiguousarray(self._points)
+            choose_coarse(address_of(points), len(points), address_of(block))
+            self._blocks.append(_frozen(block))
+        return address_of(self._blocks[0])
 
 
 class PackedConvex(NamedTuple):
@@ -38,8 +59,8 @@ class PackedConvex(NamedTuple):
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.
-    coarse : (4·COARSE,) a few of many points that span most of their hull: x, y, z, and ids as int64 bits;
-        None for few points.
+    coarse : a few of many points that span most of their hull, chosen when their address is first asked for; None for few
+        points.
     tree : the points' support tree, made when its address is first asked for; None for few points.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
         integers times 2 to it.
@@ -55,7 +76,7 @@ class PackedConvex(NamedTuple):
     points: np.ndarray
     coordinates: np.ndarray
     tree: Any
-    coarse: np.ndarray | None
+    coarse: CoarsePoints | None
     lowest: int
     content: bytes
 
@@ -70,8 +91,9 @@ def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, tree
     columns[:, :n] = points.T
     columns[:, n:] = points[0][:, None]
     # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
+    coarse = CoarsePoints(points) if n >= _FEWEST_COARSE else None
     reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree, _coarse(points))
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree, coarse)
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
@@ -91,15 +113,6 @@ def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None, c
     digest.update((points + 0.0).tobytes())
     lowest = lowest_exponent(points)
     return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, coarse, lowest, digest.digest())
-
-
-def _coarse(points: np.ndarray) -> np.ndarray | None:
-    """Points that are farthest in COARSE directions, of their cloud stretched to a cube; None for few points."""
-    if len(points) < _FEWEST_COARSE:
-        return None
-    block, points = on_cache_lines(4 * COARSE), np.ascontiguousarray(points)
-    choose_coarse(address_of(points), len(points), address_of(block))
-    return _frozen(block)
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import threading
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide import journal
-from collide.geometry.hulls.hull import convex_hull
-from collide.geometry.support_tree.build import build_support_tree
-from collide.geometry.support_tree.layout import SupportTree
+
+if TYPE_CHECKING:
+    from collide.geometry.support_tree.layout import SupportTree
 
 #: A hull of so few vertices is scanned as well, however many points were given.
 FEWEST_VERTICES = 32
@@ -59,6 +60,10 @@ if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does no
 
 
 def _grown(points: np.ndarray) -> SupportTree | None:
+    # Kernels, imported when a tree is made: packing a shape, as `verify` does, needs none.
+    from collide.geometry.hulls.hull import convex_hull
+    from collide.geometry.support_tree.build import build_support_tree
+
     hull = convex_hull(points)
     if hull.dimension < 2 or len(hull.vertices) < FEWEST_VERTICES:
         return None
