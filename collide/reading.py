@@ -102,5 +102,7 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
 
 
 def _is_masked(value: Any) -> bool:
-    masks = sys.modules.get("numpy.ma")  # whoever has a masked array has imported it; it is a tenth of numpy's own start
-    return masks is not None and isinstance(value, masks.MaskedArray) and bool(masks.getmaskarray(value).any())
+    # Whoever has a masked array has imported the module, all of it; importing it costs a tenth of numpy's own start.
+    masks = sys.modules.get("numpy.ma")
+    masked = getattr(masks, "MaskedArray", None)  # another thread may be importing it at this moment
+    return masked is not None and isinstance(value, masked) and bool(masks.getmaskarray(value).any())  # type: ignore[union-attr]

@@ -503,3 +503,16 @@ def test_a_copy_of_a_world_is_its_own():
     other = copy.deepcopy(world)
     del world
     assert other.collides() and len(other.collisions()) == 3
+
+
+def test_numbers_are_read_while_another_thread_imports_numpys_masks(monkeypatch):
+    """Half of a module is there at such a moment. Met where two threads made their first calls."""
+    import sys
+    import types
+
+    from collide import reading
+
+    monkeypatch.setitem(sys.modules, "numpy.ma", types.ModuleType("numpy.ma"))
+    assert reading.number(0.5) == 0.5
+    assert collide.Box((1, 2, 3)).size.tolist() == [1.0, 2.0, 3.0]
+    assert collide.pose((1, 2, 3))[:3, 3].tolist() == [1.0, 2.0, 3.0]
