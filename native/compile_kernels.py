@@ -65,7 +65,6 @@ def levels_of(triple: str) -> tuple[Level, ...]:
 class Compiled(NamedTuple):
     """What was made."""
 
-    folder: Path
     objects: dict[str, Path]
     entries: list[tuple[str, str, bool]]
     """(name, Numba's signature, whether Python's lock is let go), in the order of the table."""
@@ -89,20 +88,21 @@ def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), j
     wanted = [level for level in levels_of(triple) if not levels or level.name in levels]
     if not wanted:
         raise SystemExit(f"--levels: none of {levels} is among {[level.name for level in levels_of(triple)]}")
-    made_from = f"{sources.fingerprint():08x} {sources.compiler_versions()} {zlib.crc32(Path(__file__).read_bytes()):08x}"
+    fingerprint, described = sources.fingerprint(), _described(entries)
+    made_from = f"{fingerprint:08x} {sources.compiler_versions()} {zlib.crc32(Path(__file__).read_bytes()):08x}"
     out.mkdir(parents=True, exist_ok=True)
     bitcode = out / "kernels.bc"
     _forget_others(out, made_from)
     if not bitcode.exists():
         _front(entries, bitcode)
-    names = [name for name, _, _ in _described(entries)]
+    names = [name for name, _, _ in described]
     objects = {level.name: out / f"kernels-{triple}-{level.name}.o" for level in wanted}
     missing = [level for level in wanted if not objects[level.name].exists()]
     with ProcessPoolExecutor(jobs or min(len(missing) or 1, os.cpu_count() or 1)) as pool:
         waiting = [pool.submit(_back, names, bitcode, level, triple, objects[level.name]) for level in missing]
         for one in waiting:
             one.result()
-    return Compiled(out, objects, _described(entries), sources.compiler_versions(), sources.fingerprint())
+    return Compiled(objects, described, sources.compiler_versions(), fingerprint)
 
 
 def _entries() -> list:

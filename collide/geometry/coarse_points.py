@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.packing import COARSE
 from collide.kernels import entry, kernel, view_f64, view_i64
 
+#: As many points stand for many in a first, coarse look.
+COARSE = 32
 #: Cosine and sine of the golden angle, π·(3 − √5): what the spiral of directions turns by from each to the next.
 _COSINE, _SINE = -0.7373688780783197, 0.6754902942615238
 

@@ -18,13 +18,12 @@ POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
 
-#: As many points stand for many in a first, coarse look.
-COARSE = 32
-_FEWEST_COARSE = 2 * COARSE
+#: So many points have a coarse look: twice as many as then stand for them.
+_FEWEST_COARSE = 64
 
 
 class CoarsePoints:
-    """Points that are farthest in COARSE directions, of their cloud (n, 3) stretched to a cube.
+    """The few of a cloud (n, 3) that stand for all of it: `coarse_points.py`.
 
     A kernel chooses them: imported when first asked for, since `verify` packs shapes and needs no kernel.
     """
@@ -36,7 +35,7 @@ class CoarsePoints:
     @property
     def address(self) -> int:
         """Of 4·COARSE doubles: x, y, z of each, and their ids as int64 bits."""
-        from collide.geometry.coarse_points import choose_coarse
+        from collide.geometry.coarse_points import COARSE, choose_coarse
         from collide.kernels import address_of
 
         if not self._blocks:

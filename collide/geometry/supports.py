@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.packing import COARSE, CYLINDER, ELLIPSOID, POINTS
+from collide.geometry.coarse_points import COARSE
+from collide.geometry.packing import CYLINDER, ELLIPSOID, POINTS
 from collide.geometry.scan import farthest
 from collide.geometry.support_tree.query import extreme_vertex_listed
 from collide.geometry.support_tree.settle import settle_vertex

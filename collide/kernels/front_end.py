@@ -54,10 +54,6 @@ class _Library(CPUCodeLibrary):
     def finalize(self):
         self._finalized = True
 
-    @property
-    def callees(self) -> list[_Library]:
-        return self._linking_libraries
-
 
 class _Codegen(AOTCPUCodegen):
     _library_class = _Library
@@ -199,7 +195,7 @@ def _all_called(library: _Library) -> list[_Library]:
         one = waiting.pop()
         if one not in found:
             found[one] = None
-            waiting += reversed(one.callees)
+            waiting += reversed(one._linking_libraries)
     return list(found)
 
 

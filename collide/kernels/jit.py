@@ -20,7 +20,7 @@ from numba.core import sigutils
 
 from collide.journal import log
 from collide.kernels import object_cache, sources
-from collide.kernels.back_end import host, machine_code
+from collide.kernels.back_end import Target, host, machine_code
 from collide.kernels.front_end import Lowered, dispatcher, native_call
 
 __all__ = ["Entry", "code_of", "entry", "kernel", "native_call"]
@@ -76,7 +76,7 @@ class Entry:
             log.info("compiling kernel %s", self.__name__)
             code = Lowered()
             code.add(self.__name__, self.function, self.signature)
-            return machine_code(code.names, code.modules, host(position_independent=False))
+            return machine_code(code.names, code.modules, _here())
 
         return object_cache.kept(f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled)
 
@@ -127,9 +127,14 @@ def code_of(entry: Entry) -> int:
     return entry.address
 
 
+@cache
+def _here() -> Target:
+    """This very processor, and memory that the loader chooses."""
+    return host(position_independent=False)
+
+
 def _key(function: Callable, signature: str) -> str:
-    target = host(position_independent=False)
-    return repr((signature, sources.of_function(function), target, llvm.get_process_triple(), sources.compiler_versions()))
+    return repr((signature, sources.of_function(function), _here(), llvm.get_process_triple(), sources.compiler_versions()))
 
 
 _engines: list = []  # machine code lives as long as what holds it
@@ -137,7 +142,7 @@ _engines: list = []  # machine code lives as long as what holds it
 
 def _placed(name: str, code: bytes) -> int:
     """Where the function of this name starts, of an object file brought into this process."""
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), host(position_independent=False).machine())
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _here().machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _engines.append(engine)
