@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 import hierarchy_families as families
 
 import collide
-from collide.geometry.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.geometry.hierarchies.polar import polar_of_hull
-from collide.geometry.hulls.hull import convex_hull
-from collide.narrowphase.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
+from collide.hierarchies.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hierarchies.polar_hull import polar_of_hull
+from collide.hull.exact_hull import convex_hull
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 #: Polars of prisms with very many sides, turned, have as many vertices crowded at two places: they stop here.

@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from meshes import DATA, FILES, RESULTS, mesh, rotation, touching
 
 from collide import CollideError, Mesh
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.geometry.mesh_tree.graded import graded_tree
-from collide.narrowphase.triangles.queries import all_hits, first_hits
+from collide.hierarchies.graded_tree import graded_tree
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import all_hits, first_hits
 from collide.scenes.loaders.triangles import read_meshes
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from mesh_peers import MANY
 from meshes import DATA, RESULTS, mesh, rotation
 
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import all_hits
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import all_hits
 
 #: Cells of a unit along each axis, of vertices rounded and of the flat grids.
 CELLS, GRID = 256, 128

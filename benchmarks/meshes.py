@@ -30,9 +30,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from mesh_peers import QUESTIONS, Coal, Fcl, warm
 
 from collide import Mesh, collide
-from collide.geometry.hulls.hull import convex_hull
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import all_hits, first_hits, surface_distances
+from collide.hull.exact_hull import convex_hull
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 RESULTS = Path(__file__).parent / "results"

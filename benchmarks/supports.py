@@ -21,12 +21,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from convex_shapes import STRETCH, prism
 
-from collide.geometry.hulls.hull import convex_hull
-from collide.geometry.packing import pack_points
-from collide.geometry.support_tree.build import build_support_tree
-from collide.geometry.support_tree.query import COUNTERS, extreme_vertices
-from collide.geometry.supports import support_vertex
+from collide.hull.exact_hull import convex_hull
 from collide.kernels import address_of, entry, view_f64, view_i64
+from collide.lowering.packed_convex import pack_points
+from collide.support.build_support_tree import build_support_tree
+from collide.support.support_mapping import support_vertex
+from collide.support.support_tree_query import COUNTERS, extreme_vertices
 
 SIZES = (512, 2048, 8192, 32768, 131072)
 #: Bipyramids have two vertices with all others as neighbours, prisms two faces with half of them.

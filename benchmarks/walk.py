@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from supports import cloud, least
 
 import collide
-from collide.narrowphase.barba_langerman.run import run_walks
-from collide.narrowphase.barba_langerman.walk import APART
+from collide.hierarchies.run_walk import run_walks
+from collide.hierarchies.walk import APART
 
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
 KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")

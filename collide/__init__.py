@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from collide import errors as errors
     from collide import results as results
     from collide import transforms as transforms
-    from collide.certificates import Certificate, CertificateRefused, verify
+    from collide.certificates.certificates import Certificate, CertificateRefused, verify
+    from collide.contact.contact_query import contacts
+    from collide.contact.contact_rows import Contacts
     from collide.errors import (
         CollideError,
         InvalidArgument,
@@ -30,12 +32,6 @@ if TYPE_CHECKING:
     )
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
-    from collide.manifolds.ask import contacts
-    from collide.manifolds.rows import Contacts
-    from collide.meshes.inside import contains
-    from collide.meshes.overlays import Overlay, overlay
-    from collide.meshes.pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
-    from collide.meshes.rays import RayHits, raycast
     from collide.query import collide, distance, walk
     from collide.results import How, PairResult, WorldResult
     from collide.robot import Robot
@@ -55,6 +51,10 @@ if TYPE_CHECKING:
         Sphere,
     )
     from collide.shapes.tessellation import tessellate
+    from collide.surface_queries.contains import contains
+    from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
+    from collide.surface_queries.overlay import Overlay, overlay
+    from collide.surface_queries.raycast import RayHits, raycast
     from collide.transforms import pose
     from collide.world import World
 
@@ -65,13 +65,13 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
-    "collide.certificates": ("Certificate", "CertificateRefused", "verify"),
-    "collide.manifolds.ask": ("contacts",),
-    "collide.manifolds.rows": ("Contacts",),
-    "collide.meshes.inside": ("contains",),
-    "collide.meshes.overlays": ("Overlay", "overlay"),
-    "collide.meshes.pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
-    "collide.meshes.rays": ("RayHits", "raycast"),
+    "collide.certificates.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.contact.contact_query": ("contacts",),
+    "collide.contact.contact_rows": ("Contacts",),
+    "collide.surface_queries.contains": ("contains",),
+    "collide.surface_queries.overlay": ("Overlay", "overlay"),
+    "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
+    "collide.surface_queries.raycast": ("RayHits", "raycast"),
     "collide.query": ("collide", "distance", "walk"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robot": ("Robot",),

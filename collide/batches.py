@@ -1,6 +1,6 @@
 """Batches: from shapes and poses as checked by `query.py` to rows, in as many threads as asked for.
 
-Pairs of convex sets in their own frames, by far the most, go through `narrowphase/poses.py` as they are;
+Pairs of convex sets in their own frames, by far the most, go through `narrowphase/pose_batches.py` as they are;
 unions are taken apart into pairs of parts and put together again by `unions.py`.
 """
 
@@ -11,15 +11,15 @@ from functools import partial
 import numpy as np
 
 from collide.errors import InvalidPose
-from collide.geometry.tables import ShapeTable
-from collide.geometry.union_table import UnionTable
-from collide.narrowphase import run
+from collide.lowering.compound_table import UnionTable
+from collide.lowering.shape_table import ShapeTable
+from collide.narrowphase import convex_queries as run
+from collide.narrowphase.composite.composite import UnionPair, run_unions
 from collide.results import PAIR_DTYPE
-from collide.shapes.base import Shape, is_plain
+from collide.shapes.shape import Shape, is_plain
 from collide.shapes.shape_set import Picked, ShapeSet
+from collide.threads import check_threads, pieces_of, share, share_if_it_helps
 from collide.transforms import as_poses
-from collide.unions import UnionPair, run_unions
-from collide.workers import check_threads, pieces_of, share, share_if_it_helps
 
 
 def length_of(A, B, X_WA, X_WB) -> int:
@@ -160,7 +160,7 @@ def _pair_by_pair(out: np.ndarray, A: Picked, B: Picked, X_WA, X_WB, **wanted) -
 
 def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool) -> None:
     """Rows of two bodies of which one has a mesh, poses (n, 4, 4)."""
-    from collide.meshes.pair_queries import pair_hits, pair_rows
+    from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows
 
     rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
 

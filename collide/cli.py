@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from collide import arguments
+from collide import cli_arguments as arguments
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
-from collide.reports.units import count
+from collide.reports.number_format import count
 
 _STARTED = time.perf_counter()
 
@@ -133,13 +133,13 @@ def _report(args) -> int:
         raise InvalidArgument("--geometry adds to the JSON of a report: give --json FILE too")
     made = _make(args, clearance=args.clearance)
     if args.geometry:
-        from collide.reports import geometry
+        from collide.reports import scene_geometry as geometry
 
         for one in made:
             one.report.geometry = geometry.of_scene(one.scene)
     _write_reports(made, args.json)
     if args.json != "-" and not args.quiet:
-        from collide.reports import states
+        from collide.reports import state_reports as states
 
         width, whole_names = terminal.output_width(sys.stdout)
         shown = {"everything": args.all, "proofs": args.proofs or args.all, "width": width, "whole_names": whole_names}
@@ -211,8 +211,9 @@ def _make(args, **limits) -> list:
     scenes = _load(args, progress)
     trajectory = _trajectory(args, scenes)
     ignore = [_pair(scenes[0][1], words) for words in args.ignore]
-    from collide.reports import report, states
-    from collide.reports.trajectory import at_start, follow
+    from collide.reports import report
+    from collide.reports import state_reports as states
+    from collide.reports.trajectory_report import at_start, follow
 
     made = []
     for label, scene in scenes:
@@ -328,7 +329,8 @@ def _stress(args) -> int:
 
 
 def _locality(args) -> int:
-    from collide.reports import locality, terminal
+    from collide.reports import locality_report as locality
+    from collide.reports import terminal
     from collide.scenes.loaders.triangles import read_meshes
 
     if args.plot:
@@ -429,7 +431,7 @@ def _doctor(args) -> int:
 
 def _write_reports(made: list, place: str | None) -> None:
     if place:
-        from collide.reports import states
+        from collide.reports import state_reports as states
 
         _write_json(states.items(made), place)
 

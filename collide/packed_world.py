@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.errors import UnsupportedQuery
-from collide.geometry.boxes import boxes_of
-from collide.geometry.packing import PackedConvex
-from collide.geometry.tables import POSE_TERMS, ShapeTable, pose_table
-from collide.narrowphase.run import run_pairs
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.shape_table import POSE_TERMS, ShapeTable, pose_table
+from collide.narrowphase.composite.composite import combine
+from collide.narrowphase.convex_queries import run_pairs
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
-from collide.unions import combine
 
 
 class PackedWorld:
@@ -113,9 +113,9 @@ class PackedWorld:
         return found
 
     def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
-        from collide.meshes.hits import APART, OPEN
-        from collide.meshes.hulls_first import rows_within
-        from collide.meshes.single import one_state
+        from collide.narrowphase.facets.hull_culling import rows_within
+        from collide.narrowphase.facets.mesh_hits import APART, OPEN
+        from collide.narrowphase.facets.single_mesh_call import one_state
 
         A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
         if boolean:
@@ -181,7 +181,7 @@ class PackedWorld:
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
-        from collide.meshes.hulls_first import rows_within
+        from collide.narrowphase.facets.hull_culling import rows_within
 
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
         for b in bodies[meshed].tolist():

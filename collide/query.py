@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from collide import reading
+from collide import argument_checks as reading
 from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.geometry.tables import ShapeTable
-from collide.margins import checked_margin, within
-from collide.narrowphase import run
-from collide.questions import asked_poses, pose_at, pose_batch, shape_at
+from collide.lowering.shape_table import ShapeTable
+from collide.narrowphase import convex_queries as run
+from collide.narrowphase.composite.composite import UnionPair
+from collide.pair_arguments import asked_poses, pose_at, pose_batch, shape_at
 from collide.results import PairResult
-from collide.shapes.base import Shape, is_plain
+from collide.security_margin import checked_margin, within
+from collide.shapes.shape import Shape, is_plain
+from collide.threads import check_threads
 from collide.transforms import as_poses
-from collide.unions import UnionPair
-from collide.workers import check_threads
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def collide(
     X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every
         pose of the other's batch. ``(R, t)`` tuples and scipy's rotations are accepted (`transforms.as_poses`).
     security_margin : [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the
-        distance, and where the margin lies within it by growing one body (`margins.py`): exactly between polytopes and
+        distance, and where the margin lies within it by growing one body (`security_margin.py`): exactly between polytopes and
         balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
     check_poses : refuse matrices that are no rotation.
     threads : answer a batch in this many threads; the answers are the same bits.
@@ -133,14 +133,14 @@ def _is_named(algorithm, name: str) -> bool:
 
 
 def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
-    """What `collide` says with ``algorithm="barba-langerman"``, with its counts: `collide.walks.Walks`.
+    """What `collide` says with ``algorithm="barba-langerman"``, with its counts: `collide.hierarchies.hierarchy_queries.Walks`.
 
     A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`.   X_WA, X_WB, check_poses : as there.
     trace : also return the rounds of the last pose one by one.
 
     Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes.
     """
-    from collide import walks
+    from collide.hierarchies import hierarchy_queries as walks
 
     for shape in (A, B):
         walks.walk_body(shape)
@@ -258,7 +258,7 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
         raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
     if limit != math.inf or check_threads(threads) != 1:
         raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')
-    from collide import walks
+    from collide.hierarchies import hierarchy_queries as walks
 
     for shape in (A, B):
         walks.walk_body(shape, algorithm)
@@ -309,6 +309,6 @@ def _prepare(A, B) -> None:
 
 
 def _meshed_pair(A: Shape, B: Shape):
-    from collide.meshes.single import single_pair
+    from collide.narrowphase.facets.single_mesh_call import single_pair
 
     return single_pair(A, B)

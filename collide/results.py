@@ -166,12 +166,12 @@ class PairResult(Generic[Asked]):
 
     @property
     def certificate(self):
-        """Plain data that proves the boolean, worked out when asked for; see `collide.certificates`.
+        """Plain data that proves the boolean, worked out when asked for; see `collide.certificates.certificates`.
 
         A tuple of `Certificate`, one for each pair of parts it takes; None where there is none. A
         list of these for batches. `collide.verify` checks it in Python integers.
         """
-        from collide.certificates import certificate_of
+        from collide.certificates.certificates import certificate_of
 
         asked = (self._asked(k) for k in range(len(self.rows)))
         found = [certificate_of(A, B, X_WA[0], X_WB[0], row) for (A, B, X_WA, X_WB), row in zip(asked, self.rows)]

@@ -22,7 +22,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
-from collide.shapes.base import Shape
+from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
 #: Columns of ``q`` by joint type.

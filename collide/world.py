@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import journal, reading
+from collide import argument_checks as reading
+from collide import log as journal
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
-from collide.margins import checked_margin, within
 from collide.packed_world import PackedWorld
 from collide.results import HOW, UNDECIDED, WorldResult
-from collide.shapes.base import Shape
+from collide.security_margin import checked_margin, within
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 if TYPE_CHECKING:
-    from collide.manifolds.rows import WorldContacts
+    from collide.contact.contact_rows import WorldContacts
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
@@ -228,8 +229,8 @@ class World:
         margin, max_contacts, and what a row says and promises: as in `collide.contacts`. `stats` stays as it is.
         Raises UnsupportedQuery, naming the bodies, where that does.
         """
-        from collide.manifolds.ask import check_margin, check_most, contact_rows
-        from collide.manifolds.rows import WorldContacts, no_rows
+        from collide.contact.contact_query import check_margin, check_most, contact_rows
+        from collide.contact.contact_rows import WorldContacts, no_rows
 
         margin, most = check_margin("World.contacts", margin), check_most("World.contacts", max_contacts)
         bodies = list(self._bodies.values())

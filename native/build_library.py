@@ -192,7 +192,8 @@ def _write_about(place: Path, files: list[Path], made: dict) -> None:
     known = {file.relative_to(place).as_posix(): (file.stat().st_size, zlib.crc32(file.read_bytes())) for file in files}
     (place / "kernels" / "built.py").write_text(
         '"""What the library of this installation was made from. Written by the build."""\n\n'
-        f"#: Checksum of the kernels' sources (`sources.fingerprint`).\nSOURCES = {made['sources']}\n"
+        f"#: Checksum of the kernels' sources (`sources.fingerprint`), and which files they are.\nSOURCES = {made['sources']}\n"
+        f"SOURCE_FILES = {made['source_files']!r}\n"
         f"#: Levels of processors.\nLEVELS = {tuple(made['objects'])!r}\n"
         f"#: Numba and LLVM, as they were.\nCOMPILER = {made['versions']!r}\n"
         f"#: Sizes and checksums of files.\nFILES = {known!r}\n",

@@ -1,4 +1,4 @@
-/* Two half-spaces whose normals are opposite within rounding, in exact numbers: collide/narrowphase/halfspaces.py says the same
+/* Two half-spaces whose normals are opposite within rounding, in exact numbers: collide/narrowphase/exact/opposite_halfspaces.py says the same
    in Python's fractions.
 
    Only exactly opposite ones can miss each other: the slightest tilt lets them meet, however far away. */

@@ -1,4 +1,4 @@
-/* The vertices of an intersection of half-spaces, exactly: collide/geometry/double_description.py in C, ray by ray in the same
+/* The vertices of an intersection of half-spaces, exactly: collide/hull/double_description.py in C, ray by ray in the same
    order.
 
    The half-spaces {x : n.x <= b} become a cone {(x, w) : b w - n.x >= 0, w >= 0} in four dimensions (Motzkin, Raiffa, Thompson

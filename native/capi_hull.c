@@ -1,4 +1,4 @@
-/* The convex hull of points by the kernel of quickhull: collide/geometry/hulls/hull.py. */
+/* The convex hull of points by the kernel of quickhull: collide/hull/exact_hull.py. */
 #include "capi_tree.h"
 
 #include <string.h>

@@ -16,24 +16,24 @@
 
 /* --- layouts, as Python's modules have them; `rooms_of` compares them with what the kernels say ---------------------- */
 
-/* A row of integers a shape (collide/geometry/tables.py), a row of doubles, and a posed part. */
+/* A row of integers a shape (collide/lowering/shape_table.py), a row of doubles, and a posed part. */
 enum { KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT, INTS };
 enum { RADIUS, REACH, SLOP, PARAMS, NUMBERS = PARAMS + 4 };
 enum { POSE = 15 };
-/* Kinds (collide/geometry/packing.py), doubles of a block of coordinates, and the exponent where no bit is set. */
+/* Kinds (collide/lowering/packed_convex.py), doubles of a block of coordinates, and the exponent where no bit is set. */
 enum { POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE };
 enum { COORDINATES = 8, NO_BITS = 2000 };
-/* Header of queries (collide/narrowphase/poses.py), poses that go through together, and what `answer_poses` says. */
+/* Header of queries (collide/narrowphase/pose_batches.py), poses that go through together, and what `answer_poses` says. */
 enum { CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED, HEADER };
 enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };
 /* A pair that the kernels refuse to measure (collide/results.py). */
 enum { REFUSED = 255 };
 
 /* Pairs of boxes that wait on the way down two meshes' trees, and those that wait in order: as in
-   collide/narrowphase/triangles/queries.py. A tree is 136 nodes deep at most. */
+   collide/narrowphase/facets/facet_queries.py. A tree is 136 nodes deep at most. */
 enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
 
-/* What `tell_measures` tells (collide/narrowphase/measures.py). */
+/* What `tell_measures` tells (collide/narrowphase/c_constants.py). */
 enum {
     M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE, M_APICES,
     M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK,

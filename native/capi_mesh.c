@@ -1,5 +1,5 @@
-/* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/meshes/bodies.py and the tree of
-   collide/geometry/mesh_tree/build.py. */
+/* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/lowering/facet_bodies.py and the tree of
+   collide/mesh/build_bvh.py. */
 #include "capi_blake2b.h"
 #include "capi_mesh.h"
 #include "capi_tree.h"
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The header of a box-tree (collide/geometry/mesh_tree/layout.py), its numbers, and the most facets that it holds. */
+/* The header of a box-tree (collide/mesh/bvh.py), its numbers, and the most facets that it holds. */
 enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, TREE_INTS };
 enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
 static const size_t MOST_FACETS = (size_t)1 << 28;

@@ -1,4 +1,4 @@
-/* Between the files of meshes: collide/geometry/surfaces, collide/geometry/mesh_tree and collide/meshes/bodies.py in C. */
+/* Between the files of meshes: collide/mesh, collide/mesh and collide/lowering/facet_bodies.py in C. */
 #ifndef COLLIDE_CAPI_MESH_H
 #define COLLIDE_CAPI_MESH_H
 

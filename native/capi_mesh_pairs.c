@@ -1,16 +1,16 @@
-/* Two bodies of facets at a pair of poses: `PreparedPair` of collide/meshes/single.py. What that leaves to numpy is said to be
+/* Two bodies of facets at a pair of poses: `PreparedPair` of collide/narrowphase/facets/single_mesh_call.py. What that leaves to numpy is said to be
    unsupported. */
 #include "capi_mesh.h"
 
 #include <string.h>
 
-/* Header of the kernels (collide/narrowphase/triangles/single.py). */
+/* Header of the kernels (collide/narrowphase/facets/single_surface.py). */
 enum {
     TREE_A, TREE_B, ALIKE, EXCHANGED, WALK_AT, INSIDE_AT, SOLID_A, SOLID_B, POINTS_A, POINTS_B, MANY_A, MANY_B, BALLS_AT, KEYS_AT,
     MARKS_AT, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, DECIDE, SWEPT, DISTANCES_AT, ROOM_AT, HEAP_AT, N_HEAP,
     MESH_HEADER
 };
-/* A result and its marks (collide/narrowphase/triangles/distances.py). */
+/* A result and its marks (collide/narrowphase/facets/surface_distance.py). */
 enum { R_DISTANCE, R_LOWER, R_UPPER, R_POINT_A, R_POINT_B = 6, R_NORMAL = 9, RESULT = 12 };
 enum { FACET_A, FACET_B, MEETS, BOXES, TRIANGLES, EXACT_DECISIONS, MARKS };
 /* More points than this are left to a batch; bodies with radii are looked for this much farther. */

@@ -1,4 +1,4 @@
-/* Which shells with a negative volume are cavities, and which are inside out: collide/geometry/surfaces/nesting.py.
+/* Which shells with a negative volume are cavities, and which are inside out: collide/mesh/shell_nesting.py.
 
    A shell that runs the wrong way round is the wall of a cavity where everything else winds around it at least once. Rays are
    cast from one of its points in fixed directions, in doubles with an error bound, and in exact numbers for the facets that come

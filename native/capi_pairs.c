@@ -1,4 +1,4 @@
-/* Workspaces and queries: as `run_poses` of collide/narrowphase/run.py and `distance` of collide/query.py. */
+/* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_queries.py and `distance` of collide/query.py. */
 #include "capi_internal.h"
 
 #include <math.h>

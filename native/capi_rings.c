@@ -1,4 +1,4 @@
-/* Neighbours in cyclic order: `Rings` of collide/geometry/support_tree/build.py. */
+/* Neighbours in cyclic order: `Rings` of collide/support/build_support_tree.py. */
 #include "capi_tree.h"
 
 #include <string.h>

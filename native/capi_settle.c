@@ -1,4 +1,4 @@
-/* What doubles leave open goes to the exact stage: as `_finish` of collide/narrowphase/run.py. */
+/* What doubles leave open goes to the exact stage: as `_finish` of collide/narrowphase/convex_queries.py. */
 #include "capi_internal.h"
 
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Shapes from numbers: what collide/shapes checks and collide/geometry/packing.py lays out. */
+/* Shapes from numbers: what collide/shapes checks and collide/lowering/packed_convex.py lays out. */
 #include "capi_blake2b.h"
 #include "capi_mesh.h"
 

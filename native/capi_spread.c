@@ -1,4 +1,4 @@
-/* Which vertices make up the nested subsets of a support tree: collide/geometry/support_tree/spread.py. */
+/* Which vertices make up the nested subsets of a support tree: collide/support/nested_subsets.py. */
 #include "capi_tree.h"
 
 #include <string.h>

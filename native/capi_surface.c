@@ -1,4 +1,4 @@
-/* Whether facets close and enclose something: `survey_surface` of collide/geometry/surfaces/survey.py, so far as a solid needs
+/* Whether facets close and enclose something: `survey_surface` of collide/mesh/mesh_survey.py, so far as a solid needs
    it. */
 #include "capi_mesh.h"
 #include "capi_whole.h"
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* As in collide/geometry/surfaces/volumes.py: errors of a term of a volume, of a sum, and of what underflows. */
+/* As in collide/mesh/shell_volumes.py: errors of a term of a volume, of a sum, and of what underflows. */
 static const double TERM_ERROR = 1.7763568394002505e-15, UNIT = 1.1102230246251565e-16;
 #define UNDERFLOW_OF_TERMS ldexp(1.0, -1000)
 

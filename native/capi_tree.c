@@ -1,5 +1,5 @@
 /* Makes a support tree from a hull, nested subsets of its vertices and candidate lists between them: `build_support_tree` of
-   collide/geometry/support_tree/build.py, and the tree byte for byte that one. */
+   collide/support/build_support_tree.py, and the tree byte for byte that one. */
 #include "capi_tree.h"
 
 #include <stdlib.h>
@@ -12,7 +12,7 @@ enum { FEWEST_VERTICES = 32, FEWEST = 8 };
 /* Subsets fall by RATIO at least. */
 enum { MOST_LEVELS = 16 };
 
-/* Header of a tree, as kernels read it (collide/geometry/support_tree/layout.py). */
+/* Header of a tree, as kernels read it (collide/support/support_tree.py). */
 enum {
     T_POINTS, T_DEPTH, T_NODES, T_ENTRIES, T_LINKS, T_AT_NODES, T_AT_ENTRIES, T_AT_LIST_COORDINATES, T_AT_RING_STARTS, T_AT_RING,
     T_AT_RANGE, T_FLAT, T_AT_POINTS, T_HEADER

@@ -1,4 +1,4 @@
-/* Between the files that make support trees: collide/geometry/support_tree and collide/geometry/hulls in C. Room is taken from
+/* Between the files that make support trees: collide/support and collide/hull in C. Room is taken from
    an arena, and whoever makes something looks at its `failed`. */
 #ifndef COLLIDE_CAPI_TREE_H
 #define COLLIDE_CAPI_TREE_H

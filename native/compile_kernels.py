@@ -15,7 +15,6 @@ import argparse
 import importlib
 import json
 import os
-import pkgutil
 import platform
 import sys
 import time
@@ -26,8 +25,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Rooms whose modules define entries.
-ROOMS = ("broadphase", "geometry", "narrowphase")
 
 
 class Level(NamedTuple):
@@ -70,7 +67,8 @@ class Compiled(NamedTuple):
     """(name, Numba's signature, whether Python's lock is let go), in the order of the table."""
     versions: str
     sources: int
-    """`sources.fingerprint`."""
+    """`sources.fingerprint` of:"""
+    source_files: tuple[str, ...]
 
 
 def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), jobs: int | None = None) -> Compiled:
@@ -88,40 +86,38 @@ def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), j
     wanted = [level for level in levels_of(triple) if not levels or level.name in levels]
     if not wanted:
         raise SystemExit(f"--levels: none of {levels} is among {[level.name for level in levels_of(triple)]}")
-    fingerprint, described = sources.fingerprint(), _described(entries)
+    names = sources.kernel_sources()
+    fingerprint, described = sources.fingerprint(names), _described(entries)
     made_from = f"{fingerprint:08x} {sources.compiler_versions()} {zlib.crc32(Path(__file__).read_bytes()):08x}"
     out.mkdir(parents=True, exist_ok=True)
     bitcode = out / "kernels.bc"
     _forget_others(out, made_from)
     if not bitcode.exists():
         _front(entries, bitcode)
-    names = [name for name, _, _ in described]
+    called = [name for name, _, _ in described]
     objects = {level.name: out / f"kernels-{triple}-{level.name}.o" for level in wanted}
     missing = [level for level in wanted if not objects[level.name].exists()]
     with ProcessPoolExecutor(jobs or min(len(missing) or 1, os.cpu_count() or 1)) as pool:
-        waiting = [pool.submit(_back, names, bitcode, level, triple, objects[level.name]) for level in missing]
+        waiting = [pool.submit(_back, called, bitcode, level, triple, objects[level.name]) for level in missing]
         for one in waiting:
             one.result()
-    return Compiled(objects, described, sources.compiler_versions(), fingerprint)
+    return Compiled(objects, described, sources.compiler_versions(), fingerprint, names)
 
 
 def _entries() -> list:
     """All entries of the package, in the order of their modules' names and of the lines in them."""
     from collide.kernels import jit
 
-    for room in ROOMS:
-        package = importlib.import_module(f"collide.{room}")
-        for found in sorted(pkgutil.walk_packages(package.__path__, f"collide.{room}."), key=lambda found: found.name):
-            importlib.import_module(found.name)
+    written = 0
+    for file in sorted((ROOT / "collide").rglob("*.py")):
+        if found := sum(line.startswith("@entry(") for line in file.read_text(encoding="utf-8").splitlines()):
+            importlib.import_module(".".join(file.relative_to(ROOT).with_suffix("").parts))
+            written += found
     own = [entry for entry in jit.entries if entry.function.__module__.startswith("collide.")]
     entries = sorted(own, key=lambda entry: (entry.function.__module__, entry.function.__code__.co_firstlineno))
     names = [entry.__name__ for entry in entries]
     if twice := {name for name in names if names.count(name) > 1}:
         raise SystemExit(f"two entries have one name: {', '.join(sorted(twice))}")
-    written = sum(
-        line.startswith("@entry(") for room in ROOMS for file in (ROOT / "collide" / room).rglob("*.py")
-        for line in file.read_text(encoding="utf-8").splitlines()
-    )  # fmt: skip
     if written != len(entries):
         raise SystemExit(f"{written} entries stand in the sources, {len(entries)} were found")
     return entries
@@ -198,7 +194,7 @@ def main() -> None:
     made = compile_kernels(given.out, given.triple, tuple(given.levels), given.jobs)
     if given.json:
         paths = {level: str(place) for level, place in made.objects.items()}
-        print(json.dumps({"objects": paths, "entries": made.entries, "versions": made.versions, "sources": made.sources}))
+        print(json.dumps({"objects": paths, "entries": made.entries, "versions": made.versions, "sources": made.sources, "source_files": made.source_files}))
         return
     for level, place in made.objects.items():
         print(f"{level}: {place}, {place.stat().st_size / 1e6:.2f} MB, {platform.machine()}")

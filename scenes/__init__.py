@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collide.scenes.description import Scene, SceneBody
     from collide.scenes.generators import generate
-    from collide.scenes.loaders.dispatch import load
+    from collide.scenes.loaders.load_scene import load
 
 __all__ = ["Scene", "SceneBody", "generate", "load", "path", "shipped"]
 
@@ -26,7 +26,7 @@ _HOME = {
     "Scene": "collide.scenes.description",
     "SceneBody": "collide.scenes.description",
     "generate": "collide.scenes.generators",
-    "load": "collide.scenes.loaders.dispatch",
+    "load": "collide.scenes.loaders.load_scene",
 }
 _SUFFIXES = (".yaml", ".json")
 

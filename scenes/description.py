@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
-from collide.shapes.base import Shape
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ import surfaces
 from naive import LATTICE_ROTATIONS, pose, random_pose, rng_of
 
 import collide
-from collide.geometry.hulls.hull import convex_hull
+from collide.hull.exact_hull import convex_hull
 from collide.kernels import library
 from collide.kernels.mode import MODE
 

@@ -156,7 +156,7 @@ LARGE = {
 
 @cache
 def made(name, large=False):
-    from collide.geometry.support_tree.build import build_support_tree
+    from collide.support.build_support_tree import build_support_tree
 
     points, facets = (LARGE if large else HULLS)[name]()
     return points, facets, build_support_tree(points, np.unique(facets), facets, hull_of)

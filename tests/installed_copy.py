@@ -50,4 +50,4 @@ def why_no_library() -> str:
         return "this installation was built without compiled kernels"
     from collide.kernels import sources
 
-    return "" if sources.fingerprint() == built.SOURCES else "kernels were edited since the library was built: build it again"
+    return "" if sources.fingerprint(built.SOURCE_FILES) == built.SOURCES else "kernels were edited since the library was built: build it again"

@@ -27,7 +27,7 @@ from collide import (
     contains,
     pose,
 )
-from collide.meshes.by_definition import _seen_from, _winds_around, holds
+from collide.surface_queries.inside_by_definition import _seen_from, _winds_around, holds
 
 EYE = np.eye(4)
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

@@ -10,7 +10,7 @@ CHILD = r"""
 import random
 from fractions import Fraction
 import numpy as np
-from collide.geometry import digits as D
+from collide.numerics import digits as D
 
 rng = random.Random(7)
 

@@ -7,9 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from collide.geometry import double_double
-from collide.geometry.error_free import dekker_product, two_product, two_sum
-from collide.geometry.scan import (
+from collide.kernels import address_of, entry, view_f64
+from collide.numerics import double_double
+from collide.numerics.error_free import dekker_product, two_product, two_sum
+from collide.support.block_scan import (
     count_level,
     count_level_one_by_one,
     farthest,
@@ -17,7 +18,6 @@ from collide.geometry.scan import (
     least,
     least_one_by_one,
 )
-from collide.kernels import address_of, entry, view_f64
 
 pytestmark = pytest.mark.own_kernels
 

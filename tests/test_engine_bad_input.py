@@ -510,7 +510,7 @@ def test_numbers_are_read_while_another_thread_imports_numpys_masks(monkeypatch)
     import sys
     import types
 
-    from collide import reading
+    from collide import argument_checks as reading
 
     monkeypatch.setitem(sys.modules, "numpy.ma", types.ModuleType("numpy.ma"))
     assert reading.number(0.5) == 0.5

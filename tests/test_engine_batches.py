@@ -13,7 +13,7 @@ import pytest
 
 import collide
 from collide import batches
-from collide import workers as workers_module
+from collide import threads as workers_module
 from collide.errors import InvalidArgument, InvalidPose
 
 EYE = np.eye(4)

@@ -13,12 +13,13 @@ import pytest
 from naive import Case, random_pose, rng_of
 
 import collide
-from collide import batches, query, unions
-from collide.geometry.tables import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
-from collide.geometry.union_table import PART, lay_out
+from collide import batches, query
 from collide.kernels import address_of, entry, view_f64
-from collide.narrowphase import run
-from collide.narrowphase.parts import place_part, write_terms
+from collide.lowering.compound_table import PART, lay_out
+from collide.lowering.place_parts import place_part, write_terms
+from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
+from collide.narrowphase import convex_queries as run
+from collide.narrowphase.composite import composite as unions
 from collide.results import EXACT, SWEPT, UNDECIDED, flipped
 
 CASES = 60

@@ -9,11 +9,11 @@ import pytest
 
 import collide
 from collide.errors import InvalidShape
-from collide.geometry.support_tree import planted
-from collide.geometry.support_tree.layout import SupportTree, list_coordinates_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
-from collide.shapes import hull as hull_shape
+from collide.shapes import convex_hull as hull_shape
+from collide.support import lazy_support_tree as planted
+from collide.support.support_tree import SupportTree, list_coordinates_of
 
 EYE = np.eye(4)
 

@@ -13,10 +13,10 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
-from collide.geometry.tables import ShapeTable, pose_table
 from collide.kernels import address_of, entry
-from collide.narrowphase import small_hulls
-from collide.narrowphase.portals import ROUNDS
+from collide.lowering.shape_table import ShapeTable, pose_table
+from collide.narrowphase.gjk import mpr_batch as small_hulls
+from collide.narrowphase.gjk.mpr import ROUNDS
 from collide.results import HOW, PAIR_DTYPE, flipped
 
 #: Gaps and depths to ask about, in metres, of bodies about one metre long.

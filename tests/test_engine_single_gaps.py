@@ -11,7 +11,7 @@ from naive import Case, random_pose, rng_of
 
 import collide
 from collide import query
-from collide.narrowphase import run
+from collide.narrowphase import convex_queries as run
 
 
 def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):

@@ -14,8 +14,8 @@ from collide.adapters.peers.stress_truth import truth
 from collide.errors import InvalidArgument
 from collide.scenes.families import HALFSPACE, STANDARD, Case, describe, generate, names
 from collide.scenes.families.case import mean_diagonal
-from collide.scenes.families.gaps import measure, set_gap
-from collide.scenes.families.parts import EXACT_ROTATIONS, box, random_hull, rotation
+from collide.scenes.families.exact_gaps import measure, set_gap
+from collide.scenes.families.ingredients import EXACT_ROTATIONS, box, random_hull, rotation
 from collide.scenes.families.touching import contact
 
 #: As the study lists them.

@@ -39,8 +39,8 @@ import json, logging
 import numpy as np
 import collide
 from collide.kernels import object_cache
-from collide.geometry.boxes import boxes_of
-from collide.geometry.tables import ShapeTable, pose_table
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.shape_table import ShapeTable, pose_table
 
 logging.basicConfig(level=logging.INFO, format="%(message)s")
 packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
@@ -74,7 +74,7 @@ def test_kernels_are_kept_until_a_source_of_theirs_is_edited(tmp_path):
     world.write_text(world.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
     assert ask(compiled=False) == right and kept() == files
 
-    callee = site / "collide" / "geometry" / "supports.py"
+    callee = site / "collide" / "support" / "support_mapping.py"
     source = callee.read_text(encoding="utf-8")
     assert source.count("    return k\n") == 1
     callee.write_text(source.replace("    return k\n", "    return 0\n"), encoding="utf-8")
@@ -361,9 +361,9 @@ AT_ONCE = """
 import sys, threading
 import numpy as np
 import collide
-from collide import unions
-from collide.narrowphase import run
-from collide.narrowphase.triangles import single
+from collide.narrowphase.composite import composite as unions
+from collide.narrowphase import convex_queries as run
+from collide.narrowphase.facets import single_surface as single
 
 mesh = collide.Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 union = collide.Compound([(collide.Sphere(1), np.eye(4)), (collide.Sphere(0.5), np.eye(4))])

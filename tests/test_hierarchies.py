@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from hierarchy_families import STUBBORN, bipyramid, cube_grid, degree_doubling, families, prism, ring, sphere, turned
 
-from collide.geometry.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.geometry.hierarchies.polar import polar_of_hull
-from collide.geometry.hierarchies.validate import validate_hierarchy
-from collide.geometry.hulls.hull import convex_hull
+from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
+from collide.hierarchies.polar_hull import polar_of_hull
+from collide.hierarchies.validate_hierarchy import validate_hierarchy
+from collide.hull.exact_hull import convex_hull
 
 NAMES = list(families(40))
 #: In plain Python: the same tests on smaller bodies.
@@ -244,14 +244,14 @@ def test_damage_to_dependence_and_ends_is_noticed():
 
 def cut_short(hierarchy: Hierarchy, depth: int) -> Hierarchy:
     """Without the levels from ``depth`` on."""
-    from collide.geometry.hierarchies.rows import by_vertex
+    from collide.hierarchies.level_rows import by_vertex
 
     return _of_levels(hierarchy, range(depth), by_vertex)
 
 
 def skip_level(hierarchy: Hierarchy) -> Hierarchy:
     """Without its second level: what leaves is no longer independent."""
-    from collide.geometry.hierarchies.rows import by_vertex
+    from collide.hierarchies.level_rows import by_vertex
 
     return _of_levels(hierarchy, [0, *range(2, hierarchy.depth)], by_vertex)
 
@@ -278,9 +278,9 @@ SCRIPT = """
 import sys, hashlib
 sys.path.insert(0, {folder!r})
 from hierarchy_families import families
-from collide.geometry.hierarchies.hierarchy import build_hierarchy
-from collide.geometry.hierarchies.polar import polar_of_hull
-from collide.geometry.hulls.hull import convex_hull
+from collide.hierarchies.hierarchy import build_hierarchy
+from collide.hierarchies.polar_hull import polar_of_hull
+from collide.hull.exact_hull import convex_hull
 digest = hashlib.sha256()
 for name, points in families(40).items():
     hull = convex_hull(points)

@@ -14,9 +14,9 @@ import pytest
 from hierarchy_families import degree_doubling, families, sphere
 
 import collide
-from collide.geometry.hierarchies.hierarchy import DEGREE_BOUND, build_hierarchy
-from collide.geometry.hulls.hull import convex_hull
-from collide.narrowphase.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hierarchies.hierarchy import DEGREE_BOUND, build_hierarchy
+from collide.hierarchies.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hull.exact_hull import convex_hull
 from collide.scenes.families import generate
 
 SIZE = 200 if os.environ.get("NUMBA_DISABLE_JIT") != "1" else 40

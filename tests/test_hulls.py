@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from collide.geometry.hulls.hull import Hull, convex_hull
-from collide.geometry.hulls.validate import validate_hull
+from collide.hull.exact_hull import Hull, convex_hull
+from collide.hull.validate_hull import validate_hull
 
 # --- clouds -------------------------------------------------------------------------------------
 
@@ -407,10 +407,10 @@ import pickle, random, sys
 from fractions import Fraction
 import numpy as np
 from collide import kernels
-from collide.geometry.hulls import orientation as O
-from collide.geometry.hulls import quickhull as Q
-from collide.geometry.hulls.hull import convex_hull
-from collide.geometry.hulls.validate import validate_hull
+from collide.numerics import orientation as O
+from collide.hull import quickhull as Q
+from collide.hull.exact_hull import convex_hull
+from collide.hull.validate_hull import validate_hull
 assert kernels.PLAIN_PYTHON
 
 def sign(x):

@@ -78,8 +78,8 @@ _CODE = """
 import hashlib, sys
 from collide.kernels.back_end import Target, machine_code
 from collide.kernels.front_end import Lowered
-from collide.narrowphase.closing import close_rows
-from collide.geometry.hulls.quickhull import quickhull
+from collide.narrowphase.finalize_rows import close_rows
+from collide.hull.quickhull import quickhull
 code = Lowered()
 for entry in (close_rows, quickhull):
     code.add(entry.__name__, entry.function, entry.signature)

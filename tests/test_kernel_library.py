@@ -30,8 +30,8 @@ import collide
 from collide.kernels import library, mode
 
 def box():
-    from collide.geometry.boxes import boxes_of
-    from collide.geometry.tables import ShapeTable, pose_table
+    from collide.broadphase.bounding_boxes import boxes_of
+    from collide.lowering.shape_table import ShapeTable, pose_table
 
     packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
     poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
@@ -222,7 +222,7 @@ def test_what_is_no_library_is_done_without(site, ask, of):
 
 def test_a_library_of_other_sources_is_not_used(site, ask):
     """An edited kernel answers as it is written now."""
-    callee = site / "collide" / "geometry" / "supports.py"
+    callee = site / "collide" / "support" / "support_mapping.py"
     source = callee.read_text(encoding="utf-8")
     assert source.count("    return k\n") == 1
     callee.write_text(source.replace("    return k\n", "    return 0\n"), encoding="utf-8")
@@ -274,7 +274,7 @@ def test_without_library_and_numba_it_is_said_what_to_do(site, no_numba, harm):
     elif harm == "missing":
         (site / "collide" / "kernels" / "built.py").unlink()
     else:
-        with open(site / "collide" / "geometry" / "supports.py", "a", encoding="utf-8") as file:
+        with open(site / "collide" / "support" / "support_mapping.py", "a", encoding="utf-8") as file:
             file.write("# a remark\n")
     for given in (["-c", BOX + "box()"], ["-m", "collide", "report", "workcell"]):
         done = child(given, environment(site, no_numba))

@@ -26,64 +26,54 @@ def copy(tmp_path, monkeypatch) -> Path:
     return package
 
 
-def is_of_kernels(name: str) -> bool:
-    """Whether a file of the package, "geometry/scan.py", belongs to what the library is compiled from."""
-    return any(name == known or name.startswith(f"{known}/") for known in sources.KERNEL_SOURCES)
+def test_the_list_holds_what_defines_kernels_and_what_these_see(copy):
+    names = sources.kernel_sources()
+    assert {"narrowphase/gjk/gjk.py", "numerics/digits.py", "results.py", "kernels/vectors.py"} <= set(names)
+    assert not {"__init__.py", "query.py", "shapes/mesh.py", "kernels/jit.py", "kernels/library.py"} & set(names)
+    assert 80 < len(names) < 160 and sum(os.path.getsize(copy / name) for name in names) < 2e6
 
 
 def test_the_checksum_changes_with_every_source_of_kernels_and_with_nothing_else(copy):
-    first, changed, unchanged = sources.fingerprint(), [], []
-    for file in sorted(file for file in copy.rglob("*") if file.is_file()):
-        if file.suffix in (".so", ".dll", ".dylib"):
-            continue
+    names = sources.kernel_sources()
+    first, changed = sources.fingerprint(names), []
+    for file in sorted(copy.rglob("*.py")):
         content = file.read_bytes()
         file.write_bytes(content + b"\n")
-        (unchanged if sources.fingerprint() == first else changed).append(file.relative_to(copy).as_posix())
+        if sources.fingerprint(names) != first:
+            changed.append(file.relative_to(copy).as_posix())
         file.write_bytes(content)
-    assert sources.fingerprint() == first
-    assert [name for name in changed if not (is_of_kernels(name) and name.endswith(".py"))] == []
-    assert [name for name in unchanged if is_of_kernels(name) and name.endswith(".py")] == []
-    assert len(changed) > 80 and len(unchanged) > 80
+    assert sources.fingerprint(names) == first and tuple(changed) == names
 
 
-def test_the_checksum_sees_files_that_come_go_and_change_their_names(copy):
-    first, scan = sources.fingerprint(), copy / "geometry" / "scan.py"
-    seen = {first}
+def test_the_list_follows_files_that_come_and_go_and_change_their_names(copy):
+    names, scan = sources.kernel_sources(), copy / "support" / "block_scan.py"
     scan.rename(scan.with_name("scan_again.py"))
-    seen.add(sources.fingerprint())
+    with pytest.raises(FileNotFoundError):
+        sources.fingerprint(names)
     scan.with_name("scan_again.py").rename(scan)
-    (copy / "narrowphase" / "new.py").write_bytes(b"")
-    seen.add(sources.fingerprint())
-    (copy / "narrowphase" / "new.py").unlink()
-    (copy / "narrowphase" / "a room").mkdir()
-    (copy / "narrowphase" / "a room" / "new.py").write_bytes(b"")
-    seen.add(sources.fingerprint())
-    (copy / "narrowphase" / "a room" / "new.py").unlink()
-    assert len(seen) == 4 and sources.fingerprint() == first
+    (copy / "narrowphase" / "new.py").write_bytes(b"from collide.kernels import entry\n\n\n@entry('int64()')\ndef new():\n    return 0\n")
+    assert set(sources.kernel_sources()) - set(names) == {"narrowphase/new.py"}
 
 
 def test_the_checksum_does_not_depend_on_ends_of_lines_or_on_the_place(copy, tmp_path, monkeypatch):
-    """A checkout on Windows, and what Python keeps beside its sources."""
-    first = sources.fingerprint()
-    scan = copy / "geometry" / "scan.py"
+    """A checkout on Windows."""
+    names = sources.kernel_sources()
+    first = sources.fingerprint(names)
+    scan = copy / "support" / "block_scan.py"
     scan.write_bytes(scan.read_bytes().replace(b"\n", b"\r\n"))
-    (copy / "geometry" / "__pycache__").mkdir()
-    (copy / "geometry" / "__pycache__" / "left.py").write_bytes(b"x = 1\n")
-    assert sources.fingerprint() == first
+    assert sources.fingerprint(names) == first
     copy.rename(tmp_path / "elsewhere")
     monkeypatch.setattr(sources, "PACKAGE", tmp_path / "elsewhere")
-    assert sources.fingerprint() == first
+    assert sources.fingerprint(names) == first
 
 
 def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch):
     """It is part of every start."""
-    opened, kept = [], builtins.open
+    names, opened, kept = sources.kernel_sources(), [], builtins.open
     monkeypatch.setattr(builtins, "open", lambda file, *given, **named: opened.append(str(file)) or kept(file, *given, **named))
-    sources.fingerprint()
+    sources.fingerprint(names)
     monkeypatch.undo()
-    expected = [str(file) for file in copy.rglob("*.py") if is_of_kernels(file.relative_to(copy).as_posix())]
-    assert sorted(opened) == sorted(expected)
-    assert 80 < len(opened) < 160 and sum(os.path.getsize(file) for file in opened) < 2e6
+    assert opened == [str(copy / name) for name in names]
 
 
 # --- the hash of one kernel -------------------------------------------------------------------------
@@ -92,9 +82,9 @@ def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch)
 HASHES = """
 import json, os, sys
 from pathlib import Path
-from collide.geometry.boxes import bounding_boxes
+from collide.broadphase.bounding_boxes import bounding_boxes
 from collide.kernels import PLAIN_PYTHON, sources
-from collide.narrowphase.answer import answer_pairs
+from collide.narrowphase.convex_pairs import answer_pairs
 
 assert PLAIN_PYTHON, "entries are functions"
 
@@ -134,15 +124,15 @@ def test_an_edit_of_what_a_kernel_imports_makes_it_stale_and_no_other_does(tmp_p
     names = sorted(file.relative_to(site / "collide").as_posix() for file in (site / "collide").rglob("*.py"))
     _, found = hashes(site, names)
     boxes, pairs = ({name for name, stale in found.items() if stale[k]} for k in range(2))
-    assert {"geometry/boxes.py", "geometry/supports.py", "geometry/scan.py", "kernels/vectors.py"} <= boxes
-    assert {"narrowphase/answer.py", "narrowphase/epa/prove.py", "geometry/double_double.py"} <= pairs
-    assert not {"narrowphase/answer.py", "geometry/mesh_tree/build.py"} & boxes
+    assert {"broadphase/bounding_boxes.py", "support/support_mapping.py", "support/block_scan.py", "kernels/vectors.py"} <= boxes
+    assert {"narrowphase/convex_pairs.py", "narrowphase/epa/prove_facets.py", "numerics/double_double.py"} <= pairs
+    assert not {"narrowphase/convex_pairs.py", "mesh/build_bvh.py"} & boxes
     elsewhere = {name for name in names if name.split("/")[0] in ("world.py", "query.py", "manifolds", "reports", "meshes", "cli.py")}
     assert not elsewhere & pairs
     # `collide` itself, and rooms' own files, which import nothing that kernels use, may be missing; and what only decides how
     # kernels run.
-    deciding = {f"kernels/{name}.py" for name in ("jit", "library", "mode", "plain", "sources", "object_cache")} | {"errors.py", "journal.py", "cache_folder.py"}
-    for module, stale in (("collide.geometry.boxes", boxes), ("collide.narrowphase.answer", pairs)):
+    deciding = {f"kernels/{name}.py" for name in ("jit", "library", "mode", "plain", "sources", "object_cache")} | {"errors.py", "log.py", "cache_folder.py"}
+    for module, stale in (("collide.broadphase.bounding_boxes", boxes), ("collide.narrowphase.convex_pairs", pairs)):
         missing = {name for name in imported_by(module) - stale - deciding if not name.endswith("__init__.py")}
         assert not missing, f"{module} imports what its kernels' hash does not see: {sorted(missing)}"
 
@@ -152,7 +142,7 @@ def test_hashes_are_those_of_any_copy_and_process(tmp_path):
     one, two = copied(tmp_path / "one"), copied(tmp_path / "two")
     first, _ = hashes(one, [])
     assert hashes(two, [])[0] == first
-    boxes = two / "collide" / "geometry" / "boxes.py"
+    boxes = two / "collide" / "broadphase" / "bounding_boxes.py"
     boxes.write_text(boxes.read_text(encoding="utf-8") + "\n\ndef beside():\n    return 0\n", encoding="utf-8")
     edited, _ = hashes(two, [])
     assert edited[0] != first[0]

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 import collide
-from collide.geometry import double_double
-from collide.geometry.error_free import dekker_product, two_product, two_sum
 from collide.kernels import address_of, entry, kernel, view_f64
 from collide.kernels.lanes import LANES, any_of, root_of, select, transpose_eight, view_lanes
-from collide.narrowphase import fine, gap
+from collide.narrowphase.gap import precise_pair as fine
+from collide.narrowphase.gap import refine_gap as gap
+from collide.numerics import double_double
+from collide.numerics.error_free import dekker_product, two_product, two_sum
 
 #: Numbers that go into one round of all operations, and that come out.
 IN, OUT = 12, 50

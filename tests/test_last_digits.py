@@ -115,7 +115,7 @@ def test_unsigned_distances():
         assert not gaps.lower[hit].any() and not gaps.upper[hit].any() and not gaps.normal[hit].any()
         for name in ("normal", "point_a", "point_b", "lower", "upper"):
             off = np.abs(getattr(signed, name)[~hit] - getattr(gaps, name)[~hit]).max()
-            # Points of small hulls, which begin with a portal (`small_hulls.py`), may differ by rounding.
+            # Points of small hulls, which begin with a portal (`mpr_batch.py`), may differ by rounding.
             assert off <= (1e-14 if n < 60 and name.startswith("point") else 0.0), (n, name)
         assert np.array_equal(gaps.point_a[hit], gaps.point_b[hit])
         for k in np.flatnonzero(hit)[:6]:

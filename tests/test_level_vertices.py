@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import collide
-from collide.geometry.hulls.hull import convex_hull
-from collide.geometry.support_tree.build import build_support_tree
-from collide.geometry.support_tree.exact_sign import PRODUCT_TERMS, exact_sign_of_pairs
-from collide.geometry.support_tree.planted import PlantedTree
+from collide.hull.exact_hull import convex_hull
 from collide.kernels import address_of, entry, view_f64
-from collide.narrowphase.descent import MOST_NEIGHBOURS, descend, lowest_of_all
+from collide.narrowphase.gap.hull_descent import MOST_NEIGHBOURS, descend, lowest_of_all
+from collide.numerics.exact_dot_sign import PRODUCT_TERMS, exact_sign_of_pairs
+from collide.support.build_support_tree import build_support_tree
+from collide.support.lazy_support_tree import PlantedTree
 
 EYE = np.eye(4)
 TILTS = (0.0, 1e-17, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9)

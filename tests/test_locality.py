@@ -14,7 +14,7 @@ from naive import SHARED, rng_of
 
 import collide
 from collide import cli
-from collide.geometry.neighbours import PointTree
+from collide.mesh.nearest_neighbours import PointTree
 
 MESHES = SHARED / "data/meshes"
 ORDERS = 10

@@ -12,12 +12,12 @@ import surfaces
 from naive import SHARED, rng_of
 
 import collide
-from collide.geometry.surfaces import nesting
-from collide.geometry.surfaces import survey as says
-from collide.geometry.surfaces import topology as meet
-from collide.geometry.surfaces.survey import survey_surface
-from collide.geometry.surfaces.volumes import scaled_to_one
-from collide.geometry.surfaces.weld import weld
+from collide.mesh import mesh_survey as says
+from collide.mesh import mesh_topology as meet
+from collide.mesh import shell_nesting as nesting
+from collide.mesh.mesh_survey import survey_surface
+from collide.mesh.shell_volumes import scaled_to_one
+from collide.mesh.weld import weld
 
 CLOSED = {
     "box": surfaces.box(),

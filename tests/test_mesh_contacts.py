@@ -10,7 +10,7 @@ from mesh_shapes import block_ring, box
 from naive_triangles import facet_pairs
 
 import collide
-from collide.manifolds.rows import GAP, OVERLAP, WAY_OUT
+from collide.contact.contact_rows import GAP, OVERLAP, WAY_OUT
 
 EYE = np.eye(4)
 BOX = box((-0.5, -0.375, -0.25), (0.5, 0.375, 0.25))

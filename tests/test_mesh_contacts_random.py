@@ -22,7 +22,7 @@ from mesh_shapes import block_ring, box
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
 
 import collide
-from collide.manifolds.rows import WAY_OUT
+from collide.contact.contact_rows import WAY_OUT
 
 POINT, LINE = np.zeros((1, 3)), np.array([[0, 0, -0.25], [0, 0, 0.25]])
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

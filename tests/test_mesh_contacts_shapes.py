@@ -8,7 +8,7 @@ from contact_scenes import table, world_corners
 from mesh_shapes import box
 
 import collide
-from collide.manifolds.rows import CONTACT_DTYPE, GAP, OVERLAP, WAY_OUT
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, WAY_OUT
 
 EYE = np.eye(4)
 
@@ -187,7 +187,7 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
         collide.contacts(sheet, sheet, EYE, collide.pose((0, 0, 1e-3)), margin=5.0)
     flat = collide.contacts(sheet, sheet, EYE, EYE)
     near(flat.point_a, [(x, y, 0) for x in (-1, 1) for y in (-1, 1)])
-    monkeypatch.setattr("collide.manifolds.facets.MOST_PAIRS", 100)
+    monkeypatch.setattr("collide.contact.contact_facets.MOST_PAIRS", 100)
     c = collide.contacts(sheet, sheet, EYE, EYE)
     assert len(c) == 1 and c.kind[0] == WAY_OUT and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
     cubes = collide.Mesh(*box()), collide.Mesh(*box((-0.5,) * 3, (0.5,) * 3))

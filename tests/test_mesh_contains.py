@@ -12,7 +12,7 @@ from naive_triangles import as_integers, triangles_meet, winding, world_points
 
 import collide
 from collide.errors import InvalidArgument
-from collide.meshes.inside import winds_around
+from collide.surface_queries.contains import winds_around
 
 
 def in_solid(vertices, faces, X, point) -> bool:

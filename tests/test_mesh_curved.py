@@ -20,10 +20,10 @@ from naive_triangles import as_integers, winding, world_points
 from surfaces import joined
 
 import collide
-from collide.geometry.hulls.hull import convex_hull
-from collide.meshes.enclosures import enclosure_of
-from collide.meshes.facet_rows import Posed
-from collide.meshes.near_facets import near_facets
+from collide.hull.exact_hull import convex_hull
+from collide.lowering.enclosures import enclosure_of
+from collide.narrowphase.facets.facet_convex import Posed
+from collide.narrowphase.facets.near_facets import near_facets
 from collide.results import HOW
 
 KINDS = ("Cylinder", "Cone", "Ellipsoid", "HPolytope")

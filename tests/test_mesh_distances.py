@@ -10,8 +10,8 @@ from mesh_families import FAMILIES, random_pose, soup
 from mesh_shapes import bumpy_sphere
 from naive_triangles import surface_distance
 
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import surface_distances
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import surface_distances
 
 
 def spread_apart(rng, case):

@@ -14,7 +14,7 @@ from naive_triangles import as_integers, squared_distance, world_points
 
 import collide
 from collide.errors import InvalidPose
-from collide.narrowphase.triangles.queries import facets_within
+from collide.narrowphase.facets.facet_queries import facets_within
 
 FAMILIES = [random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case]
 
@@ -86,7 +86,7 @@ def test_very_unlike_sizes():
 CHILD = """
 import pickle, sys
 import collide
-from collide.narrowphase.triangles.queries import facets_within
+from collide.narrowphase.facets.facet_queries import facets_within
 found = []
 for a, b, X_WA, X_WB, reach in pickle.load(sys.stdin.buffer):
     A, B = collide.Mesh(*a, solid=False), collide.Mesh(*b, solid=False)

@@ -11,7 +11,7 @@ from mesh_shapes import box, bumpy_sphere
 
 import collide
 from collide.cli import main
-from collide.narrowphase.triangles.queries import all_hits
+from collide.narrowphase.facets.facet_queries import all_hits
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 
 

@@ -11,8 +11,8 @@ from mesh_shapes import block_ring, box
 from naive_triangles import as_integers, cross, inner, minus, world_points
 
 import collide
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import points_in_solid
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import points_in_solid
 
 
 def where(corners, p) -> int:

@@ -10,8 +10,8 @@ from mesh_families import FAMILIES, random_pose, soup
 from naive_triangles import facet_pairs
 
 import collide
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import all_hits, first_hits
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import all_hits, first_hits
 
 
 @pytest.mark.parametrize("family", FAMILIES)

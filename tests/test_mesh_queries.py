@@ -14,7 +14,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, facet_pairs, surface_distance, winding, world_points
 
 import collide
-from collide.geometry.mesh_tree.validate import validate_mesh_tree
+from collide.mesh.validate_bvh import validate_mesh_tree
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 

@@ -17,10 +17,10 @@ from naive_triangles import cross, inner, minus, world_points
 
 import collide
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.meshes.exact_places import enters
-from collide.narrowphase.triangles import rays as kernels
-from collide.narrowphase.triangles.queries import facets_on_rays
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets import ray_surface as kernels
+from collide.narrowphase.facets.facet_queries import facets_on_rays
+from collide.numerics.exact_points import enters
 
 
 def first_on_segment(o, d, a, b) -> Fraction | None:

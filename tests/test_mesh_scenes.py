@@ -11,7 +11,7 @@ import pytest
 
 from collide import Box, Compound, ConvexHull, Cylinder, Mesh, World, collide, distance, pose
 from collide.cli import main
-from collide.geometry.surfaces.own_hull import is_own_hull
+from collide.mesh.convex_surface import is_own_hull
 from collide.reports import report, terminal
 from collide.scenes import load
 from collide.scenes.description import Scene, SceneBody
@@ -261,7 +261,7 @@ def test_deep_touching_and_near_meshes_are_told_apart():
 
 def test_pairs_that_cannot_be_answered_are_listed_and_the_rest_is_answered(tmp_path, monkeypatch):
     from collide.errors import UnsupportedQuery
-    from collide.meshes import hulls_first
+    from collide.narrowphase.facets import hull_culling as hulls_first
 
     def refuse(A, B, *rest, **options):
         if isinstance(B, Cylinder) or isinstance(A, Cylinder):
@@ -323,7 +323,7 @@ def test_hulls_answer_for_meshes_far_apart_and_never_wrongly():
 
 
 def test_a_links_hull_and_meshes_in_compounds_are_found():
-    from collide.reports.meshes import is_meshed, meshes_of
+    from collide.reports.mesh_notes import is_meshed, meshes_of
 
     L = Mesh(*l_solid())
     both = Compound([(L, np.eye(4)), (Compound([(L.scaled(2.0), np.eye(4)), (Box((1, 1, 1)), np.eye(4))]), pose((1, 0, 0)))])

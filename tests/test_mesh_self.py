@@ -7,8 +7,8 @@ from mesh_families import grid, soup
 from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, cross, inner, minus, triangles_meet, world_points
 
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.narrowphase.triangles.queries import self_hits
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import self_hits
 
 
 def shares_more(P, Q) -> bool:

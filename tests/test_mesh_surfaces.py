@@ -17,9 +17,9 @@ from mesh_shapes import block_ring, bumpy_sphere
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
 
 import collide
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.geometry.mesh_tree.graded import graded_tree
-from collide.narrowphase.triangles.queries import (
+from collide.hierarchies.graded_tree import graded_tree
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.narrowphase.facets.facet_queries import (
     all_hits,
     first_hits,
     points_in_solid,
@@ -180,9 +180,9 @@ CHILD = f"""
 import pickle, sys
 import numpy as np
 from collide import kernels
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.geometry.mesh_tree.graded import graded_tree
-from collide.narrowphase.triangles.queries import *
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.hierarchies.graded_tree import graded_tree
+from collide.narrowphase.facets.facet_queries import *
 {inspect.getsource(answers)}
 assert kernels.PLAIN_PYTHON
 pickle.dump(answers(pickle.load(sys.stdin.buffer)), sys.stdout.buffer)

@@ -9,8 +9,9 @@ import pytest
 from mesh_families import grid, soup
 from mesh_shapes import bumpy_sphere
 
-from collide.geometry.mesh_tree.build import build_mesh_tree
-from collide.geometry.mesh_tree.eight_boxes import (
+from collide.hierarchies.graded_tree import graded_tree
+from collide.kernels import address_of, entry, view_f32
+from collide.mesh.box_overlap import (
     NEAR_PROBE,
     PRISM,
     boxes_meeting,
@@ -20,11 +21,10 @@ from collide.geometry.mesh_tree.eight_boxes import (
     boxes_nearest,
     boxes_nearest_one_by_one,
 )
-from collide.geometry.mesh_tree.graded import graded_tree
-from collide.geometry.mesh_tree.layout import NODE, NOTHING, SLAB, MeshTree
-from collide.geometry.mesh_tree.validate import validate_graded_tree, validate_mesh_tree
-from collide.kernels import address_of, entry, view_f32
-from collide.narrowphase.triangles.queries import all_hits
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.mesh.bvh import NODE, NOTHING, SLAB, MeshTree
+from collide.mesh.validate_bvh import validate_graded_tree, validate_mesh_tree
+from collide.narrowphase.facets.facet_queries import all_hits
 
 
 def meshes():

@@ -16,8 +16,8 @@ from naive_triangles import as_integers, facet_pairs, surface_distance, winding,
 from surfaces import joined
 
 import collide
-from collide.geometry.tables import moved_pose
-from collide.meshes.union_parts import union_of
+from collide.lowering.composite_parts import union_of
+from collide.lowering.shape_table import moved_pose
 
 EYE = np.eye(4)
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

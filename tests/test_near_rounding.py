@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import collide
-from collide.geometry.hulls.hull import convex_hull
+from collide.hull.exact_hull import convex_hull
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]

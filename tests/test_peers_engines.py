@@ -29,7 +29,7 @@ from collide import (
     Sphere,
     pose,
 )
-from collide.adapters.peers.facets import triangulate
+from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.protocol import ENGINES, Question, engine
 from collide.adapters.peers.question import bounds, convex_parts, corners
 

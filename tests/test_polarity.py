@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from collide.geometry.polarity import (
+from collide.hierarchies.polarity import (
     Halfspace,
     Plane,
     Polyhedron,

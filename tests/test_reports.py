@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from collide.errors import InvalidArgument
-from collide.reports import report, tables, terminal, units
+from collide.reports import number_format as units
+from collide.reports import report, tables, terminal
 from collide.reports.progress import Progress
 from collide.results import FORMULA, HOW, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED, WorldResult
 from collide.shapes import Sphere

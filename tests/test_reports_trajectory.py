@@ -12,8 +12,9 @@ from slider_scene import MEETS, slider_scene
 import collide.scenes
 from collide import cli
 from collide.errors import InvalidArgument, SceneError
-from collide.reports import report, states
-from collide.reports.trajectory import follow, sample, verdict
+from collide.reports import report
+from collide.reports import state_reports as states
+from collide.reports.trajectory_report import follow, sample, verdict
 from collide.scenes.loaders.state_words import in_states
 from collide.scenes.loaders.trajectories import Trajectory, read_trajectory
 

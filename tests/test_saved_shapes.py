@@ -20,7 +20,7 @@ import surfaces
 
 import collide
 from collide import ConvexHull, InvalidShape, Mesh
-from collide.shapes.saved import _digest
+from collide.shapes.shape_files import _digest
 
 EYE = np.eye(4)
 

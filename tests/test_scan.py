@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from collide.geometry.scan import farthest, farthest_listed, farthest_one_by_one
-from collide.geometry.supports import support_vertex
 from collide.kernels import address_of, entry, view_f64, view_i64
+from collide.support.block_scan import farthest, farthest_listed, farthest_one_by_one
+from collide.support.support_mapping import support_vertex
 
 pytestmark = pytest.mark.own_kernels
 

@@ -23,7 +23,8 @@ import pytest
 from collide.cli import main
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
 from collide.robot import Robot
-from collide.scenes import cache, load
+from collide.scenes import load
+from collide.scenes import mesh_cache as cache
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import files, resources, triangles
 from collide.scenes.loaders.documents import parse_document, read_document

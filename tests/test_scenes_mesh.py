@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from collide.errors import CollideError, InvalidShape, SceneError
-from collide.scenes import cache, load
-from collide.scenes.loaders import mesh as mesh_loader
+from collide.scenes import load
+from collide.scenes import mesh_cache as cache
+from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.shapes import Compound, ConvexHull
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh reads the meshes")

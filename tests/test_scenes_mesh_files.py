@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 from collide.errors import CollideError, MissingExtra, SceneError
-from collide.scenes import cache, load
+from collide.scenes import load
+from collide.scenes import mesh_cache as cache
 from collide.scenes.loaders.triangles import read_triangles
 
 

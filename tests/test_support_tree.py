@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hull_families import HULLS, directions_for, farthest_of, hull_of, integers, made, snippet
 
-from collide.geometry.support_tree.build import build_support_tree
-from collide.geometry.support_tree.exact_sign import exact_sign
-from collide.geometry.support_tree.query import extreme_vertex, extreme_vertices
-from collide.geometry.support_tree.settle import settle_vertex
 from collide.kernels import address_of, entry, view_f64
+from collide.numerics.exact_dot_sign import exact_sign
+from collide.support.build_support_tree import build_support_tree
+from collide.support.extreme_vertex import settle_vertex
+from collide.support.support_tree_query import extreme_vertex, extreme_vertices
 
 pytest.importorskip("scipy.spatial")
 

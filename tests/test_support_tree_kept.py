@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hull_families import HULLS, LARGE, bipyramid, directions_for, ellipsoid, hull_of, made, normals_of
 
-from collide.geometry.support_tree import build
-from collide.geometry.support_tree.build import LONGEST_LIST, build_support_tree, subset_sizes
-from collide.geometry.support_tree.layout import SupportTree
-from collide.geometry.support_tree.query import COUNTERS, extreme_vertices
-from collide.geometry.support_tree.settle import LOOKED_AT, SCANNED, STEPS
-from collide.geometry.support_tree.spread import nested_order
-from collide.geometry.support_tree.validate import validate_support_tree
+from collide.support import build_support_tree as build
+from collide.support.build_support_tree import LONGEST_LIST, build_support_tree, subset_sizes
+from collide.support.extreme_vertex import LOOKED_AT, SCANNED, STEPS
+from collide.support.nested_subsets import nested_order
+from collide.support.support_tree import SupportTree
+from collide.support.support_tree_query import COUNTERS, extreme_vertices
+from collide.support.validate_support_tree import validate_support_tree
 
 pytest.importorskip("scipy.spatial")
 
@@ -239,8 +239,8 @@ PLAIN = """
 import sys, numpy as np
 from collide import kernels
 assert kernels.PLAIN_PYTHON
-from collide.geometry.support_tree.build import build_support_tree
-from collide.geometry.support_tree.query import extreme_vertices
+from collide.support.build_support_tree import build_support_tree
+from collide.support.support_tree_query import extreme_vertices
 given = dict(np.load(sys.argv[1]))
 tree = build_support_tree(given["points"], given["vertices"], given["facets"], lambda points: given["none"])
 parts = {name: getattr(tree, name) for name in sys.argv[3:]}

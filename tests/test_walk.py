@@ -15,11 +15,11 @@ import pytest
 
 import collide
 from collide.adapters.peers import exact
-from collide.narrowphase.barba_langerman.run import no_walks, run_walks
-from collide.narrowphase.barba_langerman.validate import validate_rounds
-from collide.narrowphase.barba_langerman.walk import APART, LOST, MEETING
+from collide.hierarchies.hierarchy_queries import Walks, walk_body
+from collide.hierarchies.run_walk import no_walks, run_walks
+from collide.hierarchies.validate_walk import validate_rounds
+from collide.hierarchies.walk import APART, LOST, MEETING
 from collide.scenes.families import HULLS, generate, names
-from collide.walks import Walks, walk_body
 
 WALK = "barba-langerman"
 EYE = np.eye(4)
@@ -304,7 +304,7 @@ def test_a_body_whose_walk_is_lost_is_handed_over(monkeypatch):
     def lost(body_p, body_r, packed_p, packed_r, X_WP, X_WR, *, trace=False):
         return no_walks(len(X_WP)), ()
 
-    monkeypatch.setattr("collide.walks.run_walks", lost)
+    monkeypatch.setattr("collide.hierarchies.hierarchy_queries.run_walks", lost)
     found = collide.walk(A, B, X_WA, EYE[None])
     assert not found.walked.any() and (found.rows["said"] == LOST).all() and (found.hit == truth).all()
 

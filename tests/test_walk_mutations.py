@@ -21,7 +21,7 @@ sys.path.insert(0, sys.argv[1])
 import collide
 assert collide.__file__.startswith(sys.argv[1]), collide.__file__
 from collide.adapters.peers import exact
-from collide.narrowphase.barba_langerman.validate import validate_rounds
+from collide.hierarchies.validate_walk import validate_rounds
 from collide.scenes.families import generate
 wrong = broken = 0
 for name in ("touch_vf", "touch_1ulp", "near_pen", "near_sep", "rand_pen", "box_lattice"):

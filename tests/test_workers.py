@@ -10,7 +10,7 @@ import pytest
 from naive import random_pose, rng_of
 
 import collide
-from collide import workers
+from collide import threads as workers
 from collide.errors import InvalidArgument, InvalidPose
 
 EYE = np.eye(4)

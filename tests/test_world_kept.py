@@ -13,8 +13,8 @@ from naive import pose, random_pose, rng_of
 import collide
 from collide import packed_world
 from collide import world as world_module
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.errors import InvalidArgument, UnknownBody
-from collide.manifolds.rows import CONTACT_DTYPE
 from collide.results import PAIR_DTYPE
 
 EYE = np.eye(4)

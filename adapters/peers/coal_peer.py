@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.adapters.peers.facets import triangulate
+from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery

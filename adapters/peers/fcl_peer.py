@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from collide.adapters.peers.facets import triangulate
+from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply, swept
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery

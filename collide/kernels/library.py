@@ -96,10 +96,12 @@ def _built() -> Any:
 def _fits(built: Any) -> bool:
     """Whether the library was made from the sources that are here. Where there are none, as in frozen programs, nobody can have
     changed them."""
-    try:
-        return sources.fingerprint() == built.SOURCES
-    except OSError:
+    if not os.path.exists(os.path.join(sources.PACKAGE, "results.py")):
         return True
+    try:
+        return sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
+    except (AttributeError, OSError):
+        return False
 
 
 def _library_of(files: dict) -> str:

@@ -11,8 +11,8 @@ from __future__ import annotations
 import os
 
 from collide.errors import MissingExtra
-from collide.journal import log
 from collide.kernels import library
+from collide.log import log
 
 COMPILED, JUST_IN_TIME, PYTHON = "compiled", "just in time", "python"
 

@@ -21,7 +21,7 @@ from functools import cache
 from pathlib import Path
 
 from collide.cache_folder import TRUST, cache_folder, make_private, why_distrusted
-from collide.journal import log
+from collide.log import log
 
 #: Raised with every change of what a file holds.
 _VERSION = 2

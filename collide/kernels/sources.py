@@ -16,35 +16,36 @@ from pathlib import Path
 
 #: The installed package.
 PACKAGE = Path(__file__).parent.parent
-#: Rooms and files of the package that hold kernels, what kernels import, and what makes code of them.
-KERNEL_SOURCES = (
-    "broadphase", "geometry", "kernels/back_end.py", "kernels/compiled_lanes.py", "kernels/front_end.py", "kernels/lanes.py",
-    "kernels/plain_lanes.py", "kernels/prepared.py", "kernels/vectors.py", "kernels/views.py", "narrowphase", "results.py",
-    "transforms.py",
+#: Files of this room that make code of kernels; its others only decide how kernels run.
+COMPILER_SOURCES = tuple(
+    f"kernels/{name}.py" for name in
+    ("back_end", "compiled_lanes", "front_end", "lanes", "plain_lanes", "prepared", "vectors", "views")
 )  # fmt: skip
 
 
-def fingerprint() -> int:
-    """A checksum of all sources that the library is compiled from. Two milliseconds. Raises OSError where they are not there."""
+def kernel_sources() -> tuple[str, ...]:
+    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these import,
+    and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time to look."""
+    found = set(COMPILER_SOURCES)
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if b"\n@entry(" in path.read_bytes():
+            module = ".".join(("collide", *path.relative_to(PACKAGE).with_suffix("").parts))
+            found.update(map(_place_of, _reached(module)))
+    return tuple(sorted(found))
+
+
+def _place_of(module: str) -> str:
+    name = "/".join(module.split(".")[1:])
+    return f"{name}/__init__.py" if (PACKAGE / name).is_dir() else f"{name}.py"
+
+
+def fingerprint(names: tuple[str, ...]) -> int:
+    """A checksum of such files. Two milliseconds. Raises OSError where one is not there."""
     found = 0
-    for name in KERNEL_SOURCES:
-        for path in _files(os.path.join(PACKAGE, name)):
-            with open(path, "rb") as file:
-                text = file.read().replace(b"\r\n", b"\n")
-            found = zlib.crc32(text, zlib.crc32(path[len(str(PACKAGE)) :].replace(os.sep, "/").encode(), found))
-    return found
-
-
-def _files(path: str) -> list[str]:
-    if path.endswith(".py"):
-        return [path]
-    found: list[str] = []
-    with os.scandir(path) as entries:
-        for entry in sorted(entries, key=lambda entry: entry.name):
-            if entry.name.endswith(".py"):
-                found.append(entry.path)
-            elif entry.is_dir(follow_symlinks=False) and entry.name != "__pycache__":
-                found += _files(entry.path)
+    for name in names:
+        with open(os.path.join(PACKAGE, *name.split("/")), "rb") as file:
+            text = file.read().replace(b"\r\n", b"\n")
+        found = zlib.crc32(text, zlib.crc32(name.encode(), found))
     return found
 
 
@@ -104,7 +105,7 @@ def _may_matter(module: str) -> bool:
     """Whether it is a module at all, and none that only decides how kernels run."""
     if _file(module) is None or module == "collide.kernels":
         return False
-    return not module.startswith("collide.kernels.") or f"{module[8:].replace('.', '/')}.py" in KERNEL_SOURCES
+    return not module.startswith("collide.kernels.") or f"{module[8:].replace('.', '/')}.py" in COMPILER_SOURCES
 
 
 @cache

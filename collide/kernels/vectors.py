@@ -4,7 +4,7 @@ A running maximum with its index is such a loop: without fastmath LLVM must keep
 their order. Vectors of eight doubles are asked for whatever the processor has; LLVM splits them into
 two of four (AVX2) or four of two (NEON, SSE2), so the bits of an answer are the same everywhere.
 
-`collide/geometry/scan.py` and `error_free.py` have the same functions for plain Python and for tests.
+`collide/support/block_scan.py` and `error_free.py` have the same functions for plain Python and for tests.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _NOWHERE = 1 << 62
 
 @intrinsic
 def farthest_of_blocks(_context, coordinates, start, stride, count, gx, gy, gz):
-    """(index, value) of the largest x·gx + y·gy + z·gz; described in `geometry/scan.py`."""
+    """(index, value) of the largest x·gx + y·gy + z·gz; described in `support/block_scan.py`."""
     return _farthest(coordinates, _scan)
 
 
@@ -308,7 +308,7 @@ _FLOATS = ir.VectorType(_F32, LANES)
 
 @intrinsic
 def boxes_meeting(_context, boxes, at, frame, probe):
-    """Bits of the boxes that nothing parts from a box; described in `geometry/mesh_tree/eight_boxes.py`."""
+    """Bits of the boxes that nothing parts from a box; described in `mesh/box_overlap.py`."""
     return _meeting(boxes, frame, probe, _apart)
 
 
@@ -407,7 +407,7 @@ def _abs(builder, vector):
 
 @intrinsic
 def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
-    """Lower bounds of the distances of eight boxes, and how far their centres are; see `geometry/mesh_tree/eight_boxes.py`."""
+    """Lower bounds of the distances of eight boxes, and how far their centres are; see `mesh/box_overlap.py`."""
     _check_floats(boxes, slabs, frame, probe, out)
     signature = types.void(boxes, types.int64, slabs, types.int64, frame, probe, out)
 

@@ -20,7 +20,7 @@ where the stretch is a bound of |R| (`posed_pair.stretch_of`), 1 and a rounding 
 All of it together stays below 45u·S, and the error used is 64u·S, plus the slop of stored points
 and of composed poses (`PackedConvex.slop`, `pose_table`). It holds whatever the matrix, not only for
 rotations, since ρ is measured with the matrix given. Where the bracket spans zero, the exact stage
-(`decide.py`) settles the sign.
+(`settle_hulls.py`) settles the sign.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel
-from collide.narrowphase.minkowski import POINT
+from collide.narrowphase.gjk.minkowski_difference import POINT
 
 
 @kernel

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.double_double import add, divide, multiply, product_of_vectors, square_root, subtract
-from collide.geometry.error_free import two_product, two_sum
 from collide.kernels import kernel, view_f64, view_i64
-from collide.narrowphase.fine import (
+from collide.narrowphase.gap.precise_pair import (
     HEIGHT_ERROR,
     LARGEST_FINE,
     SMALLEST_FINE,
     is_composed,
     scale_of,
 )
-from collide.narrowphase.level import MOST_TIES, tied_vertices
+from collide.narrowphase.gap.tied_vertices import MOST_TIES, tied_vertices
+from collide.numerics.double_double import add, divide, multiply, product_of_vectors, square_root, subtract
+from collide.numerics.error_free import two_product, two_sum
 
 
 @kernel

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.packing import HALFSPACE
-from collide.geometry.tables import (
+from collide.kernels import kernel, view_f64, view_i64
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.shape_table import (
     ADDRESS,
     COARSE_AT,
     COUNT,
@@ -28,7 +29,6 @@ from collide.geometry.tables import (
     SLOP,
     TREE,
 )
-from collide.kernels import kernel, view_f64, view_i64
 
 #: A matrix is said to stretch by the root of this at least, 3e-151.
 _LEAST_SQUARE = 2.0**-1000

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from collide.errors import InvalidArgument
-from collide.reports import trajectory
+from collide.reports import trajectory_report as trajectory
+from collide.reports.number_format import brief_length, count
 from collide.reports.report import Report
 from collide.reports.tables import printable
-from collide.reports.units import brief_length, count
 
 SCHEMA = "collide-baseline/1"
 COLLISION, SHALLOW, TOUCHING, KNOWN, DEEPER, GONE = "collision", "shallow", "touching", "known", "deeper", "gone"

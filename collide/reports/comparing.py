@@ -5,8 +5,8 @@ Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and 
 
 from __future__ import annotations
 
+from collide.reports.number_format import brief_length, count, lengths
 from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, wrapped
-from collide.reports.units import brief_length, count, lengths
 
 SHORT = 12
 

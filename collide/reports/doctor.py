@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 
+from collide.reports.number_format import count, widths
 from collide.reports.progress import silent
 from collide.reports.report import versions
 from collide.reports.tables import Column, Table
-from collide.reports.units import count, widths
 
 #: (distribution, extra that brings it, what for)
 OPTIONAL = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 
-from collide.reports.pairs import Pairs
+from collide.reports.pair_classes import Pairs
 
 #: Pairs written at a time.
 _CHUNK = 2048

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 from collide.reports.checking import Check, Finding
+from collide.reports.number_format import brief_length
 from collide.reports.tables import printable
-from collide.reports.units import brief_length
 
 
 def text(checks: list[Check]) -> Iterator[str]:

@@ -15,10 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.reports import classes, meshes, proofs
-from collide.reports.pairs import Pairs
+from collide.reports import classes, proofs
+from collide.reports import mesh_notes as meshes
+from collide.reports.number_format import brief_length, count
+from collide.reports.pair_classes import Pairs
 from collide.reports.progress import silent
-from collide.reports.units import brief_length, count
 
 SCHEMA = "collide-report/3"
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from collide.reports.pairs import Fold, Pair, Pairs
+from collide.reports.number_format import brief_length, coordinates, count, directions, lengths, widths
+from collide.reports.pair_classes import Fold, Pair, Pairs
 from collide.reports.report import Report
 from collide.reports.tables import Column, Table
-from collide.reports.units import brief_length, coordinates, count, directions, lengths, widths
 
 #: Rows shown of each long list, unless all are asked for.
 SHORT = 12

@@ -5,12 +5,12 @@ mesh (triangles), compound (a union), shape_set (many, picked from by number). `
 meshes of scene files into hulls or unions of hulls, and says so for every body.
 """
 
-from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
+from collide.shapes.shape import Shape
 from collide.shapes.shape_set import ShapeSet
 
 __all__ = [

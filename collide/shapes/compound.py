@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape
-from collide.geometry.packing import PackedConvex
-from collide.shapes.base import Shape
+from collide.lowering.packed_convex import PackedConvex
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 #: One product of two poses rounds each coordinate of a point by at most this many units in the

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.errors import InvalidShape, UnsupportedQuery
-from collide.geometry.double_description import halfspace_vertices
-from collide.geometry.packing import pack_points
-from collide.shapes.base import Shape, alone, rows
+from collide.hull.double_description import halfspace_vertices
+from collide.lowering.packed_convex import pack_points
+from collide.shapes.shape import Shape, alone, rows
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:

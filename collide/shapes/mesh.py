@@ -6,22 +6,23 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from collide import journal, reading
+from collide import argument_checks as reading
+from collide import log as journal
 from collide.errors import InvalidShape, UnsupportedQuery
-from collide.geometry.packing import pack_points
-from collide.shapes.base import Shape, alone, facet_ids, positive, rows
-from collide.shapes.hull import ConvexHull
+from collide.lowering.packed_convex import pack_points
+from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
-from collide.shapes.saved import Field, read_arrays, write_arrays
+from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
+from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from collide.geometry.locality import Locality
-    from collide.geometry.mesh_tree.figures import TreeFigures
-    from collide.geometry.mesh_tree.layout import MeshTree
-    from collide.geometry.surfaces.survey import Survey
+    from collide.mesh.bvh import MeshTree
+    from collide.mesh.bvh_statistics import TreeFigures
+    from collide.mesh.locality import Locality
+    from collide.mesh.mesh_survey import Survey
 
     class HasFacets(Protocol):
         """What carries a mesh: trimesh.Trimesh, among others."""
@@ -106,11 +107,11 @@ class Mesh(Shape):
         if not hasattr(self, "_tree"):
             with journal.told("box-tree of a mesh of %d facets made", len(self.faces)):
                 if self._copied is None:
-                    from collide.geometry.mesh_tree.build import build_mesh_tree
+                    from collide.mesh.build_bvh import build_mesh_tree
 
                     self._store(_tree=build_mesh_tree(self.vertices, self.faces))
                 else:
-                    from collide.geometry.mesh_tree.scaled import scaled_tree
+                    from collide.mesh.scaled_bvh import scaled_tree
 
                     self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree
@@ -122,7 +123,7 @@ class Mesh(Shape):
             used = self.vertices[np.unique(self.faces)]
             with journal.told("convex hull around a mesh of %d facets made", len(self.faces)):
                 if len(used) > _MANY:
-                    from collide.geometry.hulls.hull import convex_hull
+                    from collide.hull.exact_hull import convex_hull
 
                     used = used[convex_hull(used).vertices]
                 self._store(_hull=ConvexHull(used))
@@ -136,7 +137,7 @@ class Mesh(Shape):
     @property
     def survey(self) -> Survey:
         """Which facets meet where, welded corners, shells and their volumes: of `base`, for all its scaled copies."""
-        from collide.geometry.surfaces.survey import survey_surface
+        from collide.mesh.mesh_survey import survey_surface
 
         if self._copied is not None:
             return self._copied.survey
@@ -173,12 +174,12 @@ class Mesh(Shape):
         return made
 
     def locality(self, *, repeated: bool = False, progress=None) -> Locality:
-        """How local the mesh is: Σ and σ_1 … σ_10 with their distributions; see `collide.geometry.locality`.
+        """How local the mesh is: Σ and σ_1 … σ_10 with their distributions; see `collide.mesh.locality`.
 
         repeated : count equal vertices one by one.   progress : called with a label, gives a context manager.
         O(n log n), a second for 437,645 vertices. Scaling changes nothing but rounding.
         """
-        from collide.geometry.locality import locality
+        from collide.mesh.locality import locality
 
         options = {} if progress is None else {"progress": progress}
         return locality(self.vertices, self.faces, repeated=repeated, **options)
@@ -188,8 +189,8 @@ class Mesh(Shape):
 
         The second is built for this alone: O(n log n), 1.2 s for a million facets.
         """
-        from collide.geometry.mesh_tree.figures import tree_figures
-        from collide.geometry.mesh_tree.graded import graded_tree
+        from collide.hierarchies.graded_tree import graded_tree
+        from collide.mesh.bvh_statistics import tree_figures
 
         return tree_figures(self.tree, graded_tree(self.vertices, self.faces))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collide.geometry.surfaces.survey import Survey
+    from collide.mesh.mesh_survey import Survey
 
 #: Facet numbers shown of each defect; `Defect.facets` has them all.
 _SHOWN = 6
@@ -71,8 +71,8 @@ def _numbers(facets: np.ndarray) -> str:
 
 def find_defects(survey: Survey) -> tuple[Defect, ...]:
     """The defects that a survey flags, what spoils a solid first."""
-    from collide.geometry.surfaces import survey as says
-    from collide.geometry.surfaces import topology as meet
+    from collide.mesh import mesh_survey as says
+    from collide.mesh import mesh_topology as meet
 
     nothing = bool(len(survey.signs)) and not (survey.signs > 0).any()
     kinds = [

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.errors import InvalidShape
-from collide.geometry.packing import (
+from collide.lowering.packed_convex import (
     CONE,
     CYLINDER,
     ELLIPSOID,
@@ -21,7 +21,7 @@ from collide.geometry.packing import (
     pack_halfspace,
     pack_points,
 )
-from collide.shapes.base import Shape, alone, positive, rows, scalar, three_lengths
+from collide.shapes.shape import Shape, alone, positive, rows, scalar, three_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import reading
+from collide import argument_checks as reading
 from collide.errors import InvalidArgument, InvalidShape
-from collide.shapes.base import Shape, is_plain
+from collide.shapes.shape import Shape, is_plain
 
 if TYPE_CHECKING:
-    from collide.geometry.tables import ShapeTable
-    from collide.geometry.union_table import UnionTable
+    from collide.lowering.compound_table import UnionTable
+    from collide.lowering.shape_table import ShapeTable
 
 
 class ShapeSet:
@@ -68,14 +68,14 @@ class ShapeSet:
     @cached_property
     def table(self) -> ShapeTable:
         """What kernels read, a row a shape; of a union its first part and of a mesh its box, which nobody asks for."""
-        from collide.geometry.tables import ShapeTable
+        from collide.lowering.shape_table import ShapeTable
 
         return ShapeTable([shape.bounding_parts()[0][0] for shape in self.shapes])
 
     @cached_property
     def unions(self) -> UnionTable:
         """The same with all parts of each shape, a body a shape."""
-        from collide.geometry.union_table import UnionTable
+        from collide.lowering.compound_table import UnionTable
 
         return UnionTable([shape.laid_out() for shape in self.shapes])
 

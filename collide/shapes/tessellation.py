@@ -13,11 +13,11 @@ from functools import lru_cache
 import numpy as np
 
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.hull import ConvexHull
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
+from collide.shapes.shape import Shape
 
 #: Where no tolerance is given: this part of a shape's largest radius.
 _USUAL = 0.01

@@ -20,9 +20,9 @@ import numpy as np
 
 from collide.errors import InvalidArgument
 from collide.scenes.families import (
-    boxes,
+    box_cases,
     lattices,
-    meshes,
+    mesh_cases,
     nested,
     random_pairs,
     rounded,
@@ -32,13 +32,13 @@ from collide.scenes.families import (
     touching,
 )
 from collide.scenes.families.case import HALFSPACE, HULLS, Body, Case
-from collide.scenes.families.meshes import MeshCase
+from collide.scenes.families.mesh_cases import MeshCase
 
 __all__ = ["HALFSPACE", "HULLS", "STANDARD", "Body", "Case", "MeshCase", "describe", "generate", "mesh_names", "names"]
 
 _FAMILIES: dict[str, Callable[..., Case]] = {
     family.__name__: family
-    for module in (random_pairs, touching, boxes, scales, thin, rounded, nested)
+    for module in (random_pairs, touching, box_cases, scales, thin, rounded, nested)
     for family in module.FAMILIES
 }
 #: The 27 families of the study.
@@ -48,7 +48,7 @@ _FAMILIES |= {
     family.__name__: family for module in (touching, scales, thin, rounded, swept, lattices) for family in module.OWN
 }
 #: Of pairs of meshes; their cases are `MeshCase`.
-_MESHES: dict[str, Callable[..., MeshCase]] = {family.__name__: family for family in meshes.FAMILIES}
+_MESHES: dict[str, Callable[..., MeshCase]] = {family.__name__: family for family in mesh_cases.FAMILIES}
 
 
 def names() -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import HALFSPACE, Body, Case, pair
-from collide.scenes.families.parts import EXACT_ROTATIONS, box, decimals, random_hull, rotation
+from collide.scenes.families.ingredients import EXACT_ROTATIONS, box, decimals, random_hull, rotation
 from collide.scenes.families.touching import contact, placed
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, pair
-from collide.scenes.families.parts import anywhere, box, power, random_body, random_hull, rotation, sphere
+from collide.scenes.families.ingredients import anywhere, box, power, random_body, random_hull, rotation, sphere
 
 
 def concentric(rng, index) -> Case:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collide.scenes.families.case import Case, mean_diagonal, pair
-from collide.scenes.families.gaps import set_gap
-from collide.scenes.families.parts import direction, power, random_body
+from collide.scenes.families.exact_gaps import set_gap
+from collide.scenes.families.ingredients import direction, power, random_body
 
 
 def rand_sep(rng, index) -> Case:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
-from collide.scenes.families.gaps import measure, set_gap
-from collide.scenes.families.parts import (
+from collide.scenes.families.exact_gaps import measure, set_gap
+from collide.scenes.families.ingredients import (
     anywhere,
     bipyramid,
     direction,

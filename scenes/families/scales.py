@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.scenes.families.boxes import boxes_flush, boxes_rest
+from collide.scenes.families.box_cases import boxes_flush, boxes_rest
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
-from collide.scenes.families.gaps import set_gap
-from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, sign
+from collide.scenes.families.exact_gaps import set_gap
+from collide.scenes.families.ingredients import anywhere, direction, power, random_body, random_hull, sign
 
 
 def scale(rng, index) -> Case:

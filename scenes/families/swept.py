@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
-from collide.scenes.families.gaps import set_gap
-from collide.scenes.families.parts import anywhere, direction, power, random_body, random_hull, rotation, sign, turn
+from collide.scenes.families.exact_gaps import set_gap
+from collide.scenes.families.ingredients import (
+    anywhere,
+    direction,
+    power,
+    random_body,
+    random_hull,
+    rotation,
+    sign,
+    turn,
+)
 from collide.scenes.families.thin import flat
 from collide.scenes.families.touching import UNIT, Contact, contact, placed
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, mean_diagonal, pair
-from collide.scenes.families.gaps import set_gap
-from collide.scenes.families.parts import anywhere, box, direction, power, random_hull, rotation, sign
+from collide.scenes.families.exact_gaps import set_gap
+from collide.scenes.families.ingredients import anywhere, box, direction, power, random_hull, rotation, sign
 
 
 def needles(rng, index) -> Case:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.scenes.families.case import Body, Case, pair
-from collide.scenes.families.parts import EXACT_ROTATIONS
+from collide.scenes.families.ingredients import EXACT_ROTATIONS
 
 #: The lattice's unit [m].
 UNIT = 2.0**-4

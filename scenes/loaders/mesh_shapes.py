@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidShape, SceneError
-from collide.geometry.surfaces.own_hull import is_own_hull
-from collide.scenes.loaders.mesh import CONVEX_RATIO, MeshFile, MeshPart
-from collide.shapes.base import Shape
+from collide.mesh.convex_surface import is_own_hull
+from collide.scenes.loaders.mesh_file import CONVEX_RATIO, MeshFile, MeshPart
 from collide.shapes.compound import Compound
-from collide.shapes.hull import ConvexHull
+from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
+from collide.shapes.shape import Shape
 
 
 class Taken(NamedTuple):
@@ -151,7 +151,7 @@ def _joined(parts: list[MeshPart]) -> MeshPart:
 
 
 def _joined_points(parts: list[MeshPart]) -> MeshPart:
-    from collide.scenes.loaders.mesh import distinct
+    from collide.scenes.loaders.mesh_file import distinct
 
     points = distinct(np.concatenate([part.points for part in parts]))
     return MeshPart(parts[0].name, points, np.nan, False, sum(part.faces for part in parts))

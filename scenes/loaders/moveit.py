@@ -23,9 +23,9 @@ from collide.scenes.loaders.fields import Fields, did_you_mean, placed
 from collide.scenes.loaders.files import head
 from collide.scenes.loaders.mesh_shapes import inline_shape
 from collide.scenes.loaders.states import state_of
-from collide.shapes.base import Shape
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Halfspace, Sphere
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses, pose
 
 ALLOWED = "allowed by the scene"

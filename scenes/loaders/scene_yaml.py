@@ -18,7 +18,7 @@ from collide.scenes.loaders import resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
 from collide.scenes.loaders.files import LARGEST_TEXT, MOST_INCLUDED, read_text
-from collide.scenes.loaders.mesh import OPTIONS, MeshFile, read_mesh
+from collide.scenes.loaders.mesh_file import OPTIONS, MeshFile, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of
 

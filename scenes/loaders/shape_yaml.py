@@ -117,7 +117,7 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
-    from collide.scenes.loaders import mesh as mesh_loader
+    from collide.scenes.loaders import mesh_file as mesh_loader
     from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 
     scale = _mesh_scale(fields)

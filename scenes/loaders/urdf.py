@@ -20,13 +20,13 @@ import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robot import Joint, LinkShape, Mimic, Robot
-from collide.scenes.loaders import mesh as mesh_loader
+from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.fields import placed
 from collide.scenes.loaders.files import is_file, read_bytes
 from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
-from collide.shapes.base import Shape
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
+from collide.shapes.shape import Shape
 from collide.transforms import pose
 
 MISSING_MESHES = ("error", "skip")

@@ -1,8 +1,8 @@
 """EPA: the smallest translation that separates two overlapping cores, with a proven bracket.
 
 van den Bergen 2001. A polytope inside A ⊖ B grows towards the facet whose plane lies nearest the origin, until
-the support plane of that facet coincides with it. `seed.py` is where it begins, `surface.py` the polytope,
-`expand.py` its growth in doubles, `refine.py` the last digits.
+the support plane of that facet coincides with it. `initial_polytope.py` is where it begins, `polytope_surface.py` the polytope,
+`expand_polytope.py` its growth in doubles, `refine_depth.py` the last digits.
 
 Upper bound of the depth: the value of any support plane. Lower bound: the surface is closed and oriented by
 construction (facets are exchanged for others with the same border). If each facet is seen from the origin on its

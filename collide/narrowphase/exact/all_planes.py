@@ -12,13 +12,11 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.digits import BITS, add_product, as_double_double, carry, clear
-from collide.geometry.double_double import add, cross, divide, square_root
 from collide.kernels import kernel, view_f64
-from collide.narrowphase.epa.foot import nearest_of_triangle
-from collide.narrowphase.exact.directions import scaled_by, set_normal, side_of
-from collide.narrowphase.exact.supports import support_pair
-from collide.narrowphase.exact.workspace import (
+from collide.narrowphase.epa.origin_foot import nearest_of_triangle
+from collide.narrowphase.exact.exact_directions import scaled_by, set_normal, side_of
+from collide.narrowphase.exact.exact_supports import support_pair
+from collide.narrowphase.exact.exact_workspace import (
     LONGEST,
     direction_at,
     exact_pose,
@@ -27,7 +25,7 @@ from collide.narrowphase.exact.workspace import (
     scratch_at,
     set_point,
 )
-from collide.narrowphase.fine import (
+from collide.narrowphase.gap.precise_pair import (
     FINE,
     HEIGHT_ERROR,
     LARGEST_FINE,
@@ -38,7 +36,9 @@ from collide.narrowphase.fine import (
     fine_point,
     write_low_parts,
 )
-from collide.narrowphase.fine import scale_of as power_of_two
+from collide.narrowphase.gap.precise_pair import scale_of as power_of_two
+from collide.numerics.digits import BITS, add_product, as_double_double, carry, clear
+from collide.numerics.double_double import add, cross, divide, square_root
 
 #: Most vertices of both bodies, and most planes: some ten milliseconds.
 MOST_VERTICES, MOST_PLANES = 64, 60_000

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.digits import BITS, add_double, add_number, add_product, as_double_double, carry, clear
-from collide.geometry.double_double import add, divide, square_root
-from collide.geometry.error_free import two_sum
 from collide.kernels import kernel
-from collide.narrowphase.exact.directions import scaled_by, set_normal
-from collide.narrowphase.exact.workspace import delta_at, direction_at, gram_at, point_at, scratch_at
+from collide.narrowphase.exact.exact_directions import scaled_by, set_normal
+from collide.narrowphase.exact.exact_workspace import delta_at, direction_at, gram_at, point_at, scratch_at
+from collide.numerics.digits import BITS, add_double, add_number, add_product, as_double_double, carry, clear
+from collide.numerics.double_double import add, divide, square_root
+from collide.numerics.error_free import two_sum
 
 
 @kernel

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-from collide.geometry.digits import BITS, add_number, add_product, as_double_double, carry, clear
-from collide.geometry.double_double import divide, square_root
 from collide.kernels import kernel
-from collide.narrowphase.exact.directions import scaled_by, set_normal, side_of
-from collide.narrowphase.exact.supports import support_pair
-from collide.narrowphase.exact.workspace import (
+from collide.narrowphase.exact.exact_directions import scaled_by, set_normal, side_of
+from collide.narrowphase.exact.exact_supports import support_pair
+from collide.narrowphase.exact.exact_workspace import (
     LONGEST,
     direction_at,
     exact_pose,
@@ -19,6 +17,8 @@ from collide.narrowphase.exact.workspace import (
     scratch_at,
     set_point,
 )
+from collide.numerics.digits import BITS, add_number, add_product, as_double_double, carry, clear
+from collide.numerics.double_double import divide, square_root
 
 #: Distances nearer to each other than this part are the same as far as is worked out.
 _SAME = 2.0**-70
@@ -28,7 +28,7 @@ _SAME = 2.0**-70
 def nearest_plane(pair, terms, digits, requests, at, lowest_a, lowest_b, reach_a, reach_b, size, error):
     """(proven, depth, low part) of cores that share a point, to EXACT_ERROR however small it is.
 
-    requests, at : where an entry of `requests.py` begins, or 0.   Other arguments as in `touch_exactly`.
+    requests, at : where an entry of `depth_requests.py` begins, or 0.   Other arguments as in `touch_exactly`.
 
     A plane through the origin that no vertex lies beyond settles it: nothing is less than 0. Otherwise the entry names
     all facets of a closed surface within A ⊖ B that may be nearest; the least of their exact distances is a

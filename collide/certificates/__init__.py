@@ -1,0 +1,1 @@
+"""Certificates: plain data that prove a boolean, made here and checked in Python integers."""

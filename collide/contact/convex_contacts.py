@@ -1,0 +1,262 @@
+"""Contacts of two convex sets: the faces that support the normal of their distance, laid over each other.
+
+The nearest points, or those of the least way out, are one contact. Where both bodies have a face across that normal, or
+nearly, the corners of what these faces overlap in, seen along the normal, are the others.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from collide.batches import ask
+from collide.contact.contact_facets import Pairs, Side, lengths_of, normals_of, turned
+from collide.contact.contact_points import Points, across, points_along
+from collide.contact.contact_rows import GAP, OVERLAP, Finished, no_rows, rows_of, turned_round
+from collide.contact.reduce_manifold import chosen
+from collide.errors import UnsupportedQuery
+from collide.hull.exact_hull import convex_hull
+from collide.lowering.facet_bodies import body_of, hull_of
+from collide.lowering.packed_convex import CONE, CYLINDER, HALFSPACE, POINTS, PackedConvex
+from collide.narrowphase.facets.facet_queries import NearPairs
+from collide.shapes.shape import Shape
+
+#: A face counts as across the normal down to this cosine.
+_ACROSS = 0.7
+#: Heights that differ by less than this share of the size are equal; so are directions.
+_EQUAL = 2.0**-30
+#: Corners of the polygon within a circle of a cylinder's end or a cone's base.
+_ROUND = 8
+_U = 2.0**-53
+_ERRORS = 64.0
+
+
+def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    """Rows for two shapes that are one convex set each, at single poses (4, 4). Raises UnsupportedQuery."""
+    one, other = A.parts()[0][0], B.parts()[0][0]
+    if HALFSPACE in (one.kind, other.kind) and one.kind != other.kind:
+        if one.kind == HALFSPACE:
+            return against_plane(A, B, X_WA, X_WB, margin, most)
+        return turned_round(against_plane(B, A, X_WB, X_WA, margin, most))
+    if other.content < one.content or (other.content == one.content and X_WA[:3].tolist() > X_WB[:3].tolist()):
+        return turned_round(_ordered(B, A, other, one, X_WB, X_WA, margin, most))
+    return _ordered(A, B, one, other, X_WA, X_WB, margin, most)
+
+
+def _ordered(A: Shape, B: Shape, one: PackedConvex, other: PackedConvex, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    row = _answer(A, B, X_WA, X_WB, margin)
+    if row is None:
+        return no_rows()
+    n = row["normal"].copy()
+    error = _error(one, X_WA, other, X_WB)
+    origin = X_WA[:3, 3]
+    radius = one.radius + other.radius
+    a = _support(one, X_WA[:3, :3], np.zeros(3), n, error)
+    b = _support(other, X_WB[:3, :3], X_WB[:3, 3] - origin, -n, error)
+    points = _nearest(row, one, other, n, origin)
+    facets = np.array([[-1, -1]])
+    if len(a[0]) and len(b[0]):
+        pairs = _product(a, b)
+        found = points_along(pairs, n, True, True, error)
+        found = found.take((found.gap - radius <= margin + found.error) & (found.gap - radius >= row["lower"] - _ERRORS * error))
+        points, facets = _joined(points, found, facets, pairs.near.facets[found.pair], error)
+    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
+    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
+    kept = chosen(flat, points.gap, points.error, most, max(_ERRORS * error, _EQUAL * size))
+    points, facets = points.take(kept), facets[kept]
+    distance = points.gap - radius
+    middle = 0.5 * (points.a + points.b) + 0.5 * (one.radius - other.radius) * n + origin
+    half = 0.5 * distance[:, None] * n
+    bound = points.error + 8.0 * error + one.slop + other.slop
+    return rows_of([Finished(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+
+
+def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+    """Rows for a half-space A and anything but one: corners of B within the margin of the plane, or below it."""
+    body = hull_of(body_of(B)) if B.meshed else B
+    packed = body.parts()[0][0]
+    row = _answer(A, body, X_WA, X_WB, margin)
+    if row is None:
+        return no_rows()
+    n = row["normal"].copy()
+    origin = row["point_a"]
+    error = _error(A.parts()[0][0], X_WA, packed, X_WB) + 8.0 * _U * float(np.abs(origin).max())
+    shift = X_WB[:3, 3] - origin
+    facets = np.array([[-1, -1]])
+    points = _nearest(row, A.parts()[0][0], packed, n, origin)
+    if packed.kind == POINTS:
+        corners, numbers = _corners_of(B, packed)
+        low = turned(X_WB[:3, :3], corners) + shift
+    else:
+        found, _ = _support(packed, X_WB[:3, :3], shift, -n, error)
+        low = found.reshape(-1, 3)
+        numbers = np.full(len(low), -1)
+    gap = (low * n).sum(axis=1)
+    near = gap - packed.radius <= margin + 32.0 * error
+    low, gap = low[near], gap[near]
+    slack = float(row["upper"] - row["lower"]) + 32.0 * error
+    more = Points(np.arange(len(gap)), low - gap[:, None] * n, low, gap, np.full(len(gap), slack))
+    points, facets = _joined(points, more, facets, np.stack([np.full(len(gap), -1), numbers[near]], axis=1), error)
+    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
+    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
+    kept = chosen(flat, points.gap, points.error, most, max(_ERRORS * error, _EQUAL * size))
+    points, facets = points.take(kept), facets[kept]
+    distance = points.gap - packed.radius
+    middle = 0.5 * (points.a + points.b) - 0.5 * packed.radius * n + origin
+    half = 0.5 * distance[:, None] * n
+    bound = points.error + 8.0 * error + packed.slop
+    return rows_of([Finished(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+
+
+def _joined(nearest: Points, more: Points, facets: np.ndarray, others: np.ndarray, error: float) -> tuple[Points, np.ndarray]:
+    """The corners of faces; and the nearest points, with their facets, where no corner is as near."""
+    known = nearest.gap[0] + nearest.error[0] + _ERRORS * error
+    if len(more.gap) and (more.gap - more.error).min() <= known:
+        return more, others
+    return Points(*(np.concatenate(both) for both in zip(nearest, more))), np.concatenate([facets, others])
+
+
+def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
+    """The row of `distance`, None where it is proven that they are farther apart than the margin."""
+    row = ask(A, B, X_WA[None], X_WB[None], False, margin, False, 1)[0]
+    if np.isneginf(row["distance"]):
+        raise UnsupportedQuery(
+            f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the way out; "
+            "collide() still answers"
+        )
+    if row["beyond"] or row["lower"] > margin:
+        return None
+    return row
+
+
+def _kind(row) -> int:
+    return OVERLAP if row["hit"] else GAP
+
+
+def _apart(row) -> float:
+    return max(0.0, -float(row["lower"])) if row["hit"] else 0.0
+
+
+def _nearest(row, one: PackedConvex, other: PackedConvex, n, origin) -> Points:
+    """The points of `distance`, moved back to the cores."""
+    gap = np.array([float(row["distance"]) + one.radius + other.radius])
+    a = (row["point_a"] - one.radius * n - origin)[None]
+    bracket = max(row["upper"] - row["distance"], row["distance"] - row["lower"])
+    return Points(np.array([-1]), a, a + gap[:, None] * n, gap, np.array([float(bracket)]))
+
+
+def _error(one: PackedConvex, X_WA, other: PackedConvex, X_WB) -> float:
+    """Bound of the error of a coordinate seen from A's origin."""
+    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in ((one, X_WA), (other, X_WB)))
+    if HALFSPACE in (one.kind, other.kind):
+        reach += sum(abs(float(p.params[3])) / max(1e-300, float(lengths_of(p.params[:3]))) for p in (one, other) if p.kind == HALFSPACE)
+    return 8.0 * _U * reach
+
+
+def _product(a, b) -> Pairs:
+    """Every facet of one with every facet of the other."""
+    (corners_a, ids_a), (corners_b, ids_b) = a, b
+    i, j = np.repeat(np.arange(len(ids_a)), len(ids_b)), np.tile(np.arange(len(ids_b)), len(ids_a))
+    sides = [
+        Side(ids[k], corners[k], normals_of(corners)[k], np.zeros((len(k), 3), dtype=np.int64))
+        for corners, ids, k in ((corners_a, ids_a, i), (corners_b, ids_b, j))
+    ]
+    none = np.zeros(len(i))
+    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), none > 0.0, none, none, np.zeros((len(i), 3)), np.zeros((len(i), 3)))
+    return Pairs(near, *sides)
+
+
+def _support(packed: PackedConvex, R, shift, n, error: float) -> tuple[np.ndarray, np.ndarray]:
+    """(triangles (k, 3, 3), their numbers) of the face across n that supports n, or of an edge as one without area.
+
+    Of curved faces a polygon within them; none where the body has but a point there.
+    """
+    if packed.kind == POINTS:
+        corners, ids = _hull_support(packed, turned(R, packed.points) + shift, n, error)
+    else:
+        local = (R * n[:, None]).sum(axis=0)
+        points = _round_support(packed, local / lengths_of(local))
+        corners = np.array([[points[0], points[k], points[k + 1]] for k in range(1, len(points) - 1)]).reshape(-1, 3, 3)
+        if len(points) == 2:
+            corners = points[[0, 1, 1]][None]
+        corners = turned(R, corners) + shift
+        ids = np.full(len(corners), -1)
+    return corners, ids
+
+
+def _hull_support(packed: PackedConvex, points: np.ndarray, n, error: float) -> tuple[np.ndarray, np.ndarray]:
+    facets = _facets(packed.content, packed)
+    heights = (points * n).sum(axis=1)
+    size = float(np.abs(points - points[0]).max())
+    slack = _ERRORS * error + _EQUAL * size
+    top = heights >= heights.max() - slack
+    corners = points[facets]
+    normals = normals_of(corners)
+    cosines = np.where(top[facets].any(axis=1), (normals * n).sum(axis=1), -1.0)
+    if len(facets) and cosines.max() >= _ACROSS:
+        best = int(np.argmax(cosines))
+        off = np.abs(((corners - corners[best, 0]) * normals[best]).sum(axis=2)).max(axis=1)
+        ids = np.flatnonzero((off <= slack) & ((normals * normals[best]).sum(axis=1) > 0.5))
+        return corners[ids], ids
+    some = points[top]
+    far = some[int(np.argmax(lengths_of(some - some[0])))]
+    if lengths_of(far - some[0]) <= slack:
+        return np.stack([some[0]] * 3)[None], np.array([-1])
+    return np.stack([some[0], far, far])[None], np.array([-1])
+
+
+_kept: dict[bytes, np.ndarray] = {}
+_MOST_KEPT = 512
+
+
+def _facets(content: bytes, packed: PackedConvex) -> np.ndarray:
+    """(f, 3) facets of the hull of the points, of flat ones from both sides; kept for shapes asked about lately."""
+    if content not in _kept:
+        while len(_kept) >= _MOST_KEPT:
+            _kept.pop(next(iter(_kept)), None)
+        _kept[content] = convex_hull(packed.points).facets
+    return _kept[content]
+
+
+def _corners_of(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarray]:
+    """(points, a facet that each belongs to); of meshes those in use."""
+    if shape.meshed:
+        faces = shape.faces  # type: ignore[attr-defined]
+        used, first = np.unique(faces, return_index=True)
+        return shape.vertices[used], first // 3  # type: ignore[attr-defined]
+    facets = _facets(packed.content, packed)
+    if not len(facets):
+        return packed.points, np.full(len(packed.points), -1)
+    used, first = np.unique(facets, return_index=True)
+    return packed.points[used], first // 3
+
+
+def _round_support(packed: PackedConvex, n: np.ndarray) -> np.ndarray:
+    """Points of a curved body's face or line that supports the unit vector n, in its own frame; none of an ellipsoid."""
+    aside = math.hypot(n[0], n[1])
+    x, y = (n[0] / aside, n[1] / aside) if aside > _EQUAL else (1.0, 0.0)
+    radius, half = float(packed.params[0]), float(packed.params[1])
+    if packed.kind == CYLINDER:
+        if abs(n[2]) >= _ACROSS:
+            return _disc(x, y, radius, math.copysign(half, n[2]))
+        return np.array([[x * radius, y * radius, -half], [x * radius, y * radius, half]])
+    if packed.kind == CONE:
+        if -n[2] >= _ACROSS:
+            return _disc(x, y, radius, -half)
+        return np.array([[0.0, 0.0, half], [x * radius, y * radius, -half]])
+    return np.zeros((0, 3))
+
+
+@lru_cache(maxsize=2)
+def _circle(many: int) -> np.ndarray:
+    turn = 2.0 * np.pi * np.arange(many) / many
+    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+def _disc(x: float, y: float, radius: float, z: float) -> np.ndarray:
+    """Corners of a regular polygon within a disc, its first towards (x, y); anticlockwise seen from outside."""
+    c, s = _circle(_ROUND).T
+    points = np.stack([radius * (x * c - y * s), radius * (y * c + x * s), np.full(_ROUND, z)], axis=1)
+    return points if z > 0.0 else points[::-1]

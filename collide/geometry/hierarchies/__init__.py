@@ -1,1 +1,0 @@
-"""Dobkin-Kirkpatrick hierarchies of convex hulls, plain and with bounded degree, and of their polars."""

@@ -1,1 +1,0 @@
-"""Exact convex hulls of points in space: the surface of facets, built once per shape."""

@@ -1,0 +1,181 @@
+"""The walk of Barba and Langerman, and distances along hierarchies, from Python: who plays which part, what stays open.
+
+Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one. Where neither
+has, the default narrowphase answers. What the walk cannot prove clear of rounding it hands over to the default
+narrowphase too, which settles it exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.hierarchies.hierarchy_distance import hierarchy_distance
+from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
+from collide.hierarchies.walk import APART, MEETING, OPEN_MEETING
+from collide.hierarchies.walk_bodies import WalkBody
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.shape_table import ShapeTable, pose_table
+from collide.narrowphase.convex_queries import number_of_poses, settle_proposals
+from collide.results import PAIR_DTYPE
+from collide.shapes.shape import Shape, is_plain
+
+
+class Walks:
+    """Answers of the walk, a row a pose.
+
+    hit : (n,) bool.
+    walked : (n,) bool, whether the walk proved the answer; elsewhere the default narrowphase gave it.
+    rows : (n,) `WALK_DTYPE`: rounds, constant-size tests, small linear programs and their pivots, levels reached, and
+        the plane or the point that proves the answer. Zeros where neither body has an interior.
+    exchanged : A plays R, and B plays P, since B has no interior.
+    depth_p, depth_q : levels of P's hierarchy and of that of Q = ρ0(R); 0 where neither body has an interior.
+    trace : of the last pose, where it was asked for: its rounds one by one.
+    """
+
+    __slots__ = ("_question", "depth_p", "depth_q", "exchanged", "hit", "rows", "trace", "walked")
+
+    def __init__(self, question, hit, rows, exchanged, depths, trace):
+        self._question, self.hit, self.rows, self.exchanged, self.trace = question, hit, rows, exchanged, trace
+        self.walked = rows["said"] >= APART
+        self.depth_p, self.depth_q = depths
+
+    def __len__(self) -> int:
+        return len(self.hit)
+
+    @property
+    def certificate(self):
+        """Of a single pose, plain data that proves the boolean: vertex pairs, as `distance` has them.
+
+        Found from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, found)``
+        checks it against all vertices. The plane or the point in ``rows`` proves the answer too, in doubles.
+        """
+        from collide.certificates.certificates import certificate_from
+
+        if len(self) != 1:
+            raise InvalidArgument(f"a certificate is for one pose, and there are {len(self)}")
+        A, B, X_WA, X_WB = self._question
+        row, hit = self.rows[0], bool(self.hit[0])
+        size_a, size_b = len(walk_body(A).points), len(walk_body(B).points)
+        size_p = size_b if self.exchanged else size_a
+        own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
+        corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
+        pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
+        return certificate_from(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
+
+    def __repr__(self) -> str:
+        return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
+
+
+def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
+    """What the walk keeps of a shape, made once. Raises UnsupportedQuery for all but polytopes."""
+    if not isinstance(shape, Shape):
+        raise InvalidArgument(f'algorithm="{algorithm}" takes two shapes, got {type(shape).__name__}')
+    try:
+        return shape._walk
+    except AttributeError:
+        pass
+    name = type(shape).__name__
+    if not is_plain(shape):
+        raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, no union and no mesh')
+    packed = shape.parts()[0][0]
+    if packed.kind != POINTS or packed.radius != 0.0:
+        raise UnsupportedQuery(
+            f'{name}: algorithm="{algorithm}" takes convex polytopes (ConvexHull without a radius, Box, HPolytope); '
+            "leave the algorithm out"
+        )
+    body = WalkBody(packed.points, getattr(shape, "_hull", None))
+    object.__setattr__(shape, "_walk", body)
+    return body
+
+
+def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open, *, trace: bool = False) -> Walks:
+    """Answers for poses (n, 4, 4) or (1, 4, 4), checked by the caller.
+
+    answer_open : called with the numbers of the poses that the walk leaves open; gives their booleans.
+    """
+    first, second = walk_body(A), walk_body(B)
+    n = number_of_poses(X_WA, X_WB)
+    exchanged = second.polar is None
+    if exchanged and first.polar is None:
+        rows, depths = no_walks(n), (0, 0)
+        rounds: tuple[TracedRound, ...] = ()
+    else:
+        P, R = (B, A) if exchanged else (A, B)
+        X_WP, X_WR = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
+        body_p, body_r = walk_body(P), walk_body(R)
+        rows, rounds = run_walks(
+            body_p, body_r, P.parts()[0][0], R.parts()[0][0], np.broadcast_to(X_WP, (n, 4, 4)),
+            np.broadcast_to(X_WR, (n, 4, 4)), trace=trace,
+        )  # fmt: skip
+        depths = body_p.ladder.depth, body_r.depth_of_polar
+    hit = rows["said"] == MEETING
+    found = Walks((A, B, X_WA, X_WB), hit, rows, exchanged, depths, rounds)
+    if not found.walked.all():
+        left = np.flatnonzero(~found.walked)
+        hit[left] = answer_open(left)
+    return found
+
+
+def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open) -> np.ndarray:
+    """Rows of `PAIR_DTYPE`: gaps found down both hierarchies (Dobkin and Kirkpatrick 1990), settled in integers.
+
+    Arguments as in `walk_poses`; ``answer_open`` gives whole rows, for pairs that overlap and bodies without interior.
+    ``iterations`` counts small problems.
+    """
+    first, second = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
+    n = number_of_poses(X_WA, X_WB)
+    rows = np.zeros(n, dtype=PAIR_DTYPE)
+    found = np.zeros(n, dtype=bool)
+    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+    if first.solid and second.solid:
+        for k in range(n):
+            found[k] = _propose(first, second, X_WA[k], X_WB[k], rows[k : k + 1])
+    if found.any():
+        packed = [shape.parts()[0][0] for shape in (A, B)]
+        poses = pose_table(np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n))
+        chosen = np.flatnonzero(found)
+        proposed = rows[chosen]
+        settle_proposals(
+            ShapeTable(packed), poses, np.repeat(np.arange(2), n), np.stack([chosen, n + chosen], axis=1), proposed
+        )
+        rows[chosen] = proposed
+        found[chosen] = ~proposed["hit"]
+    left = np.flatnonzero(~found)
+    if len(left):
+        rows[left] = answer_open(left)
+    return rows
+
+
+#: Sizes of bodies, and longest ways between them, whose sixth powers doubles hold: the small problems form such products.
+_SMALLEST, _LARGEST = 1e-40, 1e40
+
+
+def _is_ordinary(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray) -> bool:
+    """Whether the descent can work with these sizes; it has no room for overflow, which the default has."""
+    sizes = [np.abs(body.points).max() for body in (first, second)]
+    reach = max(np.abs(X).max() for X in (X_WA, X_WB))
+    return all(_SMALLEST < size < _LARGEST for size in sizes) and bool(reach < _LARGEST)
+
+
+def _propose(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
+    """Enter the nearest vertices of a pair into a row; False where the bodies overlap as far as doubles tell."""
+    if not _is_ordinary(first, second, X_WA, X_WB):
+        return False
+    try:
+        X_AB = np.linalg.inv(X_WA) @ X_WB
+    except np.linalg.LinAlgError:  # unchecked poses may be singular
+        return False
+    nearest = hierarchy_distance(first.packed, second.packed, X_AB[:3, :3], X_AB[:3, 3])
+    used = nearest.vertices[:, 0] >= 0
+    ids = nearest.vertices[used]
+    known = (ids[:, 0] < len(first.points)).all() and (ids[:, 1] < len(second.points)).all()
+    if not 0.0 < nearest.distance < np.inf or not known:
+        return False
+    row["distance"] = nearest.distance
+    for name, point in (("point_a", nearest.point_a), ("point_b", nearest.point_b)):
+        row[name] = X_WA[:3, :3] @ point + X_WA[:3, 3]
+    row["count"] = len(ids)
+    row["vertices_a"][:, : len(ids)], row["vertices_b"][:, : len(ids)] = ids.T
+    row["iterations"] = nearest.counters[2]
+    return True

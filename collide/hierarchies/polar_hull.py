@@ -1,0 +1,268 @@
+"""The polar of a hull about a point inside it, in doubles that are proven to lie inside the true polar.
+
+A facet with normal n through a has the polar point n / (n·(a − o)), a quotient of polynomials of degree 2 and 3. Its
+rounding to doubles could lie outside the polar Q of R − o, and the hull of such points would be the
+polar of a body that R sticks out of. Here each point is drawn towards 0 by as much as rounding can do, about 2⁻⁵¹ of it
+(the bound is at `_polar_points`). So Q' ⊆ Q exactly, and R' = o + ρ0(Q') ⊇ R exactly (Lemma 3.6); no facet of R'
+is further than a few units of the last place of R's size from R.
+
+Barba and Langerman work with real numbers and pass over this. A plane that separates P from R'
+separates it from R. A point of P and R' has yet to be tested against R: that is left to whoever walks.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
+from collide.hierarchies.symbolic_perturbation import exact_side, rank_of
+from collide.hierarchies.true_facets import Cloud, cloud_at, named_in, true_facets
+from collide.hull.exact_hull import Hull, convex_hull
+from collide.kernels import address_of, entry, kernel, view_f64, view_i32
+from collide.numerics.error_free import two_sum
+from collide.numerics.orientation import pair_product, pair_sum
+
+#: The most a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
+_MOST_DRAWN = 2.0**-10
+#: A vertex with more facets than this is polar to a side that is better not left flat: see `_uneven`.
+_MANY, _SPREAD = 64, 8.0
+#: Sizes of a body (largest distance from the origin along an axis) whose polar has ordinary doubles.
+SMALLEST, LARGEST = 1e-60, 1e60
+
+
+class PolarBody(NamedTuple):
+    """Q' = conv(points) inside Q = ρ0(R − origin).
+
+    origin : (3,) float64, strictly inside R; exact.
+    points : (m, 3) float64, 1/length; (v − origin)·q < 1 for every v of R, exactly. One for every true facet of R, or
+        for several whose points coincide as far as doubles tell: see `_clusters`.
+    spans : (m, 3) int32, three vertices of R, counter-clockwise from outside, in the plane of that facet.
+    hierarchy : of Q'; its vertices below m are rows of ``points``.
+    groups : (facets,) int64, for each true facet of R the row of ``points`` that stands for it.
+    """
+
+    origin: np.ndarray
+    points: np.ndarray
+    spans: np.ndarray
+    hierarchy: Hierarchy
+    groups: np.ndarray
+
+
+def polar_of_hull(
+    points: np.ndarray, hull: Hull, degree_bound: int = DEGREE_BOUND, origin: np.ndarray | None = None
+) -> PolarBody:
+    """The polar of the hull of points (n, 3) about ``origin``, or about a point well inside, with its hierarchy.
+
+    Near-linear but for what `build_hierarchy` says. Raises ValueError for a hull without interior, for a needle or a pancake with no double
+    inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60 to 1e60.
+    """
+    if hull.dimension != 3:
+        raise ValueError(f"the polar of a hull of dimension {hull.dimension} is not bounded; it has no interior")
+    cloud = Cloud(points)
+    triangles, _, spans = true_facets(cloud, hull)
+    centre = interior_point(cloud, spans) if origin is None else np.asarray(origin, dtype=np.float64)
+    if origin is not None and not strictly_inside(cloud, spans, centre):
+        raise ValueError(f"the origin {centre.tolist()} does not lie strictly inside the hull")
+    extent = np.nextafter(np.abs(cloud.originals[hull.vertices] - centre).max(axis=0), np.inf)
+    if not SMALLEST <= extent.max() <= LARGEST:
+        raise ValueError(f"a body of size {extent.max():g} has no polar in ordinary doubles; scale it to about 1")
+    polar = _polar_points(cloud, spans, centre, extent, _uneven(triangles, spans))
+    keep, groups = _clusters(polar, extent)
+    polar, spans = np.ascontiguousarray(polar[keep]), np.ascontiguousarray(spans[keep])
+    return PolarBody(centre, polar, spans, build_hierarchy(polar, convex_hull(polar), degree_bound), groups)
+
+
+def _clusters(polar: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(one point of each cluster, ascending; for each point the number of its cluster).
+
+    Facets that rounding split from one flat side have polar points an ulp or so apart. Which of them is highest along
+    a direction is then a matter of rounding, and Lemma 4.2, which looks around one of them only, loses the maximum. Fewer
+    points make Q' smaller and R' larger: by some 3·2⁻³⁰ of its size at most, and 3·2⁻⁴⁰ for bodies that are round.
+    """
+    scaled = polar * extent
+    cell = min(2.0**-40 * float(np.abs(scaled).max()), 2.0**-30)
+    _, first, groups = np.unique(np.rint(scaled / cell), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    number = np.empty(len(first), dtype=np.int64)
+    number[order] = np.arange(len(first))
+    return first[order], number[groups.ravel()]
+
+
+def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
+    """Of some middles of the hull the one farthest from its facets, in doubles; strictly inside, exactly.
+
+    Raises ValueError where none of them is.
+    """
+    used = cloud.originals[named_in(spans, cloud.count)]
+    corners = cloud.originals[spans]
+    middles = [
+        0.5 * used.min(axis=0) + 0.5 * used.max(axis=0), (used / len(used)).sum(axis=0),
+        (corners.sum(axis=1) / 3.0 / len(corners)).sum(axis=0), *_mid_simplices(cloud, used),
+    ]  # fmt: skip
+    order = np.argsort([-_clearance(corners, middle) for middle in middles], kind="stable")
+    for k in order.tolist():
+        if strictly_inside(cloud, spans, middles[k]):
+            return middles[k] + 0.0
+    raise ValueError("no double was found strictly inside the hull: it is thinner than the rounding of its points")
+
+
+def _mid_simplices(cloud: Cloud, used: np.ndarray) -> list[np.ndarray]:
+    """The middle of a few of the extreme points, for hulls most of whose points are crowded together."""
+    extremes = np.concatenate([used[used.argmin(axis=0)], used[used.argmax(axis=0)]])
+    return [extremes.mean(axis=0), used[:: max(1, len(used) // 7)].mean(axis=0)]
+
+
+def _clearance(corners: np.ndarray, middle: np.ndarray) -> float:
+    """Distance from the nearest plane of three corners, relative to the size of the hull; in doubles."""
+    size = np.abs(corners - middle).max()
+    a, b, c = (corners - middle).transpose(1, 0, 2) / size
+    normal = np.cross(b - a, c - a)
+    length = np.sqrt(np.square(normal).sum(axis=1))
+    return float(((a * normal).sum(axis=1) / np.maximum(length, 1e-300)).min())
+
+
+def strictly_inside(cloud: Cloud, spans: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point lies strictly below all facets; exact."""
+    row = cloud.add(point)
+    return not touches_or_sees(*cloud.addresses, address_of(spans), len(spans), row)
+
+
+def _uneven(triangles: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    """(m,) how much further than it must each polar point is drawn inside.
+
+    The facets at a vertex of large degree are polar to the corners of one flat side. Rounding errors would decide
+    how it is triangulated, and errors that change slowly along its border make a fan of it. Points drawn by
+    different amounts, half of them most, a quarter half of that, and so on, leave degrees of the order of a logarithm.
+    """
+    degree = np.bincount(triangles.ravel(), minlength=spans.max() + 1)
+    many = (degree[spans] > _MANY).any(axis=1)
+    levels = np.empty(len(spans), dtype=np.int32)
+    write_levels(address_of(levels), len(levels))
+    return np.where(many, 1.0 + _SPREAD * 2.0**-levels, 1.0)
+
+
+def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray, uneven: np.ndarray) -> np.ndarray:
+    """(m, 3) polar points, drawn inside.
+
+    Let q* be the true point, |v_k − o_k| ≤ V_k for all vertices, and W = Σ V_k |q_k| ≥ 1. What is stored is
+    q_k = q*_k (1 − d) up to 2.5·2⁻⁵³ |q_k| for three roundings, and up to 2⁻⁵⁶ max|q| for the pairs of doubles
+    (else it is taken from fractions). So (v − o)·q ≤ 1 − d + 1.25·2⁻⁵² W + 2⁻⁵⁶ max|q| ΣV, below 1 for
+    d = 2⁻⁵¹ W + 2⁻⁵⁵ max|q| ΣV or more. With W at most 2⁴¹, d is small enough for this to hold to first order.
+    """
+    triples = np.ascontiguousarray(spans, dtype=np.int32)
+    polar = np.empty((len(triples), 3))
+    sure = np.empty(len(triples), dtype=np.int32)
+    centre, reach = np.ascontiguousarray(origin), np.ascontiguousarray(extent)
+    write_polar(
+        address_of(cloud.originals), len(cloud.originals), address_of(triples), len(triples), address_of(centre),
+        address_of(reach), address_of(uneven), address_of(polar), address_of(sure),
+    )  # fmt: skip
+    for k in np.flatnonzero(sure == 0).tolist():
+        polar[k] = _from_fractions(cloud.originals[triples[k]], centre, reach)
+    if not np.isfinite(polar).all():
+        raise ValueError("the hull is so thin, and so oblique, that its polar cannot be rounded into itself")
+    return polar
+
+
+def _from_fractions(corners: np.ndarray, origin: np.ndarray, extent: np.ndarray) -> np.ndarray:
+    """One polar point, exactly, then drawn inside."""
+    a, b, c = ([Fraction(x) - Fraction(o) for x, o in zip(row, origin.tolist())] for row in corners.tolist())
+    u, v = ([x - y for x, y in zip(p, a)] for p in (b, c))
+    n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    d = sum(x * y for x, y in zip(n, a))
+    q = [x / d for x in n]
+    drawn = Fraction(2) ** -50 * sum(Fraction(s) * abs(x) for s, x in zip(extent.tolist(), q))
+    if drawn > _MOST_DRAWN or max(map(abs, q)) > 2**1000:
+        return np.full(3, np.nan)
+    return np.array([float(x * (1 - drawn)) for x in q])
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
+def touches_or_sees(scaled_at, originals_at, rows, work_at, digits_at, spans_at, count, row):
+    """1 where a point is on the plane of some facet or above it."""
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    spans = view_i32(spans_at, 3 * count)
+    for k in range(count):
+        a, b, c = np.int64(spans[3 * k]), np.int64(spans[3 * k + 1]), np.int64(spans[3 * k + 2])
+        if exact_side(cloud, a, b, c, row) >= 0:
+            return 1
+    return 0
+
+
+@entry("void(int64, int64)")
+def write_levels(levels_at, count):
+    levels = view_i32(levels_at, count)
+    for k in range(count):
+        levels[k] = level_of(k)
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_at, polar_at, sure_at):
+    """Polar points in pairs of doubles, drawn inside; ``sure`` is 0 where pairs do not suffice."""
+    points = view_f64(points_at, 3 * rows)
+    spans = view_i32(spans_at, 3 * count)
+    origin = view_f64(origin_at, 3)
+    extent = view_f64(extent_at, 3)
+    spread = view_f64(spread_at, count)
+    polar = view_f64(polar_at, 3 * count)
+    sure = view_i32(sure_at, count)
+    for k in range(count):
+        a, b, c = 3 * np.int64(spans[3 * k]), 3 * np.int64(spans[3 * k + 1]), 3 * np.int64(spans[3 * k + 2])
+        x, x_low, x_size = normal_part(points, a, b, c, 1, 2)
+        y, y_low, y_size = normal_part(points, a, b, c, 2, 0)
+        z, z_low, z_size = normal_part(points, a, b, c, 0, 1)
+        d, d_low, d_size = 0.0, 0.0, 0.0
+        for axis in range(3):
+            n, n_low, n_size = (x, x_low, x_size) if axis == 0 else ((y, y_low, y_size) if axis == 1 else (z, z_low, z_size))
+            w, w_low = two_sum(points[a + axis], -origin[axis])
+            p, p_low = pair_product(n, n_low, w, w_low)
+            d, d_low = pair_sum(d, d_low, p, p_low)
+            d_size += n_size * abs(w)
+        largest = max(abs(x), abs(y), abs(z))
+        # Pairs: an error of 2⁻⁹⁶ times the terms' magnitudes is far more than theirs (see `orientation`).
+        sizes = x_size + y_size + z_size
+        reach = extent[0] + extent[1] + extent[2]
+        sure[k] = 0
+        if d > 0.0 and d_size * 2.0**-36 < d and sizes * 2.0**-36 < largest and d > 1e-250:
+            qx, qy, qz = quotient(x, x_low, d, d_low), quotient(y, y_low, d, d_low), quotient(z, z_low, d, d_low)
+            within = extent[0] * abs(qx) + extent[1] * abs(qy) + extent[2] * abs(qz)
+            drawn = (2.0**-51 * within + 2.0**-55 * (largest / d) * reach) * spread[k]
+            polar[3 * k] = qx * (1.0 - drawn)
+            polar[3 * k + 1] = qy * (1.0 - drawn)
+            polar[3 * k + 2] = qz * (1.0 - drawn)
+            sure[k] = 1 if drawn <= _MOST_DRAWN else 0
+
+
+@kernel
+def level_of(k):
+    """How often a coin that is tossed for k falls on one side, at most 30 times."""
+    mixed = rank_of(k) >> 27
+    level = 0
+    while level < 30 and (mixed >> level) & 1 == 0:
+        level += 1
+    return level
+
+
+@kernel
+def normal_part(points, a, b, c, i, j):
+    """One component of (b − a) × (c − a) as a pair of doubles, and its terms' magnitude."""
+    ui, ui_low = two_sum(points[b + i], -points[a + i])
+    uj, uj_low = two_sum(points[b + j], -points[a + j])
+    vi, vi_low = two_sum(points[c + i], -points[a + i])
+    vj, vj_low = two_sum(points[c + j], -points[a + j])
+    p, p_low = pair_product(ui, ui_low, vj, vj_low)
+    q, q_low = pair_product(uj, uj_low, vi, vi_low)
+    high, low = pair_sum(p, p_low, -q, -q_low)
+    return high, low, abs(p) + abs(q)
+
+
+@kernel
+def quotient(n, n_low, d, d_low):
+    """n / d for pairs of doubles, rounded, to 2⁻⁵³ and a little."""
+    q = n / d
+    product, low = pair_product(q, 0.0, d, d_low)
+    rest, _ = pair_sum(n, n_low, -product, -low)
+    return q + rest / d

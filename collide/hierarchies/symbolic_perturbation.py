@@ -1,0 +1,75 @@
+"""On which side of a plane a vertex lies, with no ties: general position by symbolic perturbation.
+
+Every vertex x is moved by e(x, k)·(centre k − x) for four centres that span space. The e are
+infinitesimals, all larger than any product of two of them (as 1/N^(1 + θ), θ < 1, are for huge N), those of centre
+0 larger than those of centre 1 and so on, and, for one centre, in an order that looks random. A
+determinant that is 0 then has the sign of the first nonzero determinant in which one of its
+points is replaced by a centre: no minor is needed, only the exact test itself.
+
+That decides whenever three of the four points are not in line: they and some centre span space.
+This is Simulation of Simplicity (Edelsbrunner, Mücke 1990) with directions chosen for hulls: centre 0 is in
+the middle, vertices move inwards, and strictly extreme ones stay so. A flat facet becomes the
+triangulation in which the vertex that moves most is cut off first, the next one after it, and so on; in a
+random order that leaves O(log k) triangles at a corner of a facet with k.
+"""
+
+from __future__ import annotations
+
+from collide.kernels import kernel
+from collide.numerics.orientation import one_of_four, orientation
+
+#: Points the perturbation moves vertices towards.
+CENTRES = 4
+
+
+@kernel
+def rank_of(i):
+    """Place of vertex i in the order of the perturbation: the larger, the further it moves. No two are equal."""
+    x = (i * 1103515245 + 12345) & 0x7FFFFFFF
+    x = x ^ (x >> 15)
+    x = (x * 1103515245 + 12345) & 0x7FFFFFFF
+    x = x ^ (x >> 13)
+    return x * 134217728 + i  # below 2⁵⁸ for i < 2²⁷
+
+
+@kernel
+def exact_side(cloud, a, b, c, d):
+    """1 where d lies above the plane of a, b, c (counter-clockwise from above), 0 on it, −1 below; exact."""
+    points, originals, work, digits = cloud
+    return orientation(points, originals, work, digits, a, b, c, d, -1)
+
+
+@kernel
+def side(cloud, centres, a, b, c, d):
+    """`exact_side` of the perturbed points; 0 only where the four are in line or two are the same.
+
+    centres : row of centre 0; the others follow it.
+    """
+    points, originals, work, digits = cloud
+    sign = orientation(points, originals, work, digits, a, b, c, d, -1)
+    if sign != 0:
+        return sign
+    return tie(cloud, centres, a, b, c, d)
+
+
+@kernel
+def tie(cloud, centres, a, b, c, d):
+    """`side` of four points in one plane."""
+    points, originals, work, digits = cloud
+    for centre in range(centres, centres + CENTRES):
+        before = 1 << 60
+        for _ in range(4):
+            most = -1
+            for corner in range(4):
+                rank = rank_of(one_of_four(corner, a, b, c, d))
+                if most < rank < before:
+                    most = rank
+            before = most
+            p = centre if rank_of(a) == most else a
+            q = centre if rank_of(b) == most else b
+            r = centre if rank_of(c) == most else c
+            s = centre if rank_of(d) == most else d
+            sign = orientation(points, originals, work, digits, p, q, r, s, -1)
+            if sign != 0:
+                return sign
+    return 0

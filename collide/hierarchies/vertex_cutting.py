@@ -1,0 +1,301 @@
+"""Vertices of large degree are cut off: section 4's splitting, in doubles, with the new vertices proven inside.
+
+Barba and Langerman put a plane between a vertex w and all others; where it meets the edges of w, new vertices are
+made, and w goes. In doubles no new vertex would lie on its edge. Here it is rounded to a point of a
+tetrahedron w, r, r', s, where r, r' follow each other around w and s is a point proven to lie among w and its
+neighbours. Exact tests decide, so the new vertex is a convex combination of w and its
+neighbours with w in it: that is all that B2 and the walk need.
+
+All new vertices in one plane would leave a facet of many corners, triangulated by rounding errors, and its
+triangulation may again have vertices of large degree. So new vertex j is put a little deeper the less often 2 divides
+j: the lid over them is a shallow dome in which every other vertex is cut off by a triangle, then
+every other one of the rest, and so on. Its degrees grow like 2·log2 of the degree of w.
+
+This surface is proven convex before it stays. Where the faces at w nearly lie in a plane, no rounded vertices
+make it so. Then w is removed, and the new vertices are inserted one by one, as many as are extreme. Where even the
+proof fails, since the edges of w differ too much in length for doubles, w stays, and its degree over the
+bound: it falls as neighbours leave.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.hierarchies.cut_placement import (
+    INSETS,
+    axis_of,
+    difference,
+    find_inner,
+    inset_of,
+    place,
+    prove_new,
+    shortest_part,
+    unit_normal,
+)  # fmt: skip
+from collide.hierarchies.half_edges import (
+    degree_of,
+    drop_star,
+    drop_triangle,
+    fill_hole,
+    following,
+    join,
+    new_triangle,
+    plan_hole,
+    preceding,
+    read_ring,
+)  # fmt: skip
+from collide.hierarchies.independent_sets import STATE, mesh_at
+from collide.hierarchies.symbolic_perturbation import side
+from collide.hierarchies.true_facets import cloud_at
+from collide.hierarchies.vertex_insertion import insert_near
+from collide.kernels import entry, kernel, view_i32, view_i64
+
+#: Integers of workspace for each neighbour of the vertex: ring, outer, fresh, and the most any way of cutting takes.
+SCRATCH = 20
+
+
+@entry(
+    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64,"
+    " int64, int64, int64, int64)"
+)
+def cut(
+    scaled_at, originals_at, rows, work_at, digits_at, exponent, centres, corners_at, twins_at, triangles, leaving_at,
+    seen_at, degree_at, blocked_at, w, first, may_go, scratch_at, state_at,
+):  # fmt: skip
+    """Cut vertex w off; rows first, first + 1, ... are for new vertices, and one more.
+
+    may_go : whether w may go even where no new vertex can take its place.
+
+    Returns how many rows are used, as many as w had neighbours; −1 where w had to stay.
+    """
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows)
+    seen = view_i32(seen_at, triangles)
+    degree = view_i32(degree_at, rows)
+    blocked = view_i32(blocked_at, rows)
+    state = view_i64(state_at, STATE)
+    k = np.int64(degree[w])
+    ring = view_i64(scratch_at, k)
+    outer = view_i64(scratch_at + 8 * k, k)
+    fresh = view_i64(scratch_at + 16 * k, k)
+    workspace = scratch_at + 24 * k
+    read_ring(mesh, w, ring, outer)
+    for j in range(k):
+        fresh[j] = first + j
+    axis = axis_of(cloud, w, ring, k)
+    inner = first + k  # the row of s, behind the new vertices
+    provable = axis[3] > 0.0 and find_inner(cloud, exponent, w, ring, k, inner)
+    done = False
+    for attempt in range(INSETS if provable else 0):
+        if not done and place(cloud, exponent, w, ring, k, fresh, inner, axis, inset_of(attempt)):
+            done = strip_and_lid(cloud, centres, mesh, state, w, ring, outer, fresh, k, workspace)
+    if not done and provable and may_go != 0:
+        done = one_by_one(
+            cloud, exponent, centres, mesh, state, seen, w, ring, outer, fresh, k, inner, axis, workspace
+        )
+    if not done:
+        return -1
+    for j in range(k):
+        blocked[ring[j]] = 1
+        degree[ring[j]] = degree_of(mesh, ring[j])
+        if mesh[2][fresh[j]] >= 0:
+            blocked[fresh[j]] = 1
+            degree[fresh[j]] = degree_of(mesh, fresh[j])
+    degree[w] = 0
+    mesh[2][w] = -1
+    return k
+
+
+@kernel
+def strip_and_lid(cloud, centres, mesh, state, w, ring, outer, fresh, k, workspace):
+    """Put the new vertices in the place of w, as a strip along the ring and a lid; False, and nothing changed, where
+    that is not convex."""
+    left = view_i64(workspace, k)
+    right = view_i64(workspace + 8 * k, k)
+    lid = view_i64(workspace + 16 * k, k)
+    plan = view_i64(workspace + 24 * k, 3 * k)
+    stack = view_i64(workspace + 48 * k, 2 * k)
+    waiting = view_i64(workspace + 64 * k, k)
+    made = view_i64(workspace + 72 * k, 3 * k)
+    if not plan_hole(cloud, centres, fresh, 0, k, plan, stack):
+        return False
+    drop_star(mesh, state, w)
+    put_strip(cloud, centres, mesh, state, ring, outer, fresh, k, left, right, lid)
+    fill_hole(mesh, state, fresh, 0, k, lid, plan, waiting)
+    if convex_at_all(cloud, centres, mesh, outer, fresh, k) and all_extreme(cloud, mesh, fresh, k):
+        return True
+    take_back(mesh, state, w, ring, outer, fresh, k, made)
+    return False
+
+
+@kernel
+def one_by_one(cloud, exponent, centres, mesh, state, seen, w, ring, outer, fresh, k, inner, axis, workspace):
+    """Remove w, then insert the new vertices; those that are not strictly extreme then leave.
+
+    False, and nothing changed, where one of them cannot be proven to be where it must, or the hole cannot be closed.
+    """
+    least = shortest_part(cloud, w, ring, k, axis)
+    for j in range(k):
+        if not prove_new(cloud, exponent, w, ring, k, j, fresh[j], inner, axis, least):
+            return False
+    plan = view_i64(workspace, 3 * k)
+    stack = view_i64(workspace + 24 * k, 2 * k)
+    waiting = view_i64(workspace + 40 * k, k)
+    if not plan_hole(cloud, centres, ring, 0, k, plan, stack):
+        return False
+    drop_star(mesh, state, w)
+    fill_hole(mesh, state, ring, 0, k, outer, plan, waiting)
+    region = view_i64(workspace, 3 * k)
+    rim = view_i64(workspace + 24 * k, 3 * k)
+    waiting = view_i64(workspace + 48 * k, 7 * k)
+    step = coprime_step(k)
+    for turn in range(k):
+        j = (turn * step) % k  # next to none inserted just before: each sees few triangles
+        insert_near(cloud, centres, mesh, state, seen, fresh[j], ring[j], region, rim, waiting)
+    for j in range(k):
+        if mesh[2][fresh[j]] >= 0 and not surely_extreme(cloud, mesh, fresh[j]):
+            close_over(cloud, centres, mesh, state, fresh[j], k, workspace)
+    return True
+
+
+@kernel
+def close_over(cloud, centres, mesh, state, v, k, workspace):
+    """Remove v, which has at most 2 k neighbours."""
+    ring = view_i64(workspace, 2 * k)
+    outer = view_i64(workspace + 16 * k, 2 * k)
+    plan = view_i64(workspace + 32 * k, 6 * k)
+    stack = view_i64(workspace + 80 * k, 4 * k)
+    waiting = view_i64(workspace + 112 * k, 2 * k)
+    many = read_ring(mesh, v, ring, outer)
+    if plan_hole(cloud, centres, ring, 0, many, plan, stack):
+        drop_star(mesh, state, v)
+        fill_hole(mesh, state, ring, 0, many, outer, plan, waiting)
+        mesh[2][v] = -1
+
+
+@kernel
+def coprime_step(k):
+    """A number about 0.618·k without a divisor in common with k."""
+    step = max(1, (k * 618) // 1000)
+    while True:
+        a, b = k, step
+        while b > 0:
+            a, b = b, a % b
+        if a == 1:
+            return step
+        step += 1
+
+
+@kernel
+def put_strip(cloud, centres, mesh, state, ring, outer, fresh, k, left, right, lid):
+    """The quadrilaterals between the ring and the new vertices, two triangles each."""
+    for j in range(k):
+        n = j + 1 if j + 1 < k else 0
+        r0, r1, v0, v1 = ring[j], ring[n], fresh[j], fresh[n]
+        if side(cloud, centres, r0, r1, v0, v1) < 0:
+            h = new_triangle(mesh, state, r0, r1, v0)
+            g = new_triangle(mesh, state, v0, r1, v1)
+            join(mesh, h + 1, g)
+            left[j], right[j], lid[j] = h + 2, g + 1, g + 2
+        else:
+            h = new_triangle(mesh, state, r0, r1, v1)
+            g = new_triangle(mesh, state, r0, v1, v0)
+            join(mesh, h + 2, g)
+            left[j], right[j], lid[j] = g + 2, h + 1, g + 1
+        join(mesh, h, outer[j])
+    for j in range(k):
+        join(mesh, right[j], left[j + 1 if j + 1 < k else 0])
+
+
+@kernel
+def bent_inwards(cloud, centres, mesh, h):
+    """Whether the perturbed surface is strictly convex at half-edge h."""
+    corners, twins, _ = mesh
+    a = np.int64(corners[h])
+    b = np.int64(corners[following(h)])
+    c = np.int64(corners[preceding(h)])
+    d = np.int64(corners[preceding(np.int64(twins[h]))])
+    return side(cloud, centres, a, b, c, d) < 0
+
+
+@kernel
+def convex_at_all(cloud, centres, mesh, outer, fresh, k):
+    """Whether the surface is convex at all edges of the new triangles."""
+    _, twins, leaving = mesh
+    for j in range(k):
+        if not bent_inwards(cloud, centres, mesh, outer[j]):
+            return False
+        first = np.int64(leaving[fresh[j]])
+        h = first
+        while True:
+            if not bent_inwards(cloud, centres, mesh, h):
+                return False
+            h = np.int64(twins[preceding(h)])
+            if h == first:
+                break
+    return True
+
+
+@kernel
+def all_extreme(cloud, mesh, fresh, k):
+    """Whether all new vertices are surely extreme."""
+    for j in range(k):
+        if not surely_extreme(cloud, mesh, fresh[j]):
+            return False
+    return True
+
+
+@kernel
+def surely_extreme(cloud, mesh, v):
+    """Whether doubles show a plane through v with all of its neighbours strictly on one side."""
+    points = cloud[0]
+    corners, twins, leaving = mesh
+    x = y = z = 0.0
+    first = np.int64(leaving[v])
+    h = first
+    while True:
+        nx, ny, nz = unit_normal(points, v, np.int64(corners[following(h)]), np.int64(corners[preceding(h)]))
+        x += nx
+        y += ny
+        z += nz
+        h = np.int64(twins[preceding(h)])
+        if h == first:
+            break
+    while True:
+        dx, dy, dz = difference(points, v, np.int64(corners[following(h)]))
+        # Three products and their sums: a few units of the last place of the terms.
+        margin = 2.0**-48 * (abs(x * dx) + abs(y * dy) + abs(z * dz)) + 2.0**-1000
+        if x * dx + y * dy + z * dz >= -margin:
+            return False
+        h = np.int64(twins[preceding(h)])
+        if h == first:
+            return True
+
+
+@kernel
+def take_back(mesh, state, w, ring, outer, fresh, k, made):
+    """Put the star of w back in place of the new triangles."""
+    corners, twins, leaving = mesh
+    many = 0
+    for j in range(k):
+        v = fresh[j]
+        first = np.int64(leaving[v])
+        h = first
+        while True:
+            # Once each: from the first new vertex among its corners.
+            b, c = corners[following(h)], corners[preceding(h)]
+            if not (fresh[0] <= b < v or fresh[0] <= c < v):
+                made[many] = h // 3
+                many += 1
+            h = np.int64(twins[preceding(h)])
+            if h == first:
+                break
+    for j in range(many):
+        drop_triangle(mesh, state, made[j])
+    for j in range(k):
+        leaving[fresh[j]] = -1
+        h = new_triangle(mesh, state, w, ring[j], ring[j + 1 if j + 1 < k else 0])
+        join(mesh, h + 1, outer[j])
+        made[j] = h
+    for j in range(k):
+        join(mesh, made[j] + 2, made[j + 1 if j + 1 < k else 0])

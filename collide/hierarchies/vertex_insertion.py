@@ -1,0 +1,77 @@
+"""Vertices put into a convex surface one by one, by exact tests alone: what `cutting` falls back on.
+
+The triangles a new point lies above make a connected region; a fan from the point to its rim takes their place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.hierarchies.half_edges import drop_triangle, following, join, new_triangle, preceding
+from collide.hierarchies.symbolic_perturbation import side
+from collide.kernels import kernel
+
+
+@kernel
+def sees(cloud, centres, mesh, t, v):
+    """Whether v lies above triangle t."""
+    corners = mesh[0]
+    a, b, c = np.int64(corners[3 * t]), np.int64(corners[3 * t + 1]), np.int64(corners[3 * t + 2])
+    return side(cloud, centres, a, b, c, v) > 0
+
+
+@kernel
+def insert_near(cloud, centres, mesh, state, seen, v, near, region, rim, stack):
+    """Put v into the surface, found above a triangle at vertex ``near``; False where it is above none of them.
+
+    seen : by triangle, the last vertex found above it.
+    region, rim, stack : room for as many entries as there are half-edges that v can see.
+    Vertices that are no longer on the surface have −1 in ``leaving``.
+    """
+    corners, twins, leaving = mesh
+    first = np.int64(leaving[near])
+    h = first
+    while not sees(cloud, centres, mesh, h // 3, v):
+        h = np.int64(twins[preceding(h)])
+        if h == first:
+            return False
+    found = 1
+    edges = 0
+    region[0] = h // 3
+    seen[h // 3] = v
+    stack[0], stack[1], stack[2] = preceding(h), following(h), h
+    depth = 3
+    # Depth first, edges in their order: the rim comes out in its order, too.
+    while depth > 0:
+        depth -= 1
+        g = np.int64(twins[stack[depth]])
+        t = g // 3
+        if seen[t] == v:
+            continue
+        if sees(cloud, centres, mesh, t, v):
+            seen[t] = v
+            region[found] = t
+            found += 1
+            stack[depth], stack[depth + 1] = preceding(g), following(g)
+            depth += 2
+        else:
+            rim[edges] = g
+            edges += 1
+    for k in range(found):
+        for e in range(3 * region[k], 3 * region[k] + 3):
+            leaving[corners[e]] = -1
+    for k in range(found):
+        drop_triangle(mesh, state, region[k])
+    before = np.int64(-1)
+    start = np.int64(-1)
+    for k in range(edges):
+        g = rim[k]
+        h = new_triangle(mesh, state, np.int64(corners[following(g)]), np.int64(corners[g]), v)
+        join(mesh, h, g)
+        if k == 0:
+            start = h
+        else:
+            join(mesh, before + 1, h + 2)
+        before = h
+    join(mesh, before + 1, start + 2)
+    return True

@@ -1,0 +1,187 @@
+"""What the walk keeps of a polytope, made when a query first needs it: P's hierarchy, and R's polar with its own.
+
+Barba and Langerman, section 5, "Preprocessing". The origin of the polar is a point inside R, chosen in R's own frame,
+so that a motion of R changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from fractions import Fraction
+
+import numpy as np
+
+from collide.hierarchies.flat_hierarchy import flat_hierarchy
+from collide.hierarchies.hierarchy import build_hierarchy
+from collide.hierarchies.hierarchy_distance import PackedHierarchy
+from collide.hierarchies.packed_hierarchy import Ladder
+from collide.hierarchies.polar_hull import polar_of_hull
+from collide.hierarchies.true_facets import Cloud, label_patches, twins_of
+from collide.hull.exact_hull import Hull, convex_hull
+from collide.kernels import address_of
+
+
+class WalkBody:
+    """points : (n, 3) of a polytope, in its own frame.   hull : theirs, where it is known already."""
+
+    def __init__(self, points: np.ndarray, hull: Hull | None = None):
+        self.points = np.ascontiguousarray(points, dtype=np.float64)
+        self._hull = hull
+        self._ladder: Ladder | None = None
+        self._polar: PolarSide | None = None
+        self._packed: PackedHierarchy | None = None
+        self._hopeless = False
+
+    @property
+    def hull(self) -> Hull:
+        if self._hull is None:
+            self._hull = convex_hull(self.points)
+        return self._hull
+
+    @property
+    def solid(self) -> bool:
+        """Whether the body has an interior, and can play R."""
+        return self.hull.dimension == 3
+
+    @property
+    def ladder(self) -> Ladder:
+        """For the part of P."""
+        if self._ladder is None:
+            with _building():
+                if self._ladder is None:
+                    make = build_hierarchy if self.solid else flat_hierarchy
+                    self._ladder = Ladder(make(self.points, self.hull))
+        return self._ladder
+
+    @property
+    def packed(self) -> PackedHierarchy:
+        """The hierarchy as distances go down it; for solids."""
+        if self._packed is None:
+            with _building():
+                if self._packed is None:
+                    self._packed = PackedHierarchy(build_hierarchy(self.points, self.hull))
+        return self._packed
+
+    @property
+    def polar(self) -> PolarSide | None:
+        """For the part of R; None where the body has no interior, or one too thin for a polar in doubles."""
+        if self._polar is None and self.solid and not self._hopeless:
+            with _building():
+                if self._polar is None and not self._hopeless:
+                    try:
+                        self._polar = PolarSide(self.points, self.hull)
+                    except ValueError:
+                        self._hopeless = True
+        return self._polar
+
+    @property
+    def depth_of_polar(self) -> int:
+        """Levels of the hierarchy of the polar; 0 where there is none."""
+        return self.polar.ladder.depth if self.polar is not None else 0
+
+
+class PolarSide:
+    """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
+
+    ladder : of Q = ρ0(R − origin).   origin : (3,), inside R.   radius : of a ball about it that R holds, proven;
+    0 where rounding leaves none, and then nothing is proven by it.   starts, triangles : the facets of R for which
+    vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
+    """
+
+    def __init__(self, points: np.ndarray, hull: Hull):
+        polar = polar_of_hull(points, hull)
+        self.body = polar
+        self.ladder = Ladder(polar.hierarchy)
+        self.origin = np.asarray(polar.origin, dtype=np.float64)
+        facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
+        self.radius = _inner_radius(points, facets, self.origin)
+        patch = polar.groups[_facet_of(points, facets)]
+        order = np.argsort(patch, kind="stable")
+        self.triangles = np.ascontiguousarray(facets[order])
+        self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
+        self._centre = np.array([*self.origin, self.radius])
+        self._ball = np.array(
+            [
+                address_of(self._centre), address_of(self.starts), len(self.starts) - 1, address_of(self.triangles),
+                len(self.triangles),
+            ],
+            dtype=np.int64,
+        )  # fmt: skip
+
+    @property
+    def address(self) -> int:
+        """Of what `walk_proof.py` reads."""
+        return address_of(self._ball)
+
+
+def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """The number of each triangle's true facet, as `PolarBody` counts them."""
+    cloud, twins = Cloud(points), twins_of(facets)
+    patch = np.empty(len(facets), dtype=np.int32)
+    waiting = np.empty(len(facets), dtype=np.int32)
+    label_patches(
+        *cloud.addresses, address_of(facets), address_of(twins), len(facets), address_of(patch), address_of(waiting)
+    )
+    return patch
+
+
+#: Rounding of a distance to a facet's plane, in units of the largest coordinate: some twenty operations, and
+#: a thin triangle's normal is as good as its shortest height is long.
+_ROUNDING = 64 * 2.0**-53
+#: So many facets, those that doubles tell least of, are measured in fractions, some 20 µs each.
+_MOST_EXACT = 20_000
+
+
+def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) -> float:
+    """A lower bound of the distance from the origin to the planes of all facets."""
+    a, b, c = (points[facets[:, k]] - origin for k in range(3))
+    e, f = b - a, c - a
+    normal = np.cross(e, f)
+    length = np.sqrt(np.square(normal).sum(axis=1))
+    volume = (a * normal).sum(axis=1)
+    largest = float(np.abs(points).max() + np.abs(origin).max())
+    # Corners moved by u·largest move the determinant by at most that times the doubled areas around.
+    spans = [np.sqrt(np.square(v).sum(axis=1)) for v in (a, b, c, e, f)]
+    areas = spans[3] * spans[4] + (spans[0] + spans[1] + spans[2]) * (spans[3] + spans[4])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bound = (volume - 4 * _ROUNDING * largest * areas) / (length + _ROUNDING * largest * (spans[3] + spans[4]))
+        loose = ~(bound > 0.99 * volume / length)
+    bound[np.isnan(bound)] = -np.inf
+    least = float(bound[~loose].min(initial=np.inf))
+    order = np.flatnonzero(loose)[np.argsort(bound[loose], kind="stable")]
+    for count, k in enumerate(order.tolist()):
+        if bound[k] >= least or count == _MOST_EXACT:  # the others are farther away, or too many
+            least = min(least, float(bound[k]))
+            break
+        least = min(least, _exact_distance(points[facets[k]], origin))
+    return max(0.0, least * (1 - 1e-12))
+
+
+def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
+    """Distance from the origin to the plane of a facet, from rational numbers, rounded downwards."""
+    a, b, c = ([Fraction(v) - Fraction(o) for v, o in zip(p, origin.tolist())] for p in corners.tolist())
+    e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
+    normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
+    height = sum(x * y for x, y in zip(a, normal))
+    if height <= 0:
+        return 0.0
+    return math.sqrt(float(height * height / sum(x * x for x in normal))) * (1 - 1e-12)
+
+
+_lock = threading.RLock()
+
+
+def _building() -> threading.RLock:  # type: ignore[valid-type]
+    """Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds."""
+    return _lock
+
+
+def _new_lock() -> None:
+    global _lock
+    _lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
+    os.register_at_fork(after_in_child=_new_lock)

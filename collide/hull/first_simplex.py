@@ -1,0 +1,138 @@
+"""Four corners to begin a hull with, and the exact dimension of the cloud.
+
+Each corner is the farthest point from those before it, so that it need not leave the hull again.
+Plain doubles choose; whether the choice spans a line, a plane, space is decided exactly, and where the
+farthest point fails every other one is tried.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import kernel
+from collide.numerics.orientation import orientation
+
+#: Points written behind the cloud: the origin and one on each axis. No plane holds all four.
+APICES = 4
+
+
+@kernel
+def first_simplex(points, originals, work, digits, count, exponent, corners):
+    """The dimension of the cloud; ``corners`` receives as many of its points and one more.
+
+    The fourth corner lies below the plane of the others, seen from where they run counter-clockwise. A
+    flat cloud is given one of the points behind it: its hull is the base of a pyramid. ``exponent`` is
+    what `survey` returned.
+    """
+    first_two(originals, count, corners)
+    if corners[0] == corners[1]:
+        return 0
+    dimension = 1
+    low = 0
+    high = count
+    sign = 0
+    while dimension < 3:
+        best = farthest(points, low, high, corners, dimension)
+        found = -1
+        for t in range(low - 1, high):
+            i = best if t < low else t
+            corners[dimension + 1] = i
+            if dimension == 1:
+                corners[3] = corners[0]
+            # Off a line: in one of three projections, determinants with an axis as their last row.
+            for axis in range(0 if dimension == 1 else -1, 3 if dimension == 1 else 0):
+                sign = orientation(
+                    points, originals, work, digits, corners[0], corners[1], corners[2], corners[3], axis
+                )  # fmt: skip
+                if sign != 0:
+                    found = i
+                    break
+            if found >= 0:
+                break
+        if found < 0 and dimension == 1:
+            return 1
+        if found < 0:
+            write_apices(points, originals, count, exponent)
+            low = count
+            high = count + APICES
+        else:
+            dimension += 1
+    if sign > 0:
+        corners[1], corners[2] = corners[2], corners[1]
+    return 2 if low > 0 else 3
+
+
+@kernel
+def first_two(originals, count, corners):
+    """The first and the last point in the order of their coordinates, that of the widest axis first."""
+    axis = 0
+    widest = -1.0
+    for k in range(3):
+        low = originals[k]
+        high = originals[k]
+        for i in range(1, count):
+            low = min(low, originals[3 * i + k])
+            high = max(high, originals[3 * i + k])
+        wide = 0.5 * high - 0.5 * low
+        if wide > widest:
+            widest = wide
+            axis = k
+    a = 0
+    b = 0
+    for i in range(1, count):
+        if before(originals, i, a, axis):
+            a = i
+        if before(originals, b, i, axis):
+            b = i
+    corners[0] = a
+    corners[1] = b
+
+
+@kernel
+def before(points, a, b, axis):
+    """Whether point a comes before b in the order of their coordinates, that of ``axis`` first."""
+    for k in range(3):
+        x = points[3 * a + (axis + k) % 3]
+        y = points[3 * b + (axis + k) % 3]
+        if x != y:
+            return x < y
+    return False
+
+
+@kernel
+def farthest(points, low, high, corners, dimension):
+    """The point, of those from ``low`` to ``high``, farthest in doubles off the line or plane of the corners."""
+    a, b = corners[0], corners[1]
+    ux = points[3 * b] - points[3 * a]
+    uy = points[3 * b + 1] - points[3 * a + 1]
+    uz = points[3 * b + 2] - points[3 * a + 2]
+    if dimension == 2:  # the normal of the plane, in place of the line's direction
+        c = corners[2]
+        vx = points[3 * c] - points[3 * a]
+        vy = points[3 * c + 1] - points[3 * a + 1]
+        vz = points[3 * c + 2] - points[3 * a + 2]
+        ux, uy, uz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    best = low
+    size = -1.0
+    for i in range(low, high):
+        wx = points[3 * i] - points[3 * a]
+        wy = points[3 * i + 1] - points[3 * a + 1]
+        wz = points[3 * i + 2] - points[3 * a + 2]
+        if dimension == 2:
+            found = abs(ux * wx + uy * wy + uz * wz)
+        else:
+            found = abs(uy * wz - uz * wy) + abs(uz * wx - ux * wz) + abs(ux * wy - uy * wx)
+        if found > size or (found == size and before(points, best, i, 0)):
+            size = found
+            best = i
+    return best
+
+
+@kernel
+def write_apices(points, originals, count, exponent):
+    """The points behind the cloud. Half of the scaled unit is a double in the originals too."""
+    unit = math.ldexp(0.5, exponent)
+    for i in range(APICES):
+        for k in range(3):
+            points[3 * (count + i) + k] = 0.5 if k == i else 0.0
+            originals[3 * (count + i) + k] = unit if k == i else 0.0

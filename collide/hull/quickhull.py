@@ -1,0 +1,435 @@
+"""The hull of a cloud in space by quickhull, with exact tests (Barber, Dobkin, Huhdanpaa 1996).
+
+Every point still outside stands in the list of one facet it lies strictly above. A facet's farthest
+point becomes a corner: the facets it lies strictly above are removed, and a fan from the point to
+their rim is put in their place. Why this is right with exact tests, coplanar points or not:
+
+* the removed region is connected and its rim is a simple cycle. Each edge of the rim belongs to a
+  removed facet, so the new corner is not in line with it: no facet of the fan has zero area;
+* a facet coplanar with the new corner stays. Flat sides stand as triangles and are never made
+  anew as a whole, which is what keeps a side with 32,768 corners cheap;
+* a point q of a removed facet F belongs to a facet of the fan, or is not outside. Go straight to q from
+  inside F, which is inside the new hull, being strictly below the new corner. If q is outside, the
+  way leaves the hull in a point above F, so not in an old facet but in one of the fan, and q lies
+  strictly above that one.
+
+So the points dropped are proven to lie in the hull, and at the end no point lies above any facet.
+Distances in doubles only choose the next corner.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.hull.first_simplex import APICES, before, first_simplex
+from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
+from collide.numerics.orientation import DIGITS, UNDERFLOW, WORK, orientation, survey
+
+#: Integers of a facet: three corners, counter-clockwise from outside; the facet across each edge
+#: (corner k to k + 1); the first point of its list; its neighbours in the queue; the round
+#: in which it was last tested, negative where it was not visible.
+FACET = 10
+_ACROSS, _POINT, _BEFORE, _AFTER, _ROUND = 3, 6, 7, 8, 9
+#: Doubles of a facet: normal, a corner, how far its plane's doubles may be off, its farthest point's distance.
+PLANE = 8
+_ERROR, _FARTHEST = 6, 7
+#: Fans of more facets than this are searched by halving; at least 4, since the first four facets are no fan.
+WIDE_FAN = 48
+#: Tests per point after which corners are no longer chosen by distance. Ordinary clouds need 10 to 50.
+BUDGET = 100
+#: As `orientation`'s, for differences up to 2: 8 u times the terms' magnitudes, doubled, times 2.
+_PLANE_ERROR = 2.0**-48
+
+#: Integers of the state: free facets as a chain, facets ever used, first and last of the queue of
+#: facets with points, the round, tests of a point against a plane, facets made, how far the shuffled order
+#: was followed (−1: not begun), four corners to begin with.
+STATE = 12
+_FREE, _USED, _FIRST, _LAST, _NOW, _TESTS, _MADE, _CURSOR, _CORNERS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+
+
+@kernel
+def make_facet(points, facets, planes, state, a, b, c):
+    """Number of a new facet with no neighbours and no points."""
+    f = state[_FREE]
+    if f >= 0:
+        state[_FREE] = facets[FACET * f + _AFTER]
+    else:
+        f = state[_USED]
+        state[_USED] += 1
+    state[_MADE] += 1
+    at = FACET * f
+    facets[at] = a
+    facets[at + 1] = b
+    facets[at + 2] = c
+    facets[at + _POINT] = -1
+    facets[at + _ROUND] = 0
+    x = points[3 * a]
+    y = points[3 * a + 1]
+    z = points[3 * a + 2]
+    ux = points[3 * b] - x
+    uy = points[3 * b + 1] - y
+    uz = points[3 * b + 2] - z
+    vx = points[3 * c] - x
+    vy = points[3 * c + 1] - y
+    vz = points[3 * c + 2] - z
+    yz = uy * vz
+    zy = uz * vy
+    zx = uz * vx
+    xz = ux * vz
+    xy = ux * vy
+    yx = uy * vx
+    at = PLANE * f
+    planes[at] = yz - zy
+    planes[at + 1] = zx - xz
+    planes[at + 2] = xy - yx
+    planes[at + 3] = x
+    planes[at + 4] = y
+    planes[at + 5] = z
+    size = abs(yz) + abs(zy) + abs(zx) + abs(xz) + abs(xy) + abs(yx)
+    planes[at + _ERROR] = _PLANE_ERROR * size + UNDERFLOW
+    planes[at + _FARTHEST] = -1.0
+    return f
+
+
+@kernel
+def free_facet(facets, state, f):
+    at = FACET * f
+    if facets[at + _POINT] >= 0:
+        left = facets[at + _BEFORE]
+        right = facets[at + _AFTER]
+        if left >= 0:
+            facets[FACET * left + _AFTER] = right
+        else:
+            state[_FIRST] = right
+        if right >= 0:
+            facets[FACET * right + _BEFORE] = left
+        else:
+            state[_LAST] = left
+    facets[at] = -1
+    facets[at + _AFTER] = state[_FREE]
+    state[_FREE] = f
+
+
+@kernel
+def above(points, originals, work, digits, facets, planes, f, i):
+    """(whether point i lies strictly above facet f, its distance in some unit of the facet's)."""
+    at = PLANE * f
+    value = (
+        planes[at] * (points[3 * i] - planes[at + 3])
+        + planes[at + 1] * (points[3 * i + 1] - planes[at + 4])
+        + planes[at + 2] * (points[3 * i + 2] - planes[at + 5])
+    )
+    margin = planes[at + _ERROR]
+    if value > margin:
+        return True, value
+    if value < -margin or abs(value) + margin < work[1]:
+        return False, value
+    at = FACET * f
+    a, b, c = np.int64(facets[at]), np.int64(facets[at + 1]), np.int64(facets[at + 2])
+    return orientation(points, originals, work, digits, a, b, c, i, -1) > 0, value
+
+
+@kernel
+def put(points, facets, planes, following, state, f, i, distance):
+    """Put point i into the list of facet f: at its head if it is the farthest, else behind that."""
+    at = FACET * f
+    head = np.int64(facets[at + _POINT])
+    if head < 0:
+        last = state[_LAST]
+        facets[at + _BEFORE] = last
+        facets[at + _AFTER] = -1
+        if last >= 0:
+            facets[FACET * last + _AFTER] = f
+        else:
+            state[_FIRST] = f
+        state[_LAST] = f
+    # Of points equally far, one that is extreme in another direction: a corner of a flat side, not a point on it.
+    far = planes[PLANE * f + _FARTHEST]
+    if head < 0 or distance > far or (distance == far and before(points, head, i, 0)):
+        following[i] = head
+        facets[at + _POINT] = i
+        planes[PLANE * f + _FARTHEST] = distance
+    else:
+        following[i] = following[head]
+        following[head] = i
+
+
+@kernel
+def distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, many, fan, k):
+    """Put each orphan into the list of a facet of the fan it lies strictly above; the others are in the hull."""
+    t = 0
+    for n in range(many):
+        i = np.int64(orphans[n])
+        owner[i] = -1
+        tries = k
+        if k > WIDE_FAN:
+            t, sure = locate(points, originals, work, digits, facets, state, fan, k, i)
+            if sure:
+                tries = 1
+        for _ in range(tries):
+            state[_TESTS] += 1
+            f = np.int64(fan[t])
+            over, distance = above(points, originals, work, digits, facets, planes, f, i)
+            if over:
+                put(points, facets, planes, following, state, f, i, distance)
+                owner[i] = f
+                break  # the next orphan is tried here first: it stood in the same list
+            t += 1
+            if t == k:
+                t = 0
+
+
+@kernel
+def locate(points, originals, work, digits, facets, state, fan, k, i):
+    """(place in the fan, whether point i is above that facet if it is above any).
+
+    The half-planes from the line through the fan's apex and one corner of its rim to the other corners
+    turn through at most half a circle. A point before the first of them or after the last is above
+    that one's facet. One strictly between them is between two that follow each other, and no other
+    facet bounds the cone of the fan there. One in the plane of the first or the last is tried from
+    another corner; where three do not settle it, nothing is sure.
+    """
+    apex = np.int64(facets[FACET * fan[0] + 2])
+    start = 0
+    low = 0
+    for _ in range(3):
+        first = np.int64(facets[FACET * fan[start]])
+        low = 0
+        high = k
+        place = 1
+        while high - low > 1:
+            state[_TESTS] += 1
+            corner = np.int64(facets[FACET * fan[(start + place) % k]])
+            sign = orientation(points, originals, work, digits, apex, first, corner, i, -1)
+            if sign == 0 and (low == 0 or high == k):
+                break
+            if sign <= 0:
+                low = place
+            else:
+                high = place
+            place = k - 1 if high == k else (low + high) // 2
+        if high - low == 1:
+            return (start + low) % k, True
+        start += k // 3
+    return low, False
+
+
+@kernel
+def visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim):
+    """(facets strictly below point i, edges of their rim), from facet f on, which is one of them.
+
+    rim : each edge as the facet beyond it and the edge's place there.
+    """
+    state[_NOW] += 1
+    now = state[_NOW]
+    region[0] = f
+    facets[FACET * f + _ROUND] = now
+    found = 1
+    edges = 0
+    k = 0
+    while k < found:
+        at = FACET * region[k]
+        k += 1
+        for e in range(3):
+            g = np.int64(facets[at + _ACROSS + e])
+            stamp = facets[FACET * g + _ROUND]
+            if stamp != now and stamp != -now:
+                state[_TESTS] += 1
+                over, _ = above(points, originals, work, digits, facets, planes, g, i)
+                stamp = now if over else -now
+                facets[FACET * g + _ROUND] = stamp
+                if over:
+                    region[found] = g
+                    found += 1
+            if stamp == -now:
+                place = 0
+                while facets[FACET * g + place] != facets[at + (e + 1) % 3]:
+                    place += 1
+                rim[2 * edges] = g
+                rim[2 * edges + 1] = place
+                edges += 1
+    return found, edges
+
+
+@kernel
+def gather(facets, following, region, found, corner, orphans):
+    """All points in the lists of the region's facets but ``corner``; returns how many."""
+    many = 0
+    for k in range(found):
+        i = facets[FACET * region[k] + _POINT]
+        while i >= 0:
+            if i != corner:
+                orphans[many] = i
+                many += 1
+            i = following[i]
+    return many
+
+
+@kernel
+def shuffle(order, count):
+    """All points in an order that has nothing to do with the cloud (Fisher and Yates; a congruential generator)."""
+    for i in range(count):
+        order[i] = i
+    mixed = 1
+    for i in range(count - 1, 0, -1):
+        mixed = (mixed * 1103515245 + 12345) & 0x7FFFFFFF
+        j = ((mixed >> 3) * (i + 1)) >> 28
+        order[i], order[j] = order[j], order[i]
+
+
+@kernel
+def next_corner(facets, order, owner, state, count):
+    """(facet, point above it) to go on with; facet −1 where no point is left.
+
+    The farthest point of the facet that waits longest. Crowded clouds can make that the wrong
+    choice again and again; once too many tests were spent, points are taken in a shuffled order, for
+    which the expected number of facets made is below 6 per corner whatever the cloud.
+    """
+    if state[_TESTS] <= BUDGET * count:
+        f = state[_FIRST]
+        return f, np.int64(facets[FACET * f + _POINT]) if f >= 0 else -1
+    if state[_CURSOR] < 0:
+        shuffle(order, count)
+        state[_CURSOR] = 0
+    while state[_CURSOR] < count:
+        i = np.int64(order[state[_CURSOR]])
+        state[_CURSOR] += 1
+        if owner[i] >= 0:
+            return np.int64(owner[i]), i
+    return -1, -1
+
+
+@kernel
+def build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
+    """Facets from every edge of the rim to point i, in its order; False where it is no simple cycle."""
+    for k in range(edges):
+        g = rim[2 * k]
+        place = rim[2 * k + 1]
+        a = np.int64(facets[FACET * g + (place + 1) % 3])
+        b = np.int64(facets[FACET * g + place])
+        f = make_facet(points, facets, planes, state, a, b, i)
+        facets[FACET * f + _ACROSS] = g
+        facets[FACET * g + _ACROSS + place] = f
+        fan[k] = f
+        starting[a] = f
+    for k in range(edges):
+        f = fan[k]
+        g = starting[facets[FACET * f + 1]]
+        if g < 0:
+            return False
+        facets[FACET * f + _ACROSS + 1] = g
+        facets[FACET * g + _ACROSS + 2] = f
+    for k in range(edges):
+        a = facets[FACET * fan[k]]
+        if starting[a] != fan[k]:
+            return False
+        starting[a] = -1
+    for k in range(1, edges):
+        fan[k] = facets[FACET * fan[k - 1] + _ACROSS + 1]
+    return True
+
+
+@kernel
+def first_facets(points, facets, planes, state, corners, fan):
+    a, b, c, d = corners[0], corners[1], corners[2], corners[3]
+    fan[0] = make_facet(points, facets, planes, state, a, b, c)
+    fan[1] = make_facet(points, facets, planes, state, a, d, b)
+    fan[2] = make_facet(points, facets, planes, state, b, d, c)
+    fan[3] = make_facet(points, facets, planes, state, c, d, a)
+    for k in range(3):
+        facets[_ACROSS + k] = k + 1
+        at = FACET * (k + 1) + _ACROSS
+        facets[at] = (k + 2) % 3 + 1
+        facets[at + 1] = (k + 1) % 3 + 1
+        facets[at + 2] = 0
+
+
+@kernel
+def write_surface(facets, state, count, marks, surface):
+    """The facets of points of the cloud, and their corners marked; their number."""
+    many = 0
+    for f in range(state[_USED]):
+        at = FACET * f
+        if facets[at] < 0 or max(facets[at], facets[at + 1], facets[at + 2]) >= count:
+            continue
+        for k in range(3):
+            surface[3 * many + k] = facets[at + k]
+            marks[facets[at + k]] = 1
+        many += 1
+    return many
+
+
+@entry(f"int64({', '.join(['int64'] * 17)})")
+def quickhull(
+    count, originals_at, points_at, work_at, digits_at, facets_at, planes_at, following_at, orphans_at, starting_at,
+    owner_at, order_at, region_at, rim_at, fan_at, surface_at, state_at,
+):  # fmt: skip
+    """The dimension of a cloud; its facets are left in ``surface``, their number in state[0], corners marked.
+
+    All buffers hold APICES points more than the cloud has. ``starting`` receives the marks: 1 for points
+    that are corners of the hull, else 0; of a segment or a point too. −1: the rim of a region was no
+    simple cycle, which exact tests exclude.
+    """
+    room = count + APICES
+    points = view_f64(points_at, 3 * room)
+    originals = view_f64(originals_at, 3 * room)
+    work = view_f64(work_at, WORK)
+    digits = view_i64(digits_at, DIGITS)
+    facets = view_i32(facets_at, 2 * FACET * room)
+    planes = view_f64(planes_at, 2 * PLANE * room)
+    following = view_i32(following_at, room)
+    orphans = view_i32(orphans_at, room)
+    starting = view_i32(starting_at, room)
+    owner = view_i32(owner_at, room)
+    order = view_i32(order_at, room)
+    region = view_i32(region_at, 2 * room)
+    rim = view_i32(rim_at, 2 * room)
+    fan = view_i32(fan_at, room)
+    surface = view_i32(surface_at, 6 * room)
+    state = view_i64(state_at, STATE)
+    corners = view_i64(state_at + 8 * _CORNERS, 4)
+
+    exponent = survey(originals, points, count, work)
+    dimension = first_simplex(points, originals, work, digits, count, exponent, corners)
+    for k in range(room):
+        starting[k] = 0
+    if dimension < 2:
+        starting[corners[0]] = 1
+        starting[corners[1]] = 1
+        state[0] = 0
+        return dimension
+    many = 0
+    for i in range(count):
+        starting[i] = -1
+        owner[i] = -1
+        if i != corners[0] and i != corners[1] and i != corners[2] and i != corners[3]:
+            orphans[many] = i
+            many += 1
+    for k in range(count, room):
+        starting[k] = -1
+    state[_FREE] = -1
+    state[_USED] = 0
+    state[_FIRST] = -1
+    state[_LAST] = -1
+    state[_NOW] = 0
+    state[_CURSOR] = -1
+    state[_TESTS] = 0
+    state[_MADE] = 0
+    first_facets(points, facets, planes, state, corners, fan)
+    edges = 4
+    while True:
+        distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, many, fan, edges)
+        f, i = next_corner(facets, order, owner, state, count)
+        if f < 0:
+            break
+        found, edges = visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim)
+        many = gather(facets, following, region, found, i, orphans)
+        owner[i] = -1
+        for k in range(found):
+            free_facet(facets, state, np.int64(region[k]))
+        if not build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
+            return -1
+    for k in range(room):
+        starting[k] = 0
+    state[0] = write_surface(facets, state, count, starting, surface)
+    return dimension

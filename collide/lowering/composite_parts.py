@@ -1,0 +1,157 @@
+"""The parts of a union that meshes are asked about: single bodies and where they stand, to any nesting."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.packed_convex import HALFSPACE, PackedConvex
+from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
+from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.facets.facet_convex import Posed
+from collide.shapes.compound import Compound
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import IDENTITY, Shape
+from collide.support.extents import extent_of
+
+#: Outside half-spaces: a rounded turn moves what is far away by more.
+_UP = 1 + 2.0**-40
+
+
+class Part(NamedTuple):
+    """One body of a union.
+
+    shape : a mesh, or a convex shape.   X : (4, 4) its pose in the union's frame.
+    turn, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides [m]:
+        a pose within a pose is their exact product, rounded once.
+    """
+
+    shape: Shape
+    X: np.ndarray
+    turn: float
+    shift: float
+
+    def at(self, X_WB: np.ndarray, about: np.ndarray) -> Posed:
+        """Its poses in the world, for poses (n, 4, 4) of the union.
+
+        about : (n,) how far from it half-spaces are looked at [m].
+        """
+        bound = self.bound
+        reach = np.full(len(X_WB), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
+        X, slop = moved_pose(X_WB, self.X, reach)
+        stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
+        return Posed(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
+
+    @property
+    def bound(self) -> PackedConvex:
+        """A convex set that holds it, in its own frame."""
+        return self.shape.bounding_parts()[0][0]
+
+
+class UnionParts:
+    """A shape as a union: of one part, where it is none.
+
+    parts : single bodies in the order of the items.   convex : those that are no meshes as one shape, None where there
+    are none; ``numbers`` of them among the parts.
+    """
+
+    def __init__(self, shape: Shape):
+        self.shape = shape
+        self.parts = [Part(s, *_rounded(X)) for s, X in _leaves(shape, None)]
+        self.numbers = np.array([k for k, part in enumerate(self.parts) if not part.shape.meshed], dtype=np.int64)
+        self.convex = _convex_part(shape)
+        bounds = shape.bounding_parts()
+        self._bounds, self._X_BP = [packed for packed, _ in bounds], np.array([X for _, X in bounds])
+
+    @cached_property
+    def key(self) -> bytes:
+        """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
+        digest = hashlib.blake2b(type(self.shape).__name__.encode(), digest_size=16)
+        for part in self.parts:
+            shape = part.shape
+            if isinstance(shape, Mesh):
+                digest.update((shape.vertices + 0.0).tobytes() + shape.faces.tobytes() + bytes([shape.solid]))
+            else:
+                digest.update(part.bound.content)
+            digest.update((part.X + 0.0).tobytes())
+        return digest.digest()
+
+    @property
+    def endless(self) -> bool:
+        """Whether a half-space is among the parts."""
+        return any(packed.kind == HALFSPACE for packed in self._bounds)
+
+    def boxes(self, X_WB: np.ndarray) -> np.ndarray:
+        """(n, parts, 6) world boxes of the parts at n poses, low then high, rounded outwards."""
+        n, k = len(X_WB), len(self._bounds)
+        X_BP = np.tile(self._X_BP, (n, 1, 1))
+        reach = np.tile([packed.reach for packed in self._bounds], n)
+        poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach)
+        return boxes_of(ShapeTable(self._bounds), poses.rows, np.tile(np.arange(k), n)).reshape(n, k, 6)
+
+    def extent(self, X_WB: np.ndarray, n: np.ndarray) -> tuple[float, float]:
+        """(what no product of its points with the unit vector n exceeds, error of that), at a pose (4, 4)."""
+        value, size, slop = -math.inf, 0.0, 0.0
+        for part in self.parts:
+            posed = part.at(X_WB[None], np.zeros(1))
+            X, packed = posed.X[0], part.bound
+            own = extent_of(packed, X, n)
+            value, slop = max(value, own), max(slop, float(posed.slop[0]) + packed.slop)
+            size = max(size, 2 * packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()))
+        return value, ERROR * size + slop
+
+
+def is_union(shape: Shape) -> bool:
+    """Whether a shape is a `Compound`."""
+    return isinstance(shape, Compound)
+
+
+def union_of(shape: Shape) -> UnionParts:
+    """The parts of a shape, kept with it."""
+    try:
+        return shape._union
+    except AttributeError:
+        shape._store(_union=UnionParts(shape))
+        return shape._union
+
+
+def _leaves(shape: Shape, X: list[list[Fraction]] | None):
+    """Yields (single body, its exact pose in the outermost frame, rows of four)."""
+    if not isinstance(shape, Compound):
+        yield shape, X
+        return
+    for item, X_CS in shape.items:
+        own = [[Fraction(v) for v in row] for row in X_CS.tolist()]
+        yield from _leaves(item, own if X is None else _times(X, own))
+
+
+def _times(X: list[list[Fraction]], Y: list[list[Fraction]]) -> list[list[Fraction]]:
+    return [[sum((X[i][k] * Y[k][j] for k in range(4)), Fraction(0)) for j in range(4)] for i in range(4)]
+
+
+def _rounded(X: list[list[Fraction]] | None) -> tuple[np.ndarray, float, float]:
+    """(pose rounded once, what that turns a metre by, what it shifts), the last two rounded upwards."""
+    if X is None:
+        return IDENTITY, 0.0, 0.0
+    rounded = np.array([[float(v) for v in row] for row in X])
+    lost = [[abs(v - Fraction(float(v))) for v in row[:4]] for row in X]
+    turn = sum((v for row in lost for v in row[:3]), Fraction(0))
+    shift = sum((row[3] for row in lost), Fraction(0))
+    return rounded, float(turn) * _UP, float(shift) * _UP
+
+
+def _convex_part(shape: Shape) -> Shape | None:
+    """What is left of a shape without its meshes, in the same nesting."""
+    if not shape.meshed:
+        return shape
+    if not isinstance(shape, Compound):
+        return None
+    kept = [(_convex_part(item), X) for item, X in shape.items]
+    kept = [(item, X) for item, X in kept if item is not None]
+    return Compound(kept) if kept else None

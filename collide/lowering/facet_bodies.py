@@ -1,0 +1,152 @@
+"""Shapes as meshes meet them: facets under a box-tree, a ball swept over them, and whether there is an inside.
+
+A convex polytope is the surface of its hull and what is inside; a sphere is one facet without area and a radius, a
+capsule a segment and one. A cylinder, cone or ellipsoid has no facets: see `enclosures.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from collide import argument_checks as reading
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.hull.exact_hull import convex_hull
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.mesh.build_bvh import build_mesh_tree
+from collide.mesh.bvh import REACH, MeshTree
+from collide.shapes.compound import Compound
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import Shape, is_plain
+
+#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
+_FAR = 1e20
+
+
+class Body(NamedTuple):
+    """A set in its own frame: facets, the points they enclose where it is solid, and a ball swept over all.
+
+    tree : the facets.   points : (k, 3), one of every part that hangs together.
+    centre, reach : of a ball that holds the facets, the reach rounded upwards [m].
+    hull : the least convex shape that holds the set, once it has been asked for (`hull_of`); empty before.
+    """
+
+    shape: Shape
+    tree: MeshTree
+    solid: bool
+    radius: float
+    points: np.ndarray
+    centre: np.ndarray
+    reach: float
+    hull: list[Shape]
+
+    @property
+    def key(self) -> tuple:
+        """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
+        return self.tree.content, self.radius, self.solid
+
+
+def is_halfspace(shape: Shape) -> bool:
+    """Half-spaces have no facets: the hull of a mesh answers for it."""
+    return not shape.meshed and is_plain(shape) and shape.parts()[0][0].kind == HALFSPACE
+
+
+def has_facets(shape: Shape) -> bool:
+    """Whether a mesh, or a convex set whose surface is that of a hull of doubles, and a radius: `body_of` serves it."""
+    if isinstance(shape, Mesh):
+        return True
+    packed = shape.parts()[0][0]
+    return packed.kind == POINTS and packed.slop == 0.0
+
+
+def body_of(shape: Shape) -> Body:
+    """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with it."""
+    try:
+        return shape._surface
+    except AttributeError:
+        body = _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
+        shape._store(_surface=body)
+        return body
+
+
+def facet_body(shape, caller: str) -> Body:
+    """The body of a shape that is facets and no more, for a question about facets.
+
+    Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
+    """
+    if not isinstance(shape, Shape):
+        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
+    name = type(shape).__name__
+    if is_halfspace(shape):
+        raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
+    if isinstance(shape, Compound):
+        raise UnsupportedQuery(f"{caller}: {name} is a union; ask for each of its items")
+    if not has_facets(shape):
+        raise UnsupportedQuery(
+            f"{caller}: {name} has no facets of doubles: its surface is curved, or its corners are rounded; "
+            "a ConvexHull around it, or a Mesh, can stand in"
+        )
+    body = body_of(shape)
+    if body.radius > 0.0:
+        raise UnsupportedQuery(f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in")
+    return body
+
+
+def hull_of(body: Body) -> Shape:
+    """The hull of a mesh, without points inside; a convex shape itself."""
+    if not body.hull:
+        body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
+    return body.hull[0]
+
+
+def farthest_told(A: Body, B: Body) -> float:
+    """The largest gap [m] that box-trees tell: their boxes are floats, in units of the smaller body's size."""
+    return _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
+
+
+def reach_of(body: Body) -> float:
+    """How far the body reaches from its frame's origin [m]: never less than any of its points."""
+    x, y, z = body.tree.numbers[REACH : REACH + 3].tolist()
+    return math.sqrt(x * x + y * y + z * z) + body.radius
+
+
+def _of_mesh(mesh: Mesh) -> Body:
+    return made_body(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)], [])
+
+
+def _one_of_each_part(mesh: Mesh) -> np.ndarray:
+    """Vertex ids: one of every shell, and those of collapsed facets that no other facet uses."""
+    survey = mesh.survey
+    shells, corners = survey.shells, survey.corners
+    first = np.unique(shells, return_index=True)
+    ids = corners[first[1][first[0] >= 0], 0]
+    collapsed = shells < 0
+    if collapsed.any():
+        lonely = np.setdiff1d(corners[collapsed], corners[~collapsed])
+        ids = np.concatenate([ids, lonely])
+    return ids
+
+
+def _of_convex(shape: Shape) -> Body:
+    packed = shape.parts()[0][0]
+    hull = convex_hull(packed.points)
+    tree = build_mesh_tree(packed.points, _facets(packed.points, hull))
+    return made_body(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])
+
+
+def _facets(points: np.ndarray, hull) -> np.ndarray:
+    if hull.dimension == 3:
+        return hull.facets
+    if hull.dimension == 2:
+        return hull.facets[: len(hull.facets) // 2]
+    order = hull.vertices[np.lexsort(points[hull.vertices].T)]  # along a line its ends come first and last
+    return np.array([[order[0], order[-1], order[-1]]])
+
+
+def made_body(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray, hull: list[Shape]) -> Body:
+    """A body over the facets of a tree; parameters as of `Body`."""
+    corners = tree.triangles.reshape(-1, 3)
+    reach = float(np.sqrt(np.square(corners - tree.centre).sum(axis=1).max())) * (1 + 1e-12)
+    return Body(shape, tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach, hull)

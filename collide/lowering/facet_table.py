@@ -1,0 +1,54 @@
+"""Triangles as convex sets, written straight into the tables that kernels read: no Python object each.
+
+The triangles stand first, the convex set that they are asked about behind them, also in rank: swapped questions are
+worked out on the same numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.packed_convex import BLOCK, POINTS, PackedConvex, pack_points
+from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH
+
+#: Exponent of the lowest bit of coordinates that are all 0, as in `packing.lowest_exponent`.
+_NO_BITS = 2000
+_FACET = pack_points(np.zeros((1, 3)))
+
+
+class FacetTable:
+    """Triangles (k, 3, 3) and behind them one convex set, as `ShapeTable` lays shapes out."""
+
+    def __init__(self, corners: np.ndarray, packed: PackedConvex):
+        k = len(corners)
+        self.coordinates = np.empty((k, 3, BLOCK))
+        self.coordinates[:, :, :3] = corners.transpose(0, 2, 1)
+        self.coordinates[:, :, 3:] = corners[:, 0, :, None]
+        self.ints = np.zeros((k + 1, INTS), dtype=np.int64)
+        self.numbers = np.zeros((k + 1, NUMBERS))
+        first = address_of(self.coordinates)
+        self.ints[:k] = POINTS, 3, BLOCK, 0, 0, 0, 0, 0
+        self.ints[:k, ADDRESS] = first + self.coordinates.strides[0] * np.arange(k)
+        self.ints[:k, LOWEST] = _lowest_exponents(corners.reshape(k, 9))
+        self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
+        coarse = packed.coarse.address if packed.coarse is not None else 0
+        self.ints[k] = (
+            packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest, 1,
+            0, coarse,
+        )  # fmt: skip
+        self.numbers[k, :PARAMS] = packed.radius, packed.reach, packed.slop
+        self.numbers[k, PARAMS:] = packed.params
+        self.packed = [_FACET] * k + [packed]
+        self.addresses = address_of(self.ints), address_of(self.numbers)
+
+    def plant(self, rows: np.ndarray) -> None:
+        """Shapes asked about here are scanned: none is large enough for a support tree."""
+
+
+def _lowest_exponents(values: np.ndarray) -> np.ndarray:
+    """(k,) `packing.lowest_exponent` of rows (k, 9)."""
+    fraction, exponent = np.frexp(values)
+    mantissa = (fraction * 2.0**53).astype(np.int64)
+    lowest = exponent - 53 + np.frexp((mantissa & -mantissa).astype(float))[1] - 1
+    return np.where(values != 0.0, lowest, _NO_BITS).min(axis=1)

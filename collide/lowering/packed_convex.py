@@ -1,0 +1,143 @@
+"""A convex set as the kernels read it: a kind, a few numbers, a block of coordinates.
+
+Every convex shape is a core (points, or one of three curved sets) swept by a ball, or a
+half-space. Spheres are one point, capsules two, boxes eight: one kernel answers them all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+#: Kinds of core. POINTS is the hull of points; the others are the sets of their names.
+POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
+
+#: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
+BLOCK = 8
+
+#: So many points have a coarse look: twice as many as then stand for them.
+_FEWEST_COARSE = 64
+
+
+class CoarsePoints:
+    """The few of a cloud (n, 3) that stand for all of it: `coarse_points.py`.
+
+    A kernel chooses them: imported when first asked for, since `verify` packs shapes and needs no kernel.
+    """
+
+    def __init__(self, points: np.ndarray):
+        self._points = points
+        self._blocks: list[np.ndarray] = []  # of two threads that ask at once both may make one: the first counts
+
+    @property
+    def address(self) -> int:
+        """Of 4·COARSE doubles: x, y, z of each, and their ids as int64 bits."""
+        from collide.kernels import address_of
+        from collide.support.coarse_points import COARSE, choose_coarse
+
+        if not self._blocks:
+            block, points = on_cache_lines(4 * COARSE), np.ascontiguousarray(self._points)
+            choose_coarse(address_of(points), len(points), address_of(block))
+            self._blocks.append(_frozen(block))
+        return address_of(self._blocks[0])
+
+
+class PackedConvex(NamedTuple):
+    """One convex set, in its own frame.
+
+    kind : POINTS, CYLINDER, CONE, ELLIPSOID or HALFSPACE.
+    radius : of the ball swept over the core, in the world [m].
+    reach : proven upper bound of the distance of a core point from the frame's origin [m].
+    slop : proven upper bound of the distance between the set described and the set stored [m];
+        0 where the numbers given are stored as they are.
+    params : (4,) cylinder, cone: radius and half length; ellipsoid: three radii; half-space:
+        normal and offset; unused entries are 0.
+    points : (n, 3) core points for POINTS; their number is what ids in results refer to.
+    coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
+        filled up with copies of the first point.
+    coarse : a few of many points that span most of their hull, chosen when their address is first asked for; None for few
+        points.
+    tree : the points' support tree, made when its address is first asked for; None for few points.
+    lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
+        integers times 2 to it.
+    content : digest of the numbers above; equal for equal sets, in every process. It orders the
+        bodies of a pair, so that swapped questions are worked out on the same numbers.
+    """
+
+    kind: int
+    radius: float
+    reach: float
+    slop: float
+    params: np.ndarray
+    points: np.ndarray
+    coordinates: np.ndarray
+    tree: Any
+    coarse: CoarsePoints | None
+    lowest: int
+    content: bytes
+
+
+def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, tree: Any = None) -> PackedConvex:
+    """The hull of ``points`` (n, 3), swept by a ball of ``radius``.
+
+    tree : something with the ``address`` of the points' support tree (`support_tree.planted`).
+    """
+    n = len(points)
+    columns = on_cache_lines(3, -(-n // BLOCK) * BLOCK)
+    columns[:, :n] = points.T
+    columns[:, n:] = points[0][:, None]
+    # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
+    coarse = CoarsePoints(points) if n >= _FEWEST_COARSE else None
+    reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree, coarse)
+
+
+def pack_curved(kind: int, params, reach: float) -> PackedConvex:
+    """A cylinder, cone or ellipsoid by its numbers."""
+    return _packed(kind, 0.0, float(reach) * (1 + 1e-15), 0.0, params, *_NO_POINTS)
+
+
+def pack_halfspace(normal, offset: float) -> PackedConvex:
+    """{x : normal·x ≤ offset}; the normal keeps the length it was given."""
+    return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
+
+
+def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None, coarse=None) -> PackedConvex:
+    row = np.zeros(4)
+    row[: len(params)] = params
+    digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
+    digest.update((points + 0.0).tobytes())
+    lowest = lowest_exponent(points)
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, coarse, lowest, digest.digest())
+
+
+def on_cache_lines(*shape: int) -> np.ndarray:
+    """An empty array of doubles that begins where a cache line does.
+
+    A block of eight is then read from one line. Where two are touched, as numpy's own arrays mostly have it, a scan of 128
+    points takes a quarter longer.
+    """
+    size = math.prod(shape)
+    room = np.empty(size + BLOCK - 1)
+    first = -(room.ctypes.data // room.itemsize) % BLOCK
+    return room[first : first + size].reshape(shape)
+
+
+def lowest_exponent(values: np.ndarray) -> int:
+    """Exponent of the lowest set bit among doubles; 2000 where all are 0."""
+    fraction, exponent = np.frexp(values[values != 0.0])
+    if not len(fraction):
+        return 2000
+    mantissa = (fraction * 2.0**53).astype(np.int64)
+    return int((exponent - 53 + np.frexp((mantissa & -mantissa).astype(float))[1] - 1).min())
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
+
+
+_NO_POINTS = (_frozen(np.zeros((0, 3))), _frozen(np.zeros((3, 0))))

@@ -1,0 +1,215 @@
+"""Layout of the flat tables that kernels read: one row a shape, one row a posed part.
+
+Rows are flat because nine arrays cost 500 ns a call in Python and four addresses cost 170.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.packed_convex import PackedConvex
+
+# One row of integers a shape.
+KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)
+INTS = 8
+# One row of doubles a shape; PARAMS is the first of four.
+RADIUS, REACH, SLOP, PARAMS = range(4)
+NUMBERS = 7
+# One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), the row of the exact terms where R and
+# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel asks.
+POSE = 15
+POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
+#: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
+TERMS = 7
+#: A row of them: the terms of the 12 entries, then what each entry is more than the row of the pose says (12).
+LOW_PARTS = 12 * TERMS
+TERM_ROW = LOW_PARTS + 12
+
+#: Rounding of a part's world pose when it is a product of two: at most 4u of its terms an entry, so
+#: 4√3u·reach for the rotation and as much for the shift; doubled.
+PRODUCT_SLOP = 16 * 2.0**-53
+
+
+class ShapeTable:
+    """Distinct convex sets, row by row, with everything they point to kept alive.
+
+    Support trees are made when a row is first to be asked about: `plant`.
+
+    ``rank`` orders the rows by content, so that a pair is worked on in the same order whichever
+    way it is asked: that makes swapped answers the exact mirror of each other.
+    """
+
+    def __init__(self, packed: list[PackedConvex]):
+        self.packed = packed
+        self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
+        self.numbers = np.zeros((len(packed), NUMBERS))
+        for k, p in enumerate(packed):
+            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, p.coarse.address if p.coarse is not None else 0
+            self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
+            self.numbers[k, PARAMS:] = p.params
+        order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
+        self.ints[:, RANK] = [order[p.content] for p in packed]
+        self.addresses = address_of(self.ints), address_of(self.numbers)
+        self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
+
+    @property
+    def planted(self) -> bool:
+        """Whether no support tree is still to be made."""
+        return not self._without_tree
+
+    def plant(self, rows: np.ndarray) -> None:
+        """Have the support trees of these rows, so far as their shapes are large enough for one."""
+        if self._without_tree:
+            for k in self._without_tree.intersection(np.unique(rows).tolist()):
+                self.ints[k, TREE] = self.packed[k].tree.address
+            self._without_tree.difference_update(rows.ravel().tolist())
+
+
+class PoseTable(NamedTuple):
+    """Posed parts as the kernels read them.
+
+    rows : (k, POSE).
+    terms : (c, TERM_ROW) for the c parts whose pose is a product: entry j of (R row by row, t) is exactly
+        the sum of TERMS doubles. What the row holds is that sum, rounded; low parts are the rest, rounded.
+    """
+
+    rows: np.ndarray
+    terms: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def followed_by(self, other: PoseTable) -> PoseTable:
+        """One table of both, this one's parts first."""
+        rows = np.concatenate([self.rows, other.rows])
+        moved = rows[len(self) :, POSE_TERMS]
+        moved[moved >= 0.0] += len(self.terms)
+        return PoseTable(rows, np.concatenate([self.terms, other.terms]))
+
+    def exact(self, part: int) -> list[Fraction]:
+        """The 12 entries of a part's pose without rounding."""
+        row = self.rows[part]
+        if row[POSE_TERMS] < 0.0:
+            return [Fraction(v) for v in row[:12].tolist()]
+        terms = self.terms[int(row[POSE_TERMS]), :LOW_PARTS].reshape(12, TERMS)
+        return [sum(map(Fraction, entry), Fraction(0)) for entry in terms.tolist()]
+
+
+def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTable:
+    """Poses of k parts in the world.
+
+    X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
+
+    A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
+    the origin. Elsewhere the product is written out, so that a batch rounds as a single pose does.
+    """
+    rows = np.empty((len(X_WB), POSE))
+    R_WB, p_WB = X_WB[:, :3, :3], X_WB[:, :3, 3]
+    rows[:, :9] = R_WB.reshape(-1, 9)
+    rows[:, 9:12] = p_WB
+    rows[:, POSE_SLOP] = 0.0
+    rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
+    identity = np.eye(4)
+    own = (X_BP != identity).any(axis=(1, 2))
+    if not own.any():
+        return PoseTable(rows, NO_TERMS)
+    unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
+    rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
+    own = np.flatnonzero(own & ~unmoved)
+    if not len(own):
+        return PoseTable(rows, NO_TERMS)
+    R, p, X = R_WB[own], p_WB[own], X_BP[own]
+    rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
+    rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
+    stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
+    parts = reach[own] + np.abs(X[:, :3, 3]).sum(axis=1)
+    rows[own, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
+    terms, exact = _terms(R, p, X)
+    rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
+    terms, rounded = terms[exact], rows[own[exact], :12]
+    return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
+
+
+def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:
+    """(k, 12) what sums of terms (k, 12, TERMS) are more than these, in twice the precision."""
+    total, rest = np.zeros_like(rounded), np.zeros_like(rounded)
+    for j in range(TERMS):
+        before, total = total, total + terms[:, :, j]
+        other = total - before
+        rest += (before - (total - other)) + (terms[:, :, j] - other)
+    return rest + (total - rounded)
+
+
+def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(poses (n, 4, 4) of a part in the world, (n,) how far rounding may have moved its points [m]).
+
+    X_WB : (n, 4, 4) body poses.   X_BP : (4, 4) the part's pose in it.   reach : (n,) of its points from the part's
+    origin. The products are those of `pose_table`; 0 where they are exact, shifts and right angles among them.
+    """
+    out = np.zeros_like(X_WB)
+    out[:, 3, 3] = 1.0
+    if np.array_equal(X_BP, np.eye(4)):
+        return X_WB, np.zeros(len(X_WB))
+    exact = np.ones(len(X_WB), dtype=bool)
+    for j in range(4):
+        total = np.zeros((len(X_WB), 3))
+        for k in range(4 if j == 3 else 3):
+            if k == 3:
+                high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
+            else:
+                left, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
+                high, low = _two_products(left, factor)
+                exact &= ((np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
+            sum_, other = total + high, total
+            back = sum_ - other
+            lost = (other - (sum_ - back)) + (high - back)
+            exact &= ((low == 0.0) & (lost == 0.0)).all(axis=1)
+            total = sum_
+        out[:, :3, j] = total
+    stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
+    parts = reach + np.abs(X_BP[:3, 3]).sum()
+    slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
+    return out, np.where(exact, 0.0, slop)
+
+
+def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    return A[:, :, 0:1] * B[:, 0:1, :] + A[:, :, 1:2] * B[:, 1:2, :] + A[:, :, 2:3] * B[:, 2:3, :]
+
+
+def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 12, TERMS) doubles that add up to each entry of the product, whether they do exactly).
+
+    Error-free products after Dekker 1971. They are exact unless the low part of one underflows.
+    """
+    k = len(R)
+    terms = np.zeros((k, 12, TERMS))
+    rotation = terms[:, :9].reshape(k, 3, 3, TERMS)
+    shift = terms[:, 9:]
+    shift[:, :, 6] = p
+    exact = np.ones(k, dtype=bool)
+    for j in range(3):
+        for target, factor in ((rotation, X[:, None, j, :3]), (shift, X[:, j, 3][:, None])):
+            left = R[:, :, j, None] if target is rotation else R[:, :, j]
+            high, low = _two_products(left, factor)
+            target[..., 2 * j], target[..., 2 * j + 1] = high, low
+            safe = (np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
+            exact &= safe.reshape(k, -1).all(axis=1)
+    return terms, exact
+
+
+def _two_products(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(high, low) with high + low = a·b exactly."""
+    high = a * b
+    a_high, b_high = (134217729.0 * v for v in (a, b))
+    a_high, b_high = a_high - (a_high - a), b_high - (b_high - b)
+    a_low, b_low = a - a_high, b - b_high
+    return high, ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+#: Products larger than this have low parts that are doubles.
+SAFE_PRODUCT = 2.0**-900
+NO_TERMS = np.zeros((0, TERM_ROW))

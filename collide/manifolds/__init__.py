@@ -1,1 +1,0 @@
-"""Contacts: where two bodies touch, overlap or nearly do, as few points with one normal a patch."""

@@ -1,0 +1,123 @@
+"""One box against the eight of a node: the innermost step of every walk over mesh trees.
+
+The axes are the three of each frame (S. Gottschalk's other nine cost more than they cull) and, where distances are
+asked, the line between the centres and one direction given, that of the nearest points so far. Floats round
+here; whoever fills the probe enlarges its half lengths by a bound of that, so that nothing is parted that meets, and
+no bound is above the distance. Sums go from left to right, so compiled and plain code say the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.kernels import WITH_NUMBA
+from collide.mesh.bvh import WIDTH
+
+#: Floats of a frame: the matrix from the node's frame to the probe's, row by row.
+FRAME = 9
+#: Floats of a probe: the box's centre in the node's frame (3) and its half lengths there (3), enlarged; then
+#: the frame's shift less the box's centre (3) and its half lengths (3), enlarged, in the box's own frame. Where only
+#: meeting is asked: a slab around the box's contents, its normal in the node's frame (3), its middle (1) and its half
+#: width (1), enlarged; zeros for none.
+PROBE = 17
+#: A triangle as probe has three half-spaces more that hold it, one an edge: the outward direction in the node's frame
+#: (3) and how far its origin is out (1), less rounding.
+PRISM = PROBE + 12
+#: For distances, from 12 on: what gaps along the axes of the node's frame (3), of the probe's (3) and of any line in it (1)
+#: are worth, at least; a direction in the node's frame (3) and its gap from the probe to the node's middle (1).
+NEAR_PROBE = 23
+
+
+def boxes_meeting_one_by_one(boxes, at, frame, probe):
+    """`boxes_meeting` in numpy's floats: what plain Python runs, and what tests compare with."""
+    with np.errstate(all="ignore"):
+        rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+        apart = rows[3] < 0.0  # slots that are not used
+        for axis in range(3):
+            apart |= np.abs(rows[axis] - probe[axis]) > rows[3 + axis] + probe[3 + axis]
+            gap, reach = _along(rows, frame, probe, axis)
+            apart |= np.abs(gap) > reach
+        gap = np.full(WIDTH, probe[15])
+        reach = np.full(WIDTH, probe[16])
+        for j in range(3):
+            gap = gap + probe[12 + j] * rows[j]
+            reach = reach + np.abs(probe[12 + j]) * rows[3 + j]
+        apart |= np.abs(gap) > reach
+    return int(np.packbits(~apart, bitorder="little")[0])
+
+
+def boxes_meeting_prism_one_by_one(boxes, at, frame, probe):
+    """`boxes_meeting_prism` in numpy's floats."""
+    mask = boxes_meeting_one_by_one(boxes, at, frame, probe)
+    with np.errstate(all="ignore"):
+        rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+        for edge in range(PROBE, PRISM, 4):
+            out = np.full(WIDTH, probe[edge + 3])
+            for j in range(3):
+                out = out + probe[edge + j] * rows[j]
+                out = out - np.abs(probe[edge + j]) * rows[3 + j]
+            mask &= ~int(np.packbits(out > 0.0, bitorder="little")[0])
+    return mask
+
+
+def boxes_nearest_one_by_one(boxes, at, slabs, slab_at, frame, probe, out):
+    """`boxes_nearest` in numpy's floats."""
+    with np.errstate(all="ignore"):
+        rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+        best = np.full(WIDTH, -np.inf, dtype=np.float32)
+        lines, across, square = [], np.float32(0.0), np.float32(0.0)
+        for axis in range(3):
+            gap = np.abs(rows[axis] - probe[axis]) - (rows[3 + axis] + probe[3 + axis])
+            best = np.where(gap * probe[12 + axis] > best, gap * probe[12 + axis], best)
+        for axis in range(3):
+            gap, reach = _along(rows, frame, probe, axis)
+            lines.append(gap)
+            scaled = (np.abs(gap) - reach) * probe[15 + axis]
+            best = np.where(scaled > best, scaled, best)
+            across = across + np.abs(gap) * probe[9 + axis]
+            square = square + gap * gap
+        for j in range(3):
+            along = lines[0] * frame[j] + lines[1] * frame[3 + j] + lines[2] * frame[6 + j]
+            across = across + np.abs(along) * rows[3 + j]
+        gap = (square - across) / np.sqrt(square) * probe[18]
+        best = np.where(gap > best, gap, best)
+        plain = thin = np.full(WIDTH, probe[22])
+        normals = slabs[slab_at : slab_at + 5 * WIDTH].reshape(5, WIDTH)
+        share = probe[19] * normals[0] + probe[20] * normals[1] + probe[21] * normals[2]
+        thin = thin + share * normals[3]
+        thin = thin - np.abs(share) * normals[4]
+        for j in range(3):
+            plain = plain + probe[19 + j] * rows[j]
+            plain = plain - np.abs(probe[19 + j]) * rows[3 + j]
+            rest = probe[19 + j] - share * normals[j]
+            thin = thin + rest * rows[j]
+            thin = thin - np.abs(rest) * rows[3 + j]
+        gap = np.where(thin > plain, thin, plain)
+        best = np.where(gap > best, gap, best)
+        out[:WIDTH] = np.where(rows[3] < 0.0, np.float32(np.inf), best)
+        out[WIDTH : 2 * WIDTH] = square
+
+
+def _along(rows, frame, probe, axis):
+    gap = np.full(WIDTH, probe[6 + axis])
+    reach = np.full(WIDTH, probe[9 + axis])
+    for j in range(3):
+        gap = gap + frame[3 * axis + j] * rows[j]
+        reach = reach + np.abs(frame[3 * axis + j]) * rows[3 + j]
+    return gap, reach
+
+
+if not WITH_NUMBA:
+    boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
+    boxes_meeting_prism = boxes_meeting_prism_one_by_one
+else:
+    from collide.kernels.vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
+
+#: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis parts box k of the node whose
+#: first float is ``boxes[at]`` from the probe's box. Views of float32. `boxes_meeting_prism` looks at PRISM floats.
+#: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0 where no axis
+#: parts), then eight squared lengths of lines between centres, in units of the probe's tree.
+__all__ = [
+    "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
+    "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",
+]  # fmt: skip

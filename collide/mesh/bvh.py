@@ -1,0 +1,194 @@
+"""The tree that mesh queries walk: nodes of eight boxes, triangles in the order of the leaves.
+
+A node is 56 words of 32 bits: eight boxes as centres x, y, z and half lengths x, y, z, eight floats each,
+then eight links. A link ≥ 0 is a node, a negative one a leaf (`leaf_link`): a run of triangles. Node 0 has one
+box, that of the whole mesh. A slot that is not used has a half length of −1e30, so that nothing meets it.
+
+Boxes are held relative to ``centre`` and in units of 2^exponent, rounded outwards: floats are then as good for
+a mesh of microns far from its origin as for one of kilometres. Triangles are the doubles given, unrounded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import threading
+
+import numpy as np
+
+from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
+
+#: Boxes of a node, and its words: six floats a box and a link.
+WIDTH = 8
+NODE = 7 * WIDTH
+#: Floats of a node's eight slabs (`bvh_slabs.py`): normals x, y, z, middles, half widths.
+SLAB = 5 * WIDTH
+#: Half length of a slot that is not used.
+NOTHING = -1e30
+#: Most triangles of a leaf: what three bits of a link can tell.
+FULLEST_LEAF = 7
+#: Most facets of a mesh: a leaf's link holds its first triangle in 28 bits.
+MOST_FACETS = 1 << 28
+
+# Header that kernels read: integers, and the address of the numbers.
+NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT = range(9)
+INTS = 9
+# Numbers: centre (3), largest |coordinate| of the triangles by axis (3), radius of a ball around the centre.
+CENTRE, REACH, RADIUS = 0, 3, 6
+NUMBERS = 7
+
+
+class MeshTree:
+    """A mesh's facets under a tree of boxes, read-only; `build.build_mesh_tree` makes one.
+
+    nodes : (k, 56) int32, as the module says.
+    triangles : (m, 9) float64, the corners of the facets in the order of the leaves, in the mesh's frame [m].
+    ids : (m,) int32, the number of each of them among the facets given.
+    centre, exponent : what boxes are relative to [m], and their unit as a power of two.
+    depth : nodes on the longest way down.
+    address : of the header that kernels take; valid as long as this object lives.
+    content : digest of triangles and their numbers: it orders the bodies of a pair.
+    """
+
+    def __init__(self, nodes, triangles, ids, centre, exponent: int, depth: int):
+        self.nodes = np.ascontiguousarray(nodes, dtype=np.int32)
+        self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
+        self.ids = np.ascontiguousarray(ids, dtype=np.int32)
+        self.centre = np.array(centre, dtype=np.float64)
+        self.exponent, self.depth = int(exponent), int(depth)
+        self._check_structure()
+        corners = np.abs(self.triangles).reshape(-1, 3)
+        self.numbers = np.concatenate([self.centre, corners.max(axis=0), [self._radius()]])
+        self.header = np.array(
+            [
+                address_of(self.nodes), address_of(self.triangles), address_of(self.ids), address_of(self.numbers),
+                len(self.nodes), len(self.ids), self.depth, self.exponent, 0,
+            ],
+            dtype=np.int64,
+        )  # fmt: skip
+        self.address = address_of(self.header)
+        self._content: bytes | None = None
+        self._slabs: np.ndarray | None = None
+        for part in (self.nodes, self.triangles, self.ids, self.centre, self.numbers):
+            part.flags.writeable = False
+
+    def __reduce__(self):
+        return MeshTree, (self.nodes, self.triangles, self.ids, self.centre, self.exponent, self.depth)
+
+    @property
+    def content(self) -> bytes:
+        if self._content is None:
+            digest = hashlib.blake2b((self.triangles + 0.0).tobytes(), digest_size=16)
+            digest.update(self.ids.tobytes())
+            self._content = digest.digest()
+        return self._content
+
+    def ask_slabs(self, make) -> None:
+        """Have the slabs that distances need (`slabs.make_slabs`), made at most once."""
+        if self._slabs is None:
+            with _making():
+                if self._slabs is None:
+                    slabs = make(self)
+                    self.header[SLABS_AT] = address_of(slabs)
+                    self._slabs = slabs
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the tree, its triangles included."""
+        parts = (self.nodes, self.triangles, self.ids, self.numbers, self.header, self._slabs)
+        return sum(part.nbytes for part in parts if part is not None)
+
+    def boxes(self) -> tuple[np.ndarray, np.ndarray]:
+        """(centres, halves), both (k, 8, 3) float64, in the tree's units."""
+        floats = self.nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
+        return floats[:, :3].transpose(0, 2, 1), floats[:, 3:].transpose(0, 2, 1)
+
+    def links(self) -> np.ndarray:
+        """(k, 8) links; those of unused slots are 0."""
+        return self.nodes[:, 6 * WIDTH :]
+
+    def used(self) -> np.ndarray:
+        """(k, 8) whether a slot holds a box."""
+        return self.nodes[:, 3 * WIDTH : 4 * WIDTH].copy().view(np.float32) > NOTHING / 2
+
+    def _radius(self) -> float:
+        """Of a ball around the centre that holds the box of the whole mesh."""
+        box = self.nodes[0, : 6 * WIDTH].view(np.float32)[::WIDTH].astype(np.float64)
+        return math.ldexp(math.hypot(*(abs(box[:3]) + box[3:])), self.exponent) * (1 + 2.0**-50)
+
+    def _check_structure(self) -> None:
+        """Everything that a kernel relies on to stay inside the arrays and to come to an end."""
+        m = len(self.ids)
+        _require(self.nodes.ndim == 2 and self.nodes.shape[1] == NODE and len(self.nodes) > 0, "nodes of another shape")
+        _require(self.triangles.shape == (m, 9) and 0 < m <= MOST_FACETS, "triangles of another shape")
+        _require(self.centre.shape == (3,) and np.isfinite(self.centre).all(), "a centre that is none")
+        links, used = self.links(), self.used()
+        leaves = leaf_runs(links[used & (links < 0)])
+        first, count = leaves
+        _require((count >= 1).all() and (count <= FULLEST_LEAF).all(), "a leaf without triangles")
+        order = np.argsort(first)
+        ends = (first + count)[order]
+        _require(first[order][0] == 0 and ends[-1] == m, "leaves that do not cover the triangles")
+        _require(np.array_equal(first[order][1:], ends[:-1]), "leaves that do not follow one another")
+        parents, slots = np.nonzero(used & (links >= 0))
+        below = links[parents, slots]
+        _require((below > parents).all() and (below < len(self.nodes)).all(), "a link that does not lead down")
+        _require(len(np.unique(below)) == len(below) == len(self.nodes) - 1, "a node with two parents, or none")
+        _require(used[0].sum() == 1, "a root of more than one box")
+        _require(self.depth == _depth(parents, below, len(self.nodes)), "another depth than it says")
+
+
+_lock = threading.Lock()
+
+
+def _making() -> threading.Lock:
+    """Held while slabs are made: one tree at a time."""
+    return _lock
+
+
+def _new_lock() -> None:
+    global _lock
+    _lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
+    os.register_at_fork(after_in_child=_new_lock)
+
+
+def _depth(parents: np.ndarray, below: np.ndarray, n: int) -> int:
+    parent = np.zeros(n, dtype=np.int64)
+    parent[below] = parents
+    at, depth = np.arange(n), 1
+    while at.any():
+        at = parent[at]
+        depth += 1
+    return depth
+
+
+@kernel(inline=True)
+def open_tree(header_at):
+    """(header, numbers, boxes, links, triangles, facet numbers) of the tree whose header stands at an address."""
+    header = view_i64(header_at, INTS)
+    return (
+        header, view_f64(header[NUMBERS_AT], NUMBERS), view_f32(header[NODES_AT], NODE * header[N_NODES]),
+        view_i32(header[NODES_AT], NODE * header[N_NODES]), view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS]),
+        view_i32(header[IDS_AT], header[N_FACETS]),
+    )  # fmt: skip
+
+
+@kernel
+def leaf_link(first, count):
+    """The link to triangles first … first + count − 1."""
+    return ~((first << 3) | count)
+
+
+def leaf_runs(links: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(first, count) of the triangles behind the links to leaves."""
+    runs = ~np.asarray(links, dtype=np.int64)
+    return runs >> 3, runs & 7
+
+
+def _require(condition, what: str) -> None:
+    if not condition:
+        raise ValueError(f"mesh tree: {what}")

@@ -1,0 +1,53 @@
+"""How much room kernels take and where things stand in it, for callers in C, who cannot read Python's constants."""
+
+from __future__ import annotations
+
+from collide.hull.first_simplex import APICES
+from collide.hull.quickhull import FACET, PLANE, STATE
+from collide.kernels import entry, view_i64
+from collide.lowering.shape_table import INTS, NUMBERS, POSE
+from collide.mesh.build_bvh import _DEEPEST_SPLIT as DEEPEST_SPLIT
+from collide.mesh.build_bvh import _RECORD as RECORD
+from collide.mesh.build_bvh import _WORK as TREE_WORK
+from collide.mesh.bvh import INTS as TREE_INTS
+from collide.mesh.bvh import NODE, SLAB, WIDTH
+from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
+from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
+from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT
+from collide.narrowphase.exact.settle_hulls import WORKSPACE
+from collide.narrowphase.facets import single_surface as single
+from collide.narrowphase.facets import surface_collision as surfaces
+from collide.narrowphase.facets import surface_distance as distances
+from collide.narrowphase.facets import winding_numbers as inside
+from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
+from collide.narrowphase.pose_batches import BLOCK, HEADER
+from collide.narrowphase.rows import ROW
+from collide.numerics.orientation import DIGITS as HULL_DIGITS
+from collide.numerics.orientation import WORK
+from collide.support.candidate_lists import STACK
+from collide.support.coarse_points import COARSE
+
+#: Doubles of a walk along meshes: of whichever takes most.
+_MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside))
+
+#: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of box-trees, what is
+#: found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
+_MEASURES = (
+    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS, WORK,
+    FACET, PLANE, STATE, STACK,
+    NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
+    COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
+    single.HEADER, _MESH_DOUBLES, MESH_INTEGERS, distances.RESULT, distances.MARKS,
+)  # fmt: skip
+
+
+@entry("int64(int64, int64)")
+def tell_measures(out_at, n):
+    """Write the first n of `_MEASURES`; returns how many there are."""
+    out = view_i64(out_at, n)
+    at = 0
+    for measure in _MEASURES:
+        if at < n:
+            out[at] = measure
+        at += 1
+    return at

@@ -1,0 +1,177 @@
+"""Bodies that are unions of convex parts: questions to the kernels of `narrowphase/composite/composite_poses.py`.
+
+How one answer is made of those of the parts is told in `narrowphase/composite/composite_rows.py`.
+"""
+
+from __future__ import annotations
+
+from threading import local
+
+import numpy as np
+
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.lowering.compound_table import BALL_IN_WORLD, LaidOut, UnionTable
+from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
+from collide.narrowphase import convex_queries as run
+from collide.narrowphase.composite.composite_poses import (
+    ASKED,
+    BAD_POSE,
+    BLOCK,
+    DONE,
+    HEADER,
+    LIST,
+    LISTED,
+    SLOTS,
+    answer_unions,
+)
+from collide.narrowphase.composite.composite_rows import SCORE, combine_rows
+from collide.narrowphase.composite.single_composite_call import collide_single_union, distance_single_union
+from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, answer_pairs
+from collide.results import PAIR_DTYPE
+
+# --- workspaces ---------------------------------------------------------------------------------
+
+#: How far things have come to begin with.
+_AT_THE_START = (0,) * (HEADER - DONE)
+#: Rows of parts of a block of poses, unless one pose takes more.
+_ROOM = 4096
+
+
+class _Workspace:
+    """Scratch memory of the kernels, with room for so many rows of parts."""
+
+    def __init__(self, room: int):
+        self.room = room
+        self.poses = PoseTable(np.zeros((2 * BLOCK + room, POSE)), np.zeros((2 * BLOCK + room, TERM_ROW)))
+        self.shape_of = np.zeros(2 * BLOCK + room, dtype=np.int64)
+        self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
+        self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
+        self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
+        self.balls = np.zeros((2 + room, BALL_IN_WORLD))
+        buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, self.scores, self.slots, self.balls
+        self._addresses = tuple(map(address_of, buffers))
+
+    def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
+        """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
+        return np.array((code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
+
+
+class _SingleSpace(_Workspace):
+    """The same for single calls, which have nothing else."""
+
+    def __init__(self, room: int):
+        super().__init__(room)
+        self.byte = np.zeros(1, dtype=np.uint8)
+        self._own = np.zeros(DOUBLES), np.zeros(INTEGERS, dtype=np.int64)
+        self.scratch = address_of(self._own[0]), address_of(self._own[1])
+
+
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks; `asked` counts its pairs of parts."""
+
+    space: _Workspace | None = None
+    asked = 0
+
+    def space_for(self, table: UnionTable) -> _Workspace:
+        if self.space is None or self.space.room < table.most:
+            self.space = _Workspace(max(table.most, _ROOM))
+        return self.space
+
+
+of_thread = _OfThread()
+
+
+# --- questions ----------------------------------------------------------------------------------
+
+
+def run_unions(
+    out: np.ndarray,
+    table: UnionTable,
+    which: np.ndarray | None,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    check: bool,
+    depths: bool,
+) -> bool:
+    """Answer two bodies at n pairs of poses; False where a pose is no pose. Arguments as in `run.run_poses`.
+
+    which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
+    """
+    table.plant(which)
+    space = of_thread.space_for(table)
+    header = space.header_of(table, run.scratch())
+    while True:
+        said = answer_unions(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), len(out), boolean, depths and not boolean, limit, check,
+            run.distrust_doubles, address_of(out),
+        )  # fmt: skip
+        if not said or said == BAD_POSE:
+            of_thread.asked += int(header[ASKED])
+            return not said
+        listed = int(header[LISTED])
+        run.settle_open(
+            space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean, limit=limit,
+            depths=depths and not boolean,
+        )  # fmt: skip
+
+
+class UnionPair:
+    """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has them.
+
+    collide : a built-in function of two poses; None where it leaves the answer to the long way.
+    """
+
+    #: One for all single calls: their kernels keep Python's lock.
+    _space: _SingleSpace | None = None
+
+    def __init__(self, A: LaidOut, B: LaidOut):
+        self.unions = UnionTable([A, B])
+        self.unions.plant(None)
+        self.collide = self._distance = _long_way
+        if self.unions.counts.prod() > _MOST_AT_ONCE:
+            return
+        space = UnionPair._space  # read once: another thread may put a smaller one there
+        if space is None or space.room < self.unions.most:
+            space = UnionPair._space = _SingleSpace(self.unions.most)
+        self._held = space  # pairs made before have a smaller one
+        header = space.header_of(self.unions, space.scratch)
+        words = np.array([code_of(answer_unions), address_of(space.byte), *header.tolist()])
+        self.collide = prepared_boolean(collide_single_union, words)
+        self._distance = prepared_row(distance_single_union, words)
+
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows
+
+
+#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
+_MOST_AT_ONCE = 1024
+
+
+def _long_way(*_) -> None:
+    return None
+
+
+def combine(rows: np.ndarray, starts: np.ndarray, spans: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of) -> np.ndarray:
+    """One row a pair of bodies from rows of pairs of parts.
+
+    rows : PAIR_DTYPE, those of a pair of bodies standing together.   starts : first row of each pair of bodies.
+    spans : (k, 4) int64: first part and number of parts of A, and of B. Parts too far apart may have been left out of
+        ``rows``, but they still bar the way out.
+    table, poses, shape_of : as in `run.run_pairs`.
+    """
+    if (spans[:, 1::2] == 1).all():
+        return rows
+    out = np.zeros(len(starts), dtype=PAIR_DTYPE)  # padding too: equal answers are equal bytes
+    ends, spans, score = np.append(starts, len(rows)), np.ascontiguousarray(spans), np.zeros(SCORE)
+    combine_rows(
+        address_of(rows), address_of(ends), address_of(spans), len(starts), *table.addresses, address_of(poses.rows),
+        address_of(shape_of), address_of(score), address_of(out),
+    )  # fmt: skip
+    return out

@@ -1,0 +1,199 @@
+"""One part of a union against another body, one of the two a mesh, at poses that may be rounded products.
+
+Poses that are exact are answered as any pair is. Where a product of two poses was rounded, a part stands within its
+slop of where the rounded one would put it: gaps wider than that are proven, and so are facets that cross each other
+by more, and what lies deeper inside. What is left is open.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.batches import ask
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace
+from collide.narrowphase.facets.facet_convex import Posed
+from collide.narrowphase.facets.facet_queries import FARTHER, all_hits, first_hits, surface_distances
+from collide.narrowphase.facets.mesh_curved import curved_rows, decide
+from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN, core_hits
+from collide.narrowphase.facets.mesh_rows import PROMISE, facet_rows_of, hull_shape, mesh_rows, mesh_states
+from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
+from collide.shapes.shape import Shape
+
+#: Rounding of a determinant of differences, of the product of their lengths; and of a coordinate, of the size.
+_DETERMINANT, _COORDINATE = 2.0**-46, 2.0**-48
+#: Pairs of facets that meet and are looked at for a crossing that no rounding undoes.
+_MOST_PAIRS = 4096
+
+
+def part_states(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed) -> np.ndarray:
+    """(n,) APART, HIT or OPEN, for a mesh and another single body."""
+    slop = X_WA.slop + X_WB.slop
+    states = np.full(len(slop), OPEN)
+    exact = slop == 0.0
+    if exact.any():
+        states[exact] = mesh_states(A, B, X_WA.X[exact], X_WB.X[exact])
+    if not exact.all():
+        PA, PB = X_WA.of(~exact), X_WB.of(~exact)
+        if is_halfspace(A) or is_halfspace(B):
+            rows = _plane_rows(A, B, PA, PB, math.inf)
+            states[~exact] = np.where(rows["how"] == UNDECIDED, OPEN, np.where(rows["hit"], HIT, APART))
+        elif has_facets(A) and has_facets(B):
+            states[~exact] = loose_states(body_of(A), body_of(B), PA, PB)
+        else:
+            states[~exact] = _curved_states(A, B, PA, PB)
+    return states
+
+
+def _curved_states(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:
+    if not has_facets(A):
+        A, B, PA, PB = B, A, PB, PA
+    return decide(body_of(A), enclosure_of(B), PA, PB).state
+
+
+def part_rows(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed, limit: float) -> np.ndarray:
+    """Rows of a mesh and another single body, without depths, but against half-spaces; where open, how is "undecided".
+
+    A bracket is widened by how far rounding may have moved the parts.
+    """
+    slop = X_WA.slop + X_WB.slop
+    exact = slop == 0.0
+    rows = np.zeros(len(slop), dtype=PAIR_DTYPE)
+    planes = is_halfspace(A) or is_halfspace(B)
+    if exact.any():
+        rows[exact] = mesh_rows(A, B, X_WA.X[exact], X_WB.X[exact], limit=limit, depths=planes)
+    if not exact.all():
+        PA, PB = X_WA.of(~exact), X_WB.of(~exact)
+        if planes:
+            rows[~exact] = _plane_rows(A, B, PA, PB, limit)
+        elif has_facets(A) and has_facets(B):
+            rows[~exact] = _loose_rows(A, B, PA, PB, limit)
+        elif has_facets(A):
+            rows[~exact] = curved_rows(body_of(A), enclosure_of(B), PA, PB, limit=limit, depths=False)
+        else:
+            rows[~exact] = flipped(curved_rows(body_of(B), enclosure_of(A), PB, PA, limit=limit, depths=False))
+    return rows
+
+
+def _plane_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
+    rows = ask(hull_shape(A), hull_shape(B), PA.X, PB.X, False, math.inf, False, 1)
+    rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1
+    _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
+    crossing = (rows["lower"] <= 0.0) & (rows["upper"] > 0.0)
+    rows["how"][crossing] = UNDECIDED
+    rows["hit"] = ~(rows["lower"] > 0.0)
+    return rows
+
+
+def _size(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:
+    """(n,) of pairs of parts, as `narrowphase/bounds.py` has it."""
+    size = np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
+    for shape in (A, B):
+        bound = shape.bounding_parts()[0][0]
+        size = size + (abs(float(bound.params[3])) if is_halfspace(shape) else bound.reach + bound.radius)
+    return size
+
+
+def _widen(rows: np.ndarray, size: np.ndarray, slop: np.ndarray, limit: float) -> None:
+    """Brackets that hold however rounding moved the parts, in place; far from the world's origin they are wide."""
+    rows["lower"] = np.nextafter(rows["lower"] - slop, -np.inf)
+    rows["upper"] = np.nextafter(rows["upper"] + slop, np.inf)
+    rows["certified"] &= (rows["lower"] > 0.0) | (rows["upper"] < 0.0)
+    rows["certified"] &= (rows["upper"] - rows["lower"] <= PROMISE * size) | (rows["lower"] <= 0.0)
+    beyond = rows["lower"] > limit
+    rows["beyond"] = beyond
+    rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], np.inf
+
+
+def _loose_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
+    states = loose_states(body_of(A), body_of(B), PA, PB)
+    rows = facet_rows_of(A, B, PA.X, PB.X)
+    hit = rows["hit"].copy()
+    _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
+    apart = states == APART
+    rows["lower"][~apart & hit] = 0.0  # no depth is told
+    rows["upper"][states == HIT] = 0.0
+    rows["distance"][~apart] = 0.0
+    rows["lower"][~apart] = np.minimum(rows["lower"][~apart], 0.0)
+    rows["hit"], rows["how"] = ~apart, np.where(states == OPEN, UNDECIDED, np.where(apart, FORMULA, EXACT))
+    rows["certified"] &= states != OPEN
+    rows["beyond"] &= apart
+    return rows
+
+
+def loose_states(A: Body, B: Body, PA: Posed, PB: Posed) -> np.ndarray:
+    """(n,) states of two bodies of facets whose poses are known to within their slops."""
+    slop, radius = PA.slop + PB.slop, A.radius + B.radius
+    states = np.full(len(slop), OPEN)
+    core, inside = core_hits(A, B, PA.X, PB.X)
+    loose = 1.001 * slop
+    found = surface_distances(A.tree, B.tree, PA.X, PB.X, (radius + 4.0 * float(slop.max())) * FARTHER)
+    within = ~np.isnan(inside[:, 0])
+    states[~core & (found.lower - radius > loose)] = APART
+    states[(core & within & (found.lower > loose)) | (found.upper + loose <= radius)] = HIT
+    left = np.flatnonzero((states == OPEN) & core & ~within)
+    if len(left):
+        first = first_hits(A.tree, B.tree, PA.X[left], PB.X[left])
+        met = first.starts[1:] > first.starts[:-1]
+        left = left[met]
+        crossing = _crossing(A, B, first.pairs, PA.X[left], PB.X[left], slop[left])
+        states[left[crossing]] = HIT
+        for k in left[~crossing].tolist():
+            pairs = all_hits(A.tree, B.tree, PA.X[k], PB.X[k]).pairs[:_MOST_PAIRS]
+            many = (np.broadcast_to(value, (len(pairs), *value.shape)) for value in (PA.X[k], PB.X[k], slop[k]))
+            if _crossing(A, B, pairs, *many).any():
+                states[k] = HIT
+    return states
+
+
+def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, slop: np.ndarray) -> np.ndarray:
+    """(k,) whether an edge of one facet passes through the other by more than rounding and the slop can undo.
+
+    pairs : (k, 2) facets, at poses (k, 4, 4). The signs that say so are determinants of differences of corners; each is
+    bounded away from 0 by what moving the corners can change.
+    """
+    shift = X_WB[:, :3, 3] - X_WA[:, :3, 3]
+    U, V = _corners(A, pairs[:, 0], X_WA, np.zeros_like(shift)), _corners(B, pairs[:, 1], X_WB, shift)
+    moved = 1.001 * slop + _COORDINATE * (_terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1))
+    found = np.zeros(len(pairs), dtype=bool)
+    for T, S in ((U, V), (V, U)):
+        for k in range(3):
+            found |= _passes(S[:, k], S[:, (k + 1) % 3], T[:, 0], T[:, 1], T[:, 2], moved)
+    return found
+
+
+def _corners(body: Body, facets: np.ndarray, X: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) corners in the world's axes, relative to the origin of A's frame."""
+    return (_own_corners(body, facets)[:, :, None] * X[:, None, :3, :3]).sum(axis=3) + shift[:, None]
+
+
+def _terms(body: Body, facets: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """(k,) size of the terms that a coordinate of these corners is the sum of."""
+    terms = (np.abs(_own_corners(body, facets))[:, :, None] * np.abs(X[:, None, :3, :3])).sum(axis=3)
+    return terms.max(axis=(1, 2)) if len(terms) else np.zeros(0)
+
+
+def _own_corners(body: Body, facets: np.ndarray) -> np.ndarray:
+    place = np.empty(len(body.tree.ids), dtype=np.int64)
+    place[body.tree.ids] = np.arange(len(place))
+    return body.tree.triangles[place[facets]].reshape(-1, 3, 3)
+
+
+def _passes(p, q, a, b, c, moved) -> np.ndarray:
+    """(k,) whether segments pq pass through triangles abc, (k, 3) each, whoever moves any corner by ``moved`` (k,)."""
+    below, above = _sign(a, b, c, p, moved), _sign(a, b, c, q, moved)
+    sides = [_sign(p, q, u, v, moved) for u, v in ((a, b), (b, c), (c, a))]
+    return (below * above < 0) & (sides[0] != 0) & (sides[0] == sides[1]) & (sides[1] == sides[2])
+
+
+def _sign(a, b, c, d, moved) -> np.ndarray:
+    """(k,) sign of the volume of abcd, 0 where moving corners by ``moved`` might change it."""
+    u, v, w = b - a, c - a, d - a
+    value = (u * np.cross(v, w)).sum(axis=1)
+    x, y, z = (np.sqrt(np.square(one).sum(axis=1)) for one in (u, v, w))
+    m = 2.0 * moved
+    error = m * (x * y + y * z + z * x) + m * m * (x + y + z) + m * m * m
+    error = error * 1.001 + _DETERMINANT * (x + m) * (y + m) * (z + m) + 1e-300
+    return np.where(value > error, 1, np.where(value < -error, -1, 0))

@@ -1,0 +1,200 @@
+"""Unions with meshes: a `Compound` against a mesh, a mesh among the parts of a `Compound`, to any nesting.
+
+Apart, the distance is the least one of the parts. Convex parts of both sides are answered together, as unions of
+convex parts always are (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh in it is asked about only where their boxes
+come as near as what is known already. Overlapping, what is told is a translation that is proven to part the unions.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.batches import ask
+from collide.lowering.composite_parts import UnionParts, union_of
+from collide.lowering.facet_bodies import is_halfspace
+from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
+from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN
+from collide.narrowphase.facets.mesh_rows import rows_in_order
+from collide.narrowphase.facets.separating_translation import Parting, shortened
+from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
+from collide.shapes.shape import Shape
+
+
+def union_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool for poses (n, 4, 4): whether two shapes, one at least a union, share a point; True where open."""
+    return union_states(A, B, X_WA, X_WB) != APART
+
+
+def union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
+    """(n,) APART, HIT or OPEN.
+
+    open_ones : tell them from hits among convex parts, too, which takes longer.
+    """
+    return _states(union_of(A), union_of(B), X_WA, X_WB, open_ones)
+
+
+def _states(A: UnionParts, B: UnionParts, X_WA, X_WB, open_ones: bool = False) -> np.ndarray:
+    states = np.full(len(X_WA), APART)
+    if A.convex is not None and B.convex is not None:
+        met = np.flatnonzero(ask(A.convex, B.convex, X_WA, X_WB, True, 0.0, False, 1))
+        states[met] = HIT
+        if open_ones and len(met):
+            rows = ask(A.convex, B.convex, X_WA[met], X_WB[met], False, 0.0, False, 1)
+            states[met[rows["how"] == UNDECIDED]] = OPEN
+    gaps = _box_gaps(A, B, X_WA, X_WB)
+    for i, j in _mesh_pairs(A, B):
+        left = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
+        if len(left):
+            one, other, PA, PB = _posed(A, B, i, j, X_WA[left], X_WB[left])
+            found = part_states(one.shape, other.shape, PA, PB)
+            states[left] = np.where(found == APART, states[left], found)
+    return states
+
+
+def _mesh_pairs(A: UnionParts, B: UnionParts):
+    """Numbers of parts of which one at least is a mesh."""
+    for i, one in enumerate(A.parts):
+        for j, other in enumerate(B.parts):
+            if one.shape.meshed or other.shape.meshed:
+                yield i, j
+
+
+def _posed(A: UnionParts, B: UnionParts, i: int, j: int, X_WA, X_WB):
+    """(part, part, their poses, their poses)."""
+    one, other = A.parts[i], B.parts[j]
+    about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
+    for part in (one, other):
+        about = about + 2.0 * (part.bound.reach + part.bound.radius + np.abs(part.X[:3, 3]).sum())
+    return one, other, one.at(X_WA, about), other.at(X_WB, about)
+
+
+def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
+    """(n, parts of A, parts of B) how far their boxes are apart along an axis, negative where they overlap."""
+    a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
+    return np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=3)
+
+
+# --- rows ---------------------------------------------------------------------------------------
+
+
+def union_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
+    """Rows (PAIR_DTYPE) for poses (n, 4, 4) of two shapes, one at least a union; limit, depths as in `distance`."""
+    return rows_in_order(_rows, union_of(A), union_of(B), X_WA, X_WB, limit, depths)
+
+
+def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+    planes = is_halfspace(A.shape) or is_halfspace(B.shape)
+    asked, left_out = _part_rows(A, B, X_WA, X_WB, limit, planes)
+    out = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    for k in range(len(X_WA)):
+        rows = asked[k]
+        sure = rows[rows["hit"] & (rows["how"] != UNDECIDED)]
+        unsure = rows[rows["hit"] & (rows["how"] == UNDECIDED)]
+        if planes or not len(sure) + len(unsure):
+            out[k] = _least(rows, limit, bool(left_out[k]))
+        else:
+            _overlap(A, B, X_WA[k], X_WB[k], out[k : k + 1], sure if len(sure) else unsure, rows, depths)
+    return out
+
+
+def _part_rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: bool) -> tuple[list[np.ndarray], np.ndarray]:
+    """(rows of the pairs of parts that matter, pose by pose; (n,) bool, whether some beyond the limit were left out)."""
+    n = len(X_WA)
+    sight = math.nextafter(limit, math.inf)
+    left_out = np.zeros(n, dtype=bool)
+    asked: list[list[np.ndarray]] = [[] for _ in range(n)]
+    upper, hit = np.full(n, math.inf), np.zeros(n, dtype=bool)
+
+    def take(rows: np.ndarray, left: np.ndarray) -> None:
+        clean = np.zeros(len(rows), dtype=PAIR_DTYPE)
+        for name in FIELDS:  # padding stays 0
+            clean[name] = rows[name]
+        clean["vertices_a"] = clean["vertices_b"] = -1
+        clean["count"], clean["iterations"] = 0, 0
+        for k, row in zip(left.tolist(), clean):
+            asked[k].append(row.reshape(1))
+        upper[left] = np.minimum(upper[left], clean["upper"])
+        hit[left] |= clean["hit"] & (clean["how"] != UNDECIDED)
+
+    if A.convex is not None and B.convex is not None:
+        rows = ask(A.convex, B.convex, X_WA, X_WB, False, limit, False, 1)
+        for name, side in (("part_a", A), ("part_b", B)):
+            rows[name] = side.numbers[rows[name]]
+        take(rows, np.arange(n))
+    gaps = _box_gaps(A, B, X_WA, X_WB)
+    pairs = list(_mesh_pairs(A, B))
+    for place, (i, j) in enumerate(pairs):
+        far = gaps[:, i, j] > np.minimum(upper, sight)
+        if place + 1 == len(pairs):  # a pose keeps at least one row
+            far &= np.array([bool(rows) for rows in asked], dtype=bool)
+        left_out |= far & (gaps[:, i, j] > sight)
+        left = np.flatnonzero(~far & (planes | ~hit))
+        if len(left):
+            one, other, PA, PB = _posed(A, B, i, j, X_WA[left], X_WB[left])
+            rows = part_rows(one.shape, other.shape, PA, PB, limit)
+            for name, side, number in (("part_a", A, i), ("part_b", B, j)):
+                if len(side.parts) > 1 or side.shape is not side.parts[0].shape:
+                    rows[name] = number
+            take(rows, left)
+    return [np.concatenate(rows) for rows in asked], left_out
+
+
+def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
+    """The row of the nearest parts, its bracket widened to hold for all."""
+    row = rows[np.argmin(rows["distance"])].copy()
+    lower, upper = rows["lower"].min(), rows["upper"].min()
+    rivals = rows[rows["lower"] <= upper]
+    row["lower"], row["upper"] = lower, upper
+    row["hit"] = bool(rows["hit"].any())
+    row["certified"] = bool(rivals["certified"].all())
+    row["beyond"] = bool(rows["beyond"].all() or lower > limit)
+    if row["beyond"]:
+        lower = min(float(lower), math.nextafter(limit, math.inf)) if left_out else lower
+        row["lower"] = lower
+        row["distance"], row["upper"], row["certified"] = lower, math.inf, True
+    else:
+        row["distance"] = min(max(float(row["distance"]), float(lower)), float(upper))
+    return row
+
+
+def _overlap(A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool) -> None:
+    """The row of two unions that meet, or may."""
+    row = meeting[0].copy()
+    sure = row["how"] != UNDECIDED
+    point = 0.5 * (row["point_a"] + row["point_b"])
+    row["hit"], row["beyond"], row["certified"] = True, False, sure
+    row["upper"] = 0.0 if sure else max(0.0, float(rows["upper"].min()))
+    row["point_a"] = row["point_b"] = point
+    row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
+    if sure:
+        row["how"] = row["how"] or EXACT
+    if depths and (A.endless or B.endless):
+        row["distance"] = row["lower"] = -math.inf
+        row["normal"], row["certified"] = (0.0, 0.0, 1.0), False
+    elif depths:
+        length, bound, normal = _way_out(A, B, X_WA, X_WB, meeting)
+        row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
+        row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
+        row["certified"] = bool(sure and bound == 0.0)
+    out[0] = row
+
+
+def _way_out(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> Parting:
+    """A translation of B that parts the unions, proven."""
+    axes = np.concatenate([np.eye(3), X_WA[:3, :3].T, X_WB[:3, :3].T])
+    axes /= np.sqrt(np.square(axes).sum(axis=1))[:, None]
+    told = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
+    directions = np.concatenate([told, axes, -axes])
+    best: Parting | None = None
+    for n in directions:
+        (a, error_a), (b, error_b) = A.extent(X_WA, n), B.extent(X_WB, -n)
+        depth, bound = max(a + b, 0.0), max(a + b + error_a + error_b, 0.0)
+        if best is None or bound < best.bound:
+            best = Parting(depth, bound, n)
+    assert best is not None
+    if best.bound == 0.0:
+        return best
+    more = [-float(row["distance"]) * row["normal"] for row in meeting if -math.inf < row["distance"] < 0.0]
+    return shortened(lambda X, Y: _states(A, B, X, Y) != APART, X_WA, X_WB, best, directions, more)

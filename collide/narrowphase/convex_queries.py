@@ -1,0 +1,244 @@
+"""The narrowphase from Python: doubles first, the exact stage for what they leave open."""
+
+from __future__ import annotations
+
+from functools import cache
+from threading import local
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.kernels import PLAIN_PYTHON, address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
+from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
+from collide.narrowphase.exact.depth_requests import ROWS_TOGETHER
+from collide.narrowphase.exact.exact_depth import deepen_pairs
+from collide.narrowphase.exact.opposite_halfspaces import settle
+from collide.narrowphase.exact.settle_halfspaces import decide_planes
+from collide.narrowphase.exact.settle_hulls import WORKSPACE, decide_pairs
+from collide.narrowphase.fallback_searches import settle_by_other_searches
+from collide.narrowphase.finalize_rows import close_rows
+from collide.narrowphase.pose_batches import (
+    ANSWERED,
+    BAD_POSE,
+    BLOCK,
+    HEADER,
+    POSES_AT,
+    answer_poses,
+)
+from collide.narrowphase.single_call import collide_single, distance_single
+from collide.results import EXACT, PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.transforms import SMALLEST
+
+#: Set by tests: no pair of hulls is settled in doubles, whatever they have proven.
+distrust_doubles = False
+
+
+def run_pairs(
+    table: ShapeTable,
+    poses: PoseTable,
+    shape_of: np.ndarray,
+    pairs: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    stop_at_hit: bool = False,
+    depths: bool = True,
+) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
+
+    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.   depths : whether it is wanted how deep overlaps are.
+    Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
+    """
+    pairs = np.ascontiguousarray(pairs, dtype=np.int64)
+    rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+    table.plant(shape_of[pairs])
+    tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+    depths = depths and not boolean
+    done = 0
+    while done < len(pairs):
+        last = len(pairs) if boolean else done + ROWS_TOGETHER
+        todo, out = pairs[done:last], rows[done:last]
+        answered = answer_pairs(
+            *tables, address_of(todo), len(todo), boolean, depths, stop_at_hit, limit, address_of(out),
+            *_of_thread.space.addresses,
+        )  # fmt: skip
+        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
+        done += answered
+        # The hit that stopped the kernel may have been an open one that turned out to be apart.
+        if stop_at_hit and out["hit"][answered - 1]:
+            break
+    return rows[:done]
+
+
+def settle_proposals(table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray) -> None:
+    """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
+
+    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet are told
+    to, without a depth.
+    """
+    rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
+    _of_thread.space.integers[REQUESTS_AT] = 0
+    _finish(rows, np.ascontiguousarray(pairs, dtype=np.int64), table, poses, shape_of, boolean=False, limit=np.inf, depths=False)
+
+
+def _finish(
+    rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
+) -> None:
+    """Settle in place what doubles left open."""
+    if (rows["how"] == REFUSED).any():
+        raise UnsupportedQuery(
+            f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
+        )
+    if distrust_doubles:
+        rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
+    if (rows["how"] == UNDECIDED).any():
+        tables = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
+        terms = address_of(poses.terms), len(poses.terms)
+        digits = address_of(_of_thread.space.digits)
+        planes = decide_pairs(
+            *tables, len(rows), boolean, depths, limit, address_of(rows), *terms,
+            _of_thread.space.addresses[1] + 8 * REQUESTS_AT, digits,
+        )  # fmt: skip
+        if planes:
+            decide_planes(*tables, len(rows), boolean, limit, address_of(rows), *terms, digits)
+        if depths and not boolean:
+            shallow = (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]
+            if shallow.any():
+                deepen_pairs(*tables, address_of(shallow), len(rows), limit, address_of(rows), *terms, digits)
+        settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
+        if not distrust_doubles:
+            shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+            settle_by_other_searches(
+                rows, pairs, shapes_and_poses, _of_thread.space.addresses, boolean=boolean, depths=depths, limit=limit
+            )
+
+
+def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
+    """How many pairs two batches of poses make, of which either may be of one."""
+    return max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+
+
+def run_poses(
+    out: np.ndarray,
+    table: ShapeTable,
+    which: np.ndarray | None,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    check: bool,
+    axes: np.ndarray | None = None,
+    depths: bool = True,
+) -> bool:
+    """Answer two convex sets at n pairs of poses; False where a pose is no pose.
+
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
+    which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    check : refuse matrices that are no rotation.
+    axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
+    depths : of rows: whether it is wanted how deep overlaps are.
+    """
+    n = len(out)
+    table.plant(np.arange(2) if which is None else which)
+    space = _of_thread.space
+    header = space.header_of(table)
+    done = 0
+    while done < n:
+        said = answer_poses(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
+            0 if axes is None else address_of(axes), address_of(out),
+        )  # fmt: skip
+        if said == BAD_POSE:
+            return False
+        done = int(header[ANSWERED])
+        if said:
+            start = done - 1 - (done - 1) % BLOCK
+            rows = space.rows[: done - start] if boolean else out[start:done]
+            _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)
+            if boolean:
+                out[start:done] = rows["hit"]
+    return True
+
+
+def scratch() -> tuple[int, int]:
+    """Addresses of this thread's workspace, doubles and integers, as `answer_pairs` takes them."""
+    return _of_thread.space.addresses
+
+
+def settle_open(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool) -> None:
+    """Settle in place what doubles left open of rows that `answer_pairs` has just made with this thread's workspace."""
+    _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
+
+
+def close(rows: np.ndarray, *, depths: bool) -> bool:
+    """Finish rows of `distance` in place: `closing.close_rows`."""
+    return bool(close_rows(address_of(rows), len(rows), depths))
+
+
+class _Workspace:
+    """Scratch memory of the kernels."""
+
+    def __init__(self) -> None:
+        self.doubles = np.zeros(DOUBLES)
+        self.integers = np.zeros(INTEGERS, dtype=np.int64)
+        self.digits = np.zeros(WORKSPACE, dtype=np.int64)
+        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), NO_TERMS)
+        self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
+        self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
+        self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)
+        self.addresses = address_of(self.doubles), address_of(self.integers)
+
+        self.shape_of[BLOCK:] = 1
+        buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
+        self._header = np.zeros(HEADER, dtype=np.int64)
+        self._header[POSES_AT:ANSWERED] = *map(address_of, buffers), *self.addresses
+
+    def header_of(self, table: ShapeTable) -> np.ndarray:
+        """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""
+        header = self._header.copy()
+        header[:POSES_AT] = code_of(answer_pairs), *table.addresses
+        return header
+
+
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+_of_thread = _OfThread()
+
+
+def single_calls_are_safe() -> bool:
+    return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
+
+
+@cache
+def _space_of_single_calls() -> _Workspace:
+    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either is
+    good as long as it is held."""
+    return _Workspace()
+
+
+class SinglePair:
+    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call.
+
+    collide : a built-in function of two poses; None where it leaves the answer to the long way.
+    """
+
+    def __init__(self, table: ShapeTable):
+        table.plant(np.arange(2))
+        self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
+        header = self._space.header_of(table)
+        self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
+
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows

@@ -1,0 +1,52 @@
+"""Facets of a mesh one by one against a convex set that has none: rows of the certified convex engine.
+
+Every facet is a hull of three points, and stands before the convex set, whichever way the pair is asked
+(`lowering/facet_table.py`). Poses may be rounded products: how far they may be off is counted in (`PoseTable`, column POSE_SLOP).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.lowering.facet_table import FacetTable
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.shape_table import NO_TERMS, POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PoseTable
+from collide.mesh.bvh import MeshTree
+from collide.narrowphase.convex_queries import run_pairs
+
+
+class Posed(NamedTuple):
+    """Poses of one body.
+
+    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from where they put it [m].
+    """
+
+    X: np.ndarray
+    slop: np.ndarray
+
+    def of(self, some) -> Posed:
+        return Posed(self.X[some], self.slop[some])
+
+
+def facet_rows(
+    tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, pose: np.ndarray, place: np.ndarray, *, boolean: bool, limit: float,
+    depths: bool = True,
+) -> np.ndarray:  # fmt: skip
+    """Rows (PAIR_DTYPE) of k facets, each at one of n pairs of poses, against a convex set; the facet is A.
+
+    pose, place : (k,) which poses, and which triangles in the order of the tree.   boolean, limit, depths : as of `run_pairs`.
+    """
+    corners, own = np.unique(place, return_inverse=True)
+    table = FacetTable(tree.triangles[corners].reshape(-1, 3, 3), packed)
+    which, again = np.unique(pose, return_inverse=True)
+    rows = np.empty((len(pose) + len(which), POSE))
+    for part, side, chosen in ((slice(0, len(pose)), A, pose), (slice(len(pose), None), B, which)):
+        rows[part, :9] = side.X[chosen, :3, :3].reshape(-1, 9)
+        rows[part, 9:12] = side.X[chosen, :3, 3]
+        rows[part, POSE_SLOP] = side.slop[chosen]
+    rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
+    shape_of = np.concatenate([own.ravel(), np.full(len(which), len(corners))]).astype(np.int64)
+    pairs = np.stack([np.arange(len(pose)), len(pose) + again.ravel()], axis=1)
+    return run_pairs(table, PoseTable(rows, NO_TERMS), shape_of, pairs, boolean=boolean, limit=limit, depths=depths)  # type: ignore[arg-type]

@@ -1,0 +1,336 @@
+"""Questions about two mesh trees from Python: poses in, arrays out.
+
+Bodies are taken in the order of their contents, so that swapped questions are worked out on the same numbers; of
+two that are alike the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and
+asking numpy for their addresses, takes longer than most booleans.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import InvalidPose
+from collide.kernels import address_of, code_of
+from collide.mesh.bvh import WIDTH, MeshTree
+from collide.mesh.bvh_slabs import make_slabs
+from collide.narrowphase.facets import facets_within as near_pairs
+from collide.narrowphase.facets import ray_surface as rays
+from collide.narrowphase.facets import self_collision as self_contact
+from collide.narrowphase.facets import surface_collision as surfaces
+from collide.narrowphase.facets import surface_distance as distances
+from collide.narrowphase.facets import winding_numbers as inside
+from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
+from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, SINGULAR, walk_surfaces
+
+#: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.
+HEAP = 1 << 14
+#: Bodies with radii: cores are looked for as far as these, and this much farther, so that a bracket tells.
+FARTHER = 1 + 1e-9
+
+
+class SurfacePairs(NamedTuple):
+    """Pairs of facets that meet, at N pairs of poses.
+
+    pairs : (k, 2) int64 facet numbers of A and of B, those of a pose sorted.
+    starts : (N + 1,) int64, where the pairs of each pose begin and end.
+    counters : (N, 3) int64: pairs of boxes looked at, triangles tested, of them decided exactly.
+    """
+
+    pairs: np.ndarray
+    starts: np.ndarray
+    counters: np.ndarray
+
+
+class SurfaceDistances(NamedTuple):
+    """Distances of two surfaces at N pairs of poses [m].
+
+    distance, lower, upper : (N,) with lower ≤ truth ≤ upper proven; 0 where they meet; the limit, with an infinite
+        upper, where everything is proven farther.
+    point_a, point_b, normal : (N, 3) nearest points in the world and the unit vector from A's to B's; a common point
+        and 0 where they meet.
+    facets : (N, 2) int64 facet numbers of A and of B; −1 where everything is proven farther than the limit.
+    meets : (N,) bool, decided exactly.
+    counters : (N, 3) int64: pairs of boxes looked at, of triangles, decided exactly.
+    """
+
+    distance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    point_a: np.ndarray
+    point_b: np.ndarray
+    normal: np.ndarray
+    facets: np.ndarray
+    meets: np.ndarray
+    counters: np.ndarray
+
+
+class NearPairs(NamedTuple):
+    """Pairs of facets within a distance of each other at one pair of poses, sorted by facets.
+
+    facets : (k, 2) int64 facet numbers of A and of B.   meets : (k,) bool, decided exactly.
+    length : (k,) distance of the nearest points found, an upper bound but for rounding; 0 where they meet [m].
+    lower : (k,) proven lower bound of the distance.
+    point_a, point_b : (k, 3) nearest points in the world's axes seen from A's origin; the same where they meet.
+    """
+
+    facets: np.ndarray
+    meets: np.ndarray
+    length: np.ndarray
+    lower: np.ndarray
+    point_a: np.ndarray
+    point_b: np.ndarray
+
+
+def surfaces_meet(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(N,) bool: whether two surfaces share a point; parameters as for `first_hits`, which says where."""
+    if B.content < A.content:
+        A, B, X_WA, X_WB = B, A, X_WB, X_WA
+    _, starts, _ = _walked(A, B, X_WA, X_WB, True)
+    return starts[1:] > starts[:-1]
+
+
+def first_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
+    """One pair of facets that meet for each pair of poses, if any does: the same one every time.
+
+    X_WA, X_WB : (4, 4) or (N, 4, 4) float64, one of them or both; entries are exact reals. Surfaces only: a
+    mesh inside another meets nothing. Raises InvalidPose where a matrix is singular or nearly so.
+    """
+    if B.content < A.content:
+        keys, starts, counters = _walked(B, A, X_WB, X_WA, True)
+        return SurfacePairs(np.stack(np.divmod(keys, len(A.ids))[::-1], axis=1), starts, counters)
+    keys, starts, counters = _walked(A, B, X_WA, X_WB, True)
+    return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
+
+
+def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
+    """All pairs of facets that meet; parameters as for `first_hits`. None is lost, however many there are."""
+    if B.content < A.content:
+        keys, starts, counters = _walked(B, A, X_WB, X_WA, False)
+        b, a = np.divmod(keys, len(A.ids))
+        keys = a * len(B.ids) + b
+    else:
+        keys, starts, counters = _walked(A, B, X_WA, X_WB, False)
+    for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist()):
+        keys[begin:end].sort()
+    return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
+
+
+def _walked(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(keys, starts, counters) of bodies in order; a key is a facet of A times B's number of facets, and one of B."""
+    X_WA, X_WB, n = matched(X_WA, X_WB)
+    work = _workspace(WIDTH * (A.depth + B.depth + 4))
+    keys = np.empty(64 + n if first_only else 4096, dtype=np.int64)
+    told = np.zeros(3 + n + 1 + COUNTERS * n, dtype=np.int64)
+    where_at = told.ctypes.data
+    starts_at, counters_at = where_at + 24, where_at + 8 * (4 + n)
+    step_a, step_b = step(X_WA), step(X_WB)
+    while True:
+        said = walk_surfaces(
+            A.address, B.address, X_WA.ctypes.data, step_a, X_WB.ctypes.data, step_b, n, A.content == B.content,
+            first_only, keys.ctypes.data, len(keys), starts_at, counters_at, where_at, *work.addresses,
+        )  # fmt: skip
+        if said == SINGULAR:
+            raise InvalidPose(f"pose {int(told[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+        if said != FULL:
+            break
+        keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
+    starts = told[3 : 4 + n]
+    return keys[: starts[-1]], starts, told[4 + n :].reshape(n, COUNTERS)
+
+
+def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.inf) -> SurfaceDistances:
+    """How far two surfaces are apart; parameters as for `first_hits`.
+
+    limit : nothing farther than this is looked for [m].
+    """
+    if B.content < A.content:
+        r = surface_distances(B, A, X_WB, X_WA, limit)
+        return r._replace(point_a=r.point_b, point_b=r.point_a, normal=-r.normal, facets=r.facets[:, ::-1])
+    for tree in (A, B):
+        tree.ask_slabs(make_slabs)
+    X_WA, X_WB, n = matched(X_WA, X_WB)
+    results, marks = _near(A, B, X_WA, X_WB, n, limit)
+    # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
+    left = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
+    if len(left):
+        X_WO, X_WT = (X if X.ndim == 2 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
+        results[left], marks[left] = _near(A, B, X_WO, X_WT, len(left), np.inf)
+    return SurfaceDistances(
+        results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
+        marks[:, 2] != 0, marks[:, 3:],
+    )  # fmt: skip
+
+
+def _near(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, n: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """(results, marks) of `distances.near_surfaces`."""
+    results = np.empty((n, distances.RESULT))
+    marks = np.zeros((n, distances.MARKS), dtype=np.int64)
+    work = _workspace(WIDTH * (A.depth + B.depth + 4))
+    stack_at, n_stack, doubles_at, integers_at, decide = work.addresses
+    done = distances.near_surfaces(
+        A.address, B.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), n, A.content == B.content,
+        float(limit), results.ctypes.data, marks.ctypes.data, stack_at, n_stack, work.heap_address, HEAP, doubles_at,
+        integers_at, decide,
+    )  # fmt: skip
+    if done < n:
+        raise InvalidPose(f"pose {done}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+    return results, marks
+
+
+def facets_within(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, reach: float, most: int) -> NearPairs | None:
+    """All pairs of facets at most ``reach`` [m] apart, and a few that are farther by rounding; poses (4, 4).
+
+    most : None is returned where there are more pairs than about this. Raises InvalidPose where a matrix is singular.
+    Costs about 0.1 µs a pair of boxes and 0.3 µs a pair listed.
+    """
+    X_WA, X_WB = (np.ascontiguousarray(X, dtype=np.float64) for X in (X_WA, X_WB))
+    work = _workspace(WIDTH * (A.depth + B.depth + 2))
+    capacity = 512
+    while True:
+        out = np.empty((capacity, near_pairs.NUMBERS_OF_PAIR))
+        told = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
+        said = near_pairs.list_near_pairs(
+            A.address, B.address, X_WA.ctypes.data, X_WB.ctypes.data, float(reach), out.ctypes.data, told.ctypes.data,
+            capacity, *work.addresses,
+        )  # fmt: skip
+        if said == -SINGULAR:
+            raise InvalidPose("a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+        if said != -FULL:
+            break
+        if capacity >= most:
+            return None
+        capacity = min(4 * capacity, max(most, capacity + 1))
+    order = np.lexsort((told[:said, 1], told[:said, 0]))
+    out, told = out[order], told[order]
+    return NearPairs(told[:, :2], told[:, 2] != 0, out[:, 0], out[:, 1], out[:, 2:5], out[:, 5:8])
+
+
+def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
+    """(N,) int64: whether points are OUTSIDE (0) of a closed surface, ON it (1) or INSIDE (2), without rounding.
+
+    points : (3,) or (N, 3), in a frame of pose X_WB: points of the world with ``np.eye(4)``, vertices of another mesh
+        with its pose. X_WA, X_WB : (4, 4) or (N, 4, 4). Inside is where the surface winds once or more: it must be
+        closed, facets counter-clockwise from outside. Points on facets without area may be said to be off the surface.
+        UNDECIDED (3) where every segment tried passes an edge: not met so far.
+    """
+    X_WA, X_WB, n = matched(X_WA, X_WB)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if points.shape[-1:] != (3,) or points.ndim > 2:
+        raise ValueError(f"points must be (3,) or (N, 3), not {points.shape}")
+    if points.ndim == 2:
+        if n not in (1, len(points)):
+            raise ValueError(f"{len(points)} points for {n} poses")
+        n = len(points)
+    answers = np.zeros(n, dtype=np.int64)
+    counters = np.zeros((n, 3), dtype=np.int64)
+    work = _workspace(WIDTH * (A.depth + 2))
+    inside.points_inside(
+        A.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), points.ctypes.data,
+        3 if points.ndim == 2 else 0, n, answers.ctypes.data, counters.ctypes.data, *work.addresses,
+    )  # fmt: skip
+    if (answers == inside.SINGULAR).any():
+        k = int(np.flatnonzero(answers == inside.SINGULAR)[0])
+        raise InvalidPose(f"pose {k}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+    return answers
+
+
+def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 2) sorted facet pairs i < j of one surface that share more than common corners and edges, counters (3,)).
+
+    Decided exactly on the coordinates given; corners are common where their coordinates are equal. Facets that are
+    one facet twice are among the pairs.
+    """
+    keys = np.empty(4096, dtype=np.int64)
+    counters, where = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    planes = np.empty(self_contact.PLANE * len(tree.ids))
+    work = _workspace(WIDTH * WIDTH * (tree.depth + 2))
+    while True:
+        said = self_contact.walk_itself(
+            tree.address, keys.ctypes.data, len(keys), counters.ctypes.data, where.ctypes.data, planes.ctypes.data,
+            *work.addresses,
+        )
+        if said != self_contact.FULL:
+            break
+        keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
+    found = np.sort(keys[: where[1]])
+    return np.stack(np.divmod(found, len(tree.ids)), axis=1), counters
+
+
+def facets_on_rays(A: MeshTree, X_WA, given: np.ndarray, first_only: bool) -> tuple[np.ndarray, np.ndarray]:
+    """(hits (k, rays.HIT), counters (N, 3): boxes, triangles and exact decisions) of N rays, each ray's together.
+
+    X_WA : (4, 4) or (N, 4, 4).   given : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
+    first_only : only facets that may be the first of their ray, by brackets; all that are met otherwise.
+    """
+    X_WA = np.ascontiguousarray(X_WA, dtype=np.float64)
+    n = len(given)
+    hits = np.empty((n + 64, rays.HIT))
+    counters, where = np.zeros((n, 3), dtype=np.int64), np.zeros(2, dtype=np.int64)
+    work = _workspace(WIDTH * (A.depth + 2))
+    while True:
+        said = rays.cast_rays(
+            A.address, X_WA.ctypes.data, step(X_WA), given.ctypes.data, n, first_only, hits.ctypes.data, len(hits),
+            counters.ctypes.data, where.ctypes.data, *work.addresses,
+        )  # fmt: skip
+        if said == rays.SINGULAR:
+            raise InvalidPose(f"pose {int(where[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+        if said != rays.FULL:
+            return hits[: where[1]], counters
+        hits = np.concatenate([hits, np.empty((3 * len(hits), rays.HIT))])
+
+
+# --- poses and workspaces -----------------------------------------------------------------------
+
+
+def matched(X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, int]:
+    """Both as C-contiguous float64, and the number of poses they make."""
+    X_WA = np.ascontiguousarray(X_WA, dtype=np.float64)
+    X_WB = np.ascontiguousarray(X_WB, dtype=np.float64)
+    if X_WA.shape == (4, 4) and X_WB.shape == (4, 4):
+        return X_WA, X_WB, 1
+    for X in (X_WA, X_WB):
+        if X.shape[-2:] != (4, 4) or X.ndim not in (2, 3):
+            raise InvalidPose(f"poses must be (4, 4) or (N, 4, 4), not {X.shape}")
+    lengths = {len(X) for X in (X_WA, X_WB) if X.ndim == 3}
+    if len(lengths) > 1:
+        raise InvalidPose(f"batches of different lengths: {len(X_WA)} and {len(X_WB)}")
+    return X_WA, X_WB, lengths.pop()
+
+
+def step(X: np.ndarray) -> int:
+    """Doubles from one pose to the next."""
+    return 16 if X.ndim == 3 else 0
+
+
+class Workspace:
+    """What kernels write on besides answers."""
+
+    def __init__(self, n_stack: int):
+        self._stack = np.empty(2 * n_stack + 32, dtype=np.int64)
+        doubles = max(
+            module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside, near_pairs, rays, self_contact)
+        )
+        self._doubles = np.empty(doubles)
+        self._integers = np.empty(INTEGERS, dtype=np.int64)
+        self._heap = np.empty(2 * HEAP, dtype=np.int64)  # memory that nobody touches costs nothing
+        self.n_stack = n_stack
+        #: Stack, its length, doubles, integers, and where the exact stage stands.
+        self.addresses = (
+            address_of(self._stack), n_stack, address_of(self._doubles), address_of(self._integers),
+            code_of(decide_exactly),
+        )  # fmt: skip
+        self.heap_address = address_of(self._heap)
+
+
+_kept = threading.local()
+
+
+def _workspace(n_stack: int) -> Workspace:
+    """This thread's workspace, with room for a stack of this many entries."""
+    work = getattr(_kept, "work", None)
+    if work is None or work.n_stack < n_stack:
+        work = _kept.work = Workspace(max(n_stack, 512))
+    return work

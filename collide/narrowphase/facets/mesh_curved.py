@@ -1,0 +1,283 @@
+"""Meshes against convex shapes without exact facets: cylinders, cones, ellipsoids, polytopes with rounded corners.
+
+A polytope around the shape and one inside it decide without rounding wherever the surface of the mesh does not pass
+between them. There facets are asked about one by one, those that may be near enough, nearest first: the convex engine
+proves a bracket for each, and the mesh's is the least of them. Signs that these brackets leave open stay open.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.batches import ask
+from collide.lowering.enclosures import Enclosure
+from collide.lowering.facet_bodies import Body, farthest_told, hull_of, reach_of
+from collide.lowering.packed_convex import POINTS
+from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.facets.facet_convex import Posed, facet_rows
+from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
+from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN, core_hits, holds_points
+from collide.narrowphase.facets.near_facets import Facets, near_facets
+from collide.narrowphase.facets.separating_translation import way_out
+from collide.narrowphase.facets.winding_numbers import OUTSIDE
+from collide.narrowphase.fallback_searches import lay_points_apart
+from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
+
+#: Facets of a pose that are asked about together: so many first, then so many times more.
+_FIRST, _MORE = 8, 4
+
+
+class Decided(NamedTuple):
+    """n poses of a mesh A and a shape B.
+
+    state : (n,) APART, HIT or OPEN.   how : (n,) index into `results.HOW`.
+    point : (n, 3) of the world, in both bodies where one lies inside the other, else NaN.
+    place : (n,) the triangle that meets B, or may, in the order of the tree; −1 where none was looked for.
+    """
+
+    state: np.ndarray
+    how: np.ndarray
+    point: np.ndarray
+    place: np.ndarray
+
+
+def decide(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed) -> Decided:
+    """Whether a mesh and a shape share a point, proven for the poses and everything within their slops."""
+    n = len(X_WA.X)
+    done = Decided(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
+    exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)
+    _between_polytopes(A, E, X_WA.X, X_WB.X, np.flatnonzero(exact), done)
+    left = np.flatnonzero(done.state == OPEN)
+    if len(left):
+        where = points_in_solid(A.tree, X_WA.X[left], E.outer.points[0], X_WB.X[left])  # refuses poses that are none
+        _by_facets(A, E, X_WA, X_WB, left, done)
+        if A.solid:
+            free = (done.state[left] == APART) & (where != OUTSIDE)
+            done.state[left[free]], done.how[left[free]] = HIT, EXACT
+            done.point[left[free]] = _moved(X_WB.X[left[free]], E.outer.points[0])
+    return done
+
+
+def _between_polytopes(A: Body, E: Enclosure, X_WA, X_WB, left: np.ndarray, done: Decided) -> None:
+    if not len(left):
+        return
+    around = core_hits(A, E.outer, X_WA[left], X_WB[left]).core
+    done.state[left[~around]] = APART
+    left = left[around]
+    if E.inner is not None and len(left):
+        within = core_hits(A, E.inner, X_WA[left], X_WB[left])
+        done.state[left[within.core]] = HIT
+        done.point[left] = within.inside
+
+
+def _by_facets(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray, done: Decided) -> None:
+    """Ask about every facet that may touch, until one does."""
+    PA, PB = X_WA.of(left), X_WB.of(left)
+    near = near_facets(A.tree, E.packed, PA, PB, _across(A, E, PA, PB), np.zeros(len(left)))
+    hit, unsure = np.zeros(len(left), dtype=bool), np.zeros(len(left), dtype=bool)
+    how, place = np.full(len(left), EXACT), np.full(len(left), -1)
+    for some in _rounds(near, lambda facets: ~hit[facets.pose]):
+        pose, own = near.pose[some], near.place[some]
+        rows = facet_rows(A.tree, E.packed, PA, PB, pose, own, boolean=True, limit=0.0)
+        for k in np.flatnonzero(rows["hit"]).tolist():
+            p, sure = pose[k], rows["how"][k] != UNDECIDED
+            if not hit[p] and (sure or not unsure[p]):
+                place[p], how[p] = own[k], rows["how"][k]
+            hit[p] |= sure
+            unsure[p] |= not sure
+    done.state[left] = np.where(hit, HIT, np.where(unsure, OPEN, APART))
+    done.how[left], done.place[left] = how, place
+
+
+def _rounds(near: Facets, wanted):
+    """Yields indices of facets to be asked about next: nearest first, as many of every pose whatever the others."""
+    ranks = near.ranks()
+    begin, size = 0, _FIRST
+    most = int(ranks.max()) + 1 if len(ranks) else 0
+    while begin < most:
+        some = np.flatnonzero((ranks >= begin) & (ranks < begin + size))
+        some = some[wanted(near)[some]]
+        if len(some):
+            yield some
+        begin += size
+        size *= _MORE
+
+
+def _across(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
+    """(n, 3) from the mesh's middle to the shape's."""
+    return _moved(PB.X, E.outer.centre) - _moved(PA.X, A.centre)
+
+
+def _moved(X: np.ndarray, point: np.ndarray) -> np.ndarray:
+    return (X[..., :3, :3] * point).sum(axis=-1) + X[..., :3, 3]
+
+
+# --- rows ---------------------------------------------------------------------------------------
+
+
+def curved_rows(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, *, limit: float, depths: bool) -> np.ndarray:
+    """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop only."""
+    decided = decide(A, E, X_WA, X_WB)
+    rows = np.zeros(len(X_WA.X), dtype=PAIR_DTYPE)
+    rows["vertices_a"] = rows["vertices_b"] = -1
+    exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)
+    for own, farthest in ((exact, limit), (~exact, math.inf)):  # what is in sight must not depend on the batch
+        left = np.flatnonzero((decided.state == APART) & own)
+        if len(left):
+            rows[left] = _gaps(A, E, X_WA.of(left), X_WB.of(left), farthest, limit)
+    for k in np.flatnonzero(decided.state != APART).tolist():
+        _overlap(A, E, X_WA, X_WB, decided, rows, k, depths)
+    return rows
+
+
+def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: float) -> np.ndarray:
+    """Rows of bodies that are known to be apart; only what is no farther than ``farthest`` [m] is looked for."""
+    rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
+    facets = _facets_to_begin_with(A, E, PA, PB, farthest)
+    seen = np.flatnonzero(facets >= 0)
+    if len(seen):
+        rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), facets[seen])
+    for k in np.flatnonzero(facets < 0).tolist():
+        rows[k] = _far(A, E, PA, PB, k, farthest)
+    rows["vertices_a"] = rows["vertices_b"] = -1
+    rows["hit"] = False
+    beyond = (rows["lower"] > limit) | rows["beyond"]
+    rows["beyond"], rows["certified"] = beyond, rows["certified"] | beyond
+    rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
+    return rows
+
+
+def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float) -> np.ndarray:
+    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``farthest``.
+
+    The polytope around the shape tells, by its surface: what comes nearer to the shape than the limit either comes as
+    near to that surface, or lies inside it. So a part of the mesh that is wholly inside, however far from the surface,
+    is not beyond the limit; one point of every part says whether there is one.
+    """
+    facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf)).facets[:, 0].copy()
+    unseen = np.flatnonzero(facets < 0)
+    if len(unseen) and farthest < math.inf:
+        enclosed = unseen[holds_points(E.outer, A.points, PB.X[unseen], PA.X[unseen])]
+        if len(enclosed):
+            nearest = surface_distances(A.tree, E.outer.tree, PA.X[enclosed], PB.X[enclosed]).facets[:, 0]
+            facets[enclosed] = np.maximum(nearest, 0)  # any facet will do to begin with
+    return facets
+
+
+def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) -> np.ndarray:
+    """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
+
+    Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need not.
+    """
+    n = len(PA.X)
+    order = np.empty(len(A.tree.ids), dtype=np.int64)
+    order[A.tree.ids] = np.arange(len(order))
+    first = order[facets]
+    poses, places = [np.arange(n)], [first]
+    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf, depths=False)]
+    upper = asked[0]["upper"].copy()
+    near = near_facets(A.tree, E.packed, PA, PB, asked[0]["normal"], upper)
+    for some in _rounds(near, lambda facets: (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])):
+        pose, place = near.pose[some], near.place[some]
+        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=False)  # whatever the batch
+        poses.append(pose)
+        places.append(place)
+        asked.append(rows)
+        np.minimum.at(upper, pose, rows["upper"])
+    pose, place, rows = np.concatenate(poses), np.concatenate(places), np.concatenate(asked)
+    return _least(A, E, PA, PB, pose, place, rows, upper)
+
+
+def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper) -> np.ndarray:
+    """One row a pose from those of its facets."""
+    # The nearest by its upper bound and the width of its bracket: where that is wide the distance is a guess, and so are points.
+    order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
+    best = order[np.flatnonzero(np.diff(pose[order], prepend=-1))]
+    out = np.zeros(len(best), dtype=PAIR_DTYPE)
+    for name in FIELDS:  # padding stays 0
+        out[name] = rows[best][name]
+    out["part_a"], out["part_b"], out["count"], out["iterations"] = A.tree.ids[place[best]], 0, 0, 0
+    lower = np.full(len(best), np.inf)
+    np.minimum.at(lower, pose, rows["lower"])
+    certified = np.ones(len(best), dtype=bool)
+    np.logical_and.at(certified, pose, rows["certified"] | (rows["lower"] > upper[pose]))
+    out["lower"], out["upper"] = np.maximum(lower, 0.0), np.maximum(upper, 0.0)
+    out["distance"] = np.clip(out["distance"], out["lower"], out["upper"])
+    none = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
+    out["distance"][none] = np.maximum(out["upper"][none], 5e-324)
+    out["upper"] = np.maximum(out["upper"], out["distance"])
+    lay_points_apart(out, np.flatnonzero((out["distance"] != rows["distance"][best]) | (rows["how"][best] == UNDECIDED)))
+    promise = PROMISE_STORED if E.packed.kind == POINTS else PROMISE_CURVED
+    out["certified"] = certified | (out["upper"] - out["lower"] <= promise * _size(A, E, PA, PB))
+    out["how"][out["how"] == UNDECIDED] = EXACT  # the polytope around it is apart from the mesh
+    return out
+
+
+def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
+    """(n,) S of `narrowphase/bounds.py`."""
+    return reach_of(A) + E.packed.reach + np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
+
+
+def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
+    """The row of bodies that are out of sight: beyond the limit, or farther than boxes in floats can tell."""
+    if limit <= farthest_told(A, E.outer):
+        return _unseen(A, E, PA, PB, k, limit)
+    hulls = ask(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], False, limit, False, 1)
+    row = hulls[0]
+    slop = float(PA.slop[k] + PB.slop[k])
+    row["count"], row["part_a"], row["part_b"], row["iterations"] = 0, 0, 0, 0
+    row["lower"] = max(float(row["lower"]) - slop, 0.0)
+    one = _moved(PA.X[k], A.points[0])
+    other = _moved(PB.X[k], E.outer.points[0])
+    across = float(np.sqrt(np.square(other - one).sum())) * (1 + 2.0**-45) + slop
+    row["upper"] = max(across, float(row["upper"]))
+    row["certified"] = bool(row["lower"] > 0.0 and row["upper"] - row["lower"] <= PROMISE_STORED * across)
+    return row
+
+
+def _unseen(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
+    """The row of bodies beyond a limit: halfway between their middles, as far apart as is proven."""
+    row = np.zeros(1, dtype=PAIR_DTYPE)[0]
+    one, other = _moved(PA.X[k], A.centre), _moved(PB.X[k], E.outer.centre)
+    length = float(np.sqrt(np.square(other - one).sum()))
+    normal = (other - one) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    row["distance"] = row["lower"] = math.nextafter(limit, math.inf)
+    row["upper"], row["beyond"], row["how"], row["normal"] = math.inf, True, EXACT, normal + 0.0
+    half = 0.5 * float(row["distance"]) * normal
+    row["point_a"], row["point_b"] = 0.5 * (one + other) - half, 0.5 * (one + other) + half
+    return row
+
+
+def _overlap(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, decided: Decided, rows, k: int, depths: bool) -> None:
+    """Fill in row k of bodies that meet, or may."""
+    row, some = rows[k], slice(k, k + 1)
+    PA, PB = X_WA.of(some), X_WB.of(some)
+    sure = decided.state[k] == HIT
+    row["hit"], row["how"] = True, decided.how[k] if sure else UNDECIDED
+    point = decided.point[k]
+    if np.isnan(point[0]) and decided.place[k] >= 0:
+        place = decided.place[some]
+        facet = facet_rows(A.tree, E.packed, PA, PB, np.zeros(1, dtype=np.int64), place, boolean=False, limit=math.inf)[0]
+        point = 0.5 * (facet["point_a"] + facet["point_b"])
+        row["part_a"] = A.tree.ids[place[0]]
+        row["upper"] = 0.0 if sure else max(float(facet["upper"]), 0.0)
+    elif np.isnan(point[0]):
+        meeting = surface_distances(A.tree, E.inner.tree, PA.X, PB.X)  # type: ignore[union-attr]
+        point = meeting.point_a[0]
+        row["part_a"] = max(int(meeting.facets[0, 0]), 0)
+    row["point_a"] = row["point_b"] = point
+    row["certified"] = sure
+    if depths:
+        hulls = ask(hull_of(A), hull_of(E.outer), PA.X, PB.X, False, math.inf, False, 1)[0]
+
+        def meets(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
+            still = np.zeros(len(X_WA))
+            return decide(A, E, Posed(X_WA, still), Posed(X_WB, still)).state != APART
+
+        length, bound, normal = way_out(A, E.outer, PA.X[0], PB.X[0], hulls, [], meets)
+        row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
+        row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
+        row["certified"] = bool(sure and bound == 0.0)

@@ -1,0 +1,154 @@
+"""Which facets of a mesh may be within some distance of a convex set: a walk down the box-tree, many poses at once.
+
+Boxes and triangles are parted from the set along a few directions a pose: the mesh's axes, the set's, and one that
+the caller knows. Three gaps along the axes of a frame add up as a diagonal does, less how far the axes are from
+right angles. All of it is a lower bound of the distance, rounding taken off; what is left is a superset.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS, PackedConvex
+from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
+from collide.narrowphase.facets.facet_convex import Posed
+
+#: More boxes at once are walked in two halves of the poses.
+_MOST_BOXES = 1 << 16
+#: Of the largest numbers met, what rounding takes off a gap; unit vectors are this much shorter than 1.
+_ROUNDING, _SHORTER = 2.0**-46, 1 - 2.0**-40
+
+
+class Facets:
+    """Facets found: ``pose`` (k,), ``place`` (k,) in the order of the tree, ``bound`` (k,) of their distance [m].
+
+    Sorted by pose, then bound, then place.
+    """
+
+    def __init__(self, pose: np.ndarray, place: np.ndarray, bound: np.ndarray):
+        order = np.lexsort((place, bound, pose))
+        self.pose, self.place, self.bound = pose[order], place[order], bound[order]
+
+    def ranks(self) -> np.ndarray:
+        """(k,) how many stand before each, at its pose."""
+        starts = np.flatnonzero(np.diff(self.pose, prepend=-1))
+        counts = np.diff(np.append(starts, len(self.pose)))
+        return np.arange(len(self.pose)) - np.repeat(starts, counts)
+
+
+def near_facets(tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, along: np.ndarray, upper: np.ndarray) -> Facets:
+    """Facets of A not proven farther than ``upper`` (n,) from the set at B, at n pairs of poses.
+
+    along : (n, 3) a direction worth trying, of any length.
+    """
+    spans = _Spans(tree, packed, A, B, along)
+    found = list(_walk(tree, spans, upper, np.arange(len(upper))))
+    return Facets(*(np.concatenate(column) for column in zip(*found)))
+
+
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
+    """Yields (pose, place, bound) of the facets left."""
+    links = tree.links()
+    pose, at = poses, np.zeros(len(poses), dtype=np.int64)
+    runs = []
+    while len(at):
+        nodes = tree.nodes[at]
+        floats = nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
+        halves = floats[:, 3:].transpose(0, 2, 1)
+        used = halves[:, :, 0] > NOTHING / 2
+        many = np.repeat(pose, WIDTH).reshape(-1, WIDTH)[used]
+        link = links[at][used].astype(np.int64)
+        scale = np.ldexp(1.0, tree.exponent)
+        centres = tree.centre + floats[:, :3].transpose(0, 2, 1)[used] * scale
+        near = ~(spans.of_boxes(many, centres, halves[used] * scale) > upper[many])
+        many, link = many[near], link[near]
+        leaf = link < 0
+        runs.append((many[leaf], link[leaf]))
+        pose, at = many[~leaf], link[~leaf]
+        if len(at) * WIDTH > _MOST_BOXES and len(poses) > 1:
+            half = len(poses) // 2
+            yield from _walk(tree, spans, upper, poses[:half])
+            yield from _walk(tree, spans, upper, poses[half:])
+            return
+    pose, link = (np.concatenate(column) for column in zip(*runs))
+    first, count = leaf_runs(link)
+    pose = np.repeat(pose, count)
+    place = np.repeat(first - (np.cumsum(count) - count), count) + np.arange(len(pose))
+    for begin in range(0, max(len(pose), 1), _MOST_BOXES):
+        some = slice(begin, begin + _MOST_BOXES)
+        bound = spans.of_triangles(pose[some], tree.triangles[place[some]].reshape(-1, 3, 3))
+        near = ~(bound > upper[pose[some]])
+        yield pose[some][near], place[some][near], bound[near]
+
+
+class _Spans:
+    """A convex set between pairs of planes, and the mesh's frame along their normals, pose by pose.
+
+    Everything is relative to the origin of A's frame.
+    """
+
+    def __init__(self, tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, along: np.ndarray):
+        RA, RB = A.X[:, :3, :3], B.X[:, :3, :3]
+        D = np.concatenate([RA.transpose(0, 2, 1), RB.transpose(0, 2, 1), along[:, None]], axis=1)
+        lengths = np.sqrt(_dot(D, D))
+        D = np.where(lengths[:, :, None] > 0.0, D / np.where(lengths > 0.0, lengths, 1.0)[:, :, None], 0.0) * _SHORTER
+        t = B.X[:, :3, 3] - A.X[:, :3, 3]
+        across = _dot(D, t[:, None])
+        self.along = _turned(D, RA)
+        g = _turned(D, RB)
+        slop = (packed.radius + packed.slop + A.slop + B.slop)[:, None]
+        self.high = across + _support(packed, g) + slop
+        self.low = across - _support(packed, -g) - slop
+        reach_a = _dot(np.abs(self.along), tree.numbers[REACH : REACH + 3])
+        reach_b = packed.reach * np.sqrt(_dot(g, g))
+        self.slack = _ROUNDING * (reach_a + reach_b + np.abs(t).sum(axis=1)[:, None] + slop)
+        self.worth = np.stack([_worth(D[:, :3]), _worth(D[:, 3:6])], axis=1)
+
+    def of_boxes(self, pose, centres, halves) -> np.ndarray:
+        """(k,) bounds for boxes of the mesh's frame, by centres and half lengths (k, 3)."""
+        along = self.along[pose]
+        middle, half = _dot(along, centres[:, None]), _dot(np.abs(along), halves[:, None])
+        return self._bound(pose, middle - half, middle + half)
+
+    def of_triangles(self, pose, corners) -> np.ndarray:
+        """(k,) bounds for triangles (k, 3, 3) of the mesh's frame."""
+        products = _dot(self.along[pose][:, None], corners[:, :, None])
+        return self._bound(pose, products.min(axis=1), products.max(axis=1))
+
+    def _bound(self, pose, low, high) -> np.ndarray:
+        gaps = np.maximum(self.low[pose] - high, low - self.high[pose]) - self.slack[pose]
+        clear = np.maximum(gaps, 0.0)
+        one, other = (np.sqrt(_dot(clear[:, k : k + 3], clear[:, k : k + 3])) for k in (0, 3))
+        bound = np.maximum(one * self.worth[pose, 0], other * self.worth[pose, 1])
+        return np.where(bound > 0.0, np.maximum(bound, gaps[:, 6]), gaps.max(axis=1))
+
+
+def _worth(D: np.ndarray) -> np.ndarray:
+    """(n,) what a diagonal over gaps along three unit vectors is worth: 1 over the root of their Gram matrix's norm."""
+    gram = _dot(D[:, :, None], D[:, None])
+    return (1 - 2.0**-40) / np.sqrt(np.abs(gram).sum(axis=2).max(axis=1) + 2.0**-40)
+
+
+def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
+    """(…,) support values of a core along g (…, 3)."""
+    p = packed.params
+    if packed.kind == POINTS:
+        return _dot(g[:, :, None], packed.points).max(axis=-1)
+    if packed.kind == ELLIPSOID:
+        scaled = g * p[:3]
+        return np.sqrt(_dot(scaled, scaled))
+    round_part = p[0] * np.sqrt(g[..., 0] * g[..., 0] + g[..., 1] * g[..., 1])
+    if packed.kind == CYLINDER:
+        return round_part + p[1] * np.abs(g[..., 2])
+    assert packed.kind == CONE
+    return np.maximum(p[1] * g[..., 2], round_part - p[1] * g[..., 2])
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products along the last axis, added in one order whatever the batch."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+
+
+def _turned(D: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """(n, k, 3) directions (n, k, 3) times matrices (n, 3, 3): what they are in the frame turned."""
+    return D[:, :, 0, None] * R[:, None, 0] + D[:, :, 1, None] * R[:, None, 1] + D[:, :, 2, None] * R[:, None, 2]

@@ -1,0 +1,127 @@
+"""How deep two overlapping bodies of facets are: a translation that parts them, proven, and as short as was found.
+
+The least one has no formula. A translation is proven to part two bodies where the exact test says that they do not
+meet after it, whatever led to it; so directions are guessed, and lengths tried. What parts the hulls parts the
+bodies, too: that is the longest answer given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.lowering.facet_bodies import Body
+from collide.narrowphase.facets.facet_queries import all_hits
+from collide.narrowphase.facets.mesh_hits import hits
+
+#: Lengths tried in every direction: what parts the hulls, halved so many times; the same again from the last of them
+#: where that parts the bodies, too: they touch, or nearly.
+_HALVINGS, _AGAIN = 16, 3
+#: Then, in the best direction, so many lengths between the best and its half, so many times.
+_BETWEEN, _ROUNDS = 16, 3
+#: Pairs of facets whose normals are tried one by one.
+_FACETS = 3
+_UP = 1 + 2.0**-48
+
+#: (A, B, poses of A, poses of B) → (n,) bool, False only where they are proven apart.
+Meets = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
+
+
+class Parting(NamedTuple):
+    """A translation of B that parts it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
+
+    length: float
+    bound: float
+    normal: np.ndarray
+
+
+def way_out(A: Body, B: Body, X_WA, X_WB, hull_row, more: list[np.ndarray], meets: Meets | None = None) -> Parting:
+    """A translation that parts two bodies that meet, at poses (4, 4).
+
+    hull_row : the hulls' answer.   more : translations (3,) to be tried first.   meets : what tells whether bodies
+    meet, as `hits` does, where these are not the bodies themselves.
+    """
+    best, bound, normal = -float(hull_row["distance"]), -float(hull_row["lower"]), hull_row["normal"].copy()
+    known = Parting(max(best, 0.0), max(bound, 0.0), normal)
+    if known.bound == 0.0:
+        return known
+    told = hits if meets is None else meets
+    return shortened(
+        lambda X, Y: told(A, B, X, Y), X_WA, X_WB, known, _directions(A, B, X_WA, X_WB, [normal, *more]), more
+    )
+
+
+def shortened(meet: Callable, X_WA, X_WB, known: Parting, directions: np.ndarray, more: list[np.ndarray]) -> Parting:
+    """The shortest translation found that parts two bodies, at most as long as one that is known to.
+
+    meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit
+    vectors that are tried.   more : translations (3,) to be tried first.
+    """
+    best, bound, normal = known
+    tried = [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, np.array(more).reshape(-1, 3))]
+    top = bound
+    for _ in range(_AGAIN):
+        ladder = top * 2.0 ** -np.arange(1, _HALVINGS + 1)
+        steps = (directions[:, None] * ladder[None, :, None]).reshape(-1, 3)
+        tried += [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, steps)]
+        shortest = min(tried, key=lambda one: one[1], default=None)
+        if shortest is not None and shortest[1] < best:
+            best, bound, normal = shortest[1], shortest[2], shortest[0] / shortest[1]
+        if best > 1.5 * ladder[-1]:
+            break
+        top = ladder[-1]
+    low = 0.5 * best
+    for _ in range(_ROUNDS):
+        lengths = low + (best - low) * np.arange(1, _BETWEEN) / _BETWEEN
+        found = _parting(meet, X_WA, X_WB, normal * lengths[:, None])
+        step = (best - low) / _BETWEEN
+        if len(found):
+            value, upwards = min(map(_length, found))
+            if value < best:
+                best, bound = value, upwards
+        low = max(low, best - step)
+    return Parting(best, bound, normal)
+
+
+def _parting(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
+    """(k, 3): those of the translations (n, 3) that part the bodies, as the poses they lead to really move them."""
+    if not len(steps):
+        return np.zeros((0, 3))
+    moved = np.repeat(X_WB[None], len(steps), axis=0)
+    moved[:, :3, 3] += steps
+    free = ~meet(np.repeat(X_WA[None], len(steps), axis=0), moved)
+    return (moved[:, :3, 3] - X_WB[:3, 3])[free]
+
+
+def _length(step: np.ndarray) -> tuple[float, float]:
+    """(length, proven upper bound) of a difference of doubles, each coordinate rounded once."""
+    length = float(np.sqrt(np.square(step).sum()))
+    return length, length * _UP + 5e-324
+
+
+def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.ndarray:
+    """(k, 3) unit vectors along which the way out may be short: of the hulls, of facets that meet, of the axes."""
+    pairs = all_hits(A.tree, B.tree, X_WA, X_WB).pairs
+    guesses = list(first)
+    if len(pairs):
+        of_a, of_b = _normals(A, X_WA, pairs[:, 0]), -_normals(B, X_WB, pairs[:, 1])
+        means = of_a.sum(axis=0), of_b.sum(axis=0)
+        guesses += [*means, means[0] + means[1], *of_a[:_FACETS], *of_b[:_FACETS]]
+    guesses += [*np.eye(3), *-np.eye(3), *X_WA[:3, :3].T, *-X_WA[:3, :3].T, *X_WB[:3, :3].T, *-X_WB[:3, :3].T]
+    lengths = np.sqrt(np.square(guesses).sum(axis=1))
+    clear = lengths > 1e-100
+    return np.array(guesses)[clear] / lengths[clear, None]
+
+
+def _normals(body: Body, X: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """(k, 3) unit normals of facets in the world, 0 of those without area."""
+    place = np.empty(len(body.tree.ids), dtype=np.int64)
+    place[body.tree.ids] = np.arange(len(place))
+    corners = body.tree.triangles[place[facets]].reshape(-1, 3, 3)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    u, v = ((X[:3, :3] * w[:, None]).sum(axis=2) for w in (u, v))
+    n = np.cross(u, v)
+    lengths = np.sqrt(np.square(n).sum(axis=1))[:, None]
+    return np.where(lengths > 0.0, n / np.where(lengths > 0.0, lengths, 1.0), 0.0)

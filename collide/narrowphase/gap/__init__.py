@@ -1,0 +1,1 @@
+"""The last digits of a gap between two convex sets, in double-doubles, from the feature that GJK found."""

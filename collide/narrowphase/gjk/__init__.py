@@ -1,0 +1,1 @@
+"""GJK and MPR on the Minkowski difference: proposals in doubles, with bounds."""

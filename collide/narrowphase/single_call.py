@@ -1,0 +1,77 @@
+"""Two convex sets at one pair of poses: from matrices to the answer inside one kernel."""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import entry, kernel, prepared, view_f64, view_i32, view_i64, view_u8
+from collide.lowering.shape_table import POSE
+from collide.narrowphase.finalize_rows import forget_depth
+from collide.narrowphase.pose_batches import (
+    BLOCK,
+    CORE,
+    DOUBLES_AT,
+    HEADER,
+    INTEGERS_AT,
+    INTS_AT,
+    NUMBERS_AT,
+    PAIRS_AT,
+    POSES_AT,
+    ROWS_AT,
+    SHAPE_OF_AT,
+    answer_at,
+    set_pose,
+)
+from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, HOW, ROW
+from collide.results import REFUSED, UNDECIDED
+
+
+@kernel
+def _single(header_at, XA_at, XB_at, boolean, depths, row_at):
+    """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for.
+
+    header_at : of `pose_batches.py`.
+    """
+    header = view_i64(header_at, HEADER)
+    poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
+    good_a = set_pose(poses, 0, view_f64(XA_at, 16), True)
+    good_b = set_pose(poses, BLOCK * POSE, view_f64(XB_at, 16), True)
+    if not (good_a and good_b):
+        return -1
+    answer_at(
+        header[CORE],
+        (
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
+            depths, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
+        ),
+    )  # fmt: skip
+    marks = view_u8(row_at, ROW)
+    if marks[HOW] == UNDECIDED or marks[HOW] == REFUSED:
+        return -1
+    return int(marks[HIT])
+
+
+@entry(prepared.BOOLEAN, nogil=False)
+def collide_single(header_at, XA_at, XB_at):
+    """Whether the pair meets, 0 or 1; −1 where the long way is to be taken.
+
+    All threads share its workspace: it keeps Python's lock.
+    """
+    rows_at = view_i64(header_at, HEADER)[ROWS_AT]
+    row = view_i64(rows_at, ROW // 8)
+    for k in range(ROW // 8):
+        row[k] = 0
+    return _single(header_at, XA_at, XB_at, True, False, rows_at)
+
+
+@entry(prepared.ROW, nogil=False)
+def distance_single(header_at, XA_at, XB_at, row_at, depths):
+    """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1, too,
+    where the depth has no end."""
+    said = _single(header_at, XA_at, XB_at, False, depths, row_at)
+    view_i32(row_at, ROW // 4)[BODY_B] = 1
+    if not depths and said >= 0:
+        forget_depth(view_f64(row_at, 12), view_u8(row_at, ROW))
+    if view_f64(row_at, 1 + DISTANCE)[DISTANCE] == -math.inf:
+        said = -1
+    return said

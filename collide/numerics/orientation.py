@@ -1,0 +1,299 @@
+"""On which side of a plane a point lies, decided exactly for any finite doubles.
+
+Four stages, each asked only where the one before cannot tell: plain doubles with an error bound;
+pairs of doubles with an error bound 2⁵¹ times smaller; expansions (Priest; Shewchuk, "Adaptive
+precision floating-point arithmetic and fast robust geometric predicates", 1997), which are exact
+while nothing underflows; integers of many digits (`numerics/digits.py`), which always are.
+
+A cloud is given twice: ``points``, scaled by a power of two so that the largest coordinate lies in
+[1/2, 1), and ``originals``, as they came. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
+scaling, so the last stage reads the originals. ``work`` begins with two numbers about the cloud
+(`survey`), the rest is room for sums:
+
+* threshold: 0, or the magnitude below which a nonzero original keeps its test from the expansions;
+* quantum: where all scaled coordinates are multiples of 2^-k, k ≤ 33, a determinant is a multiple
+  of 2^-3k, and one known to be smaller is 0. That settles the ties of points on a lattice. Else 0.
+
+u is 2⁻⁵³, half the distance from 1 to the next double. No step may be contracted to a fused
+multiply-add.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import kernel
+from collide.numerics.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit
+from collide.numerics.error_free import two_product, two_sum
+
+#: Doubles in ``work``: two numbers, nine differences in two parts, a minor (≤ 16) and a determinant (≤ 192).
+WORK = 256
+_DIFFERENCES = 2
+_MINOR = 20
+_TOTAL = 40
+#: Integers in ``digits``: 14 numbers' worth of digits; a difference of two doubles has at most 84.
+DIGITS = 14 * 84
+#: Expansions multiply three coordinates with lowest bits ≥ 2⁻³³³: 2⁻⁹⁹⁹ does not underflow.
+_SMALLEST_BIT = 280
+#: A finer lattice's quantum lies below what pairs of doubles can tell from 0. Adding and taking away
+#: 1.5·2⁵² rounds a number of so few bits to an integer.
+_MOST_BITS = 33
+_ROUNDER = 6755399441055744.0
+
+#: Doubles: a term of the determinant is the product of three rounded differences (3 u), rounded as
+#: it is multiplied (2 u), subtracted (1 u) and added (2 u): (1 + u)⁸ − 1 times the sum of the terms'
+#: magnitudes, which itself is known to (1 + u)⁸. Twice that is more than enough.
+_DOUBLE_ERROR = 2.0**-49
+#: Pairs: differences are exact. A product of pairs leaves out the product of the tails and rounds
+#: three times at the size of a tail, below 6 u²; a sum of pairs rounds two tails' sums, below 4 u² of the
+#: magnitudes. Two products and three sums deep: 24 u². The rest covers the bound's own rounding.
+_PAIR_ERROR = 2.0**-100
+#: What underflow adds, in the scaling and in products of numbers below 4, is far below this.
+UNDERFLOW = 2.0**-1000
+
+
+@kernel
+def survey(originals, points, count, work):
+    """Scale the cloud into ``points`` and note threshold and quantum; returns the exponent divided by."""
+    largest = 0.0
+    for k in range(3 * count):
+        largest = max(largest, abs(originals[k]))
+    exponent = math.frexp(largest)[1]
+    # In two steps, since 2^1073 is no double.
+    half = -exponent // 2
+    factor0 = math.ldexp(1.0, half)
+    factor1 = math.ldexp(1.0, -exponent - half)
+    threshold = max(math.ldexp(1.0, exponent - _SMALLEST_BIT), 5e-324)
+    wide = False
+    bits = 0
+    steps = 1.0
+    for k in range(3 * count):
+        x = originals[k] * factor0 * factor1
+        points[k] = x
+        wide = wide or 0.0 < abs(originals[k]) < threshold
+        while bits <= _MOST_BITS and (x * steps + _ROUNDER) - _ROUNDER != x * steps:
+            bits += 1
+            steps *= 2.0
+    work[0] = threshold if wide else 0.0
+    work[1] = math.ldexp(1.0, -3 * bits) if bits <= _MOST_BITS and not wide else 0.0
+    return exponent
+
+
+@kernel
+def orientation(points, originals, work, digits, a, b, c, d, axis):
+    """Sign of (b − a) × (c − a) · (d − a): 1 where d sees a, b, c counter-clockwise, else 0 or −1.
+
+    axis : −1; or 0, 1, 2 for that unit vector in place of d − a, with d = a: the orientation of a
+        triangle projected along the axis.
+
+    The corner nearest to d is made the first: the terms of the determinant, and with them the
+    margins, shrink with that distance. A cloud that crowds together in one place needs this.
+    """
+    if axis < 0:
+        near_a = apart(points, a, d)
+        near_b = apart(points, b, d)
+        near_c = apart(points, c, d)
+        if near_b < near_a and near_b <= near_c:
+            a, b, c = b, c, a
+        elif near_c < near_a:
+            a, b, c = c, a, b
+    write_differences(points, work, a, b, c, d, axis)
+    value, size = double_determinant(work)
+    margin = _DOUBLE_ERROR * size + UNDERFLOW
+    if abs(value) > margin:
+        return 1 if value > 0.0 else -1
+    if abs(value) + margin < work[1]:
+        return 0
+    if work[0] != 0.0 and too_wide(originals, work[0], a, b, c, d):
+        return by_digits(originals, digits, a, b, c, d, axis)
+    # From here on nothing underflows: a sum of terms 0 is truly 0.
+    if size == 0.0:
+        return 0
+    value = pair_determinant(work)
+    margin = _PAIR_ERROR * size
+    if abs(value) > margin:
+        return 1 if value > 0.0 else -1
+    if abs(value) + margin < work[1]:
+        return 0
+    return by_expansions(work)
+
+
+@kernel
+def apart(points, a, b):
+    total = 0.0
+    for k in range(3):
+        total += abs(points[3 * a + k] - points[3 * b + k])
+    return total
+
+
+@kernel(inline=True)
+def one_of_four(k, a, b, c, d):
+    """Number k of four. A loop over a tuple asks whether it is left, and would raise."""
+    if k == 0:
+        return a
+    if k == 1:
+        return b
+    return c if k == 2 else d
+
+
+@kernel
+def too_wide(originals, threshold, a, b, c, d):
+    """Whether one of the points has a coordinate too small for expansions."""
+    for corner in range(4):
+        point = one_of_four(corner, a, b, c, d)
+        for k in range(3 * point, 3 * point + 3):
+            if 0.0 < abs(originals[k]) < threshold:
+                return True
+    return False
+
+
+@kernel
+def write_differences(points, work, a, b, c, d, axis):
+    """The rows b − a, c − a, d − a into ``work``, each entry as head and tail; row 3 may be a unit vector."""
+    for k in range(3):
+        at = _DIFFERENCES + 2 * k
+        base = -points[3 * a + k]
+        work[at], work[at + 1] = two_sum(points[3 * b + k], base)
+        work[at + 6], work[at + 7] = two_sum(points[3 * c + k], base)
+        work[at + 12], work[at + 13] = two_sum(points[3 * d + k], base)
+        if axis >= 0:
+            work[at + 12] = 1.0 if k == axis else 0.0
+            work[at + 13] = 0.0
+
+
+@kernel
+def double_determinant(work):
+    """The determinant of the differences' heads, and the sum of its terms' magnitudes."""
+    value = 0.0
+    size = 0.0
+    for k in range(3):
+        i = _DIFFERENCES + 2 * ((k + 1) % 3)
+        j = _DIFFERENCES + 2 * ((k + 2) % 3)
+        p = work[i] * work[j + 6]
+        q = work[j] * work[i + 6]
+        w = work[_DIFFERENCES + 12 + 2 * k]
+        value += w * (p - q)
+        size += abs(w) * (abs(p) + abs(q))
+    return value, size
+
+
+@kernel
+def pair_product(a, a_low, b, b_low):
+    product, error = two_product(a, b)
+    return product, error + (a * b_low + a_low * b)
+
+
+@kernel
+def pair_sum(a, a_low, b, b_low):
+    total, error = two_sum(a, b)
+    error += a_low + b_low
+    high = total + error
+    return high, error - (high - total)
+
+
+@kernel
+def pair_determinant(work):
+    """The determinant of the differences summed in pairs of doubles, to 24 u² of its terms' magnitudes."""
+    high = 0.0
+    low = 0.0
+    for k in range(3):
+        i = _DIFFERENCES + 2 * ((k + 1) % 3)
+        j = _DIFFERENCES + 2 * ((k + 2) % 3)
+        w = _DIFFERENCES + 12 + 2 * k
+        p, p_low = pair_product(work[i], work[i + 1], work[j + 6], work[j + 7])
+        q, q_low = pair_product(work[j], work[j + 1], work[i + 6], work[i + 7])
+        p, p_low = pair_sum(p, p_low, -q, -q_low)
+        p, p_low = pair_product(p, p_low, work[w], work[w + 1])
+        high, low = pair_sum(high, low, p, p_low)
+    return high
+
+
+@kernel
+def add_to_expansion(work, at, n, x, y):
+    """Add x·y to the expansion of n parts at ``at``; returns its new length, without parts that are 0."""
+    product, part = two_product(x, y)
+    for _ in range(2):
+        out = at
+        for k in range(at, at + n):
+            part, rest = two_sum(part, work[k])
+            if rest != 0.0:
+                work[out] = rest
+                out += 1
+        if part != 0.0:
+            work[out] = part
+            out += 1
+        n = out - at
+        part = product
+    return n
+
+
+@kernel
+def by_expansions(work):
+    """Exact sign of the determinant of the differences in ``work``."""
+    n = 0
+    for k in range(3):
+        i = _DIFFERENCES + 2 * ((k + 1) % 3)
+        j = _DIFFERENCES + 2 * ((k + 2) % 3)
+        m = 0
+        for part in range(8):
+            p = i + (part & 1)
+            q = j + 6 + ((part >> 1) & 1)
+            sign = 1.0
+            if part >= 4:
+                p += j - i
+                q += i - j
+                sign = -1.0
+            m = add_to_expansion(work, _MINOR, m, sign * work[p], work[q])
+        w = _DIFFERENCES + 12 + 2 * k
+        for part in range(w, w + 2):
+            if work[part] != 0.0:
+                for t in range(_MINOR, _MINOR + m):
+                    n = add_to_expansion(work, _TOTAL, n, work[t], work[part])
+    if n == 0:
+        return 0
+    return 1 if work[_TOTAL + n - 1] > 0.0 else -1
+
+
+@kernel
+def by_digits(originals, digits, a, b, c, d, axis):
+    """Exact sign of the determinant of the differences, from the originals; row 3 may be a unit vector."""
+    lowest = 2000
+    highest = -2000
+    for corner in range(4):
+        point = one_of_four(corner, a, b, c, d)
+        for k in range(3 * point, 3 * point + 3):
+            lowest = min(lowest, lowest_bit(originals[k]))
+            if originals[k] != 0.0:
+                highest = max(highest, math.frexp(originals[k])[1])
+    if lowest == 2000:
+        return 0
+    grid = grid_of(lowest)
+    n = (highest - BITS * grid) // BITS + 2
+    minor = 9 * n
+    total = 11 * n
+    for k in range(total, total + 3 * n):
+        digits[k] = 0
+    for cell in range(9):
+        at = cell * n
+        for k in range(at, at + n):
+            digits[k] = 0
+        if cell >= 6 and axis >= 0:
+            digits[at] = 1 if cell == 6 + axis else 0
+        else:
+            point = b if cell < 3 else (c if cell < 6 else d)
+            sign = 1.0
+            for _ in range(2):
+                add_double(digits, at, sign * originals[3 * point + cell % 3], grid)
+                point = a
+                sign = -1.0
+            carry(digits, at, n)
+    for k in range(3):
+        i = ((k + 1) % 3) * n
+        j = ((k + 2) % 3) * n
+        for t in range(minor, total):
+            digits[t] = 0
+        add_product(digits, minor, i, n, j + 3 * n, n, 1)
+        add_product(digits, minor, j, n, i + 3 * n, n, -1)
+        carry(digits, minor, 2 * n)
+        add_product(digits, total, (6 + k) * n, n, minor, 2 * n, 1)
+    return carry(digits, total, 3 * n)

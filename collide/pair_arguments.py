@@ -1,0 +1,54 @@
+"""What a pair query is asked, checked: two shapes or sequences of them, and one pose or many for each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide import argument_checks as reading
+from collide.errors import InvalidArgument, InvalidPose
+from collide.shapes.shape import Shape
+from collide.shapes.shape_set import Picked
+from collide.transforms import poses_as_given
+
+
+def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Shapes checked, poses as batches (n, 4, 4) or (1, 4, 4) whose entries are still to be checked; whether one pair is meant."""
+    X_WA, single_a = pose_batch(X_WA, "X_WA")
+    X_WB, single_b = pose_batch(X_WB, "X_WB")
+    counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
+    single = single_a and single_b
+    for name, side in (("A", A), ("B", B)):
+        if _is_sequence(side):
+            counts[name] = len(side)
+            single = False
+        elif not isinstance(side, Shape):
+            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(side)}")
+    wanted = max(counts.values()) if min(counts.values()) else 0
+    for name, count in counts.items():
+        if count != wanted and (count != 1 or name in "AB"):
+            told = ", ".join(f"{other} {n}" for other, n in counts.items())
+            kind = InvalidPose if name.startswith("X") else InvalidArgument
+            raise kind(f"lengths do not match: {told}; batches must be equally long, or a single pose")
+    return X_WA, X_WB, single
+
+
+def _is_sequence(side) -> bool:
+    """Whether it is shapes, one a pose."""
+    return isinstance(side, Picked) or (isinstance(side, (list, tuple)) and all(isinstance(shape, Shape) for shape in side))
+
+
+def pose_batch(X, name: str) -> tuple[np.ndarray, bool]:
+    """(poses (n, 4, 4), whether a single one was given)."""
+    if type(X) is np.ndarray and X.dtype == np.float64 and X.ndim in (2, 3) and X.shape[-2:] == (4, 4):
+        return np.ascontiguousarray(X).reshape(-1, 4, 4), X.ndim == 2
+    return poses_as_given(X, name, check=False)
+
+
+def shape_at(shapes, k: int) -> Shape:
+    """The shape of pair k."""
+    return shapes if isinstance(shapes, Shape) else shapes[k]
+
+
+def pose_at(X: np.ndarray, k: int) -> np.ndarray:
+    """The pose (4, 4) of pair k, of a batch or a single one."""
+    return X[k if len(X) > 1 else 0]

@@ -1,0 +1,114 @@
+"""Reports of one scene in several states, and along a trajectory: one page, one JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from collide.reports import terminal
+from collide.reports.number_format import count, lengths
+from collide.reports.report import Report
+from collide.reports.tables import Column, Line, Table, lay_out, table_lines, wrapped
+from collide.reports.trajectory_report import place, verdict
+
+SCHEMA = "collide-states/1"
+#: Pairs shown of a trajectory, unless all are asked for.
+_SHORT = 12
+
+
+class Stated(NamedTuple):
+    """A report, and the state it is of: its label as the user wrote it, "" where none was asked for."""
+
+    label: str
+    scene: Any
+    report: Report
+
+
+def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
+    """The JSON of one report, or of several states: (key, value), in order."""
+    if len(made) == 1:
+        yield from made[0].report.items()
+        return
+    yield "schema", SCHEMA
+    yield "verdict", {"text": _verdict(made), "collides": any(one.report.collides for one in made)}
+    yield "states", [{"name": one.label, "report": one.report.to_dict()} for one in made]
+
+
+def render(made: list[Stated], *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
+    """The page of one report, or a table of the states and the page of each, as `terminal.render` gives it."""
+    shown: dict[str, Any] = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
+    if len(made) == 1:
+        return _page(made[0].report, **shown)
+    style = "colliding" if any(one.report.colliding for one in made) else "free"
+    lines: list[Line] = [[(line, style)] for line in wrapped(_verdict(made), width, hanging=2)]
+    table = _state_table(made)
+    lines += [[], *table_lines(table, lay_out(table, width, whole_names), width)]
+    for one in made:
+        lines += [[], [(terminal.rule(f"STATE {one.label}", width), "title")], *_page(one.report, **shown)]
+    return lines
+
+
+def _verdict(made: list[Stated]) -> str:
+    colliding = [one.label for one in made if one.report.colliding]
+    if not colliding:
+        return f"no collision in {count(len(made), 'state')}"
+    return f"collisions in {len(colliding)} of {len(made)} states: {', '.join(colliding)}"
+
+
+def _state_table(made: list[Stated]) -> Table:
+    columns = [Column("state", "name"), Column("collisions"), Column("touching"), Column("near"), Column("deepest")]
+    rows = []
+    for label, _, report in made:
+        deepest = [pair.depth if pair.depth is not None else float("inf") for pair in report.colliding[:1]]
+        numbers = [str(len(pairs)) for pairs in (report.colliding, report.touching, report.near)]
+        rows.append([label, *numbers, lengths(deepest)[0].strip() if deepest else "-"])
+    return Table("STATES", columns, rows)
+
+
+def _page(report: Report, *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
+    page = terminal.render(report, everything=everything, proofs=proofs, width=width, whole_names=whole_names)
+    found = report.trajectory
+    if found is None:
+        return page
+    style = "colliding" if found["collides"] else "free"
+    lines: list[Line] = [[(line, style)] for line in wrapped(verdict(found), width, hanging=2)]
+    lines += [[(line, "note")] for line in wrapped(_how_sampled(found), width, hanging=2)]
+    for table in _trajectory_tables(found, None if everything else _SHORT):
+        lines += [[], *table_lines(table, lay_out(table, width, whole_names), width)]
+    return [*lines, [], [(terminal.rule("AT THE START", width), "title")], *page]
+
+
+def _how_sampled(found: dict) -> str:
+    notes = f"; {count(len(found['notes']), 'note')}: {found['notes'][0]}" if found["notes"] else ""
+    return (
+        f"{count(found['samples'], 'sample')} through {count(found['waypoints'], 'waypoint')}, no joint moving more than "
+        f"{found['resolution']:g} rad or m between two of them: by sampling, not certified in between{notes}"
+    )
+
+
+def _trajectory_tables(found: dict, limit: int | None) -> list[Table]:
+    tables = [
+        _motion_table("COLLIDING ALONG THE PATH  in the order they begin", found["colliding"], "depth", limit),
+        _motion_table("NEAR ALONG THE PATH  nearest first", found["near"], "distance", limit),
+        Table(
+            "NOT ANSWERED ALONG THE PATH", [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
+            [[entry["a"], entry["b"], entry["why"]] for entry in found["unanswered"]],
+        ),
+    ]  # fmt: skip
+    return [table for table in tables if table.rows]
+
+
+def _motion_table(title: str, pairs: list[dict], measure: str, limit: int | None) -> Table:
+    shown = pairs[:limit]
+    sizes = [abs(pair["distance"]) if pair["distance"] is not None else float("inf") for pair in shown]
+    columns = [Column("body A", "name"), Column("body B", "name"), Column(measure), Column("at"), Column("samples", optional=1)]
+    cells = zip(
+        [pair["a"] for pair in shown], [pair["b"] for pair in shown], lengths(sizes), [place(pair["at"]) for pair in shown],
+        [str(pair["samples"]) for pair in shown],
+    )  # fmt: skip
+    rows = [list(row) for row in cells]
+    if measure == "depth":
+        columns.insert(2, Column("from"))
+        for row, pair in zip(rows, shown):
+            row.insert(2, place(pair["from"]))
+    return Table(title, columns, rows, more=len(pairs) - len(shown))

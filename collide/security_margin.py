@@ -1,0 +1,78 @@
+"""Booleans with a security margin: whether two bodies come within a distance of each other.
+
+The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its last
+digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is. What is
+left open, next to curved surfaces, meshes and unions, counts as within.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+
+from collide import argument_checks as reading
+from collide.batches import ask
+from collide.errors import InvalidArgument
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.results import UNDECIDED
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.shape import Shape, is_plain
+from collide.transforms import LARGEST, SMALLEST
+
+#: (A, B, X_WA, X_WB) of a pair, poses (4, 4).
+Pair = tuple[Shape, Shape, np.ndarray, np.ndarray]
+
+
+def checked_margin(name: str, value) -> float:
+    """A margin [m] as given: 0, or of a size that a body may have. Raises InvalidArgument."""
+    margin = reading.limit(name, value)
+    if margin and not SMALLEST <= margin <= LARGEST:
+        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}")
+    return margin
+
+
+def within(rows: np.ndarray, margin: float, pair: Callable[[int], Pair]) -> np.ndarray:
+    """bool[n]: which pairs of rows, asked up to a distance of at least ``margin`` [m], are at most that far apart.
+
+    pair : the question of row k; asked for those that their bracket leaves open.
+    """
+    near = rows["hit"] | (rows["lower"] <= margin)
+    for k in np.flatnonzero(near & ~rows["hit"] & (rows["upper"] > margin)).tolist():
+        near[k] = _meets_grown(*pair(k), margin)
+    return near
+
+
+def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> bool:
+    grown = _grown(A, B, margin)
+    if grown is None:
+        return True
+    row = ask(*grown, X_WA[None], X_WB[None], False, 0.0, False, 1, depths=False)[0]
+    return bool(row["hit"] or row["how"] == UNDECIDED)
+
+
+def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
+    """Two shapes that meet exactly where A and B are within the margin; None where they are not to be had.
+
+    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space stays.
+    """
+    if not (is_plain(A) and is_plain(B)):
+        return None
+    packed = [shape.parts()[0][0] for shape in (A, B)]
+    swept = [p.kind == POINTS and p.slop == 0.0 for p in packed]
+    total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
+    first = float(total)
+    if first > total:
+        first = math.nextafter(first, 0.0)
+    rest = float(total - Fraction(first))
+    if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
+        return None
+    if all(swept):
+        return ConvexHull(packed[0].points, radius=first), ConvexHull(packed[1].points, radius=rest)
+    if rest == 0.0 and swept[0] and packed[1].kind == HALFSPACE:
+        return ConvexHull(packed[0].points, radius=first), B
+    if rest == 0.0 and swept[1] and packed[0].kind == HALFSPACE:
+        return A, ConvexHull(packed[1].points, radius=first)
+    return None

@@ -1,0 +1,138 @@
+"""ConvexHull: the hull of any points, swept by a ball."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide import log as journal
+from collide.errors import InvalidShape
+from collide.lowering.packed_convex import pack_points
+from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
+from collide.shapes.shape_files import Field, read_arrays, write_arrays
+from collide.transforms import SMALLEST
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from collide.hull.exact_hull import Hull
+
+# Hulls and support trees are kernels: imported where used, so that shapes can be made without a compiler.
+
+#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
+#: so that an answer does not depend on what was asked before.
+FEWEST_POINTS = 224
+
+
+class ConvexHull(Shape):
+    """Exactly the convex hull of the points given, swept by a ball.
+
+    points : (n, 3) in any order [m]: a solid, a flat or a straight set, one point; points that
+        are doubled, collinear, coplanar or inside are fine and change nothing.
+    faces : (m, 3) vertex ids, optional: checked for shape and range, and by `validate` for being the
+        hull's surface. The set does not depend on them.
+    radius : of the ball swept over the hull [m], ≥ 0.
+
+    Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support
+    tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point) and kept with the shape.
+    Files and pickles hold the points alone: proofs rest on the tree, so it is made from them and never believed.
+    """
+
+    __slots__ = ("_hull", "_tree", "faces", "points", "radius")
+    _fields = ("points", "faces", "radius")
+    points: np.ndarray
+    faces: np.ndarray | None
+    radius: float
+    _hull: Hull
+
+    def __init__(self, points: ArrayLike, *, faces: ArrayLike | None = None, radius: float = 0.0):
+        points = rows("ConvexHull", "points", points, (None, 3))
+        largest = float(np.abs(points).max())
+        if 0.0 < largest < SMALLEST:
+            raise InvalidShape(
+                f"ConvexHull: points: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: "
+                "scale the scene"
+            )
+        self._store(
+            points=points,
+            faces=None if faces is None else facet_ids("ConvexHull", faces, len(points), np.int64, "{n} points"),
+            radius=positive("ConvexHull", "radius", radius, zero=True),
+        )
+
+    @classmethod
+    def _from_fields(cls, points, faces, radius) -> ConvexHull:
+        return cls(points, faces=faces, radius=radius)
+
+    def _pack(self):
+        if not hasattr(self, "_tree"):
+            from collide.support.lazy_support_tree import PlantedTree
+
+            large = len(self.points) >= FEWEST_POINTS
+            object.__setattr__(self, "_tree", PlantedTree(self.points) if large else None)
+        return alone(pack_points(self.points, self.radius, tree=self._tree))
+
+    @property
+    def hull(self) -> Hull:
+        """The surface, exactly: ``dimension`` (3 solid … 0 point), ``vertices`` and ``facets`` by rows of
+        ``points``, facets counter-clockwise from outside. Worked out when first asked for, O(n log n)."""
+        from collide.hull.exact_hull import convex_hull
+
+        if not hasattr(self, "_hull"):
+            with journal.told("convex hull of %d points made", len(self.points)):
+                hull = convex_hull(self.points)
+            for array in (hull.vertices, hull.facets):
+                array.flags.writeable = False
+            object.__setattr__(self, "_hull", hull)
+        return self._hull
+
+    def validate(self) -> None:
+        """Check exactly that `hull` and the faces given are the surface of the hull of all points.
+
+        Raises InvalidShape with the defect and where it is. For tests and for data of doubtful origin.
+        """
+        from collide.hull.validate_hull import validate_hull
+
+        given = self.hull._replace(facets=self.faces) if self.faces is not None else None
+        for what, surface in (("hull", self.hull), ("faces", given)):
+            if surface is None:
+                continue
+            if what == "faces":
+                facets = surface.facets.astype(np.int32)
+                surface = surface._replace(facets=facets, vertices=np.unique(facets))
+            try:
+                validate_hull(self.points, surface)
+            except AssertionError as error:
+                raise InvalidShape(f"ConvexHull: {what}: {error}") from None
+
+    def save(self, path) -> None:
+        """Write points, faces and radius to an ``.npz`` file."""
+        arrays = {"points": self.points, "radius": np.array(self.radius)}
+        if self.faces is not None:
+            arrays["faces"] = self.faces
+        write_arrays("ConvexHull", path, _FILE_FORMAT, arrays)
+
+    @classmethod
+    def load(cls, path) -> ConvexHull:
+        """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
+        arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
+        try:
+            return cls(arrays["points"], faces=arrays.get("faces"), radius=float(arrays["radius"]))
+        except InvalidShape as error:
+            raise InvalidShape(f"ConvexHull.load: {path}: {error}") from None
+
+    def without_repeats(self) -> ConvexHull:
+        """The same set with every point once, in the order of first appearance.
+
+        Files repeat vertices (an STL names each about six times); a support query is a scan.
+        Faces are dropped, since they name the old ids.
+        """
+        distinct, first = np.unique(self.points + 0.0, axis=0, return_index=True)
+        if len(distinct) == len(self.points):
+            return self
+        return ConvexHull(self.points[np.sort(first)], radius=self.radius)
+
+
+#: Changes whenever files written before would be read wrongly.
+_FILE_FORMAT = 1
+_FILE_FIELDS = {"points": Field("f8", (None, 3)), "faces": Field("i8", (None, 3), needed=False), "radius": Field("f8", ())}

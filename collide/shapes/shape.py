@@ -1,0 +1,228 @@
+"""What all shapes share: immutability, value equality, pickling, and checks of their numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from collide import argument_checks as reading
+from collide.errors import InvalidShape
+from collide.lowering.packed_convex import PackedConvex
+from collide.transforms import LARGEST, SMALLEST
+
+if TYPE_CHECKING:
+    from collide.lowering.compound_table import LaidOut
+
+
+class Shape:
+    """A set of points in its own frame; immutable, picklable, compared by value.
+
+    Subclasses name their constructor arguments in ``_fields`` and store each under its name.
+    """
+
+    __slots__ = ("__weakref__", "_bounds", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
+    _fields: tuple[str, ...] = ()
+    _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
+    #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
+    _prepared: dict[int, Any]
+    _serial: int
+    #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
+    _walk: Any
+    #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.
+    _surface: Any
+    #: Which facets of that share corners, for contacts (`contact/contact_facets.py`).
+    _topology: Any
+    #: Its parts, as unions with meshes ask about them (`lowering/composite_parts.py`).
+    _union: Any
+    #: Its parts in the rows that kernels of unions read.
+    _laid_out: LaidOut
+    #: What `bounding_parts` gives, where that is not `parts`.
+    _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
+
+    #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
+    convex = True
+    #: True where the set is given by triangles: `meshes` answers, and there are no convex parts.
+    meshed = False
+
+    def _store(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable; make a new one instead of setting {name}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable; {name} cannot be deleted")
+
+    def __copy__(self) -> Shape:
+        return self  # nothing about it can change
+
+    def __deepcopy__(self, memo: dict) -> Shape:
+        return self
+
+    def __reduce__(self):
+        return _rebuild, (type(self), tuple(getattr(self, f) for f in self._fields))
+
+    def _key(self) -> tuple:
+        return tuple(_hashable(getattr(self, f)) for f in self._fields)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash((type(self).__name__, self._key()))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
+        return f"{type(self).__name__}({shown})"
+
+    def parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        """The convex sets whose union this is, each with its (4, 4) pose in the shape's frame.
+
+        Packed when first asked for and kept, since a shape never changes.
+        """
+        try:
+            return self._parts
+        except AttributeError:
+            object.__setattr__(self, "_parts", self._pack())
+            return self._parts
+
+    def bounding_parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        """Convex sets that hold this: its parts, or something larger and simpler. Boxes are made of them."""
+        return self.parts()
+
+    def laid_out(self) -> LaidOut:
+        """Its bounding parts as kernels of unions read them, kept like these."""
+        if not hasattr(self, "_laid_out"):
+            from collide.lowering.compound_table import lay_out
+
+            self._store(_laid_out=lay_out(self.bounding_parts()))
+        return self._laid_out
+
+    def _pack(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+        raise TypeError(f"{type(self).__name__} cannot be asked about: derive it from Shape and define _pack")
+
+
+def alone(packed: PackedConvex) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
+    """The parts of a shape that is one convex set in its own frame."""
+    return ((packed, IDENTITY),)
+
+
+IDENTITY = np.eye(4)
+IDENTITY.flags.writeable = False
+
+
+def is_plain(shape: Shape) -> bool:
+    """Whether a shape is one convex set in its own frame."""
+    if shape.meshed:
+        return False
+    parts = shape.parts()
+    return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
+
+
+def _rebuild(cls, values):
+    return cls._from_fields(*values) if hasattr(cls, "_from_fields") else cls(*values)
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # + 0.0: −0.0 and 0.0 are one number
+    return value
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray) and value.size > 4:
+        return f"<{'×'.join(map(str, value.shape))} array>"
+    if isinstance(value, tuple) and len(value) > 2:
+        return f"<{len(value)} items>"
+    return str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
+
+
+# --- checks, each naming shape, field and value -------------------------------------------------
+
+
+def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float:
+    """A finite length [m]: > 0, or ≥ 0 where ``zero`` allows it, of a magnitude we can square."""
+    number = scalar(shape, field, value)
+    if zero and number == 0.0:
+        return 0.0
+    if not number > 0:
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {reading.told(value)}")
+    if not SMALLEST <= number <= LARGEST:
+        raise InvalidShape(
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the scene"
+        )
+    return number
+
+
+def scalar(shape: str, field: str, value: Any) -> float:
+    """A finite real number."""
+    number = reading.number(value)
+    if number is None:
+        raise InvalidShape(f"{shape}: {field} must be a number, got {reading.told(value)}")
+    if not math.isfinite(number):
+        raise InvalidShape(f"{shape}: {field} must be finite, got {reading.told(value)}")
+    if abs(number) > LARGEST:
+        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {reading.told(value)}; scale the scene")
+    return number
+
+
+def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
+    """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
+    if (y is None) != (z is None):
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got two")
+    lengths = rows(shape, field, value if y is None else (value, y, z), (3,))
+    for axis, length in zip("xyz", lengths):
+        positive(shape, f"{field}.{axis}", length)
+    return lengths
+
+
+def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
+    """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
+    shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
+    array = np.array(reading.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
+    if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
+        raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
+    if array.shape[0] == 0:
+        raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
+    bad = ~(np.abs(array) <= LARGEST)
+    if bad.any():
+        where = tuple(int(k) for k in np.argwhere(bad)[0])
+        raise InvalidShape(
+            f"{shape}: {field}{list(where)} is {array[where]}; entries must be finite and within ±{LARGEST:g}"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.ndarray:
+    """(m, 3) ids of corners 0 … n − 1, as a read-only copy. corners : what the ids count, for messages."""
+    array = reading.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
+    if array.ndim != 2 or array.shape[1] != 3:
+        cut = "; cut polygons into triangles" if array.ndim == 2 and array.shape[1] > 3 else ""
+        raise InvalidShape(f"{shape}: faces must have shape (m, 3), got {array.shape}{cut}")
+    if array.dtype.kind not in "iu":
+        raise InvalidShape(f"{shape}: faces must be integers, got {_first_odd(array)}")
+    outside = ((array < 0) | (array >= n)).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        many = int(outside.sum())
+        raise InvalidShape(
+            f"{shape}: faces[{row}] is {array[row].tolist()}, but there are {corners.format(n=n, last=n - 1)}"
+            f" ({many} such facet{'s' * (many != 1)})"
+        )
+    array = np.array(array, dtype=dtype, order="C")
+    array.flags.writeable = False
+    return array
+
+
+def _first_odd(array: np.ndarray) -> str:
+    """What is wrong with ids that are no integers: the first NaN or fraction with its facet, else the type."""
+    if array.dtype.kind == "f":
+        odd = ~np.isfinite(array) | (array != np.floor(array))
+        if odd.any():
+            row, k = (int(i) for i in np.argwhere(odd)[0])
+            return f"faces[{row}, {k}] = {array[row, k]}"
+    return f"{array.dtype} (ids that are whole: faces.astype(int))"

@@ -1,0 +1,126 @@
+"""Shapes in ``.npz`` files: the arrays that define them, by name, the version of their format, and a digest of everything.
+
+A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are worked
+out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The digest
+tells damage; it is no signature. Before any array is read its header is held against what the format has, and its length
+against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from collide import argument_checks as reading
+from collide.errors import InvalidShape
+
+if TYPE_CHECKING:
+    import zipfile
+
+
+class Field(NamedTuple):
+    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether it
+    must be there."""
+
+    type: str
+    shape: tuple[int | None, ...]
+    needed: bool = True
+
+
+_STAMPS = {"format": Field("i", ()), "digest": Field("u1", (16,))}
+#: Bytes of a header, at most: ours have some 128.
+_LONGEST_HEADER = 1024
+
+
+def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays to a file. who : the class that asks, for messages."""
+    try:
+        with Path(path).open("wb") as file:
+            np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
+    except (OSError, TypeError, ValueError) as error:
+        raise InvalidShape(f"{who}.save: {reading.told(path)}: {getattr(error, 'strerror', None) or error}") from None
+
+
+def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped: str) -> dict[str, np.ndarray]:
+    """The arrays of a file that `write_arrays` wrote.
+
+    version : changes whenever files written before would be read wrongly.   fields : what the format has.
+    dropped : prefix of arrays that older files have besides; they count for the digest alone.
+    Raises InvalidShape where the file is another one, of another version, or damaged.
+    """
+    import zipfile  # here, and below: a start of the library need not load it
+
+    named = f"{who}.load: {reading.told(path) if not isinstance(path, (str, Path)) else path}"
+    other = f"{named} is of another format; save the shape again"
+    try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise InvalidShape(f"{named} is no regular file")
+        with Path(path).open("rb") as file:
+            if file.read(2) != b"PK":
+                raise InvalidShape(
+                    f"{named} is no file that {who}.save wrote. Files of meshes (STL, OBJ, PLY, …) are read by "
+                    "collide.scenes.load(path).bodies[0].shape"
+                )
+            with zipfile.ZipFile(file) as members:
+                arrays = {}
+                for member in members.infolist():
+                    name = member.filename.removesuffix(".npy")
+                    field = {**_STAMPS, **fields}.get(name)
+                    if name in arrays or (field is None and not name.startswith(dropped)):
+                        raise InvalidShape(other)
+                    arrays[name] = _read(members, member, field, other)
+    except InvalidShape:
+        raise
+    except OSError as error:
+        raise InvalidShape(f"{named}: {error.strerror or error}") from None
+    except (
+        TypeError, AttributeError, ValueError, EOFError, KeyError, IndexError, OverflowError, MemoryError, RuntimeError,
+        SyntaxError, struct.error, zipfile.BadZipFile,
+    ) as error:  # fmt: skip
+        raise InvalidShape(f"{named} is no file that {who}.save wrote ({error})") from None
+    missing = [name for name, field in {**_STAMPS, **fields}.items() if field.needed and name not in arrays]
+    if missing or int(arrays.pop("format")) != version:
+        raise InvalidShape(other)
+    digest = arrays.pop("digest")
+    if not np.array_equal(digest, _digest(arrays)):
+        raise InvalidShape(f"{named} is damaged: its contents do not fit their digest")
+    return {name: array for name, array in arrays.items() if name in fields}
+
+
+def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None, other: str) -> np.ndarray:
+    """One array, once its header and its length are what they should be. field : None for any array of numbers."""
+    import zipfile
+
+    if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 or not member.filename.endswith(".npy"):
+        raise InvalidShape(other)  # nothing we write is compressed or encrypted
+    with members.open(member) as file:
+        if np.lib.format.read_magic(file) != (1, 0):
+            raise InvalidShape(other)
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=_LONGEST_HEADER)
+        begin = file.tell()
+    if field is None:
+        known = dtype.kind in "iuf"
+    else:
+        known = f"{dtype.kind}{dtype.itemsize}".startswith(field.type) and len(shape) == len(field.shape)
+        known = known and all(want in (None, have) for want, have in zip(field.shape, shape))
+    if not known:
+        raise InvalidShape(other)
+    if begin + math.prod(shape) * dtype.itemsize != member.file_size:
+        raise ValueError(f"{member.filename} has another length than it says")
+    with members.open(member) as file:
+        return np.lib.format.read_array(file, allow_pickle=False)
+
+
+def _digest(arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Of all arrays by name: a file that was damaged must not lend its numbers to a proof."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return np.frombuffer(digest.digest(), dtype=np.uint8)

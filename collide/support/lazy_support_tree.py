@@ -1,0 +1,73 @@
+"""The support tree of a shape's points, made when a query first needs it and kept with the shape."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide import log as journal
+
+if TYPE_CHECKING:
+    from collide.support.support_tree import SupportTree
+
+#: A hull of so few vertices is scanned as well, however many points were given.
+FEWEST_VERTICES = 32
+
+
+class PlantedTree:
+    """points : (n, 3)."""
+
+    def __init__(self, points: np.ndarray):
+        self._points = points
+        self._tree: SupportTree | None = None
+        self._hopeless = False
+
+    @property
+    def tree(self) -> SupportTree | None:
+        """The tree; None where the hull has too few vertices for one."""
+        if self._tree is None and not self._hopeless:
+            with _growing():
+                if self._tree is None and not self._hopeless:
+                    with journal.told("support tree of a hull of %d points made", len(self._points)):
+                        self._tree = _grown(self._points)
+                    self._hopeless = self._tree is None
+        return self._tree
+
+    @property
+    def address(self) -> int:
+        """What kernels take: the tree's address, 0 where there is none."""
+        return self.tree.address if self.tree is not None else 0
+
+
+_lock = threading.Lock()
+
+
+def _growing() -> threading.Lock:
+    """Held while a tree grows: one at a time, since a tree of 100,000 points is a matter of a second."""
+    return _lock
+
+
+def _new_lock() -> None:
+    global _lock
+    _lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
+    os.register_at_fork(after_in_child=_new_lock)
+
+
+def _grown(points: np.ndarray) -> SupportTree | None:
+    # Kernels, imported when a tree is made: packing a shape, as `verify` does, needs none.
+    from collide.hull.exact_hull import convex_hull
+    from collide.support.build_support_tree import build_support_tree
+
+    hull = convex_hull(points)
+    if hull.dimension < 2 or len(hull.vertices) < FEWEST_VERTICES:
+        return None
+    try:
+        return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+    except ValueError:  # a hull so degenerate that no order of neighbours is certain: it is scanned
+        return None

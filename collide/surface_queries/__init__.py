@@ -1,0 +1,1 @@
+"""Questions about surfaces beside pairs of bodies: rays, points inside, overlays, facets that meet."""

@@ -1,0 +1,248 @@
+"""Mesh files: read once, looked at, and kept as arrays (`collide.scenes.mesh_cache`).
+
+Afterwards neither trimesh nor scipy nor a compiler is imported. `mesh_shapes.py` makes shapes of what is read here.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from collide.errors import InvalidShape, MissingExtra, SceneError
+from collide.scenes import mesh_cache as cache
+from collide.scenes.loaders.triangles import SUFFIXES, MeshBytes, open_mesh, triangles_of
+from collide.shapes.shape import Shape
+
+#: What a mesh may become: itself, the hull of its vertices, or a union of convex pieces.
+OPTIONS = ("mesh", "hull", "pieces")
+#: A mesh whose volume is this much of its hull's is its hull.
+CONVEX_RATIO = 1.0 - 1e-6
+
+
+@dataclass
+class MeshPart:
+    """One mesh of a file.
+
+    points : (n, 3) distinct vertices that faces use, in the file's world frame and units.
+    fill : of hulls: volume of the mesh over the volume of its hull; NaN where it has none (open, or scipy is absent).
+    closed : watertight, with consistent winding; of a mesh taken as it is: whether it is a solid.
+    faces : how many triangles.
+    pieces : the convex pieces as point sets, where a decomposition was asked for.
+    facets : (faces, 3) rows of ``points``, as the file has them, where the mesh is taken as it is.
+    own_hull : these are exactly the surface of their convex hull.   made : shapes made of it, by scale.
+    """
+
+    name: str
+    points: np.ndarray
+    fill: float
+    closed: bool
+    faces: int
+    pieces: list[np.ndarray] | None = None
+    facets: np.ndarray | None = None
+    own_hull: bool = False
+    made: dict[tuple, Shape] = field(default_factory=dict)
+
+
+@dataclass
+class MeshFile:
+    """The parts of a mesh file, and what its reader wants to say."""
+
+    parts: list[MeshPart]
+    notes: list[str]
+
+
+def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
+    """The meshes of a file, from the cache of prepared inputs or by its reader.
+
+    meshes : "mesh" for the triangles, "hull", or "pieces" for a convex decomposition of every mesh.
+    """
+    check_meshes_option(meshes)
+    if path.suffix.lower() not in SUFFIXES:
+        raise SceneError(f"unknown mesh format {path.suffix!r}; known are {', '.join(SUFFIXES)}", path=path)
+    opened = open_mesh(path)
+    # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
+    known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
+    entry = cache.key(opened.blobs, {"meshes": meshes, "suffix": opened.suffix, "volumes": known})
+    file = _kept(entry)
+    if file is None:
+        file, raw = _read(opened, meshes == "mesh")
+        if meshes == "pieces":
+            for part, (vertices, faces) in zip(file.parts, raw):
+                part.pieces = _decompose(vertices, faces, path)
+        cache.store(entry, _pack(file))
+    # The entry knows the bytes alone: a file of the same bytes may have another name.
+    if len(file.parts) == 1:
+        file.parts[0].name = path.stem
+    file.notes = [f"{path.name}: {note}" for note in file.notes]
+    return file
+
+
+def _kept(entry: str) -> MeshFile | None:
+    arrays = cache.fetch(entry)
+    try:
+        return None if arrays is None else _unpack(arrays)
+    except (KeyError, ValueError, TypeError, IndexError):
+        return None  # made by something else: read the file again
+
+
+def check_meshes_option(meshes: str) -> None:
+    if meshes not in OPTIONS:
+        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {meshes!r}')
+
+
+def size_note(extent: float, what: str) -> str | None:
+    """A note where something is so large or small that its unit may be wrong. extent : [m]."""
+    if extent > 100.0:
+        return f"{what} is {extent:g} m across: is it in millimetres? A scale of 0.001 would make it {extent / 1000:g} m"
+    if 0.0 < extent < 1e-5:
+        return f"{what} is {extent:g} m across: is its unit right?"
+    return None
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
+    found, notes = triangles_of(opened)
+    path, notes = opened.path, list(notes)
+    parts, raw = [], []
+    for name, vertices, faces in found:
+        if len(vertices):
+            part, about = _describe(as_it_is, name, vertices, faces, path)
+            parts.append(part)
+            raw.append((vertices, faces))
+            notes += about
+    if not parts:
+        raise SceneError("has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path)
+    return MeshFile(parts, notes), raw
+
+
+def _describe(as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
+    if not np.isfinite(vertices).all():
+        row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
+        raise SceneError(f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite", path=path)
+    outside = ((faces < 0) | (faces >= len(vertices))).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise SceneError(
+            f"face {row} names vertices {faces[row].tolist()}, but there are 0 … {len(vertices) - 1}", path=path
+        )
+    notes = []
+    used = np.unique(faces) if len(faces) else np.arange(len(vertices))
+    if len(used) < len(vertices):
+        notes.append(f"{len(vertices) - len(used)} vertices that no face uses were left out")
+    if not len(faces):
+        notes.append("has points but no faces; their hull was taken")
+    elif as_it_is:
+        return _as_it_is(label, vertices, faces, path), notes
+    closed, fill = _volumes(vertices, faces, path)
+    return MeshPart(label, distinct(vertices[used]), fill, closed, len(faces)), notes
+
+
+def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> MeshPart:
+    from collide.scenes.loaders.mesh_shapes import described
+
+    try:
+        return described(label, vertices, faces)
+    except InvalidShape as error:
+        raise SceneError(str(error), path=path, element=None if label == path.name else label) from None
+
+
+def distinct(vertices: np.ndarray) -> np.ndarray:
+    """Every point once, in the order of first appearance; −0.0 and 0.0 are one number."""
+    _, first = np.unique(vertices + 0.0, axis=0, return_index=True)
+    return np.ascontiguousarray(vertices[np.sort(first)] + 0.0)
+
+
+def _volumes(vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[bool, float]:
+    """Whether the mesh is closed, and its volume over that of its hull (NaN where unknown)."""
+    if len(faces) < 4:
+        return False, np.nan
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingExtra("trimesh", extra="robots", purpose=f"compare the mesh {path.name} with its hull") from None
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.merge_vertices()
+    if not (mesh.is_watertight and mesh.is_winding_consistent):
+        return False, np.nan
+    try:
+        hull = float(mesh.convex_hull.volume)
+    except Exception:  # noqa: BLE001 - scipy absent, or Qhull refusing a flat mesh: the figure is a courtesy
+        return True, np.nan
+    return True, min(1.0, abs(float(mesh.volume)) / hull) if hull > 0 else np.nan
+
+
+def _decompose(vertices: np.ndarray, faces: np.ndarray, path: Path) -> list[np.ndarray]:
+    """Convex pieces by coacd, each the points of a hull."""
+    if len(faces) < 4:
+        return [distinct(vertices)]
+    try:
+        import coacd
+    except ImportError:
+        raise MissingExtra("coacd", extra="decompose", purpose=f"cut {path.name} into convex pieces") from None
+    coacd.set_log_level("error")
+    pieces = coacd.run_coacd(coacd.Mesh(vertices, faces), seed=0)
+    pieces = [np.unique(np.asarray(points, dtype=np.float64), axis=0) for points, _ in pieces if len(points)]
+    if not pieces:
+        raise SceneError("the convex decomposition found no piece; use its hull instead", path=path)
+    return pieces
+
+
+# --- arrays for the cache -------------------------------------------------------------------------
+
+
+def _pack(file: MeshFile) -> dict[str, np.ndarray]:
+    """A mesh file as arrays; texts as one JSON string, since the cache holds no objects."""
+    about: dict[str, Any] = {"notes": file.notes, "parts": []}
+    arrays: dict[str, np.ndarray] = {}
+    for k, part in enumerate(file.parts):
+        fill = None if np.isnan(part.fill) else part.fill
+        pieces = None if part.pieces is None else len(part.pieces)
+        about["parts"].append(
+            {
+                "name": part.name, "fill": fill, "closed": bool(part.closed), "faces": part.faces, "pieces": pieces,
+                "own_hull": bool(part.own_hull),
+            }
+        )
+        arrays[f"points{k}"] = part.points
+        if part.facets is not None:
+            arrays[f"facets{k}"] = part.facets
+        for j, points in enumerate(part.pieces or []):
+            arrays[f"piece{k}_{j}"] = points
+    arrays["about"] = np.array(json.dumps(about))
+    return arrays
+
+
+def _unpack(arrays: Mapping[str, np.ndarray]) -> MeshFile:
+    about = json.loads(str(arrays["about"]))
+    parts = []
+    for k, text in enumerate(about["parts"]):
+        pieces = None if text["pieces"] is None else [_points(arrays[f"piece{k}_{j}"]) for j in range(text["pieces"])]
+        fill = np.nan if text["fill"] is None else float(text["fill"])
+        points = _points(arrays[f"points{k}"])
+        facets = _facets(arrays[f"facets{k}"], len(points)) if f"facets{k}" in arrays else None
+        parts.append(
+            MeshPart(text["name"], points, fill, text["closed"], text["faces"], pieces, facets, bool(text["own_hull"]))
+        )
+    return MeshFile(parts, list(about["notes"]))
+
+
+def _points(array: np.ndarray) -> np.ndarray:
+    if array.dtype != np.float64 or array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise ValueError("not an array of points")
+    return array
+
+
+def _facets(array: np.ndarray, points: int) -> np.ndarray:
+    if array.dtype != np.int32 or array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise ValueError("not an array of facets")
+    if array.min() < 0 or array.max() >= points:
+        raise ValueError("facets of other points")
+    return array
