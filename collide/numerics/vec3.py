@@ -1,0 +1,86 @@
+"""Small vectors in kernels: `Vec3`, and the products that geometry is written in.
+
+Sums are taken from left to right, x first, with no contraction: error bounds count on it, and equal answers are equal bits.
+A Vec3 costs nothing in machine code: its three doubles are registers.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from collide.kernels import kernel
+
+
+class Vec3(NamedTuple):
+    x: float
+    y: float
+    z: float
+
+
+@kernel(inline=True)
+def dot(a, b):
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@kernel(inline=True)
+def cross(a, b):
+    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@kernel(inline=True)
+def add(a, b):
+    return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
+
+
+@kernel(inline=True)
+def sub(a, b):
+    return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+@kernel(inline=True)
+def scale(factor, a):
+    return Vec3(factor * a.x, factor * a.y, factor * a.z)
+
+
+@kernel(inline=True)
+def neg(a):
+    return Vec3(-a.x, -a.y, -a.z)
+
+
+@kernel(inline=True)
+def vec3_at(values, at):
+    """Three doubles that stand one after another."""
+    return Vec3(values[at], values[at + 1], values[at + 2])
+
+
+@kernel(inline=True)
+def put_vec3(values, at, a):
+    values[at] = a.x
+    values[at + 1] = a.y
+    values[at + 2] = a.z
+
+
+@kernel(inline=True)
+def column_at(coords, n, k):
+    """Point k of n, kept as all x, then all y, then all z."""
+    return Vec3(coords[k], coords[n + k], coords[2 * n + k])
+
+
+@kernel(inline=True)
+def rotate(R, at, a):
+    """R a, for a matrix that stands row by row."""
+    return Vec3(
+        R[at] * a.x + R[at + 1] * a.y + R[at + 2] * a.z,
+        R[at + 3] * a.x + R[at + 4] * a.y + R[at + 5] * a.z,
+        R[at + 6] * a.x + R[at + 7] * a.y + R[at + 8] * a.z,
+    )
+
+
+@kernel(inline=True)
+def rotate_back(R, at, a):
+    """Rᵀ a."""
+    return Vec3(
+        R[at] * a.x + R[at + 3] * a.y + R[at + 6] * a.z,
+        R[at + 1] * a.x + R[at + 4] * a.y + R[at + 7] * a.z,
+        R[at + 2] * a.x + R[at + 5] * a.y + R[at + 8] * a.z,
+    )
