@@ -14,8 +14,8 @@ Rules, each measured or forced by a bug met:
 `mode.py` says how kernels run: from the library made when the package was built, compiled just in time, or as the Python
 that they are written in.
 
-    kernel(inline=, seldom=)    a function that other kernels call. inline : copy its code to where it is called.
-        seldom : it is called on few of the ways through its callers, which are made fast at its expense.
+    kernel(inline=, cold=)    a function that other kernels call. inline : copy its code to where it is called.
+        cold : it is called on few of the ways through its callers, which are made fast at its expense.
     entry(signature, nogil=)    a kernel that Python calls, with Numba's signature of it, of int64, float64 and boolean.
         nogil : let other Python threads run meanwhile. A kernel of a microsecond that shares one workspace among all
         threads keeps the lock instead.

@@ -80,7 +80,7 @@ class _Context(CPUContext):
 
     def declare_function(self, module, fndesc):
         made = super().declare_function(module, fndesc)
-        if (fndesc.modname, fndesc.qualname) in _seldom:
+        if (fndesc.modname, fndesc.qualname) in _cold:
             made.attributes.add("cold")
         return made
 
@@ -135,14 +135,14 @@ class KernelDispatcher(Dispatcher):
         )
 
 
-#: Kernels that are called seldom, by their modules and names.
-_seldom: set[tuple[str, str]] = set()
+#: Kernels on rarely taken paths, by their modules and names.
+_cold: set[tuple[str, str]] = set()
 
 
-def dispatcher(function: Callable, *, inline: bool = False, seldom: bool = False) -> KernelDispatcher:
+def dispatcher(function: Callable, *, inline: bool = False, cold: bool = False) -> KernelDispatcher:
     """A kernel, as `collide.kernels.kernel` makes it."""
-    if seldom:
-        _seldom.add((function.__module__, function.__qualname__))
+    if cold:
+        _cold.add((function.__module__, function.__qualname__))
     options = {**_FLAGS, "forceinline": inline}
     return KernelDispatcher(function, targetoptions=options, pipeline_class=_Compiler)
 

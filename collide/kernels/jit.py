@@ -30,10 +30,10 @@ _C_TYPES: dict[str, Any] = {"int64": ctypes.c_int64, "float64": ctypes.c_double,
 _compiling = threading.RLock()
 
 
-def kernel(function: Callable | None = None, *, inline: bool = False, seldom: bool = False) -> Callable:
+def kernel(function: Callable | None = None, *, inline: bool = False, cold: bool = False) -> Callable:
     if function is None:
-        return lambda wrapped: kernel(wrapped, inline=inline, seldom=seldom)
-    return dispatcher(function, inline=inline, seldom=seldom)
+        return lambda wrapped: kernel(wrapped, inline=inline, cold=cold)
+    return dispatcher(function, inline=inline, cold=cold)
 
 
 class Entry:

@@ -292,7 +292,7 @@ def _approach(pair, points, ids, weights, given, touch_suffices, radius, limit, 
     return status, n, lower, 0.0, used
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def _begin_with_given(pair, points, ids, weights):
     """Begin with the vertices that the last three ids name; returns how many of the points are kept.
 
@@ -312,7 +312,7 @@ def _tilt(pair):
     return _TILT / math.sqrt(n) if n > _FEW and pair[3] == POINTS and pair[9] == POINTS else 0.0
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def _surround(pair, points, ids, weights, tx, ty, tz, height, tilt, listed_a, listed_b):
     """Add two points on either side of where the origin lies beside point 0; returns how many are kept.
 
@@ -389,7 +389,7 @@ def _repeated(ids, n, at_a, at_b, at_c, at_d):
     return n > 2 and ids[2 * at_c] == i and ids[2 * at_c + 1] == j
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def _in_order(points, ids, n, at_a, at_b, at_c, at_d):
     """Bring the n points A, B, C to the front, and D behind them; returns where all of them stand then."""
     if at_a != 0:

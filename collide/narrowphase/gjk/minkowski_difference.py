@@ -14,7 +14,7 @@ from collide.support.support_tree_query import two_extreme_vertices
 POINT = 9
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def listed_difference_point(pair, points, ids, k, dx, dy, dz, listed_a, listed_b):
     """`inlined_difference_point` of whole bodies, called: a copy at every place where one is asked for took 8 s to compile."""
     return inlined_difference_point(pair, points, ids, k, dx, dy, dz, False, listed_a, listed_b)
@@ -91,7 +91,7 @@ def place_vertices(pair, points, ids, k, i, j):
     )  # fmt: skip
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def settle_point(pair, points, ids, k, dx, dy, dz):
     """Make point k, found by `difference_point`, one that is farthest in direction d for certain.
 

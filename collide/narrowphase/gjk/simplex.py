@@ -134,7 +134,7 @@ def nearest_in_simplex(points, n, weights, faces):
     return best
 
 
-@kernel(seldom=True)
+@kernel(cold=True)
 def nearest_of_all(points, n, weights, faces):
     """`nearest_in_simplex`, called: it is asked for at two places, and seldom."""
     return nearest_in_simplex(points, n, weights, faces)
