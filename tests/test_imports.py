@@ -49,7 +49,7 @@ ROOMS = {
     "certificates": {"errors", "transforms", "lowering", "results"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
-    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "results", "batches"},
+    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches"},
     "query": {
         "errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches", "certificates",
         "pair_arguments", "security_margin", "threads",
@@ -82,7 +82,6 @@ TO_GO = {
     "shapes": {"hierarchies", "lowering"},
     "support": {"lowering"},
     "lowering": {"broadphase", "narrowphase"},
-    "narrowphase": {"batches"},
     "query": {"hierarchies"},
     "results": {"certificates"},
 }

@@ -20,7 +20,7 @@ class Method(Enum):
     #: The four first are those of kernels, which find them in `convex_methods.py` by the packed sets.
     CLOSED = "capsule_capsule", "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment"
     PLANE = "halfspace_convex", "closed form: one support query against the plane"
-    PLANES = "halfspace_halfspace", "two planes: they meet unless exactly opposite"
+    PLANES = "halfspace_convex", "two planes: they meet unless exactly opposite"
     CONVEX = "gjk/gjk", "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open"
     FACETS = "facets/mesh_rows", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
