@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidPose
 
 if TYPE_CHECKING:
@@ -77,9 +77,9 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
 
 
 def _finite(name: str, values, shape) -> np.ndarray:
-    array = reading.array(f"pose: {name}", values, str(shape), InvalidPose)
+    array = checks.array(f"pose: {name}", values, str(shape), InvalidPose)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {reading.told(values)}")
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.describe(values)}")
     return array
 
 
@@ -148,7 +148,7 @@ def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.nd
 
 
 def _to_floats(X, name: str) -> np.ndarray:
-    return reading.array(name, X, "(4, 4)", InvalidPose)
+    return checks.array(name, X, "(4, 4)", InvalidPose)
 
 
 def _from_object(X, name: str) -> np.ndarray:
