@@ -278,7 +278,8 @@ class Robot:
         value = f" = {self.joint_value(joint.name, q[row]):g}" if joint.name in self._drivers else ""
         follows = f", which follows {cut(joint.mimic.joint)}," if joint.mimic is not None else ""
         raise InvalidPose(
-            f'{self.place}: link "{cut(joint.child)}" stands at {at}: coordinates must be finite and within {LARGEST:g}; '
+            f'{self.place}: link "{cut(joint.child)}" stands at {at}: coordinates must be finite and within '
+            f'{LARGEST:g}; '
             f'look at the origin of joint "{cut(joint.name)}"{follows} and at its value{value}'
         )
 
@@ -286,7 +287,9 @@ class Robot:
         try:
             array = np.asarray(q, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            raise InvalidArgument(f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}") from None
+            raise InvalidArgument(
+                f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}"
+            ) from None
         if array.ndim not in (1, 2) or array.shape[-1] != self.dof:
             raise InvalidArgument(
                 f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
@@ -381,7 +384,9 @@ def _indices(kind: str, names: Sequence[str]) -> dict[str, int]:
     index: dict[str, int] = {}
     for k, name in enumerate(names):
         if name in index:
-            raise SceneError(f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"')
+            raise SceneError(
+                f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"'
+            )
         index[name] = k
     return index
 
@@ -419,7 +424,8 @@ def _tree(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Join
     for joint in joints:
         if joint.child in above:
             raise SceneError(
-                f'link "{cut(joint.child)}" has two parents: it is also the child of joint "{cut(above[joint.child].name)}"',
+                f'link "{cut(joint.child)}" has two parents: it is also the child of joint '
+                f'"{cut(above[joint.child].name)}"',
                 element=f'joint "{cut(joint.name)}"',
             )
         above[joint.child] = joint
@@ -476,7 +482,9 @@ def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
         if joint.name not in single:
             broken[joint.name] = f"a {joint.type} joint has no single value that could follow another"
         elif joint.mimic.joint not in single:
-            broken[joint.name] = f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
+            broken[joint.name] = (
+                f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
+            )
     ended: set[str] = set()  # joints whose chain was followed to its end
     for name in single:
         chain: dict[str, int] = {}
@@ -487,13 +495,18 @@ def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
             here = mimic.joint if mimic is not None and here not in broken else None
         if here in chain:
             circle = list(chain)[chain[here] :]
-            broken.update({member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle})
+            broken.update(
+                {member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle}
+            )
         ended.update(chain)
     return broken
 
 
 def _about_broken(name: str, why: str) -> str:
-    return f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest to it unless a value is given'
+    return (
+        f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest '
+        'to it unless a value is given'
+    )
 
 
 def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
@@ -511,7 +524,10 @@ def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, floa
             driver, multiplier, offset = drivers[mimic.joint]
             composed = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
             if not all(map(math.isfinite, composed)):
-                what = f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its offset {composed[1]:g}'
+                what = (
+                    f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its '
+                    f'offset {composed[1]:g}'
+                )
                 raise SceneError(f"{what}: both must be finite", element=f'joint "{cut(here)}" mimic')
             drivers[here] = (driver, *composed)
     return drivers
