@@ -12,6 +12,7 @@ import numpy as np
 
 from collide import argument_checks as reading
 from collide.batches import ask, length_of
+from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_queries as run
@@ -230,7 +231,7 @@ def distance(
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
+                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
@@ -250,7 +251,7 @@ def distance(
             f"distance of {type(shape_at(A, k)).__name__} and {type(shape_at(B, k)).__name__}{where}: their overlap has no "
             "end, so no translation of finite length separates them; collide() still answers"
         )
-    return PairResult(rows, single, (_held(A), _held(B), *kept))
+    return PairResult(rows, single, (_held(A), _held(B), *kept), certify)
 
 
 def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
@@ -265,7 +266,7 @@ def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, 
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
     run.close(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB))
+    return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
 
 
 def _held(shapes):

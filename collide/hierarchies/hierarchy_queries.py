@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.certificates.make_certificate import certificate_from_pairs
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
@@ -50,8 +51,6 @@ class Walks:
         Found from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, found)``
         checks it against all vertices. The plane or the point in ``rows`` proves the answer too, in doubles.
         """
-        from collide.certificates.certificates import certificate_from
-
         if len(self) != 1:
             raise InvalidArgument(f"a certificate is for one pose, and there are {len(self)}")
         A, B, X_WA, X_WB = self._question
@@ -61,7 +60,7 @@ class Walks:
         own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
         corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
         pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
-        return certificate_from(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
+        return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
