@@ -27,6 +27,7 @@ from meshes import DATA, FILES, RESULTS, mesh, rotation, touching
 
 from collide import CollideError, Mesh
 from collide.hierarchies.graded_tree import graded_tree
+from collide.hierarchies.tree_figures import tree_figures
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits
 from collide.scenes.loaders.triangles import read_meshes
@@ -142,7 +143,7 @@ def meshes() -> list[dict]:
     rows = []
     for name, (vertices, faces) in many().items():
         one = Mesh(vertices, faces, solid=False)
-        found, trees = one.locality(), one.tree_figures()
+        found, trees = one.locality(), tree_figures(one)
         spread = found.quantiles([0.5, 0.9])
         rows.append({
             "mesh": name, "facets": len(faces), "Σ": found.global_stretch, "σ": found.local_stretches[0],

@@ -329,6 +329,7 @@ def _stress(args) -> int:
 
 
 def _locality(args) -> int:
+    from collide.hierarchies.tree_figures import tree_figures
     from collide.reports import locality_report as locality
     from collide.reports import terminal
     from collide.scenes.loaders.triangles import read_meshes
@@ -347,7 +348,7 @@ def _locality(args) -> int:
 
             found = mesh.locality(repeated=args.repeated, progress=about)
             with progress(f"{name}: building trees"):
-                measured.append(locality.Measured(name, place, found, mesh.tree_figures()))
+                measured.append(locality.Measured(name, place, found, tree_figures(mesh)))
     if args.plot:
         with progress("drawing"):
             locality.plot(measured, args.plot)

@@ -79,7 +79,7 @@ def _trees(measured: list[Measured]) -> Table:
     for item in measured:
         t = item.trees
         counts = (t.facets, t.nodes, t.depth, t.graded_size, t.node_bound, t.graded_depth, t.graded_level, t.level_bound)
-        rows.append([item.name, *map(str, counts), f"{100 * t.outlier_share:.1f} %", str(t.most_outliers)])
+        rows.append([item.name, *map(str, counts), f"{100 * t.outlier_share:.1f} %", str(t.max_outliers)])
     return Table("TREES  the one that queries walk, eight boxes a node; the graded box-tree of the paper", columns, rows, notes=_TREES)
 
 
