@@ -50,7 +50,7 @@ ROOMS = {
     "certificates": {"errors", "transforms", "numerics", "lowering", "results"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
-    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "results", "batches"},
+    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches"},
     "query": {
         "errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches", "certificates",
         "pair_arguments", "security_margin", "threads", "algorithms",
@@ -82,7 +82,6 @@ TO_GO = {
     "shapes": {"lowering"},
     "support": {"lowering"},
     "lowering": {"broadphase", "narrowphase"},
-    "narrowphase": {"batches"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
