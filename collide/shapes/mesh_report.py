@@ -54,11 +54,11 @@ class MeshReport(NamedTuple):
     defects: tuple[Defect, ...]
 
     def __str__(self) -> str:
+        shells = f"{self.shells} shell{'s' * (self.shells != 1)}"
         lines = [
             f"{'solid' if self.solid else 'surface'}: {self.why}",
             f"{self.facets} facets, {self.edges} edges, {self.used} distinct vertices in use of {self.vertices}",
-            f"{self.shells} shell{'s' * (self.shells != 1)}, Euler characteristic {self.euler}, volume "
-            f"{self.volume:.6g} m³",
+            f"{shells}, Euler characteristic {self.euler}, volume {self.volume:.6g} m³",
         ]
         return "\n".join([*lines, *(f"- {defect}" for defect in self.defects)])
 

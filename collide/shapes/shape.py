@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union",
-        "_walk",
+        "__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology",
+        "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
@@ -41,6 +41,8 @@ class Shape:
     _union: Any
     #: Its parts in the rows that kernels of unions read.
     _laid_out: LaidOut
+    #: Row and column of the pair table (`lowering/kinds.py`).
+    _kind: Any
     #: What `bounding_parts` gives, where that is not `parts`.
     _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
 

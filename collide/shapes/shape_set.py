@@ -35,6 +35,9 @@ class ShapeSet:
         Where ``shapes`` is empty or holds what is no shape.
     """
 
+    #: Kinds of the shapes, once asked for (`lowering/kinds.py`).
+    _kinds: np.ndarray
+
     def __init__(self, shapes: Sequence[Shape]):
         try:
             self.shapes = tuple(shapes)
@@ -70,11 +73,6 @@ class ShapeSet:
     def plain(self) -> np.ndarray:
         """(shapes,) bool: which are one convex set in their own frame."""
         return np.array([is_plain(shape) for shape in self.shapes])
-
-    @cached_property
-    def meshed(self) -> np.ndarray:
-        """(shapes,) bool: which are a mesh or have one in them."""
-        return np.array([shape.meshed for shape in self.shapes])
 
     @cached_property
     def table(self) -> ShapeTable:

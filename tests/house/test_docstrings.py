@@ -137,9 +137,9 @@ def lacking(item: Documented) -> list[str]:
             wrong.append(f"the unit of {name}")
         elif name in ARRAYS and not SHAPE.search(about):
             wrong.append(f"the shape of {name}")
-    if not inspect.isclass(item.value) and "Returns" not in parts and "Yields" not in parts:
-        if inspect.signature(item.function).return_annotation not in (None, "None"):
-            wrong.append("Returns")
+    gives = not inspect.isclass(item.value) and inspect.signature(item.function).return_annotation not in (None, "None")
+    if gives and "Returns" not in parts and "Yields" not in parts:
+        wrong.append("Returns")
     errors = raised(item.function) - {"AttributeError", "StopIteration", "IndexError", "KeyError", "AssertionError"}
     wrong += [f"Raises {error}" for error in sorted(errors) if error not in parts.get("Raises", "")]
     return wrong
