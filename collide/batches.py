@@ -132,9 +132,12 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, boolean: bool, limit: float,
     elif not (_any_meshed(A) or _any_meshed(B)):
         answer = partial(run_unions, out, *_union_table(A, B), X_WA, X_WB, **wanted)
     else:
-        _refuse_poses(X_WA, X_WB, check)
-        X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-        (_pair_by_pair if isinstance(A, Picked) else _meshed)(out, A, B, X_WA, X_WB, **wanted)
+        if isinstance(A, Picked):
+            _refuse_poses(X_WA, X_WB, check)
+            X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+            _pair_by_pair(out, A, B, X_WA, X_WB, **wanted)
+        else:
+            _meshed(out, A, B, X_WA, X_WB, check=check, **wanted)
         return
     if not answer(check=check):
         _refuse_poses(X_WA, X_WB, check)
@@ -158,11 +161,16 @@ def _pair_by_pair(out: np.ndarray, A: Picked, B: Picked, X_WA, X_WB, **wanted) -
         out[some] = rows
 
 
-def _meshed(rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool) -> None:
-    """Rows of two bodies of which one has a mesh, poses (n, 4, 4)."""
+def _meshed(
+    rows: np.ndarray, A: Shape, B: Shape, X_WA, X_WB, *, boolean: bool, limit: float, depths: bool, check: bool = False
+) -> None:
+    """Rows of two bodies of which one has a mesh, at poses (n, 4, 4) or (1, 4, 4)."""
     from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows
 
-    rows[:] = pair_hits(A, B, X_WA, X_WB) if boolean else pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths)
+    if boolean:
+        rows[:] = pair_hits(A, B, X_WA, X_WB, check=check)
+    else:
+        pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=rows)
 
 
 def _any_meshed(side) -> bool:

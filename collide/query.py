@@ -309,6 +309,6 @@ def _prepare(A, B) -> None:
 
 
 def _meshed_pair(A: Shape, B: Shape):
-    from collide.narrowphase.facets.single_mesh_call import single_pair
+    from collide.narrowphase.facets.mesh_pairs import single_pair
 
     return single_pair(A, B)
