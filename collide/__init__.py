@@ -30,9 +30,10 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.hierarchies.hierarchy_queries import walk
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
-    from collide.query import collide, distance, walk
+    from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
     from collide.robot import Robot
     from collide.shapes import (
@@ -72,7 +73,8 @@ _HOMES = {
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.surface_queries.raycast": ("RayHits", "raycast"),
-    "collide.query": ("collide", "distance", "walk"),
+    "collide.hierarchies.hierarchy_queries": ("walk",),
+    "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
     "collide.shapes": (

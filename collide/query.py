@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from collide import argument_checks as reading
+from collide.algorithms import named_algorithm
 from collide.batches import ask, length_of
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_queries as run
 from collide.narrowphase.composite.composite import UnionPair
-from collide.pair_arguments import asked_poses, pose_at, pose_batch, shape_at
+from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape, is_plain
 from collide.threads import check_threads
-from collide.transforms import as_poses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,8 +95,11 @@ def collide(
     margin = checked_margin("security_margin", security_margin)
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
-    if algorithm is not None and not _is_named(algorithm, "gjk"):
-        return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
+    answer = named_algorithm("collide", algorithm)
+    if answer is not None:
+        if axes is not None or check_threads(threads) != 1:
+            raise InvalidArgument(f'algorithm="{algorithm}" takes no axes, and runs in one thread')
+        return answer(A, B, X_WA, X_WB, check_poses)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     if margin:
@@ -116,51 +119,6 @@ def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: in
     rows = ask(A, B, X_WA, X_WB, False, margin, check_poses, threads, depths=False)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
-
-
-def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algorithm):
-    if not _is_named(algorithm, "barba-langerman"):
-        raise InvalidArgument(f'algorithm must be "gjk" or "barba-langerman", got {algorithm!r}')
-    if axes is not None or check_threads(threads) != 1:
-        raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
-    found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
-    return bool(found.hit[0]) if pose_batch(X_WA, "X_WA")[1] and pose_batch(X_WB, "X_WB")[1] else found.hit
-
-
-def _is_named(algorithm, name: str) -> bool:
-    """Whether an algorithm is given by this name; anything but a string, an array among them, is not."""
-    return isinstance(algorithm, str) and algorithm == name
-
-
-def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
-    """What `collide` says with ``algorithm="barba-langerman"``, with its counts: `collide.hierarchies.hierarchy_queries.Walks`.
-
-    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`.   X_WA, X_WB, check_poses : as there.
-    trace : also return the rounds of the last pose one by one.
-
-    Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes.
-    """
-    from collide.hierarchies import hierarchy_queries as walks
-
-    for shape in (A, B):
-        walks.walk_body(shape)
-    X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    return walks.walk_poses(A, B, X_WA, X_WB, lambda left: ask_default(left, True, 0.0), trace=trace)
-
-
-def _with_default(A, B, X_WA, X_WB, check_poses: bool):
-    """(poses, poses, whether single, a function that asks the default algorithm at the poses of given numbers).
-
-    Poses are checked and copied: a certificate worked out later is one for these.
-    """
-    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-
-    def ask_default(left: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
-        X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        return np.broadcast_to(ask(A, B, X_WO, X_WT, boolean, limit, False, 1, depths=depths), (len(left),))
-
-    return X_WA, X_WB, single, ask_default
 
 
 #: Longest warm-start axis: its square is far from overflow.
@@ -224,8 +182,11 @@ def distance(
     half-space).
     """
     limit = reading.limit("max_distance", max_distance)
-    if algorithm is not None and not _is_named(algorithm, "gjk"):
-        return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
+    answer = named_algorithm("distance", algorithm)
+    if answer is not None:
+        if limit != math.inf or check_threads(threads) != 1:
+            raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')
+        return answer(A, B, X_WA, X_WB, check_poses, signed)
     if limit == math.inf and threads.__class__ is int and threads == 1:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
@@ -251,21 +212,6 @@ def distance(
             "end, so no translation of finite length separates them; collide() still answers"
         )
     return PairResult(rows, single, (_held(A), _held(B), *kept))
-
-
-def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
-    if not _is_named(algorithm, "dobkin-kirkpatrick"):
-        raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
-    if limit != math.inf or check_threads(threads) != 1:
-        raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')
-    from collide.hierarchies import hierarchy_queries as walks
-
-    for shape in (A, B):
-        walks.walk_body(shape, algorithm)
-    X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
-    run.close(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB))
 
 
 def _held(shapes):
