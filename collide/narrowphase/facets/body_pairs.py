@@ -1,9 +1,9 @@
 """Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
 
-Kernels answer whole batches (`surface_pairs.py`). Completed here, pose by pose, is what a row may still lack: depths, the
-direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the surfaces' distance less the
-radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation that is proven to part the
-bodies (`separating_translation.py`); how much shorter another one might be is not known, so the bracket reaches up to 0.
+Kernels answer whole batches (`surface_pairs.py`). Completed here, pose by pose, is what a row may still lack: depths,
+the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the surfaces' distance less
+the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation that is proven to part the
+bodies (`separating_translation.py`); how much shorter another may be is not known, so the bracket reaches up to 0.
 """
 
 from __future__ import annotations
@@ -62,7 +62,10 @@ class Hits(NamedTuple):
 
 
 def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> Hits:
-    """Exactly, for poses (n, 4, 4) or (1, 4, 4), whether two bodies without their radii share a point; check: as in `states`."""
+    """Exactly, for poses (n, 4, 4) or (1, 4, 4), whether two bodies without their radii share a point.
+
+    check : as in `states`.
+    """
     inside = np.full((number_of_poses(X_WA, X_WB), 3), np.nan)
     return Hits(_states(A, B, False, X_WA, X_WB, check=check, inside=inside) != APART, inside)
 
@@ -82,8 +85,10 @@ def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     return states(A, B, X_WA, X_WB) != APART
 
 
-def _states(A: Body, B: Body, exchanged: bool, X_WA, X_WB, *, check: bool = False, inside: np.ndarray | None = None) -> np.ndarray:
-    """States of bodies in the order of the header; exchanged: the poses are those of B and A. inside : without radii."""
+def _states(
+    A: Body, B: Body, exchanged: bool, X_WA, X_WB, *, check: bool, inside: np.ndarray | None = None
+) -> np.ndarray:
+    """States of bodies; exchanged: the poses are those of B and A.   inside : as of `Hits`, of bodies without radii."""
     n = number_of_poses(X_WA, X_WB)
     out = np.zeros(n, dtype=np.uint8)
     if A.radius + B.radius > 0.0 and inside is None:
@@ -92,16 +97,18 @@ def _states(A: Body, B: Body, exchanged: bool, X_WA, X_WB, *, check: bool = Fals
 
     def ask_from(first: int, check: bool) -> int:
         return meet_poses(
-            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, n, check, inside is not None,
-            0 if inside is None else address_of(inside), address_of(out),
+            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, n, check,
+            inside is not None, 0 if inside is None else address_of(inside), address_of(out),
         )  # fmt: skip
 
     _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
     return out
 
 
-def _ask_all(ask_from: Callable[[int, bool], int], n: int, X_WA, X_WB, check: bool, is_no_pose: Callable[[int], bool]) -> None:
-    """Have a kernel answer n poses: it stops at matrices that are none. Raises InvalidPose."""
+def _ask_all(
+    ask_from: Callable[[int, bool], int], n: int, X_WA, X_WB, check: bool, is_no_pose: Callable[[int], bool]
+) -> None:
+    """Have a kernel answer n poses. It stops at a matrix that is none, or places no mesh: raises InvalidPose."""
     done = ask_from(0, check)
     while done < n:
         if not is_no_pose(done):
@@ -138,8 +145,8 @@ def _header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
             A.tree.address, B.tree.address, A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
             len(B.points), 0, 0, same_tree, same_tree and A.key == B.key, exchanged,
             code_of(surface_collision.walk_surfaces), code_of(winding_numbers.points_inside),
-            code_of(surface_distance.near_surfaces), code_of(decide_exactly), *space.addresses[:4], space.heap_address, HEAP,
-            space.scratch_address,
+            code_of(surface_distance.near_surfaces), code_of(decide_exactly), *space.addresses[:4],
+            space.heap_address, HEAP, space.scratch_address,
         ],
         dtype=np.int64,
     )  # fmt: skip
@@ -191,8 +198,8 @@ def _fill_rows(
 
     def ask_from(first: int, check: bool) -> int:
         return gap_poses(
-            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, len(rows), check, limit, reach,
-            0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, len(rows), check, limit,
+            reach, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
         )  # fmt: skip
 
     _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
@@ -221,7 +228,9 @@ def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit:
     return _completed_in_order(A, B, X_WA, X_WB, row.copy(), lacks, limit, depths)
 
 
-def _completed_in_order(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float, depths: bool) -> np.ndarray:
+def _completed_in_order(
+    A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float, depths: bool
+) -> np.ndarray:
     if lacks & TOO_FAR:
         return _far_gap(A, B, X_WA, X_WB, limit)
     steps: list[np.ndarray] = []
@@ -250,7 +259,7 @@ def _completed_in_order(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: in
 
 
 def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
-    """The row of bodies too far apart for boxes in floats: the distance of their hulls, and that of one point of each."""
+    """The row of bodies too far apart for boxes of floats: the distance of their hulls, and of one point of each."""
     row = hull_rows(A, B, X_WA[None], X_WB[None], limit)
     row["count"], row["part_a"], row["part_b"] = 0, 0, 0
     row["vertices_a"] = row["vertices_b"] = -1
@@ -301,7 +310,7 @@ class SinglePair:
         return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MOST_POINTS
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, the same bytes as a batch gives; None of overlaps, and of what kernels do not complete."""
+        """One row of `PAIR_DTYPE`, bytes as of a batch; None of overlaps, and of what kernels do not complete."""
         if not self._has_slabs:
             _make_slabs(*self._held[:2])
             self._has_slabs = True

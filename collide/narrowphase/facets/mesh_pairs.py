@@ -14,10 +14,10 @@ from collide.batches import ask
 from collide.lowering.composite_parts import is_union
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
 from collide.narrowphase.convex_queries import number_of_poses
-from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.narrowphase.facets.body_pairs import SinglePair
 from collide.narrowphase.facets.mesh_rows import facet_bodies, mesh_rows, mesh_states
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
+from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
@@ -99,8 +99,8 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
 
 
 def single_pair(A: Shape, B: Shape) -> SinglePair | None:
-    """The pair made ready for single calls, or None where these are answered as batches of one: unions, half-spaces, curved
-    shapes, very many parts. It holds trees and points, not the shapes. Raises UnsupportedQuery.
+    """The pair made ready for single calls, or None where these are answered as batches of one: unions, half-spaces,
+    curved shapes, very many parts. It holds trees and points, not the shapes. Raises UnsupportedQuery.
     """
     bodies = facet_bodies(A, B)
     return SinglePair(*bodies) if bodies is not None and SinglePair.serves(*bodies) else None

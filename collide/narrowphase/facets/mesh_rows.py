@@ -1,6 +1,7 @@
 """A mesh and another single body, whatever its kind: states and rows. Unions are taken apart in `composite/`.
 
-Bodies of facets go to `body_pairs.py`, curved shapes to `mesh_curved.py`; a half-space meets a mesh where it meets its hull.
+Bodies of facets go to `body_pairs.py`, curved shapes to `mesh_curved.py`; a half-space meets a mesh where it meets the
+mesh's hull.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ def mesh_rows(
 ) -> np.ndarray:  # fmt: skip
     """Rows (PAIR_DTYPE) for poses (n, 4, 4) or (1, 4, 4); part_a and part_b are facets, 0 where none decided.
 
-    limit, depths : as in `distance`.   check : refuse matrices that are no rotation.   out : rows to fill, zeroed, where
-    both are bodies of facets. Raises InvalidPose, UnsupportedQuery.
+    limit, depths : as in `distance`.   check : refuse matrices that are no rotation.   out : rows to fill, zeroed,
+    where both are bodies of facets. Raises InvalidPose, UnsupportedQuery.
     """
     bodies = facet_bodies(A, B)
     if bodies is not None:

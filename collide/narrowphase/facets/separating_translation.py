@@ -52,7 +52,7 @@ def separating_translation(
 
 
 def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTranslation) -> None:
-    """Make a row of bodies that meet, in place, as deep as a translation is long: its points lie about a common one (3,)."""
+    """Make a row of bodies that meet as deep as a translation is long, in place; point: (3,) a common one."""
     length, bound, normal = translation
     row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
     row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal

@@ -13,27 +13,15 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i32, view_i64, view_u8
-from collide.mesh.bvh import EXPONENT, INTS, NUMBERS, NUMBERS_AT, REACH
-from collide.mesh.bvh import CENTRE as TREE_CENTRE
-from collide.mesh.bvh import RADIUS as BALL_RADIUS
+from collide.mesh.bvh import CENTRE, EXPONENT, INTS, NUMBERS, NUMBERS_AT, RADIUS, REACH
+from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
 from collide.narrowphase.facets.posed_surfaces import balls_apart, later, off_rotation
-from collide.narrowphase.facets.surface_collision import DONE
-from collide.narrowphase.facets.surface_distance import DISTANCE, EXACT, FACET_A, FACET_B, LOWER, MARKS, MEETS, RESULT, UPPER
-from collide.narrowphase.facets.surface_distance import NORMAL as RESULT_NORMAL
-from collide.narrowphase.facets.surface_distance import POINT_A as RESULT_A
-from collide.narrowphase.facets.surface_distance import POINT_B as RESULT_B
-from collide.narrowphase.facets.winding_numbers import OUTSIDE
-from collide.narrowphase.facets.winding_numbers import SINGULAR as NOT_INVERTIBLE
+from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, MARKS, MEETS, RESULT
 from collide.narrowphase.pose_batches import is_pose
-from collide.narrowphase.rows import BEYOND, BODY_B, CERTIFIED, EXACT_ROUNDS, HIT as ROW_HIT, HOW, NORMAL, PART_A, PART_B, POINT_A
-from collide.narrowphase.rows import DISTANCE as ROW_DISTANCE
-from collide.narrowphase.rows import LOWER as ROW_LOWER
-from collide.narrowphase.rows import POINT_B, ROW, open_row, view_row
-from collide.narrowphase.rows import UPPER as ROW_UPPER
+from collide.narrowphase.rows import ROW, open_row, view_row
 from collide.numerics.vec3 import Vec3, add, dot, put_vec3, scale, sub, vec3_at
-from collide.results import EXACT as HOW_EXACT
-from collide.results import FORMULA, UNDECIDED
+from collide.results import EXACT, FORMULA, UNDECIDED
 
 _test_surfaces = native_call(surface_collision.SIGNATURE)
 _test_points = native_call(winding_numbers.SIGNATURE)
@@ -107,7 +95,8 @@ class PosedPair(NamedTuple):
 
 @kernel(inline=True)
 def _body(words, radii, side):
-    return FacetBody(words[TREE_A + side], words[SOLID_A + side], words[POINTS_A + side], words[N_POINTS_A + side], radii[side])
+    points_at, n_points = words[POINTS_A + side], words[N_POINTS_A + side]
+    return FacetBody(words[TREE_A + side], words[SOLID_A + side], points_at, n_points, radii[side])
 
 
 @kernel(inline=True)
@@ -124,8 +113,8 @@ def _posed_pair(header_at, XA_at, XB_at, exchanged):
 def _space(header_at):
     words = view_i64(header_at, HEADER)
     return Space(
-        words[SURFACES_CODE], words[POINTS_CODE], words[DISTANCES_CODE], words[EXACT_CODE], words[STACK_AT], words[N_STACK],
-        words[DOUBLES_AT], words[INTEGERS_AT], words[HEAP_AT], words[N_HEAP], words[SCRATCH_AT],
+        words[SURFACES_CODE], words[POINTS_CODE], words[DISTANCES_CODE], words[EXACT_CODE], words[STACK_AT],
+        words[N_STACK], words[DOUBLES_AT], words[INTEGERS_AT], words[HEAP_AT], words[N_HEAP], words[SCRATCH_AT],
     )  # fmt: skip
 
 
@@ -164,21 +153,21 @@ def _are_poses(XA_at, step_a, XB_at, step_b, k, first, check):
 @kernel
 def _may_hold(X, numbers, Y, point):
     """Whether a point posed by Y may lie in the ball around the body at X: by a margin above rounding."""
-    centre = vec3_at(numbers, TREE_CENTRE)
+    centre = vec3_at(numbers, CENTRE)
     across = sub(_placed(Y, point), _placed(X, centre))
     size = 0.0
     for i in range(3):
-        size += abs(X[4 * i + 3]) + abs(Y[4 * i + 3]) + 2.0 * (abs(numbers[TREE_CENTRE + i]) + numbers[REACH + i])
+        size += abs(X[4 * i + 3]) + abs(Y[4 * i + 3]) + 2.0 * (abs(numbers[CENTRE + i]) + numbers[REACH + i])
     size += 2.0 * (abs(point.x) + abs(point.y) + abs(point.z))
-    reach = numbers[BALL_RADIUS] * (1.0 + off_rotation(X))
+    reach = numbers[RADIUS] * (1.0 + off_rotation(X))
     return not math.sqrt(dot(across, across)) > 1.001 * reach + 1e-9 * size
 
 
 @kernel
 def _point_inside(space, body, X_at, points_at, n_points, Y_at):
-    """Number of the first point, of n in a frame at Y, that lies in the body at X; −1 where none does, −2 where X places no mesh.
+    """Number of the first point, of n in a frame at Y, that lies in the body at X; −1 where none does.
 
-    A point that every segment tried leaves open counts as inside.
+    −2 where the matrix X places no mesh. A point that every segment tried leaves open counts as inside.
     """
     X = view_f64(X_at, 16)
     Y = view_f64(Y_at, 16)
@@ -198,23 +187,27 @@ def _point_inside(space, body, X_at, points_at, n_points, Y_at):
                 space.doubles_at, space.integers_at, space.exact,
             ),
         )  # fmt: skip
-        if words[0] == NOT_INVERTIBLE:
+        if words[0] == winding_numbers.SINGULAR:
             return -2
-        if words[0] != OUTSIDE:
+        if words[0] != winding_numbers.OUTSIDE:
             return k
     return -1
 
 
 @kernel
 def _test_inside(space, body, X_at, other, Y_at, inside_at):
-    """HIT where a point of the other body, at Y, lies in the one at X, APART or SINGULAR; inside: where it is in the world."""
+    """HIT where a point of the other body, at Y, lies in the one at X; else APART or SINGULAR.
+
+    inside : 0, or three doubles that become the point in the world.
+    """
     if body.solid == 0:
         return APART
     k = _point_inside(space, body, X_at, other.points_at, other.n_points, Y_at)
     if k < 0:
         return APART if k == -1 else SINGULAR
     if inside_at != 0:
-        put_vec3(view_f64(inside_at, 3), 0, _placed(view_f64(Y_at, 16), vec3_at(view_f64(other.points_at + 24 * k, 3), 0)))
+        point = vec3_at(view_f64(other.points_at + 24 * k, 3), 0)
+        put_vec3(view_f64(inside_at, 3), 0, _placed(view_f64(Y_at, 16), point))
     return HIT
 
 
@@ -231,12 +224,12 @@ def _test_cores(space, pair, inside_at):
     done = _test_surfaces(
         space.surfaces,
         (
-            pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, True, space.scratch_at, KEYS,
-            starts_at, starts_at + 16, starts_at + 40, space.stack_at, space.n_stack, space.doubles_at,
+            pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, True, space.scratch_at,
+            KEYS, starts_at, starts_at + 16, starts_at + 40, space.stack_at, space.n_stack, space.doubles_at,
             space.integers_at, space.exact,
         ),
     )  # fmt: skip
-    if done != DONE:
+    if done != surface_collision.DONE:
         return SINGULAR
     if words[1] > words[0]:
         return HIT
@@ -246,27 +239,33 @@ def _test_cores(space, pair, inside_at):
     return state
 
 
+@kernel(inline=True)
+def _result(space):
+    """The scratch's row of results of distances, and its marks."""
+    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
+    return view_f64(found_at, RESULT), view_i64(found_at + 8 * RESULT, MARKS)
+
+
 @kernel
 def _measure(space, pair, limit):
     """The surfaces' distance into the scratch, looked for within the limit; False where a matrix places no mesh."""
     found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    marks_at = found_at + 8 * RESULT
-    found = view_f64(found_at, RESULT)
-    marks = view_i64(marks_at, MARKS)
+    found, marks = _result(space)
     while True:
         for i in range(MARKS):
             marks[i] = 0
         done = _measure_surfaces(
             space.distances,
             (
-                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, found_at, marks_at,
-                space.stack_at, space.n_stack, space.heap_at, space.n_heap, space.doubles_at, space.integers_at, space.exact,
+                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, found_at,
+                found_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap, space.doubles_at,
+                space.integers_at, space.exact,
             ),
         )  # fmt: skip
         if done < 1:
             return False
         # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
-        if marks[FACET_A] >= 0 or not found[LOWER] < limit or limit == math.inf:
+        if marks[FACET_A] >= 0 or not found[surface_distance.LOWER] < limit or limit == math.inf:
             return True
         limit = math.inf
 
@@ -274,12 +273,11 @@ def _measure(space, pair, limit):
 @kernel
 def _test_gap(space, radius):
     """APART, HIT or OPEN: swept bodies whose cores, measured just now, do not meet."""
-    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    found = view_f64(found_at, RESULT)
-    meets = view_i64(found_at + 8 * RESULT, MARKS)[MEETS] != 0
-    if found[LOWER] > radius if radius > 0.0 else not meets:
+    found, marks = _result(space)
+    meets = marks[MEETS] != 0
+    if found[surface_distance.LOWER] > radius if radius > 0.0 else not meets:
         return APART
-    return HIT if found[UPPER] <= radius or meets else OPEN
+    return HIT if found[surface_distance.UPPER] <= radius or meets else OPEN
 
 
 @kernel
@@ -321,7 +319,7 @@ def meet_single(header_at, XA_at, XB_at):
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, int64, int64)")
 def meet_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, cores, inside_at, states_at):
-    """States of bodies at poses ``first`` … n − 1; returns how many are done: one that is not is NO_POSE or SINGULAR.
+    """States of bodies at poses ``first`` … n − 1; returns how many are done: the next is NO_POSE or SINGULAR.
 
     XA, XB : matrices; step 16 or, for a single pose, 0.   check : refuse matrices that are no rotation.
     cores : leave radii out.   inside : 0, or three doubles a pose: a point of the world in both bodies, where a part of
@@ -380,7 +378,7 @@ def _reach(numbers, radius):
 
 @kernel
 def _size(pair):
-    """S of docs/conventions.md: reaches of both bodies from their frames' origins, and the distance between these [m]."""
+    """S of docs/conventions.md: reaches of both bodies from their frames' origins, and how far these are apart [m]."""
     XA = view_f64(pair.XA_at, 16)
     XB = view_f64(pair.XB_at, 16)
     across = Vec3(XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11])
@@ -392,14 +390,14 @@ def _size(pair):
 def _set_bracket(row_at, found, radius):
     """Lower and upper bound and distance of bodies, from those of their cores."""
     row = view_f64(row_at, 12)
-    row[ROW_LOWER] = found[LOWER] - radius
-    row[ROW_UPPER] = found[UPPER] - radius
+    row[rows.LOWER] = found[surface_distance.LOWER] - radius
+    row[rows.UPPER] = found[surface_distance.UPPER] - radius
     if radius > 0.0:
-        _step(row_at, ROW_LOWER, False)
-        _step(row_at, ROW_UPPER, True)
-    row[ROW_DISTANCE] = min(max(found[DISTANCE] - radius, row[ROW_LOWER]), row[ROW_UPPER])
-    if row[ROW_DISTANCE] == 0.0:  # apart, and nearer than the bracket is wide: 0 would say that they touch
-        row[ROW_DISTANCE] = row[ROW_UPPER]
+        _step(row_at, rows.LOWER, False)
+        _step(row_at, rows.UPPER, True)
+    row[rows.DISTANCE] = min(max(found[surface_distance.DISTANCE] - radius, row[rows.LOWER]), row[rows.UPPER])
+    if row[rows.DISTANCE] == 0.0:  # apart, and nearer than the bracket is wide: 0 would say that they touch
+        row[rows.DISTANCE] = row[rows.UPPER]
 
 
 @kernel
@@ -407,62 +405,59 @@ def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
     """The row of bodies whose cores are apart, from their distance in the scratch; returns what it lacks.
 
     hull : 0, or the row of the bodies' hulls, A and B as they are asked about.   exchanged : these are worked on in the
-    other order. Of facets that all but touch rounding leaves many directions, and the pair
-    found may be one around the corner of two faces that lie on each other: hulls as far apart, as far as is proven, know
-    the bodies' own direction.
+    other order. Of facets that all but touch rounding leaves many directions, and the pair found may be one around the
+    corner of two faces that lie on each other: hulls as far apart, as far as is proven, know the bodies' direction.
     """
-    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    found = view_f64(found_at, RESULT)
-    marks = view_i64(found_at + 8 * RESULT, MARKS)
+    found, marks = _result(space)
     row, words, flags = open_row(row_at)
     radius = pair.A.radius + pair.B.radius
     unseen = marks[FACET_A] < 0
-    middle_a = _placed(view_f64(pair.XA_at, 16), vec3_at(_numbers(pair.A), TREE_CENTRE))
-    middle_b = _placed(view_f64(pair.XB_at, 16), vec3_at(_numbers(pair.B), TREE_CENTRE))
-    normal = vec3_at(found, RESULT_NORMAL)
+    middle_a = _placed(view_f64(pair.XA_at, 16), vec3_at(_numbers(pair.A), CENTRE))
+    middle_b = _placed(view_f64(pair.XB_at, 16), vec3_at(_numbers(pair.B), CENTRE))
+    normal = vec3_at(found, surface_distance.NORMAL)
     if unseen or (normal.x == 0.0 and normal.y == 0.0 and normal.z == 0.0):
         normal = _unit_or_z(sub(middle_b, middle_a))
     size = _size(pair)
     _set_bracket(row_at, found, radius)
     lacks = 0
     turned = False
-    if not unseen and found[DISTANCE] <= NEARLY_TOUCHING * size:
+    if not unseen and found[surface_distance.DISTANCE] <= NEARLY_TOUCHING * size:
         if hull_at == 0:
             lacks = NEARLY_TOUCH
         else:
             hull = view_f64(hull_at, 12)
-            turned = hull[ROW_UPPER] + pair.A.radius + pair.B.radius >= found[LOWER]
+            turned = hull[rows.UPPER] + pair.A.radius + pair.B.radius >= found[surface_distance.LOWER]
             if turned:
-                normal = vec3_at(hull, NORMAL)
+                normal = vec3_at(hull, rows.NORMAL)
                 if exchanged:
                     normal = sub(Vec3(0.0, 0.0, 0.0), normal)
-    point_a = add(vec3_at(found, RESULT_A), scale(pair.A.radius, normal))
-    point_b = sub(vec3_at(found, RESULT_B), scale(pair.B.radius, normal))
+    point_a = add(vec3_at(found, surface_distance.POINT_A), scale(pair.A.radius, normal))
+    point_b = sub(vec3_at(found, surface_distance.POINT_B), scale(pair.B.radius, normal))
     if turned:  # lay the points as far apart, about their middle
-        missing = scale(0.5, sub(scale(row[ROW_DISTANCE], normal), sub(point_b, point_a)))
+        missing = scale(0.5, sub(scale(row[rows.DISTANCE], normal), sub(point_b, point_a)))
         point_a = sub(point_a, missing)
         point_b = add(point_b, missing)
-    beyond = unseen or row[ROW_LOWER] > limit
-    narrow = row[ROW_UPPER] <= row[ROW_LOWER] + PROMISE * size
-    flags[CERTIFIED] = 1 if (narrow or beyond) and (row[ROW_LOWER] > 0.0 or radius == 0.0) else 0
-    flags[BEYOND] = 1 if beyond else 0
+    beyond = unseen or row[rows.LOWER] > limit
+    narrow = row[rows.UPPER] <= row[rows.LOWER] + PROMISE * size
+    flags[rows.CERTIFIED] = 1 if (narrow or beyond) and (row[rows.LOWER] > 0.0 or radius == 0.0) else 0
+    flags[rows.BEYOND] = 1 if beyond else 0
     if unseen:  # beyond the limit; without one, `body_pairs.py` writes this row
-        row[ROW_LOWER] = limit if limit < math.inf else 0.0
+        row[rows.LOWER] = limit if limit < math.inf else 0.0
         if limit < math.inf:
-            _step(row_at, ROW_LOWER, True)
+            _step(row_at, rows.LOWER, True)
         middle = scale(0.5, add(middle_a, middle_b))
-        half = scale(0.5 * row[ROW_LOWER], normal)
+        half = scale(0.5 * row[rows.LOWER], normal)
         point_a = sub(middle, half)
         point_b = add(middle, half)
     if beyond:
-        row[ROW_DISTANCE] = row[ROW_LOWER]
-        row[ROW_UPPER] = math.inf
-    put_vec3(row, NORMAL, add(normal, Vec3(0.0, 0.0, 0.0)))  # never −0.0
-    put_vec3(row, POINT_A, point_a)
-    put_vec3(row, POINT_B, point_b)
-    words[PART_A] = max(marks[FACET_A], 0)
-    words[PART_B] = max(marks[FACET_B], 0)
-    flags[EXACT_ROUNDS] = min(marks[EXACT], 255)
+        row[rows.DISTANCE] = row[rows.LOWER]
+        row[rows.UPPER] = math.inf
+    put_vec3(row, rows.NORMAL, add(normal, Vec3(0.0, 0.0, 0.0)))  # never −0.0
+    put_vec3(row, rows.POINT_A, point_a)
+    put_vec3(row, rows.POINT_B, point_b)
+    words[rows.PART_A] = max(marks[FACET_A], 0)
+    words[rows.PART_B] = max(marks[FACET_B], 0)
+    flags[rows.EXACT_ROUNDS] = min(marks[surface_distance.EXACT], 255)
     exponent = min(view_i64(pair.A.tree_at, INTS)[EXPONENT], view_i64(pair.B.tree_at, INTS)[EXPONENT])
     if unseen and limit > FARTHEST * math.ldexp(1.0, int(exponent)):
         lacks |= TOO_FAR
@@ -475,10 +470,8 @@ def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
 
     reach : how far cores are looked for, above the limit and the radii [m].   hull, exchanged : as of `_write_gap`.
     """
-    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    found = view_f64(found_at, RESULT)
-    marks = view_i64(found_at + 8 * RESULT, MARKS)
-    _, words, flags = open_row(row_at)
+    found, marks = _result(space)
+    _, _, flags = open_row(row_at)
     radius = pair.A.radius + pair.B.radius
     if _balls_apart(pair, reach):
         for i in range(RESULT):
@@ -486,18 +479,18 @@ def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
         for i in range(MARKS):
             marks[i] = 0
         marks[FACET_A] = marks[FACET_B] = -1
-        found[DISTANCE] = found[LOWER] = reach
-        found[UPPER] = math.inf
+        found[surface_distance.DISTANCE] = found[surface_distance.LOWER] = reach
+        found[surface_distance.UPPER] = math.inf
     else:
-        inside = view_f64(row_at + 8 * POINT_A, 3)
+        inside = view_f64(row_at + 8 * rows.POINT_A, 3)
         inside[0] = math.nan
-        state = _test_cores(space, pair, row_at + 8 * POINT_A)
+        state = _test_cores(space, pair, row_at + 8 * rows.POINT_A)
         if state == SINGULAR or (state == APART and not _measure(space, pair, reach)):
             return ROW_SINGULAR
         if state == HIT:
-            flags[ROW_HIT] = 1
-            flags[HOW] = HOW_EXACT
-            put_vec3(view_f64(row_at, 12), POINT_B, vec3_at(inside, 0))
+            flags[rows.HIT] = 1
+            flags[rows.HOW] = EXACT
+            put_vec3(view_f64(row_at, 12), rows.POINT_B, vec3_at(inside, 0))
             return CORES_MEET
     lacks = _write_gap(space, pair, limit, hull_at, exchanged, row_at)
     state = _test_gap(space, radius)
@@ -506,8 +499,8 @@ def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
         state = APART if _test_gap(space, radius) == APART else OPEN
     if state != APART:
         lacks |= RADII_MEET
-        flags[ROW_HIT] = 1
-    flags[HOW] = UNDECIDED if state == OPEN else FORMULA
+        flags[rows.HIT] = 1
+    flags[rows.HOW] = UNDECIDED if state == OPEN else FORMULA
     return lacks
 
 
@@ -515,22 +508,22 @@ def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
 def _exchange(row_at):
     """Make a row that of the same bodies in the other order (`results.flipped`)."""
     row, words, _ = view_row(row_at)
-    normal = vec3_at(row, NORMAL)
-    point = vec3_at(row, POINT_A)
-    part = words[PART_A]
-    put_vec3(row, NORMAL, sub(Vec3(0.0, 0.0, 0.0), normal))
-    put_vec3(row, POINT_A, vec3_at(row, POINT_B))
-    put_vec3(row, POINT_B, point)
-    words[PART_A] = words[PART_B]
-    words[PART_B] = part
+    normal = vec3_at(row, rows.NORMAL)
+    point = vec3_at(row, rows.POINT_A)
+    part = words[rows.PART_A]
+    put_vec3(row, rows.NORMAL, sub(Vec3(0.0, 0.0, 0.0), normal))
+    put_vec3(row, rows.POINT_A, vec3_at(row, rows.POINT_B))
+    put_vec3(row, rows.POINT_B, point)
+    words[rows.PART_A] = words[rows.PART_B]
+    words[rows.PART_B] = part
 
 
 @kernel
 def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, hull_at, row_at):
     """A row of the bodies as they are asked about; returns what it lacks.
 
-    Bodies are worked on in the order of their contents, those that are equal in the order of their poses, so that swapped
-    questions give the same numbers.
+    Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped questions
+    give the same numbers.
     """
     words = view_i64(header_at, HEADER)
     exchanged = words[EXCHANGED] != 0
@@ -549,7 +542,7 @@ def gap_single(header_at, XA_at, XB_at, row_at, _depths):
     """1 where bodies are apart, with their row of PAIR_DTYPE, zeroed before; −1 where the long way is to be taken."""
     if not (_is_rigid(XA_at, True) and _is_rigid(XB_at, True)):
         return -1
-    view_i32(row_at, ROW // 4)[BODY_B] = 1
+    view_i32(row_at, ROW // 4)[rows.BODY_B] = 1
     lacks = _row_at_poses(header_at, _space(header_at), XA_at, XB_at, math.inf, math.inf, 0, row_at)
     return -1 if lacks != 0 else 1
 
@@ -558,8 +551,8 @@ def gap_single(header_at, XA_at, XB_at, row_at, _depths):
 def gap_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, reach, hulls_at, rows_at, lacks_at):
     """Rows of bodies at poses ``first`` … n − 1; returns how many are done: of one that is not, ``lacks`` says why.
 
-    XA, XB, check : as of `meet_poses`.   limit : beyond it only a lower bound is wanted [m].   reach : how far cores are
-    looked for: next above the limit and the radii [m].   hulls : 0, or rows of the bodies' hulls, for directions.
+    XA, XB, check : as of `meet_poses`.   limit : beyond it only a lower bound is wanted [m].   reach : how far cores
+    are looked for: next above the limit and the radii [m].   hulls : 0, or rows of the bodies' hulls, for directions.
     rows : of PAIR_DTYPE, zeroed; of cores that meet both points become a point inside both, NaN where surfaces meet.
     lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
     """
