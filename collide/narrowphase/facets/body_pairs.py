@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.batches import ask
 from collide.errors import InvalidPose
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.facet_bodies import Body, hull_of, reach_of
 from collide.mesh.bvh import WIDTH
 from collide.mesh.bvh_slabs import make_slabs
+from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
 from collide.narrowphase.facets.exact_triangles import decide_exactly
@@ -218,7 +218,7 @@ def farthest_gap(A: Body, B: Body) -> float:
 
 def hull_rows(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
     """Rows of the bodies' hulls."""
-    return ask(hull_of(A), hull_of(B), X_WA, X_WB, False, limit, False, 1)
+    return convex_rows(hull_of(A), hull_of(B), X_WA, X_WB, limit=limit)
 
 
 def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float, depths: bool) -> np.ndarray:

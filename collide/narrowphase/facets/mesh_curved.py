@@ -56,15 +56,12 @@ def curved_states(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, *, 
     return state
 
 
-def decide(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, check: bool = False) -> Decided:
-    """Whether a mesh and a shape share a point, proven for the poses and everything within their slops.
-
-    check : refuse matrices that are no rotation, of poses without slop.
-    """
+def decide(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> Decided:
+    """Whether a mesh and a shape share a point, proven for the poses and everything within their slops."""
     n = len(X_WA.X)
     done = Decided(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
     exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)
-    _between_polytopes(A, E, X_WA.X, X_WB.X, np.flatnonzero(exact), done, check)
+    _between_polytopes(A, E, X_WA.X, X_WB.X, np.flatnonzero(exact), done)
     left = np.flatnonzero(done.state == OPEN)
     if len(left):
         where = points_in_solid(A.tree, X_WA.X[left], E.outer.points[0], X_WB.X[left])  # refuses poses that are none
@@ -76,10 +73,10 @@ def decide(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, c
     return done
 
 
-def _between_polytopes(A: Body, E: Enclosure, X_WA, X_WB, left: np.ndarray, done: Decided, check: bool) -> None:
+def _between_polytopes(A: Body, E: Enclosure, X_WA, X_WB, left: np.ndarray, done: Decided) -> None:
     if not len(left):
         return
-    around = core_hits(A, E.outer, X_WA[left], X_WB[left], check=check).core
+    around = core_hits(A, E.outer, X_WA[left], X_WB[left]).core
     done.state[left[~around]] = APART
     left = left[around]
     if E.inner is not None and len(left):
@@ -134,10 +131,10 @@ def _moved(X: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def curved_rows(
-    A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, limit: float, depths: bool, check: bool = False
+    A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, limit: float, depths: bool
 ) -> np.ndarray:
     """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop only."""
-    decided = decide(A, E, X_WA, X_WB, check=check)
+    decided = decide(A, E, X_WA, X_WB)
     rows = np.zeros(len(X_WA.X), dtype=PAIR_DTYPE)
     rows["vertices_a"] = rows["vertices_b"] = -1
     exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)

@@ -10,18 +10,18 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
-from collide.lowering.composite_parts import is_union
+from collide.lowering.facet_bodies import body_of
+from collide.lowering.kinds import kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
-from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.body_pairs import SinglePair
-from collide.narrowphase.facets.mesh_rows import facet_bodies, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_rows import checked_poses, mesh_rows, mesh_states
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
+from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-from collide.transforms import as_poses
 
 
 def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
@@ -41,14 +41,14 @@ def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check
 
 def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:
     """States of two shapes; parts_open: tell OPEN from HIT among convex parts, too."""
-    if facet_bodies(A, B) is None and (is_union(A) or is_union(B)):
-        states = union_states(A, B, *_full_poses(X_WA, X_WB, check), open_ones=parts_open)
+    if _are_unions(A, B):
+        states = union_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
     else:
         states = mesh_states(A, B, X_WA, X_WB, check=check)
     undecided = np.flatnonzero(states == OPEN)
     covers = _convex_covers(A, B) if len(undecided) else None  # a mesh's hull is made when it is first needed
     if covers is not None:
-        hulls_meet = ask(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided), True, 0.0, False, 1)
+        hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
         states[undecided[~hulls_meet]] = APART
     return states
 
@@ -62,15 +62,15 @@ def pair_rows(
     part_a, part_b : of a `Compound` the number of its part, in the order of its items, nested ones in their place; of
     any other shape the facet.   out : (n,) zeroed rows, to be filled and returned.
     """
-    if facet_bodies(A, B) is None and (is_union(A) or is_union(B)):
-        rows = union_rows(A, B, *_full_poses(X_WA, X_WB, check), limit=limit, depths=depths)
+    if _are_unions(A, B):
+        rows = union_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
     else:
         rows = mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
     undecided = np.flatnonzero(rows["how"] == UNDECIDED)
     covers = _convex_covers(A, B) if len(undecided) else None
     if covers is not None:
         poses = _poses_of(X_WA, undecided), _poses_of(X_WB, undecided)
-        hulls = ask(*covers, *poses, False, math.inf, False, 1, depths=False)
+        hulls = convex_rows(*covers, *poses, depths=False)
         apart = hulls["lower"] > 0.0
         _make_gaps(rows, undecided[apart], hulls[apart], limit)
     if out is not None and rows is not out:
@@ -88,7 +88,7 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
     covers = _convex_covers(A, B) if limit < math.inf else None
     if covers is None:
         return pair_rows(A, B, X_WA, X_WB, limit=limit)
-    rows = ask(*covers, X_WA, X_WB, False, limit, False, 1, depths=False)
+    rows = convex_rows(*covers, X_WA, X_WB, limit=limit, depths=False)
     beyond = rows["beyond"] | (rows["lower"] > limit)
     rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hulls, not of the meshes
     rows["part_a"], rows["part_b"] = 0, 0
@@ -99,11 +99,17 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
 
 
 def single_pair(A: Shape, B: Shape) -> SinglePair | None:
-    """The pair made ready for single calls, or None where these are answered as batches of one: unions, half-spaces,
-    curved shapes, very many parts. It holds trees and points, not the shapes. Raises UnsupportedQuery.
+    """Two bodies of facets made ready for single calls; None where these are batches of one: of very many parts.
+
+    The pair holds trees and points, not the shapes.
     """
-    bodies = facet_bodies(A, B)
-    return SinglePair(*bodies) if bodies is not None and SinglePair.serves(*bodies) else None
+    bodies = body_of(A), body_of(B)
+    return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
+
+
+def _are_unions(A: Shape, B: Shape) -> bool:
+    """Whether one is a `Compound`, to be taken apart."""
+    return method_of(kind_of(A), kind_of(B)) is Method.MESH_PARTS
 
 
 def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
@@ -114,13 +120,6 @@ def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
 
 def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
     return X if len(X) == 1 else X[some]
-
-
-def _full_poses(X_WA: np.ndarray, X_WB: np.ndarray, check: bool) -> list[np.ndarray]:
-    """Both checked, and as long as each other."""
-    n = number_of_poses(X_WA, X_WB)
-    checked = as_poses(X_WA, "X_WA", check=check), as_poses(X_WB, "X_WB", check=check)
-    return [np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in checked]
 
 
 def _make_gaps(rows: np.ndarray, which: np.ndarray, hulls: np.ndarray, limit: float) -> None:

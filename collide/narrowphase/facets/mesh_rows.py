@@ -8,27 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.batches import ask
-from collide.lowering.composite_parts import is_union
 from collide.lowering.enclosures import enclosure_of
-from collide.lowering.facet_bodies import Body, as_given, body_of, has_facets, is_halfspace
+from collide.lowering.facet_bodies import as_given, body_of
+from collide.lowering.kinds import Kind, kind_of
+from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.body_pairs import body_rows, states
 from collide.narrowphase.facets.mesh_curved import curved_rows, curved_states
 from collide.narrowphase.facets.surface_pairs import APART, HIT
 from collide.results import flipped
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-
-
-def facet_bodies(A: Shape, B: Shape) -> tuple[Body, Body] | None:
-    """Both bodies, where both shapes have facets and are no unions."""
-    bodies = getattr(A, "_surface", None), getattr(B, "_surface", None)  # made already, more often than not
-    if type(bodies[0]) is Body and type(bodies[1]) is Body:
-        return bodies
-    if any(is_union(shape) or is_halfspace(shape) or not has_facets(shape) for shape in (A, B)):
-        return None
-    return body_of(A), body_of(B)
+from collide.transforms import as_poses
 
 
 def mesh_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
@@ -36,12 +28,12 @@ def mesh_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check
 
     check : refuse matrices that are no rotation. Raises InvalidPose, UnsupportedQuery.
     """
-    bodies = facet_bodies(A, B)
-    if bodies is not None:
-        return states(*bodies, X_WA, X_WB, check=check)
-    if is_halfspace(A) or is_halfspace(B):
-        return np.where(ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, check, 1), HIT, APART)
-    if not has_facets(A):
+    method = method_of(kind_of(A), kind_of(B))
+    if method is Method.FACETS:
+        return states(body_of(A), body_of(B), X_WA, X_WB, check=check)
+    if method is Method.HULL:
+        return np.where(convex_hits(hull_shape(A), hull_shape(B), *checked_poses(X_WA, X_WB, check)), HIT, APART)
+    if kind_of(A) is not Kind.MESH:
         A, B, X_WA, X_WB = B, A, X_WB, X_WA
     return curved_states(body_of(A), enclosure_of(B), X_WA, X_WB, check=check)
 
@@ -55,20 +47,27 @@ def mesh_rows(
     limit, depths : as in `distance`.   check : refuse matrices that are no rotation.   out : rows to fill, zeroed,
     where both are bodies of facets. Raises InvalidPose, UnsupportedQuery.
     """
-    bodies = facet_bodies(A, B)
-    if bodies is not None:
-        return body_rows(*bodies, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
-    if is_halfspace(A) or is_halfspace(B):
-        rows = ask(hull_shape(A), hull_shape(B), X_WA, X_WB, False, limit, check, 1, depths=depths)
+    method = method_of(kind_of(A), kind_of(B))
+    if method is Method.FACETS:
+        return body_rows(body_of(A), body_of(B), X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+    if method is Method.HULL:
+        X_WA, X_WB = checked_poses(X_WA, X_WB, check)
+        rows = convex_rows(hull_shape(A), hull_shape(B), X_WA, X_WB, limit=limit, depths=depths)
         rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hull, not of the mesh
         return rows
-    if not has_facets(A):
+    if kind_of(A) is not Kind.MESH:
         return flipped(mesh_rows(B, A, X_WB, X_WA, limit=limit, depths=depths, check=check))
-    n = number_of_poses(X_WA, X_WB)
-    PA, PB = (as_given(np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4)))) for X in (X_WA, X_WB))
-    return curved_rows(body_of(A), enclosure_of(B), PA, PB, limit=limit, depths=depths, check=check)
+    PA, PB = map(as_given, checked_poses(X_WA, X_WB, check))
+    return curved_rows(body_of(A), enclosure_of(B), PA, PB, limit=limit, depths=depths)
 
 
 def hull_shape(shape: Shape) -> Shape:
     """The hull of a mesh, any other shape itself."""
     return shape.convex_hull if isinstance(shape, Mesh) else shape
+
+
+def checked_poses(X_WA: np.ndarray, X_WB: np.ndarray, check: bool) -> list[np.ndarray]:
+    """Both checked, and as long as each other; check: refuse matrices that are no rotation. Raises InvalidPose."""
+    n = number_of_poses(X_WA, X_WB)
+    poses = as_poses(X_WA, "X_WA", check=check), as_poses(X_WB, "X_WB", check=check)
+    return [np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in poses]
