@@ -113,11 +113,15 @@ def around_the_origin(rng) -> np.ndarray:
         corners = rng.normal(size=(4, 3))
         weights = np.linalg.solve(np.vstack([corners.T, np.ones(4)]), [0.0, 0.0, 0.0, 1.0])
         if weights.min() > 0.1:
-            return corners / np.linalg.norm(corners, axis=1)[:, None]
+            return on_a_sphere(corners)
+
+
+def on_a_sphere(points) -> np.ndarray:
+    return points / np.linalg.norm(points, axis=1)[:, None]
 
 
 CLOUDS = {
-    "sphere": lambda rng: (lambda p: p / np.linalg.norm(p, axis=1)[:, None])(rng.normal(size=(60, 3))),
+    "sphere": lambda rng: on_a_sphere(rng.normal(size=(60, 3))),
     "scattered": lambda rng: rng.normal(size=(60, 3)) * (1.0, 2.0, 0.7),
     "needle": lambda rng: rng.normal(size=(60, 3)) * (20.0, 1.0, 1.0),
     "cube": lambda rng: rng.integers(-2, 3, size=(60, 3)) * 1.0,
