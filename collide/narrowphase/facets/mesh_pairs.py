@@ -14,10 +14,10 @@ from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
+from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.body_pairs import SinglePair
 from collide.narrowphase.facets.mesh_rows import checked_poses, mesh_rows, mesh_states
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
-from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
 from collide.shapes.mesh import Mesh
