@@ -4,7 +4,7 @@
     python benchmarks/mesh_corruptions.py --minutes 20 --share 0/2
     python benchmarks/mesh_corruptions.py --only duck.obj --case 17
 
-One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/mesh_corruptions.py`). Files
+One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/families/mesh_corruptions.py`). Files
 are gone through in rounds of a few corruptions, so that a run cut short has seen all of them. A file and the number
 of a case give the same case again. Exit status: 0 nothing wrong, 1 something is.
 """
@@ -22,7 +22,7 @@ from zlib import crc32
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "families"))
 
 import mesh_corruptions
 

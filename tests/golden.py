@@ -187,7 +187,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true", help="keep what the engine answers now")
     given = parser.parse_args()
-    sys.path.insert(0, str(Path(__file__).parent))
+    sys.path[:0] = [str(Path(__file__).with_name(folder)) for folder in ("soak", "oracles")]
     found = {name: [asked, told] for name, asked, told in groups()}
     if given.write:
         FILE.write_text(json.dumps(found, indent=0) + "\n", encoding="utf-8")

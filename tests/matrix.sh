@@ -2,7 +2,7 @@
 # One wheel, every Python that is on this machine: built once, then installed and tested under each of them, away from the checkout.
 #
 #   bash tests/matrix.sh                 # the engine's tests that need no extras, a minute or two a Python
-#   bash tests/matrix.sh tests/test_engine_closed_forms.py     # other tests
+#   bash tests/matrix.sh tests/engine/test_closed_forms.py     # other tests
 #   WHEEL=dist/….whl PYTHONS="3.10 3.13" bash tests/matrix.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -10,8 +10,9 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 chosen=("$@")
 [ ${#chosen[@]} -gt 0 ] || chosen=(
-    tests/test_engine_closed_forms.py tests/test_engine_batches.py tests/test_engine_exact.py tests/test_engine_symmetry.py
-    tests/test_hulls.py tests/test_support_tree.py tests/test_mesh_distances.py tests/test_mesh_contacts.py
+    tests/engine/test_closed_forms.py tests/test_batches.py tests/engine/test_exact_answers.py tests/engine/test_symmetry.py
+    tests/hull/test_exact_hull.py tests/support/test_support_tree_query.py
+    tests/narrowphase/facets/test_surface_distance.py tests/contact/test_mesh_contacts.py
 )
 if [ -z "${WHEEL:-}" ]; then
     echo "building the wheel (two minutes)"

@@ -14,7 +14,7 @@ from collide.robot import Joint, LinkShape, Mimic, Robot
 from collide.shapes import Sphere
 from collide.transforms import pose
 
-SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 DEMO = next(
     (folder for base in site.getsitepackages() if (folder := Path(base) / "cmeel.prefix/share/example-robot-data/robots").is_dir()),
     None,

@@ -1,7 +1,7 @@
 """The checking mode of the walk: every invariant of every round, against every vertex of the levels reached.
 
 O(n) a round and in doubles with a tolerance, since the walk's own points are rounded. Run by tests; the same walk in
-rational numbers, with the same checks and none, stands in tests/reference_walk.py.
+rational numbers, with the same checks and none, stands in tests/hierarchies/reference_walk.py.
 """
 
 from __future__ import annotations

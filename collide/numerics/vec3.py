@@ -69,6 +69,23 @@ def component(a, axis):
 
 
 @kernel(inline=True)
+def divide(a, divisor):
+    """a / divisor: each component is a quotient, rounded once."""
+    return Vec3(a.x / divisor, a.y / divisor, a.z / divisor)
+
+
+@kernel(inline=True)
+def absolute(a):
+    return Vec3(abs(a.x), abs(a.y), abs(a.z))
+
+
+@kernel(inline=True)
+def max_abs(a):
+    """The largest magnitude of a component."""
+    return max(abs(a.x), abs(a.y), abs(a.z))
+
+
+@kernel(inline=True)
 def vec3_at(values, at):
     """Three doubles that stand one after another."""
     return Vec3(values[at], values[at + 1], values[at + 2])

@@ -27,7 +27,6 @@ from collide.narrowphase.gap.precise_pair import (
     SLOP_ERROR,
     PosedDifference,
     across_edge,
-    add_products,
     direction_length,
     larger,
     normal_of_edges,
@@ -37,7 +36,7 @@ from collide.narrowphase.gap.precise_pair import (
 from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD
 from collide.numerics.error_free import two_product, two_sum
-from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm1, put_vec3, rotate, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import add, cross, divide, dot, neg, norm1, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
 #: Rounding of a weight's numerator in doubles, of points and edges rounded once, with a dozen roundings to spare.
 _WEIGHT_ERROR = 64 * 2.0**-53
@@ -185,12 +184,7 @@ def _set_distance(question, n, feature, direction, answer, proven):
     answer[at.GAP] = gap.high
     answer[at.GAP_LOW] = gap.low
     answer[at.GAP_LOWER], answer[at.GAP_NEAREST], answer[at.GAP_UPPER] = dd.bracket(gap, error * over)
-    put_vec3(answer, at.UNIT, over_length(dd.leading(direction), length.high))
-
-
-@kernel(inline=True)
-def over_length(a, length):
-    return Vec3(a.x / length, a.y / length, a.z / length)
+    put_vec3(answer, at.UNIT, divide(dd.leading(direction), length.high))
 
 
 @kernel(inline=True)

@@ -1,7 +1,7 @@
 """Random pairs of all kinds of shapes, sizes up to 1:10^6, near touching on purpose, each answer judged by an oracle.
 
-    python tests/soak.py --minutes 5 --seed 1 [--ratio 1e6] [--kinds cone,sphere] [--save DIR]
-    python tests/soak.py --seed 1 --case 1234          one case again, with its code
+    python tests/soak/soak.py --minutes 5 --seed 1 [--ratio 1e6] [--kinds cone,sphere] [--save DIR]
+    python tests/soak/soak.py --seed 1 --case 1234          one case again, with its code
 
 Pairs and poses are drawn in `soak_pairs.py`, what is asked of each is in `soak_judges.py`, and the truth comes from
 `curved_oracle.py`, which shares no code with the engine. Prints failures as they come, with code that asks again, and at
@@ -15,6 +15,8 @@ import collections
 import sys
 import time
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "oracles"))
 
 from soak_judges import judge, judge_group
 from soak_pairs import KINDS, draw
@@ -102,7 +104,7 @@ def soak(seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs
 def _group_code(seed: int, ratio: float, kinds, group) -> str:
     numbers = [case.number for case in group]
     return (
-        "import sys, numpy as np, collide as C; sys.path.insert(0, 'tests')\nfrom soak_pairs import draw\n"
+        "import sys, numpy as np, collide as C; sys.path[:0] = ['tests/soak', 'tests/oracles']\nfrom soak_pairs import draw\n"
         f"cases = [draw({seed}, k, {ratio!r}, {tuple(kinds)!r}) for k in {numbers}]\n"
     )
 

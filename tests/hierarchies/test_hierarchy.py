@@ -301,7 +301,7 @@ def test_kernels_run_as_plain_python_with_the_same_bits():
         done = subprocess.run(
             [sys.executable, "-c", script],
             check=False, capture_output=True, text=True, timeout=300, env=environment,
-            cwd=Path(__file__).parent.parent,
+            cwd=Path(__file__).parents[2],
         )
         assert done.returncode == 0, done.stderr
         found[plain] = done.stdout

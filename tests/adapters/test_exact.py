@@ -513,7 +513,7 @@ def test_three_hundred_vertices_verify():
 
 
 def published_failures():
-    path = Path(__file__).resolve().parents[2] / "shared" / "data" / "cases" / "peer_failures.json"
+    path = Path(__file__).resolve().parents[3] / "shared" / "data" / "cases" / "peer_failures.json"
     if not path.exists():
         pytest.skip("shared/data with the published peer failures is not beside this checkout")
     return json.loads(path.read_text())

@@ -17,7 +17,7 @@ from collide.adapters.peers import protocol
 from collide.adapters.peers.child import IsolatedPeer, last_words
 from collide.adapters.peers.protocol import Question, engine
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+SHARED = Path(__file__).resolve().parents[3] / "shared"
 
 ENGINES = '''
 import os, sys, time

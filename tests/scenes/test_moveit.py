@@ -12,7 +12,7 @@ from collide.errors import CollideError, SceneError
 from collide.scenes import load
 from collide.shapes import Box, Compound, Cone, Cylinder, Halfspace, Mesh
 
-SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 SCENES = sorted((SHARED / "scenes/motionbenchmaker").glob("*/*/scene*.yaml")) if SHARED.is_dir() else []
 
 #: MoveIt calls every start and goal free. This pair meets here: the URDF that comes with the scenes has a

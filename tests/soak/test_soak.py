@@ -1,4 +1,4 @@
-"""Some pairs of the soak, and that it notices a wrong engine. `python tests/soak.py --minutes 5` judges many more."""
+"""Some pairs of the soak, and that it notices a wrong engine. `python tests/soak/soak.py --minutes 5` judges many more."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_pairs_of_all_kinds_keep_every_promise():
         truths[judged.truth] += 1
         sharp += judged.told
         for promise, found, _ in judged.failures:
-            failures.append(f"python tests/soak.py --seed {seed} --case {number}   # {case.kinds}: {promise}: {found}")
+            failures.append(f"python tests/soak/soak.py --seed {seed} --case {number}   # {case.kinds}: {promise}: {found}")
     assert not failures, "\n".join(failures)
     assert truths[True] >= PAIRS / 5 and truths[False] >= PAIRS / 3 and truths[None] <= PAIRS / 50
     assert sharp >= 0.9 * PAIRS, "the oracle is too coarse to judge the engine"

@@ -16,7 +16,7 @@ import pytest
 
 import collide
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "accuracy.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 CURVED = ("cylinder", "cone", "ellipsoid")
 KINDS = ("sphere", "capsule", "box", "hull", "half-space", *CURVED)
 COLUMNS = ("gap", "gap nearly in line", "depth", "depth in line")

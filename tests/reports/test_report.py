@@ -161,7 +161,7 @@ def test_document_names_every_field():
 def report_page() -> str:
     from pathlib import Path
 
-    page = Path(__file__).parents[1] / "docs" / "report-schema.md"
+    page = Path(__file__).parents[2] / "docs" / "report-schema.md"
     if not page.is_file():
         pytest.skip("docs are not beside the tests")
     return page.read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ import pytest
 from collide.kernels import WITH_NUMBA, address_of, kernel, view_f64, view_i64
 
 pytestmark = [pytest.mark.own_kernels]
-NATIVE = Path(__file__).resolve().parent.parent / "native"
+NATIVE = Path(__file__).resolve().parents[2] / "native"
 
 if WITH_NUMBA:
     from collide.kernels.back_end import BackEndError, Target, host, machine_code

@@ -222,8 +222,8 @@ def test_axes_that_come_back_part_the_bodies():
 
 CHILD = """
 import sys
-sys.path.insert(0, sys.argv[1])
-import test_engine_portals as portals
+sys.path[:0] = sys.argv[1:]
+import test_mpr_batch as portals
 for boolean in (True, False):
     sys.stdout.buffer.write(portals.rows_of(portals.asked(40, "plain"), boolean=boolean).tobytes())
 """
@@ -232,8 +232,8 @@ for boolean in (True, False):
 @pytest.mark.own_kernels
 def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", CHILD, str(Path(__file__).parent)], env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=300, check=False,
+        [sys.executable, "-W", "ignore", "-c", CHILD, *(str(Path(file).parent) for file in (__file__, naive.__file__))],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=300, check=False,
     )  # fmt: skip
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     rows, gaps = (rows_of(asked(40, "plain"), boolean=boolean) for boolean in (True, False))

@@ -21,7 +21,7 @@ import pytest
 
 import collide
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 #: Folder of the repository → folder of the installed package.
 FOLDERS = {"collide": "collide", "adapters": "collide/adapters", "scenes": "collide/scenes"}
 LITTER = shutil.ignore_patterns("__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib")

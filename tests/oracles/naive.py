@@ -20,7 +20,7 @@ from collide.adapters.peers import exact
 from collide.results import FIELDS
 
 ULP = 2.0**-52
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+SHARED = Path(__file__).resolve().parents[3] / "shared"
 
 #: The 24 rotations with entries 0 and ±1: they move lattices onto lattices without rounding.
 LATTICE_ROTATIONS = [

@@ -1,6 +1,6 @@
 """Answers of all kinds from seeds, as digests: the same bits are asked for however kernels were made, and wherever they run.
 
-    python tests/answers_digest.py [pairs hulls meshes worlds]
+    python tests/kernels/answers_digest.py [pairs hulls meshes worlds]
     {"mode": "compiled", "level": "v4", "digests": {"pairs": "5d41…", …}, "counts": {"pairs": [hits, asked], …}}
 """
 
@@ -10,9 +10,13 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path += [str(Path(__file__).resolve().parents[1] / folder) for folder in ("oracles", "families")]
 
 import naive
-import numpy as np
 import surfaces
 from naive import LATTICE_ROTATIONS, pose, random_pose, rng_of
 

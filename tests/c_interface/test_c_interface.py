@@ -31,7 +31,7 @@ from collide.results import PAIR_DTYPE, flipped
 if mode.MODE != mode.COMPILED:
     pytest.skip(f"kernels are not those of the library: {mode.WHY}", allow_module_level=True)
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples" / "c"
 CONVEX = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone", "ellipsoid",
