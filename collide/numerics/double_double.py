@@ -11,6 +11,7 @@ Operands are `DD`s of doubles, or of `Lanes` for eight numbers at once. Names ar
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
@@ -114,6 +115,52 @@ def bracket(a, error):
     return Bracket(lower, a.high + a.low, upper)
 
 
+# --- beyond the range of doubles ------------------------------------------------------------------
+
+
+class ScaledDD(NamedTuple):
+    """value · 2^exponent."""
+
+    value: DD
+    exponent: int
+
+
+@kernel
+def ldexp(x, exponent):
+    """x·2^exponent, with exponents far out of range brought to where they still give 0 or infinity."""
+    return math.ldexp(x, int(min(max(exponent, -5000), 5000)))
+
+
+@kernel
+def ldexp_dd(a, exponent):
+    return DD(ldexp(a.high, exponent), ldexp(a.low, exponent))
+
+
+@kernel
+def unscaled(a):
+    """A `ScaledDD` as a double-double, rounded to 0 or infinity where it is out of range."""
+    return ldexp_dd(a.value, a.exponent)
+
+
+@kernel
+def scaled_sqrt(a):
+    """√a of a `ScaledDD`: a power of four is taken out first, so that nothing tiny vanishes."""
+    odd = a.exponent & 1
+    return ScaledDD(sqrt(ldexp_dd(a.value, odd)), (a.exponent - odd) // 2)
+
+
+@kernel
+def normalized(a):
+    """A double-double as a `ScaledDD` of size ½ to 1."""
+    exponent = math.frexp(a.high)[1]
+    return ScaledDD(ldexp_dd(a, -exponent), exponent)
+
+
+@kernel
+def scaled_div(a, b):
+    return ScaledDD(div(a.value, b.value), a.exponent - b.exponent)
+
+
 # --- vectors --------------------------------------------------------------------------------------
 
 
@@ -141,6 +188,12 @@ def put_vec3(values, at, a):
     values[at + 3] = a.y.low
     values[at + 4] = a.z.high
     values[at + 5] = a.z.low
+
+
+@kernel(inline=True)
+def exact_vec3(a):
+    """A `Vec3` of doubles as it is."""
+    return DDVec3(DD(a.x, 0.0), DD(a.y, 0.0), DD(a.z, 0.0))
 
 
 @kernel(inline=True)

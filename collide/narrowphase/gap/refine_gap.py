@@ -36,7 +36,20 @@ from collide.narrowphase.gap.precise_pair import (
 from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD
 from collide.numerics.error_free import two_product, two_sum
-from collide.numerics.vec3 import add, cross, divide, dot, neg, norm1, put_vec3, rotate, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import (
+    add,
+    cross,
+    divide,
+    dot,
+    neg,
+    norm1,
+    put_vec3,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
 
 #: Rounding of a weight's numerator in doubles, of points and edges rounded once, with a dozen roundings to spare.
 _WEIGHT_ERROR = 64 * 2.0**-53
