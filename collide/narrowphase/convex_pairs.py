@@ -13,6 +13,7 @@ from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.kernels.lanes import LANES
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.convex_methods import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.core_distance import (
     FINE_AT,
     OWN_DOUBLES,
@@ -24,7 +25,6 @@ from collide.narrowphase.core_distance import (
     name_plane,
     segments,
 )
-from collide.narrowphase.dispatch import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.epa.polytope_surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.polytope_surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.exact.depth_requests import ENTRY, REQUESTS, add_request

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from collide.mesh.bvh import MeshTree
-    from collide.mesh.bvh_statistics import TreeFigures
     from collide.mesh.locality import Locality
     from collide.mesh.mesh_survey import Survey
 
@@ -183,16 +182,6 @@ class Mesh(Shape):
 
         options = {} if progress is None else {"progress": progress}
         return locality(self.vertices, self.faces, repeated=repeated, **options)
-
-    def tree_figures(self) -> TreeFigures:
-        """Sizes, depths and outliers of the tree that queries walk and of the graded box-tree of Erickson's paper.
-
-        The second is built for this alone: O(n log n), 1.2 s for a million facets.
-        """
-        from collide.hierarchies.graded_tree import graded_tree
-        from collide.mesh.bvh_statistics import tree_figures
-
-        return tree_figures(self.tree, graded_tree(self.vertices, self.faces))
 
     def save(self, path) -> None:
         """Write the mesh to an ``.npz`` file."""
