@@ -63,7 +63,7 @@ def _everything(x, y):
     u = dd.vec3_at(x, 0)
     v = dd.vec3_at(x, dd.STRIDE)
     dd.put_vec3(y, 33, dd.cross(u, v))
-    y[39], y[40] = dd.dot(u, v)
+    y[39], y[40] = dd.inner(u, v)
     y[41], y[42] = dekker_product(a, b)
     y[43] = fine.larger(a, b)
     y[44] = fine.smaller(a, b)

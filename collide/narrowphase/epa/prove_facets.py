@@ -28,8 +28,8 @@ def prove_facets(surface, count):
             e = dd.difference(vec3_at(points, POINT * facets[FACET * f + 1]), a)
             g = dd.difference(vec3_at(points, POINT * facets[FACET * f + 2]), a)
             normal = dd.cross(e, g)
-            height = dd.dot(normal, dd.exact_vec3(a))
-            length = dd.sqrt(dd.dot(normal, normal))
+            height = dd.inner(normal, dd.exact_vec3(a))
+            length = dd.sqrt(dd.inner(normal, normal))
             if length.high == 0.0:
                 continue
             error = _DETERMINANT_ERROR * norm1(a) * (norm1(dd.leading(e)) * norm1(dd.leading(g)))
