@@ -12,7 +12,7 @@ from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBN
 from collide.narrowphase.exact.all_planes import depth_by_all_planes
 from collide.narrowphase.exact.settle_hulls import DIGITS, set_normal
 from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
-from collide.narrowphase.rows import LOWER, ROW, UPPER, write_verdict
+from collide.narrowphase.rows import LOWER, ROW, UPPER, view_row, write_verdict
 from collide.numerics.double_double import add, bracket
 from collide.numerics.error_free import two_sum
 from collide.results import EXACT
@@ -59,6 +59,6 @@ def deepen_pairs(
         set_normal(
             row, pair, terms_at, corners, 3, digits_at, radius_a, radius_b, size, -vx, -vy, -vz, distance, flip
         )
-        write_verdict(row, marks, distance, max(row[LOWER], low), min(row[UPPER], high), EXACT, 0.0, limit)
+        write_verdict(view_row(rows_at + ROW * k), distance, max(row[LOWER], low), min(row[UPPER], high), EXACT, 0.0, limit)
         found += 1
     return found

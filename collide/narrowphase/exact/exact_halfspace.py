@@ -23,7 +23,9 @@ from collide.numerics.digits import (
     grid_of,
     lowest_bit,
 )
-from collide.numerics.double_double import add, divide, square_root
+from collide.numerics.double_double import add as dd_add
+from collide.numerics.double_double import divide, square_root
+from collide.numerics.vec3 import add, column_at, dot, rotate
 
 #: Most digits of any number that is multiplied once more.
 _LONGEST = 64
@@ -84,7 +86,6 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     """
     A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
     p, q = A.pose_at, B.pose_at
-    t = pair.t
     pose_a = exact_pose(poses, p, terms)
     pose_b = exact_pose(poses, q, terms)
     rot, n_rot = span_of_entries(pose_a, 0, 9)
@@ -117,12 +118,12 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     clear(digits, constant, n_sum)
     add_product(digits, constant + low_second - low, _slot(15), 3 * n_rot + 2, _slot(18), n_b, -1)
     carry(digits, constant, n_sum)
-    nx, ny, nz, offset, length = plane_in_world(numbers, A.params_at, poses, p)
+    plane = plane_in_world(pair, A)
     lowest = math.inf
     for k in range(B.n):
-        lowest = min(lowest, _height(B.coords, B.padded, k, poses, q, t.x, t.y, t.z, nx, ny, nz, offset))
+        lowest = min(lowest, _height(pair, k, plane))
     # Only vertices that may be the lowest are looked at exactly: usually one.
-    threshold = lowest + 2.0 * error * length
+    threshold = lowest + 2.0 * error * plane.length
     best = 0
     least = math.inf
     least_low = 0.0
@@ -132,7 +133,7 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
         add_entry(digits, _slot(20 + k), pose_b, k, rot_b, 1.0)
         carry(digits, _slot(20 + k), n_rot_b)
     for k in range(B.n):
-        if _height(B.coords, B.padded, k, poses, q, t.x, t.y, t.z, nx, ny, nz, offset) > threshold:
+        if _height(pair, k, plane) > threshold:
             continue
         verdict, excess, excess_low = _reaches(
             digits, pose_a, pose_b, B.coords, B.padded, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
@@ -149,15 +150,10 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
 
 
 @kernel
-def _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset):
-    """s of vertex k in doubles."""
-    x = coords[k]
-    y = coords[m + k]
-    z = coords[2 * m + k]
-    along_x = nx * (poses[q] * x + poses[q + 1] * y + poses[q + 2] * z + tx)
-    along_y = ny * (poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z + ty)
-    along_z = nz * (poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z + tz)
-    return along_x + along_y + along_z - offset
+def _height(pair, k, plane):
+    """s of vertex k of B in doubles."""
+    b = add(rotate(pair.poses, pair.B.pose_at, column_at(pair.B.coords, pair.B.padded, k)), pair.t)
+    return dot(plane.normal, b) - plane.offset
 
 
 @kernel
@@ -202,7 +198,7 @@ def _reaches(
     if radius == 0.0 or sign <= 0:
         if height == 0.0 and sign != 0:  # vanished, but not 0
             height = 5e-324 * sign
-        height, height_low = add(height, height_low, -radius, 0.0)
+        height, height_low = dd_add(height, height_low, -radius, 0.0)
         return TOUCHING if sign <= 0 else SEPARATE, height, height_low
     # s² ≤ r² |n|², each side on its own grid: 2·low, and 2·low_plane + 2·(grid of r).
     low_r = grid_of(lowest_bit(radius))
@@ -234,7 +230,7 @@ def _reaches(
     # (s² − r²|n|²) / |n|² over s/|n| + r, which is s/|n| − r without cancellation.
     value, value_low, exponent = as_double_double(digits, left, n)
     value, value_low = divide(value, value_low, square, square_low)
-    sum_of_both, sum_low = add(height, height_low, radius, 0.0)
+    sum_of_both, sum_low = dd_add(height, height_low, radius, 0.0)
     down = math.frexp(sum_of_both)[1]
     value, value_low = divide(value, value_low, math.ldexp(sum_of_both, -down), math.ldexp(sum_low, -down))
     shift = int(exponent + BITS * min(2 * low, 2 * low_plane + 2 * low_r) - 2 * half - odd - down)

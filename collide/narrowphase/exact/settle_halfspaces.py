@@ -16,7 +16,7 @@ from collide.narrowphase.exact.exact_halfspace import reach_plane_exactly
 from collide.narrowphase.exact.settle_hulls import DIGITS
 from collide.narrowphase.halfspace_convex import reach_of_plane
 from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
-from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, write_verdict, write_vertices
+from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, view_row, write_verdict, write_vertices
 from collide.numerics.double_double import bracket
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
@@ -42,7 +42,7 @@ def decide_planes(
         )
         if not known or pair.A.kind != HALFSPACE or pair.B.kind != POINTS:
             continue
-        _, skew = reach_of_plane(pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at)
+        _, skew = reach_of_plane(pair, pair.A)
         verdict, vertex, excess, excess_low = reach_plane_exactly(
             pair, terms, digits, ints[INTS * pair.B.shape + LOWEST], reach_of(pair, pair.B), radius_of(pair, pair.B), size,
             (ERROR * size + slop) * skew,
@@ -59,13 +59,13 @@ def decide_planes(
         upper = min(upper, high)
         if verdict == TOUCHING:
             upper = min(upper, 0.0)
-        write_verdict(row, marks, distance, max(lower, low), upper, EXACT, math.inf if boolean else 0.0, limit)
+        write_verdict(view_row(rows_at + ROW * k), distance, max(lower, low), upper, EXACT, math.inf if boolean else 0.0, limit)
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0
             marks[HOW] = EXACT
         ids[0] = -1
         ids[1] = vertex
-        write_vertices(words, marks, ids, 1, flip)
+        write_vertices(view_row(rows_at + ROW * k), ids, 1, flip)
         marks[EXACT_ROUNDS] = 1
         settled += 1
     return settled

@@ -26,7 +26,7 @@ from collide.narrowphase.gap.precise_pair import (
     scale_of,
     write_low_parts,
 )
-from collide.narrowphase.gjk.minkowski_difference import POINT, combined, place_vertices
+from collide.narrowphase.gjk.minkowski_difference import POINT, POINT_OF_A, POINT_OF_B, place_vertices, weighted_sum
 from collide.narrowphase.gjk.simplex import weigh_enclosed
 from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
 from collide.narrowphase.rows import (
@@ -43,12 +43,14 @@ from collide.narrowphase.rows import (
     UPPER,
     VERTICES_A,
     VERTICES_B,
+    view_row,
     write_verdict,
     write_vertices,
 )
 from collide.numerics.double_double import add, bracket
 from collide.numerics.error_free import two_sum
-from collide.numerics.vec3 import column_at
+from collide.numerics.vec3 import add as add_vec3
+from collide.numerics.vec3 import column_at, put_vec3, vec3_at
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: Digits of workspace; 24 integers for ids follow them, and doubles for planes.
@@ -128,12 +130,10 @@ def _set_common_point(row, pair, ids, n, room_at, flip):
     miss, extent = weigh_enclosed(points, weights) if n == 4 else (math.inf, 0.0)
     if not miss <= _NEAR_MISS * extent:
         weigh_corners(points, POINT, n, weights, 0.0, 0.0, 0.0)
-    poses = pair.poses
-    for axis in range(3):
-        a = combined(points, weights, n, 3 + axis) + poses[pair.A.pose_at + 9 + axis]
-        b = combined(points, weights, n, 6 + axis) + poses[pair.B.pose_at + 9 + axis]
-        row[POINT_A + axis] = b if flip else a
-        row[POINT_B + axis] = a if flip else b
+    a = add_vec3(weighted_sum(points, weights, n, POINT_OF_A), vec3_at(pair.poses, pair.A.pose_at + 9))
+    b = add_vec3(weighted_sum(points, weights, n, POINT_OF_B), vec3_at(pair.poses, pair.B.pose_at + 9))
+    put_vec3(row, POINT_A, b if flip else a)
+    put_vec3(row, POINT_B, a if flip else b)
 
 
 @kernel
@@ -233,7 +233,7 @@ def decide_pairs(
                 distance, flip,
             )  # fmt: skip
         width = math.inf if boolean else 0.0
-        write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
+        write_verdict(view_row(rows_at + ROW * k), distance, lower, upper, EXACT, width, limit)
         if proven and not apart and SMALLEST_FINE < size < LARGEST_FINE and _points_miss(row, size, row[DISTANCE]):
             _set_points(
                 row, pair, terms_at, ids, shown, digits_at, radius_a, radius_b, size, row[DISTANCE],
@@ -244,6 +244,6 @@ def decide_pairs(
         if verdict == SEPARATE:  # also where the gap is smaller than the smallest double
             marks[HIT] = 0
             marks[HOW] = EXACT
-        write_vertices(words, marks, ids, shown, flip)
+        write_vertices(view_row(rows_at + ROW * k), ids, shown, flip)
         marks[EXACT_ROUNDS] = min(rounds, 255)
     return left

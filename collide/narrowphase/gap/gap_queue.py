@@ -72,11 +72,13 @@ from collide.narrowphase.rows import (
     NORMAL,
     ROW,
     UPPER,
+    view_row,
     write_vectors,
     write_verdict,
 )
 from collide.numerics.double_double import bracket
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
+from collide.numerics.vec3 import Vec3, add, max_abs, neg, scale, sub, vec3_at
 from collide.results import UNDECIDED
 
 #: Kinds of gap: one to three points, edges of one part or of two, poses as given or composed.
@@ -246,8 +248,7 @@ def polish_waiting(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, 
                 ints_at, numbers_at, poses_at, note, view_i64(note_at + 8 * _IDS, 6), question, answer,
                 across_at + 8 * lane, composed, doubles_at, integers_at,
             )  # fmt: skip
-        row_at = rows_at + ROW * note[_ROW]
-        _write(view_f64(row_at, 12), view_u8(row_at, ROW), question, answer, note, proven, depths, limit)
+        _write(view_row(rows_at + ROW * note[_ROW]), question, answer, note, proven, depths, limit)
 
 
 @kernel(inline=True)
@@ -317,48 +318,38 @@ def write_guess(row, distance, lower, upper, nx, ny, nz):
 
 
 @kernel(inline=True)
-def _write(row, marks, question, answer, note, proven, depths, limit):
+def _write(row, question, answer, note, proven, depths, limit):
     """Finish a row: with proven digits, or as doubles say, for the exact stage to settle."""
     radius_a = question[LANES * RADIUS_A]
     radius_b = question[LANES * RADIUS_B]
-    distance = row[DISTANCE]
-    lower = row[LOWER]
-    upper = row[UPPER]
-    nx = row[NORMAL]
-    ny = row[NORMAL + 1]
-    nz = row[NORMAL + 2]
+    distance = row.doubles[DISTANCE]
+    lower = row.doubles[LOWER]
+    upper = row.doubles[UPPER]
+    nhat = vec3_at(row.doubles, NORMAL)
     if proven:
         distance = answer[LANES * GAP_NEAREST]
         lower = max(lower, answer[LANES * GAP_LOWER])
         upper = min(upper, answer[LANES * GAP_UPPER])
-        nx = -answer[LANES * UNIT]
-        ny = -answer[LANES * (UNIT + 1)]
-        nz = -answer[LANES * (UNIT + 2)]
-    write_verdict(row, marks, distance, lower, upper, note[_HOW], 0.0, limit)
+        nhat = neg(_lane_vec3(answer, UNIT))
+    write_verdict(row, distance, lower, upper, note[_HOW], 0.0, limit)
     decided = lower > 0.0 or upper <= 0.0
-    unfinished = marks[CERTIFIED] == 0 and (depths or upper > 0.0)
+    unfinished = row.flags[CERTIFIED] == 0 and (depths or upper > 0.0)
     # Radii may prove an overlap of cores between which doubles see no clear direction.
     vague = not proven and radius_a + radius_b > 0.0
     # Shares of a triangle's edges say little if it is thin; the exact stage takes more care.
     reach = 1.0 / question[LANES * SCALE]
-    miss = 0.0
-    core = row[DISTANCE] + (radius_a + radius_b)
-    for axis in range(3):
-        a = answer[LANES * (POINT_A + axis)]
-        b = answer[LANES * (POINT_B + axis)]
-        n = nx if axis == 0 else (ny if axis == 1 else nz)
-        reach = max(reach, abs(a), abs(b))
-        miss = max(miss, abs((b - a) - core * n))
-    missed = proven and miss > _NEAR_MISS * reach and marks[BEYOND] == 0
+    core = row.doubles[DISTANCE] + (radius_a + radius_b)
+    a = _lane_vec3(answer, POINT_A)
+    b = _lane_vec3(answer, POINT_B)
+    reach = max(reach, max_abs(a), max_abs(b))
+    miss = max_abs(sub(sub(b, a), scale(core, nhat)))
+    missed = proven and miss > _NEAR_MISS * reach and row.flags[BEYOND] == 0
     if not decided or unfinished or vague or missed:
-        marks[HOW] = UNDECIDED
-    write_vectors(
-        row, nx, ny, nz,
-        answer[LANES * POINT_A] + radius_a * nx,
-        answer[LANES * (POINT_A + 1)] + radius_a * ny,
-        answer[LANES * (POINT_A + 2)] + radius_a * nz,
-        answer[LANES * POINT_B] - radius_b * nx,
-        answer[LANES * (POINT_B + 1)] - radius_b * ny,
-        answer[LANES * (POINT_B + 2)] - radius_b * nz,
-        note[_FLIP] == 1,
-    )  # fmt: skip
+        row.flags[HOW] = UNDECIDED
+    write_vectors(row, nhat, add(a, scale(radius_a, nhat)), sub(b, scale(radius_b, nhat)), note[_FLIP] == 1)
+
+
+@kernel(inline=True)
+def _lane_vec3(values, at):
+    """A vector of one lane of eight."""
+    return Vec3(values[LANES * at], values[LANES * (at + 1)], values[LANES * (at + 2)])
