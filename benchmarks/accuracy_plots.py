@@ -65,10 +65,10 @@ def _against_time(rows: list[dict]):
     from matplotlib.lines import Line2D
 
     figure, axes, cells = _grid(rows, "Error against time: coal at its default and at tolerances 1e-3 … 1e-12")
-    for axis, own in cells:
+    for axis, cell_rows in cells:
         for level, marker in _LEVELS.items():
             for engine, colour in _COLOURS.items():
-                at = [r for r in own if (r["level"], r["engine"]) == (level, engine)]
+                at = [r for r in cell_rows if (r["level"], r["engine"]) == (level, engine)]
                 if not at:
                     continue
                 x, y = [r["min_us"] for r in at], [_error(r) for r in at]
@@ -84,9 +84,9 @@ def _against_time(rows: list[dict]):
 
 def _against_gap(rows: list[dict]):
     figure, axes, cells = _grid(rows, "Error against gap and depth")
-    for axis, own in cells:
+    for axis, cell_rows in cells:
         for engine, setting, style in _SETTINGS:
-            at = [r for r in own if (r["engine"], r["setting"]) == (engine, setting)]
+            at = [r for r in cell_rows if (r["engine"], r["setting"]) == (engine, setting)]
             if at:
                 label = engine if setting in ("signed",) else f"{engine} {setting}"
                 axis.plot([float(r["level"]) for r in at], [_error(r) for r in at], style, color=_COLOURS[engine], label=label,

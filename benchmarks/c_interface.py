@@ -56,7 +56,7 @@ int main(int count, char **given)
 """
 
 
-def posed() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def poses() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(7)
     X = np.zeros((2, POSES, 4, 4))
     X[:, :, 3, 3] = 1.0
@@ -74,31 +74,31 @@ def in_c(folder: Path, X_WA, X_WB, points) -> list[list[float]]:
     library = Path(collide.get_library())
     command = [os.environ.get("CC", "cc"), "-O2", f"-I{collide.get_include()}", str(source), "-o", str(program)]
     subprocess.run([*command, str(library), f"-Wl,-rpath,{library.parent}", "-lm"], check=True)
-    told = subprocess.run([str(program), str(data)], check=True, capture_output=True, text=True).stdout
-    return [[float(number) for number in line.split()] for line in told.splitlines()]
+    output = subprocess.run([str(program), str(data)], check=True, capture_output=True, text=True).stdout
+    return [[float(number) for number in line.split()] for line in output.splitlines()]
 
 
 def in_python(shape, X_WA, X_WB) -> list[float]:
-    pairs, found = list(zip(X_WA, X_WB)) * 20, []
+    pairs, answers = list(zip(X_WA, X_WB)) * 20, []
     for ask in (collide.collide, collide.distance):
         best = float("inf")
         for _ in range(ROUNDS):
-            begun = time.process_time()
+            start = time.process_time()
             for A, B in pairs:
                 ask(shape, shape, A, B)
-            best = min(best, time.process_time() - begun)
-        found.append(best / len(pairs) * 1e9)
-    return found
+            best = min(best, time.process_time() - start)
+        answers.append(best / len(pairs) * 1e9)
+    return answers
 
 
 def main() -> None:
-    X_WA, X_WB, points = posed()
+    X_WA, X_WB, points = poses()
     with tempfile.TemporaryDirectory() as folder:
         c = in_c(Path(folder), X_WA, X_WB, points)
     print(f"{'ns a call':20} {'C boolean':>10} {'Python':>8} {'C distance':>11} {'Python':>8}")
     for (boolean, distance), (name, shape) in zip(c, (("two boxes", collide.Box((1, 1.2, 0.8))), ("hulls of 128", collide.ConvexHull(points)))):
-        own = in_python(shape, X_WA, X_WB)
-        print(f"{name:20} {boolean:10.0f} {own[0]:8.0f} {distance:11.0f} {own[1]:8.0f}")
+        python_seconds = in_python(shape, X_WA, X_WB)
+        print(f"{name:20} {boolean:10.0f} {python_seconds[0]:8.0f} {distance:11.0f} {python_seconds[1]:8.0f}")
 
 
 if __name__ == "__main__":

@@ -52,14 +52,14 @@ def compared(whole, parts, poses: int) -> list[str]:
             question()
             taken.append((time.perf_counter() - started) / poses * 1e6)
     gc.enable()
-    one, other = (statistics.median(taken[1:]) for taken in times)
-    return [f"{one:.3f}", f"{other:.3f}", f"{one / other:.2f}"]
+    median_a, median_b = (statistics.median(taken[1:]) for taken in times)
+    return [f"{median_a:.3f}", f"{median_b:.3f}", f"{median_a / median_b:.2f}"]
 
 
 def pairs_of(A: collide.Compound, B, X_WA: np.ndarray, X_WB: np.ndarray) -> list[tuple]:
     """Every part of A against every part of B: (shape, shape, poses, poses)."""
-    own, others = ([(shape, X @ X_SP) for shape, X_SP in parts_of(S)] for S, X in ((A, X_WA), (B, X_WB)))
-    return [(one, other, X, Y) for (one, X), (other, Y) in itertools.product(own, others)]
+    parts_a, parts_b = ([(shape, X @ X_SP) for shape, X_SP in parts_of(S)] for S, X in ((A, X_WA), (B, X_WB)))
+    return [(shape_a, shape_b, X, Y) for (shape_a, X), (shape_b, Y) in itertools.product(parts_a, parts_b)]
 
 
 def parts_of(shape) -> list[tuple]:
@@ -98,19 +98,19 @@ def others(rng, parts: int, n: int):
     """Compound against Compound, two threads, a ShapeSet, a list."""
     box, A, B = collide.Box((0.5, 0.5, 0.5)), compound(rng, parts), compound(rng, parts)
     library = [compound(rng, parts) for _ in range(8)]
-    chosen = rng.integers(0, 8, n)
+    corners = rng.integers(0, 8, n)
     shapes = collide.ShapeSet([*library, box, *(shape for S in library for shape, _ in S.items)])
     boxes = shapes[np.full(n, len(library))]
     for name, spread in SPREAD.items():
         X_WA, X_WB = random_poses(rng, n, spread), random_poses(rng, n, spread)
-        X_WPs = [np.array([X @ library[c].items[k][1] for X, c in zip(X_WA, chosen)]) for k in range(parts)]
-        picked = [(shapes[len(library) + 1 + parts * chosen + k], boxes, X, X_WB) for k, X in enumerate(X_WPs)]
-        listed = [([library[c].items[k][0] for c in chosen], box, X, X_WB) for k, X in enumerate(X_WPs)]
+        X_WPs = [np.array([X @ library[c].items[k][1] for X, c in zip(X_WA, corners)]) for k in range(parts)]
+        picked = [(shapes[len(library) + 1 + parts * corners + k], boxes, X, X_WB) for k, X in enumerate(X_WPs)]
+        listed = [([library[c].items[k][0] for c in corners], box, X, X_WB) for k, X in enumerate(X_WPs)]
         cases = {
             "both": ((A, B, X_WA, X_WB), pairs_of(A, B, X_WA, X_WB), {}),
             "threads=2": ((A, box, X_WA, X_WB), pairs_of(A, box, X_WA, X_WB), {"threads": 2}),
-            "ShapeSet": ((shapes[chosen], boxes, X_WA, X_WB), picked, {}),
-            "list": (([library[c] for c in chosen], box, X_WA, X_WB), listed, {}),
+            "ShapeSet": ((shapes[corners], boxes, X_WA, X_WB), picked, {}),
+            "list": (([library[c] for c in corners], box, X_WA, X_WB), listed, {}),
         }
         for (interface, (whole, pairs, named)), (what, ask) in itertools.product(cases.items(), QUESTIONS.items()):
             measured = compared(partial(ask, *whole, **named), partial(one_by_one, ask, pairs, **named), n)

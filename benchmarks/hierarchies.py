@@ -32,7 +32,7 @@ from collide.hull.exact_hull import convex_hull
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 #: Polars of prisms with very many sides, turned, have as many vertices crowded at two places: they stop here.
-MOST_POLAR = 1_000_000
+MAX_POLAR = 1_000_000
 KINDS: dict[str, Callable[[int], np.ndarray]] = {
     "sphere": families.sphere,
     "degree doubling": lambda n: families.degree_doubling(round(np.log2(n / 3))),
@@ -73,7 +73,7 @@ def rows_of(kind: str, n: int, bounds: tuple[int, ...], polar: bool) -> list[dic
     for bound in bounds:
         hierarchy, build_s = timed(lambda bound=bound: build_hierarchy(points, hull, bound))
         rows.append(measured(kind, "BDK" if bound else "DK", n, hierarchy, hull_s, build_s))
-    if polar and n <= MOST_POLAR:
+    if polar and n <= MAX_POLAR:
         body, build_s = timed(lambda: polar_of_hull(points, hull))
         rows.append(measured(kind, "polar", n, body.hierarchy, hull_s, build_s))
     return rows
@@ -87,7 +87,7 @@ def distance_row(n: int, bound: int, count: int = 200) -> dict:
     points = families.sphere(n)
     body = PackedHierarchy(build_hierarchy(points, convex_hull(points), bound))
     rng = np.random.default_rng(5)
-    rotations = np.stack([turn(q) for q in rng.normal(size=(count, 4))])
+    rotations = np.stack([rotation_of(q) for q in rng.normal(size=(count, 4))])
     directions = rng.normal(size=(count, 3))
     shifts = 2.2 * directions / np.sqrt(np.square(directions).sum(axis=1))[:, None]
     X_WB = np.tile(np.eye(4), (count, 1, 1))
@@ -96,19 +96,19 @@ def distance_row(n: int, bound: int, count: int = 200) -> dict:
     shape = collide.ConvexHull(points)
     best, best_default = np.inf, np.inf
     for _ in range(4):
-        found, seconds = timed(lambda: [hierarchy_distance(body, body, r, s) for r, s in zip(rotations, shifts)])
+        results, seconds = timed(lambda: [hierarchy_distance(body, body, r, s) for r, s in zip(rotations, shifts)])
         default, default_s = timed(lambda: collide.distance(shape, shape, X_WA, X_WB))
         best, best_default = min(best, seconds), min(best_default, default_s)
-    apart = np.array([f.distance for f in found])
+    apart = np.array([f.distance for f in results])
     assert np.abs(apart - default.distance).max() < 1e-12
-    levels_a, levels_b, problems, looked_at = np.mean([f.counters for f in found], axis=0)
+    levels_a, levels_b, problems, looked_at = np.mean([f.counters for f in results], axis=0)
     return {
         "n": n, "bound": bound, "depth": body.hierarchy.depth, "levels_a": levels_a, "levels_b": levels_b,
         "problems": problems, "looked_at": looked_at, "us": best / count * 1e6, "default_us": best_default / count * 1e6,
     }  # fmt: skip
 
 
-def turn(q: np.ndarray) -> np.ndarray:
+def rotation_of(q: np.ndarray) -> np.ndarray:
     w, x, y, z = q / np.sqrt(np.square(q).sum())
     return np.array(
         [

@@ -132,19 +132,19 @@ def main() -> None:
     args = parser.parse_args()
     contestants = [(sys.executable, level) for level in args.levels] + ([(args.against, "")] if args.against else [])
     names = [level or "this" for level in args.levels] + (["other"] if args.against else [])
-    found: list[list[dict]] = [[] for _ in contestants]
+    runs_by_contestant: list[list[dict]] = [[] for _ in contestants]
     for round_ in range(args.rounds):
         for k, contestant in enumerate(contestants):
-            found[k].append(run(*contestant, args.only))
+            runs_by_contestant[k].append(run(*contestant, args.only))
         print(f"round {round_ + 1} of {args.rounds}", file=sys.stderr, flush=True)
     print("ns a pair: median of the processes (their spread), × against the last column by medians and by least times\n")
     print(f"{'case':34}", *(f"{name:>27}" for name in names))
-    for case in found[0][0]:
-        medians = [statistics.median(one[case][0] for one in runs) for runs in found]
-        spreads = [(max(one[case][0] for one in runs) / min(one[case][0] for one in runs) - 1) * 100 for runs in found]
-        least = [min(one[case][0] for one in runs) for runs in found]
+    for case in runs_by_contestant[0][0]:
+        medians = [statistics.median(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
+        spreads = [(max(by_case[case][0] for by_case in runs) / min(by_case[case][0] for by_case in runs) - 1) * 100 for runs in runs_by_contestant]
+        least = [min(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
         cells = [f"{m:7.0f} ±{s:2.0f} % ×{m / medians[-1]:5.2f} ×{b / least[-1]:5.2f}" for m, s, b in zip(medians, spreads, least)]
-        bits = {one[case][1] for runs in found for one in runs}
+        bits = {by_case[case][1] for runs in runs_by_contestant for by_case in runs}
         print(f"{case:34}", *(f"{cell:>27}" for cell in cells), "" if len(bits) == 1 else "  OTHER BITS")
 
 

@@ -102,9 +102,9 @@ def measure(case: Case, runs: int, cold_runs: int, pythons: list[str]) -> dict[t
             for j, python in enumerate(pythons):
                 last[python] = fresh = str(Path(folder) / f"{j}-{k}")
                 Path(fresh).mkdir(mode=0o700)
-                one = run(case, fresh, python)  # where the cache does not matter, this fills the file system's
+                first = run(case, fresh, python)  # where the cache does not matter, this fills the file system's
                 if case.cached:
-                    taken.setdefault((python, "cold"), []).append(one)
+                    taken.setdefault((python, "cold"), []).append(first)
         for _ in range(runs):
             for python in pythons:
                 taken.setdefault((python, "warm" if case.cached else "-"), []).append(run(case, last[python], python))
@@ -137,26 +137,26 @@ def _installed(distribution: str) -> bool:
 
 def rows(runs: int, cold_runs: int, pythons: list[str], only: str) -> list[dict[str, str]]:
     """One row per case and state of the cache; cases whose package is missing are left out, with a word."""
-    found = []
+    rows = []
     for case in [case for case in CASES if only in case.name]:
         if case.needs and not _installed(case.needs):
             print(f"left out: {case.name} ({case.needs} is not installed)", file=sys.stderr)
             continue
         for (python, state), taken in measure(case, runs, cold_runs, pythons).items():
-            seconds = [one.seconds for one in taken]
-            found.append({
+            seconds = [run_k.seconds for run_k in taken]
+            rows.append({
                 "case": case.name, "of": "this" if python == sys.executable else "other", "cache": state, "runs": str(len(taken)),
                 "median_s": f"{statistics.median(seconds):.3f}", "min_s": f"{min(seconds):.3f}",
-                "max_s": f"{max(seconds):.3f}", "peak_MiB": f"{max(one.peak for one in taken):.0f}",
+                "max_s": f"{max(seconds):.3f}", "peak_MiB": f"{max(run_k.peak for run_k in taken):.0f}",
             })  # fmt: skip
-    return found
+    return rows
 
 
 def show(table: list[dict[str, str]]) -> None:
     widths = {key: max(len(key), *(len(row[key]) for row in table)) for key in table[0]}
     for line in [{key: key for key in widths}, *table]:
-        left = {"case", "of", "cache"}
-        print("  ".join(line[k].ljust(w) if k in left else line[k].rjust(w) for k, w in widths.items()).rstrip())
+        left_columns = {"case", "of", "cache"}
+        print("  ".join(line[k].ljust(w) if k in left_columns else line[k].rjust(w) for k, w in widths.items()).rstrip())
 
 
 def write(table: list[dict[str, str]], about: dict[str, str]) -> Path:

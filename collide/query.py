@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import weakref
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, overload
 
@@ -12,15 +10,17 @@ import numpy as np
 
 from collide import argument_checks as reading
 from collide.algorithms import named_algorithm
-from collide.batches import ask, length_of
+from collide.batches import answer_batch, length_of
+from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.lowering.shape_table import ShapeTable
-from collide.narrowphase import convex_queries as run
-from collide.narrowphase.composite.composite import UnionPair
+from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_queries import close
+from collide.narrowphase.dispatch import REFUSED, Method
+from collide.narrowphase.pair_queries import prepare
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
 from collide.security_margin import checked_margin, within
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.threads import check_threads
 
 if TYPE_CHECKING:
@@ -109,14 +109,14 @@ def collide(
 
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    _prepare(A, B)
-    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
+    prepare(A, B)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses), threads)
     return bool(hits[0]) if single else hits
 
 
 def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    rows = ask(A, B, X_WA, X_WB, False, margin, check_poses, threads, depths=False)
+    rows = answer_batch(A, B, X_WA, X_WB, Question(False, margin, depths=False, check=check_poses), threads)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
 
@@ -135,7 +135,7 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
         raise InvalidArgument("axes must be contiguous, writeable and finite: it is read and updated in place")
     if len(axes) and np.abs(axes).max() > _LONGEST_AXIS:
         raise InvalidArgument(f"axes must not be longer than {_LONGEST_AXIS:g}: only their directions count")
-    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads, axes)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses, axes=axes), threads)
     return bool(hits[0]) if single else hits
 
 
@@ -191,70 +191,27 @@ def distance(
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
+                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    kept = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
-    _prepare(A, B)
-    endless = []
+    pose_copies = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
+    prepare(A, B)
+    unbounded = []
 
-    def close(rows: np.ndarray) -> None:
-        if run.close(rows, depths=signed):
-            endless.append(True)
+    def finish(rows: np.ndarray) -> None:
+        if close(rows, depths=signed):
+            unbounded.append(True)
 
-    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed, close=close, kept=kept)
-    if endless:
+    question = Question(False, limit, signed, check_poses)
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads, finish=finish, pose_copies=pose_copies)
+    if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
-        raise UnsupportedQuery(
-            f"distance of {type(shape_at(A, k)).__name__} and {type(shape_at(B, k)).__name__}{where}: their overlap has no "
-            "end, so no translation of finite length separates them; collide() still answers"
-        )
-    return PairResult(rows, single, (_held(A), _held(B), *kept))
+        pair = " and ".join(type(shape_at(S, k)).__name__ for S in (A, B))
+        raise UnsupportedQuery(f"distance of {pair}{where}: {REFUSED[Method.PLANES, 'distance']}")
+    return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies), certify)
 
 
-def _held(shapes):
+def _immutable(shapes):
     return tuple(shapes) if isinstance(shapes, list) else shapes
-
-
-# --- single calls -------------------------------------------------------------------------------
-
-#: Numbers of shapes within this process, never used again.
-_serials = itertools.count()
-#: A shape keeps this many partners prepared for single calls.
-_PARTNERS = 512
-
-
-def _prepare(A, B) -> None:
-    """Make a pair of shapes ready for single calls, and keep it with A, by the number B has then."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape)):
-        return
-    meshed = A.meshed or B.meshed
-    if not run.single_calls_are_safe():
-        return
-    if not hasattr(A, "_prepared"):
-        object.__setattr__(A, "_prepared", {})
-    if not hasattr(B, "_serial"):
-        object.__setattr__(B, "_serial", next(_serials))
-    prepared, serial = A._prepared, B._serial
-    if serial in prepared:
-        return
-    if meshed:
-        pair = _meshed_pair(A, B)
-    elif is_plain(A) and is_plain(B):
-        pair = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
-    else:
-        pair = UnionPair(A.laid_out(), B.laid_out())
-    if pair is None:
-        return
-    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _PARTNERS)]:  # a list: other threads add and finalizers take
-        prepared.pop(oldest, None)
-    prepared[serial] = pair
-    weakref.finalize(B, prepared.pop, serial, None)  # what is gone is not held by its partners
-
-
-def _meshed_pair(A: Shape, B: Shape):
-    from collide.narrowphase.facets.single_mesh_call import single_pair
-
-    return single_pair(A, B)

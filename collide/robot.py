@@ -192,8 +192,8 @@ class Robot:
         by_name = {joint.name: joint for joint in self.joints}
         followers: list[tuple[Joint, float]] = []
         notes: list[str] = []
-        for name, given in values.items():
-            value = _joint_value(name, given)
+        for name, raw in values.items():
+            value = _joint_value(name, raw)
             if name in column:
                 q[column[name]] = value
             elif name not in by_name or by_name[name].type in ("planar", "floating"):
@@ -213,14 +213,14 @@ class Robot:
                 )
         return q, notes + self.limit_notes(q)
 
-    def default_notes(self, given: Iterable[str], q: np.ndarray) -> list[str]:
-        """A note about the columns that were not ``given`` a value and stand in ``q`` by default."""
-        given = set(given)
-        unset = [(name, value) for name, value in zip(self.joint_names, q) if name not in given]
+    def default_notes(self, names: Iterable[str], q: np.ndarray) -> list[str]:
+        """A note about the columns that were not ``names`` a value and stand in ``q`` by default."""
+        names = set(names)
+        unset = [(name, value) for name, value in zip(self.joint_names, q) if name not in names]
         if not unset:
             return []
-        shown = ", ".join(f"{name} = {value:g}" if value else name for name, value in unset)
-        return [f"robot {self.name}: no value given for {shown}: 0 taken, or the limit nearest to 0"]
+        listed = ", ".join(f"{name} = {value:g}" if value else name for name, value in unset)
+        return [f"robot {self.name}: no value given for {listed}: 0 taken, or the limit nearest to 0"]
 
     def joint_value(self, name: str, q: np.ndarray) -> float:
         """The value of a joint that moves along one coordinate, mimicking ones included."""
@@ -487,7 +487,7 @@ def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
             here = mimic.joint if mimic is not None and here not in broken else None
         if here in chain:
             circle = list(chain)[chain[here] :]
-            broken.update({one: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for one in circle})
+            broken.update({member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle})
         ended.update(chain)
     return broken
 
@@ -509,11 +509,11 @@ def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, floa
             mimic = single[here].mimic
             assert mimic is not None
             driver, multiplier, offset = drivers[mimic.joint]
-            found = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
-            if not all(map(math.isfinite, found)):
-                what = f'along the chain to joint "{cut(driver)}" its multiplier becomes {found[0]:g} and its offset {found[1]:g}'
+            composed = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
+            if not all(map(math.isfinite, composed)):
+                what = f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its offset {composed[1]:g}'
                 raise SceneError(f"{what}: both must be finite", element=f'joint "{cut(here)}" mimic')
-            drivers[here] = (driver, *found)
+            drivers[here] = (driver, *composed)
     return drivers
 
 

@@ -141,9 +141,9 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
     scene.add(SceneBody("ground", Box((pitch * (wide + 2), 1.0, 0.25)), pose((0, 0, -0.125)), static=True, source="stack: ground"))
     for layer in range(layers):
         for k in range(wide):
-            shift, turn = rng.uniform(-jitter, jitter, 2)
+            shift, angle = rng.uniform(-jitter, jitter, 2)
             x = (k - (wide - 1) / 2 + (0.25 if layer % 2 else -0.25)) * pitch + shift
-            X = pose((x, 0.0, (layer + 0.5) * size[2]), rpy=(0.0, 0.0, turn))
+            X = pose((x, 0.0, (layer + 0.5) * size[2]), rpy=(0.0, 0.0, angle))
             scene.add(SceneBody(f"box_{layer}_{k}", Box(size), X, source=f"stack: layer {layer}, box {k}"))
     return scene
 
@@ -266,7 +266,7 @@ def _arm() -> dict[str, Any]:
     def link(name: str, shape: dict, xyz) -> dict[str, Any]:
         return {"name": name, "collision": [{"shape": shape, "pose": {"xyz": xyz}}]}
 
-    def turn(name: str, parent: str, child: str, xyz, axis, limit: float) -> dict[str, Any]:
+    def revolute(name: str, parent: str, child: str, xyz, axis, limit: float) -> dict[str, Any]:
         return {
             "name": name, "type": "revolute", "parent": parent, "child": child, "origin": {"xyz": xyz}, "axis": axis,
             "limits": [-limit, limit],
@@ -291,12 +291,12 @@ def _arm() -> dict[str, Any]:
             link("right_finger", finger, [0, -0.0075, 0.035]),
         ],
         "joints": [
-            turn("yaw", "base", "turret", [0, 0, 0.12], [0, 0, 1], 3.0),
-            turn("shoulder", "turret", "upper_arm", [0, 0, 0.16], [0, 1, 0], 2.0),
-            turn("elbow", "upper_arm", "forearm", [0, 0, 0.36], [0, 1, 0], 2.6),
-            turn("forearm_roll", "forearm", "roll", [0, 0, 0.3], [0, 0, 1], 3.0),
-            turn("wrist_pitch", "roll", "wrist", [0, 0, 0.1], [0, 1, 0], 2.2),
-            turn("wrist_roll", "wrist", "palm", [0, 0, 0.09], [0, 0, 1], 3.0),
+            revolute("yaw", "base", "turret", [0, 0, 0.12], [0, 0, 1], 3.0),
+            revolute("shoulder", "turret", "upper_arm", [0, 0, 0.16], [0, 1, 0], 2.0),
+            revolute("elbow", "upper_arm", "forearm", [0, 0, 0.36], [0, 1, 0], 2.6),
+            revolute("forearm_roll", "forearm", "roll", [0, 0, 0.3], [0, 0, 1], 3.0),
+            revolute("wrist_pitch", "roll", "wrist", [0, 0, 0.1], [0, 1, 0], 2.2),
+            revolute("wrist_roll", "wrist", "palm", [0, 0, 0.09], [0, 0, 1], 3.0),
             {"name": "left_slide", **slide, "child": "left_finger", "axis": [0, 1, 0]},
             {"name": "right_slide", **slide, "child": "right_finger", "axis": [0, -1, 0], "mimic": {"joint": "left_slide"}},
         ],

@@ -47,10 +47,10 @@ ROOMS = {
         "errors", "kernels", "transforms", "numerics", "hull", "support", "mesh", "shapes", "lowering", "broadphase", "results",
         "threads",
     },
-    "certificates": {"errors", "transforms", "lowering", "results"},
+    "certificates": {"errors", "transforms", "numerics", "lowering", "results"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
-    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "results", "batches"},
+    "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches"},
     "query": {
         "errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches", "certificates",
         "pair_arguments", "security_margin", "threads", "algorithms",
@@ -68,8 +68,8 @@ ROOMS = {
     },
     "packed_world": {"errors", "lowering", "broadphase", "narrowphase", "results", "threads"},
     "world": {
-        "errors", "argument_checks", "log", "transforms", "shapes", "broadphase", "results", "contact", "security_margin",
-        "packed_world",
+        "errors", "argument_checks", "log", "transforms", "shapes", "broadphase", "results", "certificates", "contact",
+        "security_margin", "packed_world",
     },
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "shapes", "cache_folder", "kernels", ""},
@@ -82,8 +82,6 @@ TO_GO = {
     "shapes": {"lowering"},
     "support": {"lowering"},
     "lowering": {"broadphase", "narrowphase"},
-    "narrowphase": {"batches"},
-    "results": {"certificates"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
-from collide.certificates.certificates import certificate_from
+from collide.batches import answer_batch
+from collide.certificates.make_certificate import certificate_from_pairs, certify
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
@@ -20,6 +20,7 @@ from collide.hierarchies.walk import APART, MEETING, OPEN_MEETING
 from collide.hierarchies.walk_bodies import WalkBody
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import ShapeTable, pose_table
+from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.convex_queries import close, number_of_poses, settle_proposals
 from collide.pair_arguments import asked_poses, pose_batch
 from collide.results import PAIR_DTYPE, PairResult
@@ -65,7 +66,7 @@ class Walks:
         own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
         corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
         pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
-        return certificate_from(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
+        return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
@@ -131,7 +132,7 @@ def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> Pa
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
     close(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB))
+    return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
 
 
 def _with_default(A, B, X_WA, X_WB, check_poses: bool):
@@ -144,7 +145,7 @@ def _with_default(A, B, X_WA, X_WB, check_poses: bool):
 
     def ask_default(ids: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
         X_A, X_B = (X if len(X) == 1 else np.ascontiguousarray(X[ids]) for X in (X_WA, X_WB))
-        return np.broadcast_to(ask(A, B, X_A, X_B, boolean, limit, False, 1, depths=depths), (len(ids),))
+        return np.broadcast_to(answer_batch(A, B, X_A, X_B, Question(boolean, limit, depths)), (len(ids),))
 
     return X_WA, X_WB, single, ask_default
 

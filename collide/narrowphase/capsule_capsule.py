@@ -10,7 +10,20 @@ import math
 from collide.kernels import kernel
 from collide.narrowphase.core_distance import CoreDistance
 from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, height, place_vertices, point_at
-from collide.numerics.vec3 import Vec3, add, cross, divide, dot, neg, norm, put_vec3, scale, sub, unit_orthogonal, vec3_at
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    cross,
+    divide,
+    dot,
+    neg,
+    norm,
+    put_vec3,
+    scale,
+    sub,
+    unit_orthogonal,
+    vec3_at,
+)
 
 #: Segments are parallel where the sine of their angle is at most 1e-12.
 _PARALLEL = 1e-24

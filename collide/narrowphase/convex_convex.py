@@ -10,7 +10,8 @@ from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.capsule_capsule import segment_cores
 from collide.narrowphase.core_distance import convex_cores, request_plane
 from collide.narrowphase.exact.depth_requests import add_request
-from collide.narrowphase.gap.gap_queue import can_wait, put_down, write_guess
+from collide.narrowphase.gap.gap_queue import enqueue, write_guess
+from collide.narrowphase.gap.precise_pair import is_refinable
 from collide.narrowphase.gjk.minkowski_difference import AXIS, POINT_OF_A, POINT_OF_B, weighted_sum
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import (
@@ -56,10 +57,10 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
     row.words[ITERATIONS] = core.iterations
     distance = -core.depth - radius
     is_gap = exact_numbers and not query.boolean and core.depth < -error and lower <= query.limit
-    if is_gap and can_wait(size):
+    if is_gap and is_refinable(size):
         write_guess(row, distance, lower, upper, core.nhat)
         write_vertices(row, work.ids, core.n_vertices, flip)
-        return put_down(
+        return enqueue(
             pair, query.terms_at, work.ids, work.weights, core.n_points, flip, how, row_number, size, ordered.slop, error,
             work.queue_at, work.queue_integers_at,
         )  # fmt: skip

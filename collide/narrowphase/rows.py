@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.numerics.vec3 import put_vec3
-from collide.results import PAIR_DTYPE, UNDECIDED
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 
 
 def _at(field: str, unit: int) -> int:
@@ -45,6 +45,12 @@ def view_row(row_at):
 @kernel(inline=True)
 def is_undecided(row):
     return row.flags[HOW] == UNDECIDED
+
+
+@kernel(inline=True)
+def is_open(row):
+    """Whether the row is left to the exact stage, or refused."""
+    return row.flags[HOW] == UNDECIDED or row.flags[HOW] == REFUSED
 
 
 @kernel(inline=True)

@@ -42,15 +42,15 @@ def to_dict(measured: list[Measured], repeated: bool) -> dict:
 
 
 def _mesh_dict(item: Measured) -> dict:
-    found = item.locality
-    limits, counts = found.histogram()
+    locality = item.locality
+    limits, counts = locality.histogram()
     return {
-        "name": item.name, "path": item.path, "vertices": found.vertices, "distinct": found.distinct,
-        "in_use": found.in_use, "facets": found.facets, "shortest_edge": found.shortest, "longest_edge": found.longest,
-        "global_stretch": found.global_stretch, "local_stretch": found.local_stretches.tolist(),
-        "worst_vertex": found.worst.tolist(), "mean": found.means.tolist(),
-        "quantiles": {str(share): row.tolist() for share, row in zip(_SHARES, found.quantiles(_SHARES))},
-        "histogram": {"limits": limits.tolist(), "counts": counts.T.tolist()}, "depth_bound": found.depth_bound,
+        "name": item.name, "path": item.path, "vertices": locality.vertices, "distinct": locality.distinct,
+        "in_use": locality.in_use, "facets": locality.facets, "shortest_edge": locality.shortest, "longest_edge": locality.longest,
+        "global_stretch": locality.global_stretch, "local_stretch": locality.local_stretches.tolist(),
+        "worst_vertex": locality.worst.tolist(), "mean": locality.means.tolist(),
+        "quantiles": {str(share): row.tolist() for share, row in zip(_SHARES, locality.quantiles(_SHARES))},
+        "histogram": {"limits": limits.tolist(), "counts": counts.T.tolist()}, "depth_bound": locality.depth_bound,
         "trees": {**item.trees._asdict(), "node_bound": item.trees.node_bound},
     }  # fmt: skip
 

@@ -33,8 +33,8 @@ def of_scene(scene) -> dict:
 def of_shape(shape, size: float) -> dict:
     """A shape as plain data. size : of the square that stands for a half-space [m]."""
     try:
-        found = tessellate(shape, size=size)
-        drawn = {"vertices": found.vertices.tolist(), "faces": found.faces.tolist(), "deviation": found.deviation}
+        triangles = tessellate(shape, size=size)
+        drawn = {"vertices": triangles.vertices.tolist(), "faces": triangles.faces.tolist(), "deviation": triangles.deviation}
     except UnsupportedQuery:
         drawn = {"vertices": [], "faces": [], "deviation": None}
     return {"kind": type(shape).__name__, "parameters": _parameters(shape), **drawn}

@@ -22,7 +22,7 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_bounds", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
+    __slots__ = ("__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -38,6 +38,8 @@ class Shape:
     _union: Any
     #: Its parts in the rows that kernels of unions read.
     _laid_out: LaidOut
+    #: Row and column of the pair table (`lowering/kinds.py`).
+    _kind: Any
     #: What `bounding_parts` gives, where that is not `parts`.
     _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
 

@@ -26,6 +26,9 @@ class ShapeSet:
     shapes : a sequence of shapes. Picking by an integer gives the shape, by an integer array a `Picked`.
     """
 
+    #: Kinds of the shapes, once asked for (`lowering/kinds.py`).
+    _kinds: np.ndarray
+
     def __init__(self, shapes: Sequence[Shape]):
         try:
             self.shapes = tuple(shapes)
@@ -59,11 +62,6 @@ class ShapeSet:
     def plain(self) -> np.ndarray:
         """(shapes,) bool: which are one convex set in their own frame."""
         return np.array([is_plain(shape) for shape in self.shapes])
-
-    @cached_property
-    def meshed(self) -> np.ndarray:
-        """(shapes,) bool: which are a mesh or have one in them."""
-        return np.array([shape.meshed for shape in self.shapes])
 
     @cached_property
     def table(self) -> ShapeTable:

@@ -64,10 +64,10 @@ class MeshCase(NamedTuple):
 def mesh_grids(rng, index: int) -> MeshCase:
     """Two bumpless grids of facets in one plane: flush, side by side, apart by 2⁻³⁰ or crossing by it."""
     n = int(rng.integers(2, 5))
-    one, other = (_grid(n, 2.0 ** -int(rng.integers(0, 3))) for _ in range(2))
+    A, B = (_grid(n, 2.0 ** -int(rng.integers(0, 3))) for _ in range(2))
     height = float(rng.choice([0.0, 0.0, 2.0**-30]))
     shift = np.array([*rng.integers(-n, n + 1, 2) * 0.25, height])
-    return _turned(rng, (*one, False), (*other, False), shift)
+    return _turned(rng, (*A, False), (*B, False), shift)
 
 
 def mesh_identical(rng, index: int) -> MeshCase:
@@ -127,12 +127,12 @@ FAMILIES = (mesh_grids, mesh_identical, mesh_nested, mesh_gaps, mesh_soups, mesh
 # --- parts ------------------------------------------------------------------------------------------
 
 
-def _turned(rng, one, other, shift, *, exact: bool = True) -> MeshCase:
+def _turned(rng, A, B, shift, *, exact: bool = True) -> MeshCase:
     """The pair with B moved by a shift, both then turned and moved alike: by an exact rotation, or any."""
     R = EXACT_ROTATIONS[rng.integers(len(EXACT_ROTATIONS))] if exact else rotation(rng)
     t = rng.integers(-64, 65, 3) / 16
     sides = []
-    for (vertices, faces, solid), step in ((one, np.zeros(3)), (other, np.asarray(shift, dtype=float))):
+    for (vertices, faces, solid), step in ((A, np.zeros(3)), (B, np.asarray(shift, dtype=float))):
         X = np.eye(4)
         X[:3, :3], X[:3, 3] = R, (R * step).sum(axis=1) + t
         sides.append(Surface(np.asarray(vertices, dtype=float), np.asarray(faces), solid, X))

@@ -87,9 +87,9 @@ def _at(path: Path, element: str, what: str) -> NoReturn:
 # --- what trimesh will read -----------------------------------------------------------------------
 
 
-def check(found: Source, path: Path) -> list[str]:
+def check(source: Source, path: Path) -> list[str]:
     """Notes about what is not read; SceneError for counts, ids and references that do not fit together."""
-    looked = _Check(found.header, path)
+    looked = _Check(source.header, path)
     try:
         return looked.all()
     except (TypeError, AttributeError, KeyError, ValueError, OverflowError) as error:
@@ -119,10 +119,10 @@ class _Check:
 
     def _list(self, key: str) -> list:
         if key not in self._lists:
-            found = self.header.get(key, [])
-            if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
-                _at(self.path, key, f"must be a list of mappings, got {brief(found)}")
-            self._lists[key] = found
+            values = self.header.get(key, [])
+            if not isinstance(values, list) or not all(isinstance(entry, dict) for entry in values):
+                _at(self.path, key, f"must be a list of mappings, got {brief(values)}")
+            self._lists[key] = values
         return self._lists[key]
 
     def _count(self, value: Any, where: str) -> int:

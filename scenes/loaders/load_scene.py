@@ -67,7 +67,7 @@ def load(
     started = time.perf_counter()
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), scale, missing_meshes)
     mesh_loader.check_meshes_option(meshes)
-    parts = [_load_one(_resolve(one), options) for one in (path, *more_paths)]
+    parts = [_load_one(_resolve(path_or_name), options) for path_or_name in (path, *more_paths)]
     scene = parts[0] if len(parts) == 1 else _together(parts)
     if state is not None:
         scene = _in_state(scene, state)

@@ -69,7 +69,7 @@ def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
     known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
     entry = cache.key(opened.blobs, {"meshes": meshes, "suffix": opened.suffix, "volumes": known})
-    file = _kept(entry)
+    file = _from_cache(entry)
     if file is None:
         file, raw = _read(opened, meshes == "mesh")
         if meshes == "pieces":
@@ -83,7 +83,7 @@ def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     return file
 
 
-def _kept(entry: str) -> MeshFile | None:
+def _from_cache(entry: str) -> MeshFile | None:
     arrays = cache.fetch(entry)
     try:
         return None if arrays is None else _unpack(arrays)
@@ -109,10 +109,10 @@ def size_note(extent: float, what: str) -> str | None:
 
 
 def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
-    found, notes = triangles_of(opened)
+    triangles, notes = triangles_of(opened)
     path, notes = opened.path, list(notes)
     parts, raw = [], []
-    for name, vertices, faces in found:
+    for name, vertices, faces in triangles:
         if len(vertices):
             part, about = _describe(as_it_is, name, vertices, faces, path)
             parts.append(part)

@@ -132,10 +132,10 @@ def _request_file(path: Path) -> Path | None:
 
 def _robot_state(state: Fields, robot: Robot, scene: Scene, X_WR: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
     """Joint values the robot knows, and where a virtual joint puts its root."""
-    given = state_of(state.get("joint_state") or {}, state.path, state.place("joint_state"))
+    values = state_of(state.get("joint_state") or {}, state.path, state.place("joint_state"))
     known = {joint.name for joint in robot.joints} | set(robot.joint_names)
-    strangers = [joint for joint in given if joint not in known]
-    if strangers and len(strangers) == len(given):
+    strangers = [joint for joint in values if joint not in known]
+    if strangers and len(strangers) == len(values):
         state.fail(f"none of the joints {listing(strangers)} is known; robot {robot.name} has {listing(robot.joint_names)}")
     if strangers:
         scene.notes.append(f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {listing(strangers)}")
@@ -144,7 +144,7 @@ def _robot_state(state: Fields, robot: Robot, scene: Scene, X_WR: np.ndarray) ->
         transforms = Fields(multi, state.path, state.place("multi_dof_joint_state")).items("transforms")
         if transforms:
             X_WR = _transform(Fields(*_swap(transforms[0], state.path)))
-    return {joint: value for joint, value in given.items() if joint in known}, X_WR
+    return {joint: value for joint, value in values.items() if joint in known}, X_WR
 
 
 def _goal(goal: Fields) -> dict[str, float]:
@@ -294,12 +294,12 @@ def _inline_mesh(fields: Fields, meshes: str) -> tuple[Shape, str | None]:
 
 def _triangles(fields: Fields) -> np.ndarray:
     """(m, 3) ids; each triangle is a list of three, or a shape_msgs/MeshTriangle. None at all means a cloud of points."""
-    given = fields.get("triangles")
-    if not given:
+    indices = fields.get("triangles")
+    if not indices:
         return np.zeros((0, 3), dtype=np.int64)
-    if isinstance(given, list) and isinstance(given[0], dict):
-        given = [entry.get("vertex_indices") if isinstance(entry, dict) else None for entry in given]
-    faces = Fields({"triangles": given}, fields.path, fields.element).numbers("triangles", (None, 3))
+    if isinstance(indices, list) and isinstance(indices[0], dict):
+        indices = [entry.get("vertex_indices") if isinstance(entry, dict) else None for entry in indices]
+    faces = Fields({"triangles": indices}, fields.path, fields.element).numbers("triangles", (None, 3))
     if (faces != np.floor(faces)).any() or np.abs(faces).max() >= 2**31:
         fields.fail("must be whole numbers, the rows of vertices", "triangles")
     return faces.astype(np.int64)
@@ -343,19 +343,19 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
     """
     names = [body.name for body in scene.bodies]
     pairs: dict[tuple[str, str], str] = {}
-    own = robot.disabled_pairs
+    disabled_pairs = robot.disabled_pairs
     matrix = fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
     if matrix is not None and matrix.get("entry_names"):
         pairs.update({pair: ALLOWED for pair in _matrix_pairs(matrix, names)})
         named = {*matrix.words("entry_names"), *matrix.words("default_entry_names")}
         strangers = [link for link in robot.links if link in robot.geometry and link not in named]
-        own = [(a, b, reason) for a, b, reason in own if a in strangers or b in strangers]
-        if own:
+        disabled_pairs = [(a, b, reason) for a, b, reason in disabled_pairs if a in strangers or b in strangers]
+        if disabled_pairs:
             scene.notes.append(
                 f"{Path(str(fields.path)).name}: the allowed-collision matrix does not name {listing(strangers)}; "
                 "for these the pairs that the robot itself disables hold"
             )
-    for a, b, reason in (*own, *robot.rigid_pairs):
+    for a, b, reason in (*disabled_pairs, *robot.rigid_pairs):
         if (b, a) not in pairs:
             pairs.setdefault((a, b), reason)
     scene.allowed += [(a, b, reason) for (a, b), reason in pairs.items()]

@@ -17,7 +17,7 @@ from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
-from collide.scenes.loaders.files import LARGEST_TEXT, MOST_INCLUDED, read_text
+from collide.scenes.loaders.files import LARGEST_TEXT, MAX_INCLUDED, read_text
 from collide.scenes.loaders.mesh_file import OPTIONS, MeshFile, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of
@@ -111,13 +111,13 @@ def _include(building: _Building, entry: Any, place: str) -> None:
     file = resources.find(entry, building.path, building.package_path, element=place)
     chain = (*building.open_files, building.path.resolve())
     if file.resolve() in chain:
-        names = " -> ".join(one.name for one in (*chain, file))
+        names = " -> ".join(included.name for included in (*chain, file))
         raise SceneError(f"files include each other in a circle: {names}", path=building.path, element=place)
     text, so_far = read_text(file), building.included
     so_far.files, so_far.characters = so_far.files + 1, so_far.characters + len(text)
-    for number, most, of_what in ((so_far.files, MOST_INCLUDED, "files"), (so_far.characters, LARGEST_TEXT, "characters")):
-        if number > most:
-            what = f"with this the scene includes more than {most:,} {of_what}, repeats counted: put their bodies in one file"
+    for number, limit, of_what in ((so_far.files, MAX_INCLUDED, "files"), (so_far.characters, LARGEST_TEXT, "characters")):
+        if number > limit:
+            what = f"with this the scene includes more than {limit:,} {of_what}, repeats counted: put their bodies in one file"
             raise SceneError(what, path=building.path, element=place)
     _build_into(replace(building, path=file, metres=1.0, open_files=chain), parse_document(text, file))
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError, cut
 from collide.scenes.loaders import dae, gltf, obj, off, ply, stl
-from collide.scenes.loaders.files import MOST_PLACED, read_mesh_bytes
+from collide.scenes.loaders.files import MAX_PLACED, read_mesh_bytes
 from collide.scenes.loaders.polygons import Part, Read
 from collide.shapes.mesh import Mesh
 
@@ -109,15 +109,15 @@ def _by_trimesh(opened: MeshBytes) -> Read:
     except Exception as error:  # noqa: BLE001 - the readers of two formats raise what they like
         raise SceneError(f"is not a mesh that can be read: {_one_line(error)}", path=path) from None
     placed = sum(len(getattr(loaded.geometry.get(about.get("geometry")), "faces", ())) for _, _, about in edges)
-    if placed > MOST_PLACED:
-        raise SceneError(f"its nodes place {placed:,} facets; read are at most {MOST_PLACED:,}", path=path)
+    if placed > MAX_PLACED:
+        raise SceneError(f"its nodes place {placed:,} facets; read are at most {MAX_PLACED:,}", path=path)
     metre = _metres(loaded.units)
     if metre != 1.0:
         notes = [f"the file says its unit is {metre:g} m; it was scaled to metres", *notes]
     # by name: the graph keeps no order
-    found = sorted(_placed(edges, str(loaded.graph.base_frame)), key=lambda one: one[0])
-    shapes = {name: one for name, one in loaded.geometry.items() if isinstance(one, (trimesh.Trimesh, trimesh.PointCloud))}
-    return Read([_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in found if geometry in shapes], notes)
+    placed_meshes = sorted(_placed(edges, str(loaded.graph.base_frame)), key=lambda item: item[0])
+    shapes = {name: item for name, item in loaded.geometry.items() if isinstance(item, (trimesh.Trimesh, trimesh.PointCloud))}
+    return Read([_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in placed_meshes if geometry in shapes], notes)
 
 
 def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
@@ -125,7 +125,7 @@ def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
     below: dict[str, list] = {}
     for upper, lower, about in edges:
         below.setdefault(upper, []).append((lower, about))
-    found = []
+    placed = []
     several: Counter[str] = Counter()
     waiting = [(base, np.eye(4))]
     while waiting:
@@ -139,9 +139,9 @@ def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
                     # trimesh ends the names of several primitives of one glTF mesh at random
                     several[str(node)] += 1
                     name = f"{node}_{several[str(node)]}"
-                found.append((name, about["geometry"], X_WL))
+                placed.append((name, about["geometry"], X_WL))
             waiting.append((lower, X_WL))
-    return found
+    return placed
 
 
 def _part(name: str, mesh, X_WG: np.ndarray, metre: float) -> Part:

@@ -77,14 +77,14 @@ def load_robot(
     return robot
 
 
-def find_srdf(urdf: Path, robot_name: str | None, given) -> Path | None:
+def find_srdf(urdf: Path, robot_name: str | None, srdf) -> Path | None:
     """The SRDF given, or the one beside the URDF: same stem, or ../srdf/NAME.srdf; None where none is."""
-    if given is False:
+    if srdf is False:
         return None
-    if given is not None:
-        if not is_file(Path(given)):
-            raise SceneError("no such file", path=given)
-        return Path(given)
+    if srdf is not None:
+        if not is_file(Path(srdf)):
+            raise SceneError("no such file", path=srdf)
+        return Path(srdf)
     for folder in (urdf.parent, urdf.resolve().parent.parent / "srdf"):
         for stem in dict.fromkeys(filter(None, (urdf.stem, robot_name))):
             if is_file(folder / f"{stem}.srdf"):
@@ -145,10 +145,10 @@ def parse_xml(path: Path, notes: list[str]) -> ET.Element:
     except (ValueError, LookupError) as error:
         raise SceneError(f"cannot be decoded as XML: {error}", path=path) from None
     if root.tag.startswith("{"):
-        own = root.tag[: root.tag.index("}") + 1]
+        namespace = root.tag[: root.tag.index("}") + 1]
         for element in root.iter():
-            if isinstance(element.tag, str) and element.tag.startswith(own):
-                element.tag = element.tag[len(own) :]
+            if isinstance(element.tag, str) and element.tag.startswith(namespace):
+                element.tag = element.tag[len(namespace) :]
     foreign = sorted({element.tag.rsplit("}", 1)[-1] for element in root.iter() if str(element.tag).startswith("{")})
     if foreign:
         notes.append(f"elements of another namespace were not read: {listing(foreign)}")
@@ -301,17 +301,17 @@ def _element_shapes(collision: ET.Element, link: str, place: str, reading: Readi
 
 
 def _primitive(element: ET.Element, place: str, reading: Reading):
-    def one(attribute: str) -> float:
+    def number(attribute: str) -> float:
         return float(floats(element, attribute, 1, place, reading)[0])
 
     if element.tag == "box":
         return Box(floats(element, "size", 3, place, reading))
     if element.tag == "sphere":
-        return Sphere(one("radius"))
+        return Sphere(number("radius"))
     if element.tag == "cylinder":
-        return Cylinder(one("radius"), one("length"))
+        return Cylinder(number("radius"), number("length"))
     if element.tag == "capsule":
-        return Capsule(one("radius"), one("length"))
+        return Capsule(number("radius"), number("length"))
     reading.fail(place, f"unknown shape <{cut(element.tag)}>; known are box, sphere, cylinder, capsule and mesh")
 
 
@@ -358,7 +358,7 @@ def _note_size(extent: float, place: str, reading: Reading) -> None:
 
 
 def _as_paths(package_path) -> list[Path]:
-    given = [package_path] if isinstance(package_path, (str, Path)) else list(package_path)
-    return [Path(entry) for entry in given]
+    folders = [package_path] if isinstance(package_path, (str, Path)) else list(package_path)
+    return [Path(entry) for entry in folders]
 
 

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace
+from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.facet_convex import Posed
 from collide.narrowphase.facets.facet_queries import FARTHER, all_hits, first_hits, surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, decide
@@ -78,7 +78,7 @@ def part_rows(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed, limit: float) -> np.
 
 
 def _plane_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
-    rows = ask(hull_shape(A), hull_shape(B), PA.X, PB.X, False, math.inf, False, 1)
+    rows = convex_rows(hull_shape(A), hull_shape(B), PA.X, PB.X)
     rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1
     _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
     crossing = (rows["lower"] <= 0.0) & (rows["upper"] > 0.0)

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
 from collide.lowering.composite_parts import UnionParts, union_of
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
+from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN
 from collide.narrowphase.facets.mesh_rows import rows_in_order
 from collide.narrowphase.facets.separating_translation import Parting, shortened
@@ -38,10 +38,10 @@ def union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open
 def _states(A: UnionParts, B: UnionParts, X_WA, X_WB, open_ones: bool = False) -> np.ndarray:
     states = np.full(len(X_WA), APART)
     if A.convex is not None and B.convex is not None:
-        met = np.flatnonzero(ask(A.convex, B.convex, X_WA, X_WB, True, 0.0, False, 1))
+        met = np.flatnonzero(convex_hits(A.convex, B.convex, X_WA, X_WB))
         states[met] = HIT
         if open_ones and len(met):
-            rows = ask(A.convex, B.convex, X_WA[met], X_WB[met], False, 0.0, False, 1)
+            rows = convex_rows(A.convex, B.convex, X_WA[met], X_WB[met], limit=0.0)
             states[met[rows["how"] == UNDECIDED]] = OPEN
     gaps = _box_gaps(A, B, X_WA, X_WB)
     for i, j in _mesh_pairs(A, B):
@@ -119,7 +119,7 @@ def _part_rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: b
         hit[left] |= clean["hit"] & (clean["how"] != UNDECIDED)
 
     if A.convex is not None and B.convex is not None:
-        rows = ask(A.convex, B.convex, X_WA, X_WB, False, limit, False, 1)
+        rows = convex_rows(A.convex, B.convex, X_WA, X_WB, limit=limit)
         for name, side in (("part_a", A), ("part_b", B)):
             rows[name] = side.numbers[rows[name]]
         take(rows, np.arange(n))

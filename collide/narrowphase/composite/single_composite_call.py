@@ -7,7 +7,7 @@ import math
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.composite.composite_poses import DONE, HEADER, UNIONS_SIGNATURE
 from collide.narrowphase.finalize_rows import forget_depth
-from collide.narrowphase.rows import BODY_B, DISTANCE, ROW
+from collide.narrowphase.rows import BODY_B, DISTANCE, ROW, view_row
 
 answer_unions_at = native_call(UNIONS_SIGNATURE)
 
@@ -53,5 +53,5 @@ def distance_single_union(header_at, XA_at, XB_at, row_at, depths):
     row = view_f64(row_at, 12)
     view_i32(row_at, ROW // 4)[BODY_B] = 1
     if not depths:
-        forget_depth(row, view_u8(row_at, ROW))
+        forget_depth(view_row(row_at))
     return -1 if row[DISTANCE] == -math.inf else 0

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
+from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.mesh_pairs import convex_cover, pair_rows
 from collide.shapes.shape import Shape
 
@@ -22,7 +22,7 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
     """
     hulls = convex_cover(A), convex_cover(B)
     if limit < math.inf and None not in hulls:
-        rows = ask(*hulls, X_WA, X_WB, False, limit, False, 1, depths=False)
+        rows = convex_rows(*hulls, X_WA, X_WB, limit=limit, depths=False)
         if rows["beyond"][0] or rows["lower"][0] > limit:
             rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hulls, not of the meshes
             rows["part_a"], rows["part_b"] = 0, 0

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.batches import ask
 from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, farthest_told, hull_of, reach_of
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.facet_convex import Posed, facet_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN, core_hits, holds_points
@@ -225,7 +225,7 @@ def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
     """The row of bodies that are out of sight: beyond the limit, or farther than boxes in floats can tell."""
     if limit <= farthest_told(A, E.outer):
         return _unseen(A, E, PA, PB, k, limit)
-    hulls = ask(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], False, limit, False, 1)
+    hulls = convex_rows(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], limit=limit)
     row = hulls[0]
     slop = float(PA.slop[k] + PB.slop[k])
     row["count"], row["part_a"], row["part_b"], row["iterations"] = 0, 0, 0, 0
@@ -271,7 +271,7 @@ def _overlap(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, decided: Decided, 
     row["point_a"] = row["point_b"] = point
     row["certified"] = sure
     if depths:
-        hulls = ask(hull_of(A), hull_of(E.outer), PA.X, PB.X, False, math.inf, False, 1)[0]
+        hulls = convex_rows(hull_of(A), hull_of(E.outer), PA.X, PB.X)[0]
 
         def meets(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
             still = np.zeros(len(X_WA))

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
 from collide.lowering.composite_parts import is_union
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
+from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.mesh_hits import APART, OPEN
 from collide.narrowphase.facets.mesh_rows import mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -35,7 +35,7 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones
     left = np.flatnonzero(states == OPEN)
     covers = _covers(A, B) if len(left) else None  # a mesh's hull is made when it is first needed
     if covers is not None:
-        states[left[~ask(*covers, _some(X_WA, left), _some(X_WB, left), True, 0.0, False, 1)]] = APART
+        states[left[~convex_hits(*covers, _some(X_WA, left), _some(X_WB, left))]] = APART
     return states
 
 
@@ -50,7 +50,7 @@ def pair_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: 
     left = np.flatnonzero(rows["how"] == UNDECIDED)
     covers = _covers(A, B) if len(left) else None
     if covers is not None:
-        told = ask(*covers, _some(X_WA, left), _some(X_WB, left), False, math.inf, False, 1, depths=False)
+        told = convex_rows(*covers, _some(X_WA, left), _some(X_WB, left), depths=False)
         apart = told["lower"] > 0.0
         _part(rows, left[apart], told[apart], limit)
     return rows

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from collide.batches import ask
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import Body, body_of, farthest_told, has_facets, hull_of, is_halfspace, reach_of
+from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.facet_convex import Posed
 from collide.narrowphase.facets.facet_queries import surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, decide
@@ -33,7 +33,7 @@ PROMISE = 2.0**-43
 def mesh_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """(n,) APART, HIT or OPEN for poses (n, 4, 4) of two shapes, a mesh among them. Raises UnsupportedQuery."""
     if is_halfspace(A) or is_halfspace(B):
-        return np.where(ask(hull_shape(A), hull_shape(B), X_WA, X_WB, True, 0.0, False, 1), HIT, APART)
+        return np.where(convex_hits(hull_shape(A), hull_shape(B), X_WA, X_WB), HIT, APART)
     if not has_facets(A):
         return mesh_states(B, A, X_WB, X_WA)
     if not has_facets(B):
@@ -48,7 +48,7 @@ def mesh_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = Tr
     limit, depths : as in `distance`.
     """
     if is_halfspace(A) or is_halfspace(B):
-        rows = ask(hull_shape(A), hull_shape(B), X_WA, X_WB, False, limit, False, 1, depths=depths)
+        rows = convex_rows(hull_shape(A), hull_shape(B), X_WA, X_WB, limit=limit, depths=depths)
         rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hull, not of the mesh
         return rows
     if not has_facets(A):
@@ -165,7 +165,7 @@ def _of_hulls(A: Body, B: Body, X_WA, X_WB, found, normal: np.ndarray) -> np.nda
     near = np.flatnonzero((found.facets[:, 0] >= 0) & (found.distance <= NEAR * _size(A, B, X_WA, X_WB)))
     if not len(near):
         return near
-    hulls = ask(hull_of(A), hull_of(B), X_WA[near], X_WB[near], False, math.inf, False, 1)
+    hulls = convex_rows(hull_of(A), hull_of(B), X_WA[near], X_WB[near])
     as_far = hulls["upper"] + A.radius + B.radius >= found.lower[near]
     near, hulls = near[as_far], hulls[as_far]
     normal[near] = hulls["normal"]
@@ -174,7 +174,7 @@ def _of_hulls(A: Body, B: Body, X_WA, X_WB, found, normal: np.ndarray) -> np.nda
 
 def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
     """The row of bodies so far apart that boxes in floats could not tell how far: their hulls and one point of each do."""
-    row = ask(hull_of(A), hull_of(B), X_WA[None], X_WB[None], False, limit, False, 1)
+    row = convex_rows(hull_of(A), hull_of(B), X_WA[None], X_WB[None], limit=limit)
     row["count"], row["part_a"], row["part_b"] = 0, 0, 0
     row["vertices_a"] = row["vertices_b"] = -1
     if not row["beyond"][0]:
@@ -213,7 +213,7 @@ def _overlap(A: Body, B: Body, X_WA, X_WB, rows, k: int, point, more, depths: bo
         row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
         row["point_a"], row["point_b"], row["certified"] = point, point, decided
         return
-    hulls = ask(hull_of(A), hull_of(B), X_WA[None], X_WB[None], False, math.inf, False, 1)[0]
+    hulls = convex_rows(hull_of(A), hull_of(B), X_WA[None], X_WB[None])[0]
     length, bound, normal = way_out(A, B, X_WA, X_WB, hulls, more)
     row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
     row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
