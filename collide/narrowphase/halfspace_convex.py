@@ -172,7 +172,7 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     ties = view_i64(ties_at, MAX_TIES + 1)
     _put_fine_plane(pair, plane)
     normal = dd.vec3_at(plane, 0)
-    length = dd.sqrt(dd.dot(normal, normal))
+    length = dd.sqrt(dd.inner(normal, normal))
     if not (2.0**-300 < length.high < 2.0**300):
         return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     g = rotate_back(poses, q, divide(dd.leading(normal), length.high))
@@ -187,7 +187,7 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
         point = DDVec3(
             _fine_coordinate(b, poses, p, q, 0), _fine_coordinate(b, poses, p, q, 1), _fine_coordinate(b, poses, p, q, 2)
         )
-        height = dd.dot(point, normal)
+        height = dd.inner(point, normal)
         if dd.less(height, least):
             least = height
     distance = dd.div(dd.sub(least, DD(plane[6], plane[7])), length)

@@ -6,7 +6,7 @@ product, a quotient or a root is good to a relative 16 u² = 2⁻¹⁰², barrin
 should lie between 2⁻⁴⁰⁰ and 2⁴⁰⁰, or be 0.
 
 Operands are `DD`s of doubles, or of `Lanes` for eight numbers at once. Names are read with the module's:
-``dd.add``, ``dd.dot``.
+``dd.add``, ``dd.inner``.
 """
 
 from __future__ import annotations
@@ -247,14 +247,14 @@ def _determinant(a, b, c, d):
 
 
 @kernel(inline=True)
-def dot(a, b):
+def inner(a, b):
     """a·b, to 2⁻¹⁰¹·Σ|products|."""
-    total = unnormalized_dot(a, b)
+    total = unnormalized_inner(a, b)
     return two_sum(total.high, total.low)
 
 
 @kernel(inline=True)
-def unnormalized_dot(a, b):
+def unnormalized_inner(a, b):
     """a·b as two doubles, the second of which may be larger than the first, to 25u²·Σ|products|.
 
     Errors of products and sums, and lower parts, are at most 5u·Σ|products| together; sums of them round by 24u².

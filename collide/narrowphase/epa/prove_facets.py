@@ -27,8 +27,8 @@ def prove_facets(surface, n_facets):
             e = dd.difference(point_at(surface.points, corner(surface, f, 1)), a)
             g = dd.difference(point_at(surface.points, corner(surface, f, 2)), a)
             normal = dd.cross(e, g)
-            height = dd.dot(normal, dd.exact_vec3(a))
-            length = dd.sqrt(dd.dot(normal, normal))
+            height = dd.inner(normal, dd.exact_vec3(a))
+            length = dd.sqrt(dd.inner(normal, normal))
             if length.high == 0.0:
                 continue
             error = _DETERMINANT_ERROR * norm1(a) * (norm1(dd.leading(e)) * norm1(dd.leading(g)))

@@ -35,7 +35,7 @@ from collide.support.support_tree_query import rings_of
 MAX_NEIGHBOURS = 768
 #: Error of a product of vectors in doubles, in units of Σ|products|: both factors, the product and two sums round once.
 _DOUBLE_ERROR = 8.0 * 2.0**-53
-#: The same of `dd.dot`; and of either, products below the smallest normal double.
+#: The same of `dd.inner`; and of either, products below the smallest normal double.
 _DD_ERROR, _TINY = 2.0**-101, 2.0**-960
 
 
@@ -63,9 +63,9 @@ def direction_in_body(poses, p, low, low_at, direction, sign):
     p : row of the pose.   low, low_at : where its low parts begin; no doubles where it is as given.
     """
     d = dd.vec3_at(direction, 0)
-    x = dd.dot(_column(poses, p, low, low_at), d)
-    y = dd.dot(_column(poses, p + 1, low, low_at + 1), d)
-    z = dd.dot(_column(poses, p + 2, low, low_at + 2), d)
+    x = dd.inner(_column(poses, p, low, low_at), d)
+    y = dd.inner(_column(poses, p + 1, low, low_at + 1), d)
+    z = dd.inner(_column(poses, p + 2, low, low_at + 2), d)
     return dd.scale_vec3(sign, DDVec3(x, y, z))
 
 
@@ -117,7 +117,7 @@ def descend(tree, first, g, terms):
         vertex = best
     if not all_certain or (plateau and view_i64(tree, HEADER)[FLAT] == 0):
         return LowestVertex(False, first, DD(0.0, 0.0), n_visited)
-    height = dd.dot(dd.difference(vec3_at(corners, 3 * vertex), vec3_at(corners, 3 * first)), g)
+    height = dd.inner(dd.difference(vec3_at(corners, 3 * vertex), vec3_at(corners, 3 * first)), g)
     if height.high > 0.0:  # rounded: it is not higher
         return LowestVertex(True, vertex, DD(0.0, 0.0), n_visited)
     return LowestVertex(True, vertex, height, n_visited)
@@ -143,7 +143,7 @@ def _compare(a, b, g, terms):
 def _compare_finely(a, b, g, error, terms):
     """`_compare` where doubles leave it open: in double-doubles, then as an exact sum."""
     d = dd.difference(a, b)
-    height = dd.dot(d, g)
+    height = dd.inner(d, g)
     if height.high > error:
         return HeightSign(True, 1, height.high)
     if height.high < -error:
@@ -169,7 +169,7 @@ def lowest_of_all(coords, n, padded, first, g):
         if x + y + z - _DOUBLE_ERROR * (abs(x) + abs(y) + abs(z)) >= lowest.high:
             continue
         n_fine += 1
-        height = dd.dot(dd.difference(vertex, start), g)
+        height = dd.inner(dd.difference(vertex, start), g)
         if dd.less(height, lowest):
             best = i
             lowest = height

@@ -179,7 +179,7 @@ def fine_edge(fine, k, j):
 @kernel
 def fine_height(fine, k, direction):
     """Point k along a direction, both stored."""
-    return dd.dot(dd.vec3_at(fine, dd.STRIDE * k), dd.vec3_at(direction, 0))
+    return dd.inner(dd.vec3_at(fine, dd.STRIDE * k), dd.vec3_at(direction, 0))
 
 
 # --- directions -----------------------------------------------------------------------------------
@@ -188,7 +188,7 @@ def fine_height(fine, k, direction):
 @kernel(inline=True)
 def direction_length(d):
     """|d|, or 0 where the direction says nothing."""
-    length = dd.sqrt(dd.dot(d, d))
+    length = dd.sqrt(dd.inner(d, d))
     return dd.dd_select(norm1(dd.leading(d)) > _SHORTEST, length, DD(0.0, 0.0))
 
 
@@ -229,7 +229,7 @@ def across_edge(w, e):
     Taken twice where that is short: the first time leaves what rounding at |w| makes, the second what rounding at the
     result makes. Where the edge is not much nearer than its length, once is enough.
     """
-    square = dd.dot(e, e)
+    square = dd.inner(e, e)
     across = _reject(w, e, square)
     once = norm1(dd.leading(across))
     again = once <= 2.0**-20 * square.high * (norm1(dd.leading(w)) + root_of(square.high))
@@ -241,7 +241,7 @@ def across_edge(w, e):
 @kernel
 def _reject(w, e, square):
     """w |e|² − e (w·e)."""
-    along = dd.dot(w, e)
+    along = dd.inner(w, e)
     return DDVec3(
         dd.sub(dd.mul(w.x, square), dd.mul(e.x, along)),
         dd.sub(dd.mul(w.y, square), dd.mul(e.y, along)),

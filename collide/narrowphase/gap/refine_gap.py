@@ -178,12 +178,12 @@ def refine_gaps(question, n, parts, composed, feature, direction, answer):
 def _set_distance(question, n, feature, direction, answer, proven):
     """Everything of an answer that is a number along the direction."""
     length = direction_length(direction)
-    height = dd.dot(dd.vec3_at(feature, 0), direction)
+    height = dd.inner(dd.vec3_at(feature, 0), direction)
     nonzero = length.high > 0.0
     length = DD(select(nonzero, length.high, 1.0), length.low)
     spread = 0.0 * length.high
     for k in range(1, n):
-        slope = dd.unnormalized_dot(dd.vec3_at(feature, dd.STRIDE * k), direction)
+        slope = dd.unnormalized_inner(dd.vec3_at(feature, dd.STRIDE * k), direction)
         spread = larger(spread, abs(slope.high + slope.low))
     distance = dd.div(height, length)
     error = core_error(spread, 0.0, length.high, question[at.SLOP], question[at.SCALE])
