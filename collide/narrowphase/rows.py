@@ -63,6 +63,14 @@ def clear_vertices(row):
 
 
 @kernel(inline=True)
+def open_row(row_at):
+    """`view_row`, and the row names no vertices."""
+    row = view_row(row_at)
+    clear_vertices(row)
+    return row
+
+
+@kernel(inline=True)
 def write_vectors(row, nhat, p_a, p_b, flip):
     """Normal and witness points of the pair as asked, from those of the pair as worked on (exchanged if ``flip``)."""
     sign = -1.0 if flip else 1.0

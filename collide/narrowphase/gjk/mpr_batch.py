@@ -50,8 +50,7 @@ from collide.narrowphase.rows import (
     ROW,
     VERTICES_A,
     VERTICES_B,
-    clear_vertices,
-    view_row,
+    open_row,
     write_decision,
 )
 from collide.numerics.vec3 import Vec3, divide, norm, put_vec3, sub, vec3_at
@@ -164,8 +163,7 @@ def _are_far(numbers, poses, sa, pa, sb, pb, boolean, error, limit, row_at):
 @kernel(inline=True)
 def _write_miss(row_at, lower, nhat, limit, iterations):
     """A boolean: apart by ``lower`` at least along nhat, for the pair as asked."""
-    row = view_row(row_at)
-    clear_vertices(row)
+    row = open_row(row_at)
     row.words[ITERATIONS] = iterations
     write_decision(row, lower, lower, math.inf, PLANE, limit)
     put_vec3(row.doubles, NORMAL, nhat)
@@ -200,8 +198,7 @@ def _answer_eight(room_at, notes_at, count, corners, boolean, limit, rows_at):
             nhat = Vec3(found[at], found[at + LANES], found[at + 2 * LANES])
             _write_miss(row_at, lower, nhat, limit, iterations)
         elif boolean and clearance > error:
-            row = view_row(row_at)
-            clear_vertices(row)
+            row = open_row(row_at)
             row.words[ITERATIONS] = iterations
             write_decision(row, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
         elif not boolean:
@@ -214,8 +211,7 @@ def _write_portal(found, notes, k, corners, clearance, row_at, limit):
 
     clearance : of the origin in the tetrahedron of o and the portal, −1 where it is not proven to lie in it.
     """
-    row = view_row(row_at)
-    clear_vertices(row)
+    row = open_row(row_at)
     words = row.words
     for n in range(3):
         name = int(found[LANES * (PORTAL + CORNER * n + NAME) + k])
