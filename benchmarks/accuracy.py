@@ -103,7 +103,9 @@ class Tally:
         if not answer.certified:
             self.uncertified[kind] += 1
             width = (answer.upper - answer.lower) / size_of(case)
-            self.example = self.example or f"seed {case.seed} index {case.index}: {float(value):.2e}, bracket {width:.0e} L"
+            self.example = (
+                self.example or f"seed {case.seed} index {case.index}: {float(value):.2e}, bracket {width:.0e} L"
+            )
 
     def row(self) -> dict:
         timed = {path: [us for us in taken if not math.isnan(us)] for path, taken in self.us.items()}
@@ -120,10 +122,12 @@ class Tally:
             row |= dict.fromkeys([*(f"uncertified_{kind}s" for kind in CLASSES), "missed", "example"], "")
         count = sum(map(len, self.us.values()))
         for path in PATHS:
-            own = timed.get(path, [])
-            row[f"share_{path}"] = f"{len(own) / count:.3f}" if self.engine == "collide" and count else ""
-            row[f"us_{path}"] = f"{statistics.median(own):.1f}" if own else ""
-        row["us"] = f"{statistics.median(every):.1f}" if (every := [us for own in timed.values() for us in own]) else ""
+            timings = timed.get(path, [])
+            row[f"share_{path}"] = f"{len(timings) / count:.3f}" if self.engine == "collide" and count else ""
+            row[f"us_{path}"] = f"{statistics.median(timings):.1f}" if timings else ""
+        row["us"] = (
+            f"{statistics.median(every):.1f}" if (every := [us for timings in timed.values() for us in timings]) else ""
+        )
         return row
 
 
@@ -147,7 +151,8 @@ def show_families(rows: list[dict]) -> None:
     if ours:
         columns = {
             "family": "family", "gaps": "gaps", "depths": "overlaps", "touchs": "touching",
-            "gap_error_certified": "gap error", "depth_error_certified": "depth error", "normal_excess": "normal excess", "missed": "missed",
+            "gap_error_certified": "gap error", "depth_error_certified": "depth error",
+            "normal_excess": "normal excess", "missed": "missed",
         }  # fmt: skip
         lines = [[*columns.values(), "uncertified", "doubles / exact / other", "µs", "µs exact"]]
         for r in ours:
@@ -163,11 +168,13 @@ def show_families(rows: list[dict]) -> None:
         tell(", ".join(f"{name} {count}" for name, count in total.items()))
     others = [name for name in dict.fromkeys(r["engine"] for r in rows) if name != "collide"]
     if others:
-        found = {(r["family"], r["engine"]): r for r in rows}
+        by_key = {(r["family"], r["engine"]): r for r in rows}
         lines = [["family", *others]]
         for family in dict.fromkeys(r["family"] for r in rows):
-            cells = [found[family, name] for name in others]
-            lines.append([family, *(f"{r['gap_error'] or '-'} {r['depth_error'] or '-'} {r['normal_excess']}" for r in cells)])
+            cells = [by_key[family, name] for name in others]
+            lines.append(
+                [family, *(f"{r['gap_error'] or '-'} {r['depth_error'] or '-'} {r['normal_excess']}" for r in cells)]
+            )
         aligned("the others: largest error of gaps, of depths, excess of normals", lines)
 
 
@@ -182,16 +189,18 @@ def curved(seeds: range, count: int) -> list[dict]:
     rows = []
     for a, b in PAIRS:
         for kind in POSES:
-            found = [widths(a, b, kind, count, seed) for seed in seeds]
-            width, hits, certified = (np.concatenate([getattr(f, name) for f in found]) for name in found[0]._fields[:3])
+            per_seed = [widths(a, b, kind, count, seed) for seed in seeds]
+            width, hits, certified = (
+                np.concatenate([getattr(f, name) for f in per_seed]) for name in per_seed[0]._fields[:3]
+            )
             row: dict = {"a": a, "b": b, "poses": kind, "gaps": int((~hits).sum()), "depths": int(hits.sum())}
             for name, of in (("gap", width[~hits]), ("depth", width[hits])):
                 row[f"{name}_width"] = f"{of.max():.2e}" if len(of) else ""
                 row[f"{name}_width_999"] = f"{np.sort(of)[int(0.999 * (len(of) - 1))]:.2e}" if len(of) else ""
                 row[f"{name}_width_median"] = f"{np.median(of):.2e}" if len(of) else ""
-            sure = width[hits & certified]
-            row["depth_width_certified"] = f"{sure.max():.2e}" if len(sure) else ""
-            row |= {"uncertified": int((~certified).sum()), "us": f"{min(f.us for f in found):.1f}"}
+            certified_widths = width[hits & certified]
+            row["depth_width_certified"] = f"{certified_widths.max():.2e}" if len(certified_widths) else ""
+            row |= {"uncertified": int((~certified).sum()), "us": f"{min(f.us for f in per_seed):.1f}"}
             rows.append(row)
         say(f"{a} and {b}")
     return rows
@@ -218,9 +227,13 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--engines", default="collide,coal,coal_t9,fcl,pybullet",
                         help="whom to ask: collide, coal, coal_t9 (tolerance 1e-9), fcl, pybullet, commas between "
                              "(default: all); what is not installed is left out with a word")  # fmt: skip
-    parser.add_argument("--plot", metavar="FILE", type=Path,
-                        help="draw the parts \"time\" and \"curved\": FILE.png becomes FILE-time.png, FILE-gaps.png and "
-                             "FILE-curved.png (needs the extra plots)")  # fmt: skip
+    parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        type=Path,
+        help='draw the parts "time" and "curved": FILE.png becomes FILE-time.png, FILE-gaps.png and '
+        "FILE-curved.png (needs the extra plots)",
+    )
     parser.add_argument("--quick", action="store_true", help="a look: 1 seed, 3 cases, small hulls, no CSV")
     parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
     args = parser.parse_args()
@@ -230,8 +243,8 @@ def arguments() -> argparse.Namespace:
         parser.error("at least one seed and one case are needed, and seeds from 0 on")
     args.families = args.families.split(",") if args.families else names()
     args.engines = [word for word in args.engines.split(",") if word]
-    for kind, given, known in (("family", args.families, names()), ("engine", args.engines, ENGINES)):
-        if unknown := [word for word in given if word not in known]:
+    for kind, requested, known in (("family", args.families, names()), ("engine", args.engines, ENGINES)):
+        if unknown := [word for word in requested if word not in known]:
             parser.error(f"no {kind} {', '.join(unknown)}: there are {', '.join(known)}")
     if args.plot and find_spec("matplotlib") is None:
         parser.error("--plot needs matplotlib: pip install 'collide-robotics[plots]'")

@@ -126,6 +126,6 @@ def widths(a: str, b: str, kind: str, count: int, seed: int) -> Widths:
     started = time.perf_counter()
     rows = collide.distance(A, B, X_WA, X_WB).rows
     seconds = time.perf_counter() - started
-    size = np.array([reach(one) + reach(other) for one, other in zip(A, B)])
+    size = np.array([reach(A_k) + reach(B_k) for A_k, B_k in zip(A, B)])
     size += np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
     return Widths((rows["upper"] - rows["lower"]) / size, rows["hit"], rows["certified"], seconds / count * 1e6)

@@ -26,7 +26,7 @@ ENGINES: dict[str, tuple[str, float | None]] = {
 #: What can settle an answer of collide.
 PATHS = ("doubles", "closed form", "exact", "undecided")
 #: A distance that is no length.
-_ENDLESS = 1e300
+_UNBOUNDED = 1e300
 #: Calls of one question, whose fastest counts.
 _CALLS = 5
 
@@ -88,7 +88,7 @@ def _of_peer(row, reason: str, kind: str) -> Answer:
     if not row["answered"]:
         return Answer(failed=reason or "no answer")
     distance = float(row["distance"])
-    if not abs(distance) < _ENDLESS:
+    if not abs(distance) < _UNBOUNDED:
         return Answer(failed=f"no length: {distance}")
     return Answer(distance, normal=tuple(row["normal"].tolist()), us=float(reason) if kind == "coal" else math.nan)
 

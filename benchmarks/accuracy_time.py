@@ -1,4 +1,4 @@
-"""Error against time, for `benchmarks/accuracy.py`: hulls of points on a sphere at gaps and depths from 1e-1 down to 1e-12.
+"""Error against time, for `benchmarks/accuracy.py`: hulls of points on a sphere, gaps and depths 1e-1 to 1e-12.
 
 Every pair is placed by collide's own distances, B moved along the normal; the truth of each pose as it then stands is
 exact arithmetic's. All poses are timed, the first few are judged. Ours is one batch call; coal and python-fcl are
@@ -38,13 +38,15 @@ def placed(A, B, target: float, count: int, random) -> np.ndarray:
     directions = random.normal(size=(count, 3))
     X[:, :3, 3] = directions * (1.2 * LENGTH / np.sqrt(np.square(directions).sum(axis=1)))[:, None]
     for _ in range(_STEPS):
-        found = distance(A, B, _EYE, X)
-        X[:, :3, 3] += (target - found.distance)[:, None] * found.normal
+        result = distance(A, B, _EYE, X)
+        X[:, :3, 3] += (target - result.distance)[:, None] * result.normal
     return X
 
 
 def truths(A, B, X: np.ndarray) -> list[Decimal]:
-    return [exact.signed_distance(A.points, _EYE[:3, :3], _EYE[:3, 3], B.points, one[:3, :3], one[:3, 3]) for one in X]
+    return [
+        exact.signed_distance(A.points, _EYE[:3, :3], _EYE[:3, 3], B.points, X_WB[:3, :3], X_WB[:3, 3]) for X_WB in X
+    ]
 
 
 def error_against_time(sizes: tuple[int, ...], engines: list[str], quick: bool) -> list[dict]:
@@ -69,16 +71,16 @@ def _level(n, side, level, solids, X, exactly, engines, repeats) -> list[dict]:
     A, B = (solid.shape for solid in solids)
     which = np.tile([0, 1], (len(X), 1))
     tasks: dict = {("collide", "signed"): lambda: distance(A, B, _EYE, X)}
-    found = {("collide", "signed"): distance(A, B, _EYE, X).distance}
+    answers = {("collide", "signed"): distance(A, B, _EYE, X).distance}
     if side == "gap":
         tasks["collide", "unsigned"] = lambda: distance(A, B, _EYE, X, signed=False)
-        found["collide", "unsigned"] = distance(A, B, _EYE, X, signed=False).distance
+        answers["collide", "unsigned"] = distance(A, B, _EYE, X, signed=False).distance
     if "coal" in engines:
         coal = Coal(list(solids), which, X)
         for tolerance in TOLERANCES:
             name = "coal", "default" if tolerance is None else f"{tolerance:.0e}"
             tasks[name] = coal.loop("signed", tolerance)
-            found[name] = coal.answers("signed", tolerance)
+            answers[name] = coal.answers("signed", tolerance)
     fcl = Fcl(list(solids), which, X) if "fcl" in engines else None
     times: dict = {name: [] for name in tasks}
     for _ in range(repeats):
@@ -87,11 +89,11 @@ def _level(n, side, level, solids, X, exactly, engines, repeats) -> list[dict]:
         if fcl:
             times.setdefault(("fcl", "default"), []).append(fcl.seconds("signed"))
     if fcl:
-        found["fcl", "default"] = fcl.answers("signed")
+        answers["fcl", "default"] = fcl.answers("signed")
         fcl.close()
     rows = []
     for (engine, setting), taken in times.items():
-        errors = [float(abs(Decimal(float(d)) - t) / abs(t)) for d, t in zip(found[engine, setting], exactly)]
+        errors = [float(abs(Decimal(float(d)) - t) / abs(t)) for d, t in zip(answers[engine, setting], exactly)]
         us = [seconds / len(X) * 1e6 for seconds in taken]
         rows.append({
             "n": n, "side": side, "level": f"{level:.0e}", "engine": engine, "setting": setting, "runs": len(us),
@@ -109,20 +111,20 @@ def steady_seconds(task) -> float:
 
 def show_time(rows: list[dict]) -> None:
     """For every size and level, our largest error and time beside coal's default, its best setting, and python-fcl."""
-    found = {(r["n"], r["side"], r["level"], r["engine"], r["setting"]): r for r in rows}
+    by_key = {(r["n"], r["side"], r["level"], r["engine"], r["setting"]): r for r in rows}
     settings = [("collide", "signed"), ("coal", "default"), ("coal", "1e-09"), ("coal", "1e-12"), ("fcl", "default")]
     settings = [s for s in settings if any((r["engine"], r["setting"]) == s for r in rows)]
     lines = [["n", "side", "level", *(cell for e, s in settings for cell in (f"{e} {s}", "µs"))]]
     for n, side, level in dict.fromkeys((r["n"], r["side"], r["level"]) for r in rows):
         line = [f"{n:,}", side, level]
         for setting in settings:
-            r = found[(n, side, level, *setting)]
+            r = by_key[(n, side, level, *setting)]
             line += [r["max_error"], f"{r['min_us']:.2f}"]
         lines.append(line)
     aligned("largest error relative to the exact value, and µs a pair", lines)
     slower = [
-        (n, side, level) for n, side, level, e, s in found
-        if (e, s) == ("coal", "1e-09") and found[n, side, level, e, s]["min_us"]
-        < found[n, side, level, "collide", "signed"]["min_us"]
+        (n, side, level) for n, side, level, e, s in by_key
+        if (e, s) == ("coal", "1e-09") and by_key[n, side, level, e, s]["min_us"]
+        < by_key[n, side, level, "collide", "signed"]["min_us"]
     ]  # fmt: skip
     tell(f"cells in which coal at tolerance 1e-9 is faster: {len(slower)} {slower or ''}".rstrip())

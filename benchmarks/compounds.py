@@ -3,8 +3,9 @@
     python benchmarks/compounds.py               # about two minutes
     python benchmarks/compounds.py --quick       # fewer parts and poses
 
-Compounds of random boxes against a box, and against each other (every part against every part), at poses of which about half
-overlap ("near") or few do ("far"). Parts stand where the compound has them: their poses are multiplied out beforehand. Both
+Compounds of random boxes against a box, and against each other (every part against every part), at poses of which about
+half overlap ("near") or few do ("far"). Parts stand where the compound has them: their poses are multiplied out
+beforehand. Both
 are asked in turn, and the medians of their times compared: a ratio of 1 is the sum of the parts.
 """
 
@@ -39,7 +40,9 @@ def random_poses(rng, n: int, spread: float) -> np.ndarray:
 
 
 def compound(rng, parts: int) -> collide.Compound:
-    return collide.Compound([(collide.Box(rng.uniform(0.2, 0.6, 3)), random_poses(rng, 1, 0.7)[0]) for _ in range(parts)])
+    return collide.Compound(
+        [(collide.Box(rng.uniform(0.2, 0.6, 3)), random_poses(rng, 1, 0.7)[0]) for _ in range(parts)]
+    )
 
 
 def compared(whole, parts, poses: int) -> list[str]:
@@ -52,14 +55,14 @@ def compared(whole, parts, poses: int) -> list[str]:
             question()
             taken.append((time.perf_counter() - started) / poses * 1e6)
     gc.enable()
-    one, other = (statistics.median(taken[1:]) for taken in times)
-    return [f"{one:.3f}", f"{other:.3f}", f"{one / other:.2f}"]
+    median_a, median_b = (statistics.median(taken[1:]) for taken in times)
+    return [f"{median_a:.3f}", f"{median_b:.3f}", f"{median_a / median_b:.2f}"]
 
 
 def pairs_of(A: collide.Compound, B, X_WA: np.ndarray, X_WB: np.ndarray) -> list[tuple]:
     """Every part of A against every part of B: (shape, shape, poses, poses)."""
-    own, others = ([(shape, X @ X_SP) for shape, X_SP in parts_of(S)] for S, X in ((A, X_WA), (B, X_WB)))
-    return [(one, other, X, Y) for (one, X), (other, Y) in itertools.product(own, others)]
+    parts_a, parts_b = ([(shape, X @ X_SP) for shape, X_SP in parts_of(S)] for S, X in ((A, X_WA), (B, X_WB)))
+    return [(shape_a, shape_b, X, Y) for (shape_a, X), (shape_b, Y) in itertools.product(parts_a, parts_b)]
 
 
 def parts_of(shape) -> list[tuple]:
@@ -79,7 +82,14 @@ def batches(rng, counts, sizes):
             X = random_poses(rng, n, spread), random_poses(rng, n, spread)
             pairs = pairs_of(A, box, *X)
             for what, ask in QUESTIONS.items():
-                yield ["batch", what, name, parts, n, *compared(partial(ask, A, box, *X), partial(one_by_one, ask, pairs), n)]
+                yield [
+                    "batch",
+                    what,
+                    name,
+                    parts,
+                    n,
+                    *compared(partial(ask, A, box, *X), partial(one_by_one, ask, pairs), n),
+                ]
 
 
 def singles(rng, counts, n: int):
@@ -98,19 +108,19 @@ def others(rng, parts: int, n: int):
     """Compound against Compound, two threads, a ShapeSet, a list."""
     box, A, B = collide.Box((0.5, 0.5, 0.5)), compound(rng, parts), compound(rng, parts)
     library = [compound(rng, parts) for _ in range(8)]
-    chosen = rng.integers(0, 8, n)
+    corners = rng.integers(0, 8, n)
     shapes = collide.ShapeSet([*library, box, *(shape for S in library for shape, _ in S.items)])
     boxes = shapes[np.full(n, len(library))]
     for name, spread in SPREAD.items():
         X_WA, X_WB = random_poses(rng, n, spread), random_poses(rng, n, spread)
-        X_WPs = [np.array([X @ library[c].items[k][1] for X, c in zip(X_WA, chosen)]) for k in range(parts)]
-        picked = [(shapes[len(library) + 1 + parts * chosen + k], boxes, X, X_WB) for k, X in enumerate(X_WPs)]
-        listed = [([library[c].items[k][0] for c in chosen], box, X, X_WB) for k, X in enumerate(X_WPs)]
+        X_WPs = [np.array([X @ library[c].items[k][1] for X, c in zip(X_WA, corners)]) for k in range(parts)]
+        picked = [(shapes[len(library) + 1 + parts * corners + k], boxes, X, X_WB) for k, X in enumerate(X_WPs)]
+        listed = [([library[c].items[k][0] for c in corners], box, X, X_WB) for k, X in enumerate(X_WPs)]
         cases = {
             "both": ((A, B, X_WA, X_WB), pairs_of(A, B, X_WA, X_WB), {}),
             "threads=2": ((A, box, X_WA, X_WB), pairs_of(A, box, X_WA, X_WB), {"threads": 2}),
-            "ShapeSet": ((shapes[chosen], boxes, X_WA, X_WB), picked, {}),
-            "list": (([library[c] for c in chosen], box, X_WA, X_WB), listed, {}),
+            "ShapeSet": ((shapes[corners], boxes, X_WA, X_WB), picked, {}),
+            "list": (([library[c] for c in corners], box, X_WA, X_WB), listed, {}),
         }
         for (interface, (whole, pairs, named)), (what, ask) in itertools.product(cases.items(), QUESTIONS.items()):
             measured = compared(partial(ask, *whole, **named), partial(one_by_one, ask, pairs, **named), n)
@@ -129,7 +139,10 @@ def main(quick: bool) -> None:
         measured.append([str(cell) for cell in row])
         print("  ".join(f"{cell:>11}" for cell in measured[-1]), flush=True)
     ratios = np.array([float(row[-1]) for row in measured[1:]])
-    print(f"\nmedian ratio {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: {int((ratios > 1.2).sum())} of {len(ratios)}")
+    print(
+        f"\nmedian ratio {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: {int((ratios > 1.2).sum())} "
+        f"of {len(ratios)}"
+    )
     target = ROOT / "benchmarks" / "results" / "compounds.csv"
     target.parent.mkdir(exist_ok=True)
     with target.open("w", newline="", encoding="utf-8") as file:

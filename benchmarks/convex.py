@@ -8,7 +8,8 @@ Tables: hulls of n points on a sphere, an ellipsoid 1:3:10, a pancake 1:50, and 
 "shapes", random pairs of hundreds of different hulls, whose data are in no cache; "single", one Python call
 a pair; "threads", large batches with `threads=2`, and plain arithmetic in two threads, µs in all (two cores
 shared with others are less than two); "cgal", our boolean beside the times published for CGAL's hull
-hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of touching, a third 5 to 50 % deep, shuffled into one batch; all engines get the same. Engines take turns in
+hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of touching, a third 5 to 50 %
+    deep, shuffled into one batch; all engines get the same. Engines take turns in
 one run, and ratios are of medians. Ours is a batch call, coal and python-fcl are Python loops, each at
 its best: objects and transforms are ready beforehand, and booleans want no contacts. Our times by class
 are of batches a third as long, which spread the cost of a call over fewer pairs.
@@ -32,7 +33,7 @@ from pathlib import Path
 
 import numpy as np
 from convex_peers import QUESTIONS, Coal, Fcl
-from convex_shapes import CLASSES, LENGTH, Posed, Scene, scene
+from convex_shapes import CLASSES, LENGTH, Scene, WorldSolids, scene
 from startup import machine
 
 #: Distributions of the engines compared with.
@@ -79,11 +80,11 @@ def ours(asked: Scene, table: str, threads: int = 1) -> dict:
 
     solids, which, X_WBs = asked.solids, asked.which, asked.X_WBs
     if table == "shapes":
-        posed = Posed(solids)
+        in_world = WorldSolids(solids)
         return {
-            "boolean": lambda: posed.hits(which, X_WBs),
-            "signed": lambda: posed.rows(which, X_WBs)["distance"],
-            "unsigned": lambda: posed.rows(which, X_WBs, signed=False)["distance"],
+            "boolean": lambda: in_world.hits(which, X_WBs),
+            "signed": lambda: in_world.rows(which, X_WBs)["distance"],
+            "unsigned": lambda: in_world.rows(which, X_WBs, signed=False)["distance"],
         }
     A, B, eye = solids[0].shape, solids[1].shape, np.eye(4)
     if table == "single":
@@ -105,9 +106,9 @@ def operation_counts(asked: Scene) -> str:
     A round asks one support point of each body, so this bounds the cost of a support query from above.
     The engine counts no support queries of booleans.
     """
-    posed = Posed(asked.solids)
-    rows = posed.rows(asked.which, asked.X_WBs)
-    seconds = min(seconds_of(lambda: posed.rows(asked.which, asked.X_WBs)) for _ in range(3))
+    in_world = WorldSolids(asked.solids)
+    rows = in_world.rows(asked.which, asked.X_WBs)
+    seconds = min(seconds_of(lambda: in_world.rows(asked.which, asked.X_WBs)) for _ in range(3))
     gjk, epa = rows["iterations"] & 0xFFFF, rows["iterations"] >> 16
     parts = []
     for k, name in enumerate(CLASSES):
@@ -129,11 +130,11 @@ def seconds_of(task) -> float:
 
 def disagreements(asked: Scene, coal: Coal) -> str:
     """Against coal, away from touching: pairs whose booleans differ, and the largest difference of distances."""
-    posed = Posed(asked.solids)
-    clear = np.abs(asked.distances) > TOUCHING * LENGTH
+    in_world = WorldSolids(asked.solids)
+    not_touching = np.abs(asked.distances) > TOUCHING * LENGTH
     hits, signed = coal.answers("boolean") > 0, coal.answers("signed")
-    differ = clear & (posed.hits(asked.which, asked.X_WBs) != hits)
-    text = f"{differ.sum()} of {clear.sum()} booleans differ from coal's"
+    differ = not_touching & (in_world.hits(asked.which, asked.X_WBs) != hits)
+    text = f"{differ.sum()} of {not_touching.sum()} booleans differ from coal's"
     if differ.any():
         text += f" (in {(differ & (hits != (signed <= 0))).sum()} coal's own distance contradicts its boolean)"
     return f"{text}; distances by at most {np.abs(asked.distances - signed).max() / LENGTH:.0e} lengths"
@@ -151,7 +152,7 @@ def compared(table: str, n: int, asked: Scene, engines: list[str], repeats: int)
         times.setdefault((question, engine, poses), []).append(seconds / count * 1e6)
 
     if "coal" in peers:
-        tell(f"{table}, n = {n}: {disagreements(asked, peers['coal'])}")
+        log(f"{table}, n = {n}: {disagreements(asked, peers['coal'])}")
     for _ in range(repeats + 1):
         for question, task in mix.items():
             note(question, "collide", "mix", seconds_of(task), len(asked.which))
@@ -164,7 +165,7 @@ def compared(table: str, n: int, asked: Scene, engines: list[str], repeats: int)
     if "fcl" in peers:
         peers["fcl"].close()
     if table != "single":
-        tell(f"{table}, n = {n}: {operation_counts(asked)}")
+        log(f"{table}, n = {n}: {operation_counts(asked)}")
     return [row(table, n, *key, warm) for key, (_, *warm) in times.items()]
 
 
@@ -180,9 +181,9 @@ def threaded(n: int, asked: Scene, repeats: int) -> list[dict]:
     alone, together = ours(asked, "threads"), ours(asked, "threads", threads=2)
     times: dict[tuple[str, str, str], list[float]] = {}
 
-    def note(question: str, one: float, two: float, count: int) -> None:
-        times.setdefault((question, "collide", "mix"), []).append(one / count * 1e6)
-        times.setdefault((question, "two threads", "mix"), []).append(two / count * 1e6)
+    def note(question: str, seconds_a: float, seconds_b: float, count: int) -> None:
+        times.setdefault((question, "collide", "mix"), []).append(seconds_a / count * 1e6)
+        times.setdefault((question, "two threads", "mix"), []).append(seconds_b / count * 1e6)
 
     with ThreadPoolExecutor(2) as pool:
         for _ in range(repeats + 1):
@@ -219,8 +220,8 @@ def judged(rows: list[dict]) -> list[dict]:
         r["ratio"] = r["bar"] = r["stretch"] = r["verdict"] = ""
         if r["engine"] == "collide":
             continue
-        own, key = mine[r["table"], r["n"], r["question"]], (r["table"], r["question"])
-        ratio = own / r["median_us"] if r["engine"] == "two threads" else r["median_us"] / own
+        our_answers, key = mine[r["table"], r["n"], r["question"]], (r["table"], r["question"])
+        ratio = our_answers / r["median_us"] if r["engine"] == "two threads" else r["median_us"] / our_answers
         bar: float | None = 4.0 if r["table"] == "cgal" else BARS.get(key, {}).get(r["n"])
         stretch = STRETCH.get(key, {}).get(r["n"])
         r["ratio"] = f"{ratio:.2f}"
@@ -233,16 +234,16 @@ def judged(rows: list[dict]) -> list[dict]:
 def show(table: str, rows: list[dict]) -> None:
     """One line a question and size: our time by class, theirs, the ratios and the bars."""
     others = [engine for engine in dict.fromkeys(r["engine"] for r in rows) if engine != "collide"]
-    found = {(r["question"], r["n"], r["engine"], r["poses"]): r for r in rows}
+    by_key = {(r["question"], r["n"], r["engine"], r["poses"]): r for r in rows}
     classes = [name for name in (*CLASSES, "mix") if any(r["poses"] == name for r in rows)]
     lines = [["question", "n", *classes, *(cell for e in others for cell in (e, "×")), "bar", "stretch", "verdict"]]
     for question in dict.fromkeys(r["question"] for r in rows):
         for n in dict.fromkeys(r["n"] for r in rows):
             line = [question, f"{n:,}"]
-            line += [f"{found[question, n, 'collide', name]['median_us']:.3f}" for name in classes]
+            line += [f"{by_key[question, n, 'collide', name]['median_us']:.3f}" for name in classes]
             verdict = ["", "", ""]
             for engine in others:
-                r = found.get((question, n, engine, "mix"))
+                r = by_key.get((question, n, engine, "mix"))
                 line += [f"{r['median_us']:.3f}", r["ratio"]] if r else ["", ""]
                 if r and r["bar"]:
                     verdict = [r["bar"], r["stretch"], r["verdict"]]
@@ -258,9 +259,9 @@ def show(table: str, rows: list[dict]) -> None:
 def aligned(title: str, lines: list[list[str]]) -> None:
     """A table: the first column to the left, the others to the right."""
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    tell(f"\n{title}")
+    log(f"\n{title}")
     for first, *rest in lines:
-        tell("  ".join([first.ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(rest, widths[1:]))]).rstrip())
+        log("  ".join([first.ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(rest, widths[1:]))]).rstrip())
 
 
 def write(name: str, rows: list[dict], about: dict[str, str]) -> Path:
@@ -282,7 +283,7 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def tell(text: str) -> None:
+def log(text: str) -> None:
     """A finding."""
     print(text, flush=True)
 

@@ -16,9 +16,9 @@ import numpy as np
 
 QUESTIONS = ("boolean", "signed", "unsigned")
 #: Most iterations of coal where a tolerance is asked for; its default is too few for tight ones.
-MOST_ITERATIONS = 1000
+MAX_ITERATIONS = 1000
 #: How long python-fcl may take over one loop before it counts as hung [s].
-PATIENCE = 300.0
+TIMEOUT = 300.0
 
 
 class Coal:
@@ -50,11 +50,11 @@ class Coal:
 
     def answers(self, question: str, tolerance: float | None = None) -> np.ndarray:
         ask, request, result, origin = *self._asked(question, tolerance), self._origin
-        found = []
+        answers = []
         for a, b, T in self._pairs:
             result.clear()  # a distance result that is not cleared keeps its answer
-            found.append(ask(a, origin, b, T, request, result))
-        return np.array(found, dtype=float)
+            answers.append(ask(a, origin, b, T, request, result))
+        return np.array(answers, dtype=float)
 
     @staticmethod
     def _asked(question: str, tolerance: float | None) -> tuple:
@@ -74,7 +74,7 @@ def set_tolerance(request, tolerance: float | None) -> None:
     """coal's GJK and EPA told to stop there; None leaves a request as it is."""
     if tolerance is not None:
         request.gjk_tolerance = request.epa_tolerance = tolerance
-        request.gjk_max_iterations = request.epa_max_iterations = MOST_ITERATIONS
+        request.gjk_max_iterations = request.epa_max_iterations = MAX_ITERATIONS
 
 
 def _coal_hull(points: np.ndarray, faces: np.ndarray):
@@ -102,10 +102,10 @@ class Fcl:
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_fcl_child, args=(other,), daemon=True)
+        self._pipe, child_end = context.Pipe()
+        self._process = context.Process(target=_fcl_child, args=(child_end,), daemon=True)
         self._process.start()
-        other.close()  # or the death of the child would not close the pipe
+        child_end.close()  # or the death of the child would not close the pipe
         try:
             self._pipe.send(self._job)
         except OSError:
@@ -125,7 +125,7 @@ class Fcl:
             return nothing
         try:
             self._pipe.send(question)
-            if self._pipe.poll(PATIENCE):
+            if self._pipe.poll(TIMEOUT):
                 return self._pipe.recv()
         except (EOFError, OSError):
             pass
@@ -166,5 +166,5 @@ def _fcl_child(pipe) -> None:
             request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=signed)
             ask, result = fcl.distance, fcl.DistanceResult
         started = time.perf_counter()
-        found = [ask(a, b, request, result()) for a, b in pairs]  # results accumulate, so each pair gets its own
-        pipe.send((time.perf_counter() - started, np.array(found, dtype=float)))
+        results = [ask(a, b, request, result()) for a, b in pairs]  # results accumulate, so each pair gets its own
+        pipe.send((time.perf_counter() - started, np.array(results, dtype=float)))

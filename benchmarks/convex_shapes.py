@@ -99,11 +99,11 @@ class Scene(NamedTuple):
     labels: np.ndarray
     distances: np.ndarray
 
-    def only(self, chosen: np.ndarray) -> Scene:
-        return self._replace(**{f: getattr(self, f)[chosen] for f in ("which", "X_WBs", "labels", "distances")})
+    def only(self, indices: np.ndarray) -> Scene:
+        return self._replace(**{f: getattr(self, f)[indices] for f in ("which", "X_WBs", "labels", "distances")})
 
 
-class Posed:
+class WorldSolids:
     """collide's batch over a scene of many shapes: a pair of them at every pose."""
 
     def __init__(self, solids: list[Solid]):
@@ -135,12 +135,12 @@ def scene(kind: str, n: int, poses: int, shapes: int = 2) -> Scene:
     directions /= np.sqrt(np.square(directions).sum(axis=1))[:, None]
     X = np.tile(np.eye(4), (count, 1, 1))
     X[:, :3, :3] = rotations(random.normal(size=(count, 4)))
-    posed = Posed(solids)
+    in_world = WorldSolids(solids)
 
     def signed(rows: np.ndarray, along: np.ndarray) -> np.ndarray:
         at = X[rows]
         at[:, :3, 3] = directions[rows] * along[:, None]
-        return posed.rows(which[rows], at)["distance"]
+        return in_world.rows(which[rows], at)["distance"]
 
     everything = np.arange(count)
     if kind == "sphere" and n >= ROUND_ENOUGH:
@@ -173,13 +173,13 @@ def place(signed: Callable, targets: np.ndarray, deepest: np.ndarray) -> tuple[n
     high = 2 * LENGTH + np.maximum(targets, 0.0)  # beyond both reaches, which shifted means have made longer than 1
     f_high = signed(np.arange(n), high) - targets
     assert (f_low < 0).all() and (f_high > 0).all(), "the distances wanted lie on the lines of centres"
-    along, found, last = high.copy(), f_high + targets, np.zeros(n, dtype=int)
+    along, values, last = high.copy(), f_high + targets, np.zeros(n, dtype=int)
     open_rows = np.arange(n)
     for _ in range(60):
         r = open_rows
         along[r] = (low[r] * f_high[r] - high[r] * f_low[r]) / (f_high[r] - f_low[r])
-        found[r] = signed(r, along[r])
-        error = found[r] - targets[r]
+        values[r] = signed(r, along[r])
+        error = values[r] - targets[r]
         side = np.where(error < 0, -1, 1)
         # Illinois: an end that stays twice has its value halved, so that both ends close in.
         halved = np.where(side == last[r], 0.5, 1.0)
@@ -188,7 +188,7 @@ def place(signed: Callable, targets: np.ndarray, deepest: np.ndarray) -> tuple[n
         last[r] = side
         open_rows = r[np.abs(error) > 1e-4 * LENGTH]
         if not len(open_rows):
-            return along, found
+            return along, values
     raise AssertionError(f"{len(open_rows)} of {n} poses found no place")
 
 

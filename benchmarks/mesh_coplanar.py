@@ -2,9 +2,9 @@
 
     python benchmarks/mesh_coplanar.py       # two minutes; --no-csv
 
-Equal meshes in equal poses, turned and not; meshes whose vertices are rounded to a grid, one moved by a cell; flat grids
-of 32,768 facets in one plane. The share of pairs of facets that needed more than doubles is told, and how many pairs coal
-finds. Times are the fastest of three, engines in turn.
+Equal meshes in equal poses, turned and not; meshes whose vertices are rounded to a grid, one moved by a cell; flat
+grids of 32,768 facets in one plane. The share of pairs of facets that needed more than doubles is told, and how many
+pairs coal finds. Times are the fastest of three, engines in turn.
 """
 
 from __future__ import annotations
@@ -32,13 +32,16 @@ def flat_grid(n: int) -> tuple[np.ndarray, np.ndarray]:
     """(vertices, faces): 2·n² triangles over the unit square."""
     x, y = np.meshgrid(np.arange(n + 1) / n, np.arange(n + 1) / n, indexing="ij")
     corner = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :n].ravel()
-    lower, upper = np.stack([corner, corner + n + 1, corner + 1], axis=1), np.stack([corner + 1, corner + n + 1, corner + n + 2], axis=1)
+    lower, upper = (
+        np.stack([corner, corner + n + 1, corner + 1], axis=1),
+        np.stack([corner + 1, corner + n + 1, corner + n + 2], axis=1),
+    )
     return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), np.concatenate([lower, upper])
 
 
-def moved(x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
+def moved(x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
     X = np.eye(4)
-    X[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    X[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     X[:2, 3] = x, y
     return X
 
@@ -57,7 +60,7 @@ def cases():
     half = moved(0.5 / GRID, 0.25 / GRID)
     yield "grids on each other", grid, grid, np.eye(4), np.eye(4)
     yield "grids, half a cell moved", grid, grid, np.eye(4), half
-    yield "grids, turned in their plane", grid, grid, np.eye(4), moved(turn=0.3)
+    yield "grids, turned in their plane", grid, grid, np.eye(4), moved(angle=0.3)
     yield "grids, both turned out of it", grid, grid, turned, turned @ half
 
 
@@ -94,14 +97,14 @@ def measured(name, A, B, X_WA, X_WB) -> dict:
         coal.collide(models[0], places[0], models[1], places[1], request, result)
         return result.numContacts()
 
-    found = all_hits(*trees, X_WA, X_WB)
-    _, triangles, exact = found.counters[0].tolist()
+    hits = all_hits(*trees, X_WA, X_WB)
+    _, triangles, exact = hits.counters[0].tolist()
     pairs_of_coal = ask_coal()
-    own, theirs = fastest(lambda: all_hits(*trees, X_WA, X_WB)), fastest(ask_coal)
+    ours, theirs = fastest(lambda: all_hits(*trees, X_WA, X_WB)), fastest(ask_coal)
     return {
-        "case": name, "pairs": len(found.pairs), "pairs_of_coal": pairs_of_coal, "tested": triangles,
-        "exact_share": f"{exact / max(triangles, 1):.4f}", "ms": f"{own:.2f}", "coal_ms": f"{theirs:.2f}",
-        "ratio": f"{theirs / own:.2f}", "us_a_test": f"{1e3 * own / max(triangles, 1):.3f}",
+        "case": name, "pairs": len(hits.pairs), "pairs_of_coal": pairs_of_coal, "tested": triangles,
+        "exact_share": f"{exact / max(triangles, 1):.4f}", "ms": f"{ours:.2f}", "coal_ms": f"{theirs:.2f}",
+        "ratio": f"{theirs / ours:.2f}", "us_a_test": f"{1e3 * ours / max(triangles, 1):.3f}",
     }  # fmt: skip
 
 

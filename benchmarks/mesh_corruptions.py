@@ -4,8 +4,9 @@
     python benchmarks/mesh_corruptions.py --minutes 20 --share 0/2
     python benchmarks/mesh_corruptions.py --only duck.obj --case 17
 
-One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/families/mesh_corruptions.py`). Files
-are gone through in rounds of a few corruptions, so that a run cut short has seen all of them. A file and the number
+One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/families/mesh_corruptions.py`).
+Files are gone through in rounds of a few corruptions, so that a run cut short has seen all of them. A file and the
+number
 of a case give the same case again. Exit status: 0 nothing wrong, 1 something is.
 """
 
@@ -40,8 +41,8 @@ def files(only: str | None) -> list[tuple[str, Path]]:
     import pybullet_data
 
     root = Path(pybullet_data.getDataPath())
-    found = [(p.relative_to(root).as_posix(), p) for p in root.rglob("*") if p.suffix.lower() in SUFFIXES]
-    return sorted(entry for entry in found if only is None or only in entry[0])
+    files = [(p.relative_to(root).as_posix(), p) for p in root.rglob("*") if p.suffix.lower() in SUFFIXES]
+    return sorted(entry for entry in files if only is None or only in entry[0])
 
 
 def whole(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
@@ -93,18 +94,22 @@ def main() -> None:
             seen.add(name)
             for k in cases[begin : begin + ROUND]:
                 try:
-                    kind, said = case(name, mesh, k)
+                    kind, outcome = case(name, mesh, k)
                 except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-                    kind, said = "?", mesh_corruptions.Said("raised", False, f"{type(error).__name__}: {error}")
-                counts[said.outcome] += 1
-                counts["solids" if said.solid else "surfaces"] += said.outcome not in ("refused", "raised")
+                    kind, outcome = "?", mesh_corruptions.Said("raised", False, f"{type(error).__name__}: {error}")
+                counts[outcome.outcome] += 1
+                counts["solids" if outcome.solid else "surfaces"] += outcome.outcome not in ("refused", "raised")
                 kinds[kind] += 1
-                if said.wrong:
+                if outcome.wrong:
                     wrong += 1
-                    print(f"WRONG --only {name} --case {k} ({kind}): {said.wrong}", flush=True)
+                    print(f"WRONG --only {name} --case {k} ({kind}): {outcome.wrong}", flush=True)
         spent = time.perf_counter() - started
         end = "in the middle of" if stopped else "after"
-        print(f"{spent:6.0f} s  {end} case {min(begin + ROUND, len(cases)) - 1} of {len(seen)} files: {dict(counts)}, {wrong} wrong", flush=True)
+        print(
+            f"{spent:6.0f} s  {end} case {min(begin + ROUND, len(cases)) - 1} of {len(seen)} files: {dict(counts)}, "
+            f"{wrong} wrong",
+            flush=True,
+        )
         if stopped:
             break
     print(f"cases by kind: {dict(kinds)}")

@@ -15,8 +15,8 @@ import numpy as np
 #: What is timed: building, the boolean, all pairs of facets (without contact points), the distance with points.
 QUESTIONS = ("build", "boolean", "all pairs", "distance")
 #: Pairs of facets asked for.
-MANY = 10_000_000
-PATIENCE = 120.0
+MAX_PAIRS = 10_000_000
+TIMEOUT = 120.0
 
 
 #: A run repeats short loops for as long as this, and counts the fastest: other processes come in between.
@@ -75,7 +75,7 @@ class Coal:
             request, ask, result = coal.CollisionRequest(), coal.collide, coal.CollisionResult
             request.break_distance = 0.0
             request.enable_contact = False
-            request.num_max_contacts = 1 if question == "boolean" else MANY
+            request.num_max_contacts = 1 if question == "boolean" else MAX_PAIRS
         started = time.perf_counter()
         for X_WA, X_WB in self._poses:
             ask(a, X_WA, b, X_WB, request, result())
@@ -99,17 +99,17 @@ class Fcl:
 
     def __init__(self, meshes: list, X_WAs: np.ndarray, X_WBs: np.ndarray):
         context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_child, args=(other,), daemon=True)
+        self._pipe, child_end = context.Pipe()
+        self._process = context.Process(target=_child, args=(child_end,), daemon=True)
         self._process.start()
-        other.close()
+        child_end.close()
         self._pipe.send((meshes, X_WAs, X_WBs))
 
     def seconds(self, question: str) -> float:
         """As `Coal.seconds`; NaN once the child has died or hung."""
         try:
             self._pipe.send(question)
-            if self._pipe.poll(PATIENCE):
+            if self._pipe.poll(TIMEOUT):
                 return self._pipe.recv()
         except (EOFError, OSError):
             pass
@@ -120,7 +120,7 @@ class Fcl:
         """The booleans; None where the child is dead."""
         try:
             self._pipe.send("answers")
-            return self._pipe.recv() if self._pipe.poll(PATIENCE) else None
+            return self._pipe.recv() if self._pipe.poll(TIMEOUT) else None
         except (EOFError, OSError):
             return None
 
@@ -163,7 +163,7 @@ def _fcl_once(fcl, question: str, meshes, poses) -> float:
         for a, b in poses:
             fcl.distance(a, b, request, fcl.DistanceResult())
     else:
-        request = fcl.CollisionRequest(num_max_contacts=1 if question == "boolean" else MANY, enable_contact=False)
+        request = fcl.CollisionRequest(num_max_contacts=1 if question == "boolean" else MAX_PAIRS, enable_contact=False)
         for a, b in poses:
             fcl.collide(a, b, request, fcl.CollisionResult())
     return time.perf_counter() - started

@@ -1,6 +1,7 @@
 """Making meshes and measuring their locality: time against the number of facets.
 
-    python benchmarks/mesh_shapes.py [MESH...]        # a minute; --no-csv. Without files: the real inputs, where they are
+    python benchmarks/mesh_shapes.py [MESH...]
+    # a minute; --no-csv. Without files: the real inputs, where they are
 
 For each mesh, in milliseconds, the fastest of several runs: `Mesh` as it comes (welding, defects, shells, volumes),
 the same as loose triangles the way an STL has them, taken as a surface without a look, read from a pickle; and
@@ -38,15 +39,17 @@ def least(task, seconds: float = 1.5) -> float:
 
 def measured(name: str, vertices: np.ndarray, faces: np.ndarray) -> dict:
     mesh = collide.Mesh(vertices, faces)
-    kept = pickle.dumps(mesh)
-    loose, ids = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
-    found = mesh.locality()
+    pickled = pickle.dumps(mesh)
+    corners, ids = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+    locality = mesh.locality()
     return {
         "mesh": name, "facets": len(faces), "solid": mesh.solid, "shells": mesh.report.shells,
-        "mesh_ms": least(lambda: collide.Mesh(vertices, faces)), "soup_ms": least(lambda: collide.Mesh(loose, ids)),
-        "surface_ms": least(lambda: collide.Mesh(vertices, faces, solid=False)), "unpickle_ms": least(lambda: pickle.loads(kept)),
-        "locality_ms": least(mesh.locality), "sigma": found.local_stretches[0], "sigma_10": found.local_stretches[9],
-        "Sigma": found.global_stretch,
+        "mesh_ms": least(lambda: collide.Mesh(vertices, faces)), "soup_ms": least(lambda: collide.Mesh(corners, ids)),
+        "surface_ms": least(lambda: collide.Mesh(vertices, faces, solid=False)),
+        "unpickle_ms": least(lambda: pickle.loads(pickled)),
+        "locality_ms": least(mesh.locality), "sigma": locality.local_stretches[0],
+        "sigma_10": locality.local_stretches[9],
+        "Sigma": locality.global_stretch,
     }  # fmt: skip
 
 
@@ -59,11 +62,14 @@ def main() -> None:
     inputs = [(name, mesh.vertices, mesh.faces) for file in files for name, mesh in read_meshes(file)]
     inputs += [(f"harpsicordia_{n}", m.vertices, m.faces) for n in SIZES for m in harpsicordia(n)[:1]]
     rows: list[dict] = []
-    for given in inputs:
-        rows.append(measured(*given))
+    for source in inputs:
+        rows.append(measured(*source))
         if len(rows) == 1:
             print("  ".join(f"{title:>12}" for title in rows[0]))
-        print("  ".join(f"{v:>12,.4g}" if isinstance(v, float) else f"{v!s:>12.12}" for v in rows[-1].values()), flush=True)
+        print(
+            "  ".join(f"{v:>12,.4g}" if isinstance(v, float) else f"{v!s:>12.12}" for v in rows[-1].values()),
+            flush=True,
+        )
     if not args.no_csv:
         with (Path(__file__).parent / "results" / "mesh_shapes.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")

@@ -1,6 +1,7 @@
 """Triangle meshes against coal and FCL: building, booleans, all pairs of facets, distances.
 
-    python benchmarks/meshes.py                       # ten minutes; --meshes teapot bunny, --runs N, --poses N, --no-csv
+    python benchmarks/meshes.py
+    # ten minutes; --meshes teapot bunny, --runs N, --poses N, --no-csv
 
 Meshes are scaled to a box diagonal of 1 and stand in random poses of six classes: far (0.5 apart), gaps of 1e-2 and
 1e-4, shallow (1e-3 into each other), deep (0.1), and inside (the second mesh a tenth as large, in the first one).
@@ -99,14 +100,14 @@ def touching(A, B, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 def poses(A, B, count: int, seed: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Class to (X_WAs, X_WBs)."""
     rng = np.random.default_rng(seed)
-    found: dict[str, list] = {name: [] for name in CLASSES}
+    by_class: dict[str, list] = {name: [] for name in CLASSES}
     for _ in range(count):
         X, Y, direction, way = touching(A, B, rng)
         for name, further in CLASSES.items():
             Z = Y.copy()
             Z[:3, 3] = X[:3, 3] + ((way + further) * direction if further is not None else rng.normal(size=3) * 0.02)
-            found[name].append((X, Z))
-    return {name: tuple(np.array(X) for X in zip(*pairs)) for name, pairs in found.items()}  # type: ignore[misc]
+            by_class[name].append((X, Z))
+    return {name: tuple(np.array(X) for X in zip(*pairs)) for name, pairs in by_class.items()}  # type: ignore[misc]
 
 
 #: How often a batch of booleans holds every pose.
@@ -116,13 +117,13 @@ OVER = 10
 def ours(trees, meshes, X_WAs, X_WBs) -> dict:
     """(question, how asked) -> a task."""
     A, B = trees
-    many_WA, many_WB = (np.tile(X, (OVER, 1, 1)) for X in (X_WAs, X_WBs))
+    X_WAs_repeated, X_WBs_repeated = (np.tile(X, (OVER, 1, 1)) for X in (X_WAs, X_WBs))
     surfaces = [Mesh(*m, solid=False) for m in meshes]
     each = list(zip(X_WAs, X_WBs))
     collide(*surfaces, *each[0])  # trees are built when first asked for
     return {
         ("build", "batch"): lambda: [build_mesh_tree(*m) for m in meshes],
-        ("boolean", "batch"): lambda: first_hits(A, B, many_WA, many_WB),
+        ("boolean", "batch"): lambda: first_hits(A, B, X_WAs_repeated, X_WBs_repeated),
         ("boolean", "single"): lambda: [collide(*surfaces, X, Y) for X, Y in each],
         ("all pairs", "batch"): lambda: all_hits(A, B, X_WAs, X_WBs),
         ("distance", "batch"): lambda: surface_distances(A, B, X_WAs, X_WBs),
@@ -145,7 +146,7 @@ def measured(pair: str, name: str, meshes, trees, X_WAs, X_WBs, runs: int, with_
     tasks = ours(trees, meshes, X_WAs, X_WBs)
     peers = [Coal("OBBRSS", meshes, X_WAs, X_WBs), Coal("OBB", meshes, X_WAs, X_WBs), Fcl(meshes, X_WAs, X_WBs)]
     hits = np.diff(first_hits(*trees, X_WAs, X_WBs).starts) > 0
-    wrong = {p.name: "" if (said := p.answers()) is None else int((said != hits).sum()) for p in peers}
+    wrong = {p.name: "" if (reply := p.answers()) is None else int((reply != hits).sum()) for p in peers}
     rows = []
     for question in QUESTIONS:
         if question == "build" and not with_build:
@@ -158,13 +159,15 @@ def measured(pair: str, name: str, meshes, trees, X_WAs, X_WBs, runs: int, with_
                 times[f"collide {how}"].append(seconds_of(tasks[question, how]) / asked_over)
             for peer in peers:
                 times[peer.name].append(peer.seconds(question))
-        own = np.median(times["collide batch"])
+        ours_seconds = np.median(times["collide batch"])
         count = 1 if question == "build" else len(X_WAs)
         for engine, taken in times.items():
             rows.append({
-                "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes), "poses": "" if question == "build" else name,
-                "question": question, "engine": engine, "runs": len(taken), "median_us": f"{np.median(taken) / count * 1e6:.2f}",
-                "least_us": f"{min(taken) / count * 1e6:.2f}", "ratio": f"{np.median(taken) / own:.2f}",
+                "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes),
+                "poses": "" if question == "build" else name,
+                "question": question, "engine": engine, "runs": len(taken),
+                "median_us": f"{np.median(taken) / count * 1e6:.2f}",
+                "least_us": f"{min(taken) / count * 1e6:.2f}", "ratio": f"{np.median(taken) / ours_seconds:.2f}",
                 "disagreements": wrong.get(engine, "") if question == "boolean" else "",
             })  # fmt: skip
     rows += counted(pair, name, meshes, trees, X_WAs, X_WBs)
@@ -180,28 +183,34 @@ def counted(pair: str, name: str, meshes, trees, X_WAs, X_WBs) -> list[dict]:
         boxes, triangles, exact = ask(*trees, X_WAs, X_WBs).counters.mean(axis=0)
         rows.append({
             "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes), "poses": name, "question": question,
-            "engine": "collide counters", "boxes": f"{boxes:.1f}", "triangles": f"{triangles:.1f}", "exact": f"{exact:.2f}",
+            "engine": "collide counters", "boxes": f"{boxes:.1f}", "triangles": f"{triangles:.1f}",
+            "exact": f"{exact:.2f}",
         })  # fmt: skip
     return rows
 
 
-def shown(rows: list[dict]) -> str:
+def as_text(rows: list[dict]) -> str:
     """Ratios to each peer, a line a pair of meshes, question and class."""
-    lines = [f"{'meshes':12} {'question':10} {'poses':9} {'us':>9} {'single':>8} {'OBBRSS':>7} {'OBB':>7} {'fcl':>7}  wrong"]
+    lines = [
+        f"{'meshes':12} {'question':10} {'poses':9} {'us':>9} {'single':>8} {'OBBRSS':>7} {'OBB':>7} {'fcl':>7}  wrong"
+    ]
     keys = dict.fromkeys((r["meshes"], r["question"], r["poses"]) for r in rows if "ratio" in r)
     for key in keys:
         of = {r["engine"]: r for r in rows if (r["meshes"], r["question"], r["poses"]) == key and "ratio" in r}
         wrong = "/".join(str(of[e]["disagreements"]) for e in ("coal OBBRSS", "coal OBB", "fcl"))
         single = of["collide single"]["median_us"] if "collide single" in of else ""
         ratios = " ".join(f"{of[e]['ratio']:>7}" for e in ("coal OBBRSS", "coal OBB", "fcl"))
-        lines.append(f"{key[0]:12} {key[1]:10} {key[2]:9} {of['collide batch']['median_us']:>9} {single:>8} {ratios}  {wrong}")
+        lines.append(
+            f"{key[0]:12} {key[1]:10} {key[2]:9} {of['collide batch']['median_us']:>9} {single:>8} {ratios}  {wrong}"
+        )
     return "\n".join(lines)
 
 
 def write(rows: list[dict]) -> Path:
     """The CSV, with the processor and the versions the times belong to."""
     about = {
-        "cpu": processor(), "cores": str(os.cpu_count()), "system": platform.system(), "python": platform.python_version(),
+        "cpu": processor(), "cores": str(os.cpu_count()), "system": platform.system(),
+        "python": platform.python_version(),
         **{name: version(package) for name, package in PACKAGES.items()},
     }  # fmt: skip
     slug = re.sub(r"[^a-z0-9]+", "-", about["cpu"].lower()).strip("-")
@@ -235,15 +244,15 @@ def main() -> int:
     for pair in options.meshes:
         meshes = [mesh(name) for name in PAIRS[pair]]
         trees = [build_mesh_tree(*m) for m in meshes]
-        posed = poses(*trees, options.poses, seed=1)
+        poses_by_class = poses(*trees, options.poses, seed=1)
         for k, name in enumerate(options.classes):
-            both, own = meshes, trees
+            both, our_trees = meshes, trees
             if name == "inside":
                 both = [meshes[0], (meshes[1][0] * 0.1, meshes[1][1])]
-                own = [trees[0], build_mesh_tree(*both[1])]
-            found = measured(pair, name, both, own, *posed[name], options.runs, k == 0)
-            print(shown(found) if not rows else shown(found).split("\n", 1)[1], flush=True)
-            rows += found
+                our_trees = [trees[0], build_mesh_tree(*both[1])]
+            row = measured(pair, name, both, our_trees, *poses_by_class[name], options.runs, k == 0)
+            print(as_text(row) if not rows else as_text(row).split("\n", 1)[1], flush=True)
+            rows += row
     if not options.no_csv:
         print(write(rows))
     return 0

@@ -1,10 +1,12 @@
 """Rays against meshes: `collide.raycast` beside embree and trimesh's own rays, and pybullet's batches.
 
-    python benchmarks/rays.py                    # half a minute; needs trimesh and pybullet; embreex where it is installed
+    python benchmarks/rays.py
+    # half a minute; needs trimesh and pybullet; embreex where it is installed
 
-First hits of random rays through meshes of box diagonal 1, from a sphere around them at points near the middle. Engines take
-turns; times are the least of several turns, per ray. embree and pybullet work in single precision or with meshes read
-anew from a file; "facets" and "missed" count rays for which they name another facet, or none, where a facet is hit.
+First hits of random rays through meshes of box diagonal 1, from a sphere around them at points near the middle. Engines
+take turns; times are the least of several turns, per ray. embree and pybullet work in single precision or with meshes
+read anew from a file; "facets" and "missed" count rays for which they name another facet, or none, where a facet is
+hit.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ import collide
 #: No more than one batch of pybullet's.
 RAYS, TURNS = 16_000, 7
 #: trimesh's own rays take up to a second each.
-FEW = 16
+SAMPLE = 16
 
 
 def rays(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -39,19 +41,19 @@ def rays(seed: int) -> tuple[np.ndarray, np.ndarray]:
 def engines(vertices, faces, origins, directions, folder: Path) -> dict:
     """Name to a task that gives (facets or −1, which rays it was asked)."""
     body = collide.Mesh(vertices, faces, solid=False)
-    found = {"collide": lambda: collide.raycast(body, np.eye(4), origins, directions).facet}
+    by_engine = {"collide": lambda: collide.raycast(body, np.eye(4), origins, directions).facet}
     import trimesh
     from trimesh.ray import ray_triangle
 
     plain = trimesh.Trimesh(vertices, faces, process=False)
-    few = slice(0, FEW)
+    sample = slice(0, SAMPLE)
     slow = ray_triangle.RayMeshIntersector(plain)
-    found["trimesh"] = lambda: slow.intersects_first(origins[few], directions[few])
+    by_engine["trimesh"] = lambda: slow.intersects_first(origins[sample], directions[sample])
     try:
         from trimesh.ray import ray_pyembree
 
         quick = ray_pyembree.RayMeshIntersector(plain)
-        found["embree"] = lambda: quick.intersects_first(origins, directions)
+        by_engine["embree"] = lambda: quick.intersects_first(origins, directions)
     except (ImportError, AttributeError):
         print("embree is not installed (pip install embreex): left out")
     try:
@@ -61,18 +63,20 @@ def engines(vertices, faces, origins, directions, folder: Path) -> dict:
         plain.export(place)
         client = pybullet.connect(pybullet.DIRECT)
         flag = pybullet.GEOM_FORCE_CONCAVE_TRIMESH
-        shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=str(place), flags=flag, physicsClientId=client)
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_MESH, fileName=str(place), flags=flag, physicsClientId=client
+        )
         pybullet.createMultiBody(0, shape, physicsClientId=client)
         starts, ends = origins.tolist(), (origins + 2 * directions).tolist()
 
         def ask() -> np.ndarray:
-            told = pybullet.rayTestBatch(starts, ends, numThreads=1, physicsClientId=client)
-            return np.array([-1 if one[0] < 0 else -2 for one in told])
+            replies = pybullet.rayTestBatch(starts, ends, numThreads=1, physicsClientId=client)
+            return np.array([-1 if reply[0] < 0 else -2 for reply in replies])
 
-        found["pybullet"] = ask
+        by_engine["pybullet"] = ask
     except ImportError:
         print("pybullet is not installed (pip install 'collide-robotics[peers]'): left out")
-    return found
+    return by_engine
 
 
 def main() -> int:
@@ -87,24 +91,39 @@ def main() -> int:
             tasks = engines(vertices, faces, origins, directions, Path(folder))
             facets = {engine: task() for engine, task in tasks.items()}
             best = dict.fromkeys(tasks, np.inf)
-            for turn in range(TURNS):
+            for k in range(TURNS):
                 for engine, task in tasks.items():
-                    if engine == "trimesh" and turn:
+                    if engine == "trimesh" and k:
                         continue
                     started = time.perf_counter()
                     task()
                     best[engine] = min(best[engine], time.perf_counter() - started)
-        own = facets["collide"]
+        ours = facets["collide"]
         for engine, seconds in best.items():
-            said = facets[engine]
-            others = own[: len(said)]
-            wrong = {"missed": int(((said == -1) & (others >= 0)).sum()), "extra": int(((said != -1) & (others < 0)).sum())}
+            theirs = facets[engine]
+            others = ours[: len(theirs)]
+            wrong = {
+                "missed": int(((theirs == -1) & (others >= 0)).sum()),
+                "extra": int(((theirs != -1) & (others < 0)).sum()),
+            }
             if engine != "pybullet":
-                wrong["facets"] = int(((said != others) & (said >= 0) & (others >= 0)).sum())
-            each = seconds / len(said) * 1e6
-            rows.append({"mesh": name, "facets": len(faces), "engine": engine, "us_per_ray": f"{each:.2f}", "hit_share": f"{(own >= 0).mean():.2f}",
-                         **{f"rays_{key}": value for key, value in wrong.items()}})  # fmt: skip
-            print(f"{name:12} {engine:9} {each:8.2f} µs a ray, {each / (best['collide'] / RAYS * 1e6):7.2f} of collide's; {wrong}", flush=True)
+                wrong["facets"] = int(((theirs != others) & (theirs >= 0) & (others >= 0)).sum())
+            each = seconds / len(theirs) * 1e6
+            rows.append(
+                {
+                    "mesh": name,
+                    "facets": len(faces),
+                    "engine": engine,
+                    "us_per_ray": f"{each:.2f}",
+                    "hit_share": f"{(ours >= 0).mean():.2f}",
+                    **{f"rays_{key}": value for key, value in wrong.items()},
+                }
+            )
+            print(
+                f"{name:12} {engine:9} {each:8.2f} µs a ray, {each / (best['collide'] / RAYS * 1e6):7.2f} of "
+                f"collide's; {wrong}",
+                flush=True,
+            )
     place = RESULTS / "rays.csv"
     with open(place, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [*dict.fromkeys(key for row in rows for key in row), "cores"])

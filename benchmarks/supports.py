@@ -69,21 +69,21 @@ def measured(kind: str, n: int) -> dict:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     directions = np.concatenate([random.normal(size=(3 * DIRECTIONS // 4, 3)), normals])
     counters = np.zeros(COUNTERS, dtype=np.int64)
-    found = extreme_vertices(tree, directions, True, counters)
+    vertices = extreme_vertices(tree, directions, True, counters)
     checked = slice(None, None, max(1, len(directions) * n // 40_000_000))
     best = (points @ directions[checked].T).max(axis=0)
-    mine = (points[found[checked]] * directions[checked]).sum(axis=1)
+    mine = (points[vertices[checked]] * directions[checked]).sum(axis=1)
     assert (mine >= best - 1e-14 * np.abs(directions[checked]).sum(axis=1)).all(), "a settled vertex is not farthest"
     scanned, steps, looked_at, signs = counters / len(directions)
     per = 1e9 / len(directions)
     packed = pack_points(points)
-    few = directions[: max(20, 20_000_000 // n)]
+    sample = directions[: max(20, 20_000_000 // n)]
     return {
         "kind": kind, "n": n, "hull_ms": least(lambda: convex_hull(points), 3) * 1e3, "tree_ms": least(build, 3) * 1e3,
         "bytes_a_vertex": tree.nbytes / n, "longest_list": int(np.diff(tree.nodes).max()),
         "tree_ns": least(lambda: extreme_vertices(tree, directions, False)) * per,
         "settled_ns": least(lambda: extreme_vertices(tree, directions, True)) * per,
-        "scan_ns": least(lambda: scan_all(packed, few), 3) / len(few) * 1e9,
+        "scan_ns": least(lambda: scan_all(packed, sample), 3) / len(sample) * 1e9,
         "scanned": scanned, "looked_at": looked_at, "steps": steps, "exact_signs": signs,
     }  # fmt: skip
 
@@ -158,7 +158,10 @@ def main() -> None:
             if columns is None:
                 columns = list(row)
                 print("  ".join(f"{c:>14}" for c in columns))
-            print("  ".join(f"{v:>14,.4g}" if not isinstance(v, (str, int)) else f"{v:>14}" for v in row.values()), flush=True)
+            print(
+                "  ".join(f"{v:>14,.4g}" if not isinstance(v, (str, int)) else f"{v:>14}" for v in row.values()),
+                flush=True,
+            )
     print("\n".join(["", *fitted(rows)]))
     if not args.no_csv:
         path = Path(__file__).parent / "results" / "supports.csv"

@@ -4,9 +4,9 @@
 
 Pairs of bodies of n vertices of several kinds, at poses of which about half meet and many nearly touch. Counts are
 exact, so they are fitted: rounds ≤ a + b·(log2 n + log2 m), for the mean and for the largest of all poses. Time is
-taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is compared with
-the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole bodies at once
-(early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
+taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is
+compared with the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole
+bodies at once (early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from collide.hierarchies.walk import APART
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
 KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")
 #: Larger ones of this generator crowd their vertices; benchmarks/hierarchies.py has one of 786,433.
-MOST_DOUBLING = 200_000
+MAX_DOUBLING = 200_000
 POSES = 1000
 #: Poses timed together: few enough that a turn is seldom interrupted.
 CHUNK = 100
@@ -52,16 +52,16 @@ def degree_doubling(n: int) -> np.ndarray:
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         height = normal @ q
         middle = (q + a + b) / 3
-        room = np.full(len(ring), np.inf)
+        slack = np.full(len(ring), np.inf)
         for n_other, d_other in (
             (np.roll(normal, 1, axis=0), np.roll(height, 1)), (np.roll(normal, -1, axis=0), np.roll(height, -1)),
             (outer[:, :3], outer[:, 3]),
         ):  # fmt: skip
             along = (normal * n_other).sum(axis=1)
-            left = d_other - (middle * n_other).sum(axis=1)
+            remainder = d_other - (middle * n_other).sum(axis=1)
             with np.errstate(divide="ignore"):
-                room = np.where(along > 0, np.minimum(room, left / along), room)
-        made = middle + (0.2 * np.minimum(room, 0.1))[:, None] * normal
+                slack = np.where(along > 0, np.minimum(slack, remainder / along), slack)
+        made = middle + (0.2 * np.minimum(slack, 0.1))[:, None] * normal
         new = np.cross(made - a, b - a)
         new *= np.sign((new * (a - q)).sum(axis=1))[:, None]
         planes = np.concatenate([new, (new * a).sum(axis=1)[:, None]], axis=1)
@@ -104,17 +104,17 @@ def measured(kind: str, n: int) -> dict:
     A, B = body(kind, n, 0), body(kind, n, 2)
     X_WA, X_WB = poses(A, B, rng), np.eye(4)[None]
     started = time.perf_counter()
-    found = collide.walk(A, B, X_WA, X_WB)
+    result = collide.walk(A, B, X_WA, X_WB)
     prepared = time.perf_counter() - started
     truth = collide.collide(A, B, X_WA, X_WB)
-    assert (found.hit == truth).all(), f"{kind} {n}: the walk and the default disagree"
-    axes = found.rows["axis"] * np.where(found.exchanged, -1.0, 1.0) * (found.rows["said"] == APART)[:, None]
+    assert (result.hit == truth).all(), f"{kind} {n}: the walk and the default disagree"
+    axes = result.rows["axis"] * np.where(result.exchanged, -1.0, 1.0) * (result.rows["said"] == APART)[:, None]
     packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
     names = "default", "walk", "walk_kernel", "early_kernel", "default_with_axes"
     seconds = dict.fromkeys(names, 0.0)
     for start in range(0, POSES, CHUNK):
-        own = slice(start, start + CHUNK)
-        X, X_of_B, given = X_WA[own], np.broadcast_to(X_WB, (CHUNK, 4, 4)), axes[own]
+        chunk = slice(start, start + CHUNK)
+        X, X_of_B, axes_k = X_WA[chunk], np.broadcast_to(X_WB, (CHUNK, 4, 4)), axes[chunk]
 
         def by_kernel(early, X=X, X_of_B=X_of_B):
             run_walks(A._walk, B._walk, packed_a, packed_b, X, X_of_B, early=early)
@@ -124,7 +124,7 @@ def measured(kind: str, n: int) -> dict:
             "walk": lambda X=X: collide.walk(A, B, X, X_WB),
             "walk_kernel": lambda: by_kernel(False),
             "early_kernel": lambda: by_kernel(True),
-            "default_with_axes": lambda X=X, given=given: collide.collide(A, B, X, X_WB, axes=given.copy()),
+            "default_with_axes": lambda X=X, axes_k=axes_k: collide.collide(A, B, X, X_WB, axes=axes_k.copy()),
         }
         fastest = dict.fromkeys(names, np.inf)
         for _ in range(TURNS):
@@ -132,16 +132,17 @@ def measured(kind: str, n: int) -> dict:
                 fastest[name] = min(fastest[name], least(tasks[name], 1))
         for name in names:
             seconds[name] += fastest[name]
-    rows = found.rows
+    rows = result.rows
     per = 1e6 / POSES
     ladder_p, ladder_q = A._walk.ladder, B._walk.polar.ladder
     return {
-        "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices), "facets_of_r": len(B._walk.polar.starts) - 1,
-        "depth_p": found.depth_p, "depth_q": found.depth_q, "hits": truth.mean(),
+        "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices),
+        "facets_of_r": len(B._walk.polar.starts) - 1,
+        "depth_p": result.depth_p, "depth_q": result.depth_q, "hits": truth.mean(),
         "rounds_mean": rows["rounds"].mean(), "rounds_most": int(rows["rounds"].max()),
         "tests_mean": rows["tests"].mean(), "tests_most": int(rows["tests"].max()),
         "games_mean": rows["games"].mean(), "pivots_mean": rows["pivots"].mean(),
-        "proven": found.walked.mean(), "prepare_ms": prepared * 1e3,
+        "proven": result.walked.mean(), "prepare_ms": prepared * 1e3,
         "bytes_a_vertex_p": ladder_p.bytes / n, "bytes_a_vertex_q": ladder_q.bytes / n,
         **{f"{name}_us": taken * per for name, taken in seconds.items()},
     }  # fmt: skip
@@ -180,7 +181,9 @@ def drawn(rows: list[dict], path: str) -> None:
         rounds.plot(n, [r["rounds_mean"] for r in of], "o--", color=line.get_color())
         times.plot(n, [r["walk_kernel_us"] for r in of], "o-", color=line.get_color(), label=kind)
         times.plot(n, [r["default_us"] for r in of], "o:", color=line.get_color())
-    rounds.set(title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None))
+    rounds.set(
+        title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None)
+    )
     times.set(title="time of a query [µs]: walk, and (dotted) default", xscale="log", yscale="log", xlabel="vertices")
     rounds.legend()
     times.legend()
@@ -196,17 +199,20 @@ def main() -> None:
     args = parser.parse_args()
     path = Path(__file__).parent / "results" / "walk.csv"
     rows = {} if args.no_csv else read(path)
-    told = False
+    warned = False
     for kind in args.kinds.split(","):
         for n in map(int, args.sizes.split(",")):
-            if kind == "doubling" and n > MOST_DOUBLING:
+            if kind == "doubling" and n > MAX_DOUBLING:
                 continue
             row = measured(kind, n)
-            if not told:
+            if not warned:
                 print("  ".join(f"{c:>11.11}" for c in row))
-                told = True
+                warned = True
             rows[kind, n] = row
-            print("  ".join(f"{v:>11,.4g}" if not isinstance(v, (str, int)) else f"{v:>11}" for v in row.values()), flush=True)
+            print(
+                "  ".join(f"{v:>11,.4g}" if not isinstance(v, (str, int)) else f"{v:>11}" for v in row.values()),
+                flush=True,
+            )
             if not args.no_csv:
                 write(path, rows)
     print("\n".join(["", *fitted(list(rows.values()))]))
@@ -219,9 +225,10 @@ def read(path: Path) -> dict[tuple[str, int], dict]:
     if not path.exists():
         return {}
     with path.open(newline="") as file:
-        found = list(csv.DictReader(file))
+        rows = list(csv.DictReader(file))
     return {
-        (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()} for row in found
+        (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()}
+        for row in rows
     }
 
 
@@ -230,10 +237,10 @@ def write(path: Path, rows: dict[tuple[str, int], dict]) -> None:
     with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({k: shown(v) for k, v in row.items()} for row in ordered)
+        writer.writerows({k: as_text(v) for k, v in row.items()} for row in ordered)
 
 
-def shown(value) -> str:
+def as_text(value) -> str:
     if isinstance(value, str) or value == int(value):
         return str(value if isinstance(value, str) else int(value))
     return f"{value:.6g}"

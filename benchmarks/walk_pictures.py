@@ -60,10 +60,10 @@ def levels() -> None:
     """Six levels of a bounded hierarchy, the body itself first."""
     A = collide.ConvexHull(ball(400, 1))
     hierarchy = walk_body(A).ladder.hierarchy
-    chosen = np.unique(np.linspace(0, hierarchy.depth - 1, 6).astype(int))
+    levels_drawn = np.unique(np.linspace(0, hierarchy.depth - 1, 6).astype(int))
     figure = pyplot.figure(figsize=(11, 2.2), layout="constrained")
-    for k, level in enumerate(chosen.tolist()):
-        axes = figure.add_subplot(1, len(chosen), k + 1, projection="3d")
+    for k, level in enumerate(levels_drawn.tolist()):
+        axes = figure.add_subplot(1, len(levels_drawn), k + 1, projection="3d")
         draw_body(axes, hierarchy.points, hierarchy.triangles(level), BLUE)
         count = len(hierarchy.vertices(level))
         tidy(axes, A.points, f"$P_{{{level + 1}}}$: {count} vertices")
@@ -79,14 +79,14 @@ def polar() -> None:
     figure = pyplot.figure(figsize=(9, 4), layout="constrained")
     axes = figure.add_subplot(1, 2, 1, projection="3d")
     draw_body(axes, points, R.hull.facets, GREY, 0.9)
-    own = side.triangles[side.starts[0] : side.starts[1]]
-    draw_body(axes, points * 1.002, own, RED)
+    triangles = side.triangles[side.starts[0] : side.starts[1]]
+    draw_body(axes, points * 1.002, triangles, RED)
     tidy(axes, points, "R, and one of its facets")
     axes = figure.add_subplot(1, 2, 2, projection="3d")
     draw_body(axes, Q.points, Q.triangles(0), GREEN, 0.9)
     vertex = Q.points[0]
     axes.scatter(*(vertex * 1.01), color=RED, s=45, depthshade=False)
-    direction = points[own].mean(axis=(0, 1))
+    direction = points[triangles].mean(axis=(0, 1))
     for each in figure.axes:
         azimuth = np.degrees(np.arctan2(direction[1], direction[0]))
         each.view_init(elev=15, azim=azimuth + 20)
@@ -103,38 +103,38 @@ def query():
         direction = rng.standard_normal(3)
         X = np.eye(4)
         X[:3, 3] = direction / np.linalg.norm(direction) * rng.uniform(1.7, 1.95)
-        found = collide.walk(A, B, X, np.eye(4), trace=True)
-        turns = sum(a.invariant != b.invariant for a, b in zip(found.trace, found.trace[1:]))
+        result = collide.walk(A, B, X, np.eye(4), trace=True)
+        turns = sum(a.invariant != b.invariant for a, b in zip(result.trace, result.trace[1:]))
         if best is None or turns > best[0]:
-            best = turns, X, found
+            best = turns, X, result
     return A, B, best[1], best[2]
 
 
 def rounds() -> None:
     """The rounds of one query: where it stands in both hierarchies, and how far its plane is from deciding."""
-    A, B, X, found = query()
-    P, Q = A._walk.ladder.hierarchy, B._walk.polar.ladder.hierarchy
+    A, B, X, result = query()
+    primal, Q = A._walk.ladder.hierarchy, B._walk.polar.ladder.hierarchy
     offset = X[:3, 3] - B._walk.polar.origin
     figure, (path, margins) = pyplot.subplots(1, 2, figsize=(11, 4), layout="constrained")
-    i, j = [r.level_p for r in found.trace], [r.level_q for r in found.trace]
+    i, j = [r.level_p for r in result.trace], [r.level_q for r in result.trace]
     path.plot(i, j, color=GREY, zorder=1)
     for name, colour in (("separation", BLUE), ("inverse separation", GREEN)):
-        own = [r for r in found.trace if r.invariant == name]
-        path.scatter([r.level_p for r in own], [r.level_q for r in own], color=colour, zorder=2, label=name)
+        steps_of = [r for r in result.trace if r.invariant == name]
+        path.scatter([r.level_p for r in steps_of], [r.level_q for r in steps_of], color=colour, zorder=2, label=name)
     path.invert_xaxis()
     path.invert_yaxis()
     path.set(xlabel="level i of P", ylabel="level j of Q", title="one level down in each round")
     path.legend()
-    numbers = np.arange(len(found.trace))
+    numbers = np.arange(len(result.trace))
     now, whole = [], []
-    for r in found.trace:
+    for r in result.trace:
         if r.invariant == "separation":
-            now.append(((P.points[P.vertices(r.level_p - 1)] + offset) @ r.z).min())
-            whole.append(((P.points[P.vertices(0)] + offset) @ r.z).min())
+            now.append(((primal.points[primal.vertices(r.level_p - 1)] + offset) @ r.z).min())
+            whole.append(((primal.points[primal.vertices(0)] + offset) @ r.z).min())
         else:
             now.append((Q.points[Q.vertices(r.level_q - 1)] @ (r.x + offset)).max())
             whole.append((Q.points[Q.vertices(0)] @ (r.x + offset)).max())
-    colours = [BLUE if r.invariant == "separation" else GREEN for r in found.trace]
+    colours = [BLUE if r.invariant == "separation" else GREEN for r in result.trace]
     margins.axhline(1, color="black", linewidth=0.8)
     margins.vlines(numbers, whole, now, colors=colours, linewidth=1)
     margins.scatter(numbers, now, color=colours, label="against the level reached")
@@ -149,29 +149,33 @@ def rounds() -> None:
 
 def bodies() -> None:
     """The same query in the primal space: the levels of P met, and the planes of the separation invariant."""
-    A, B, X, found = query()
-    P = A._walk.ladder.hierarchy
+    A, B, X, result = query()
+    primal = A._walk.ladder.hierarchy
     offset = X[:3, 3] - B._walk.polar.origin
-    own = [r for r in found.trace if r.invariant == "separation"]
-    chosen = [own[k] for k in np.unique(np.linspace(0, len(own) - 1, 3).astype(int))]
+    steps_of = [r for r in result.trace if r.invariant == "separation"]
+    steps = [steps_of[k] for k in np.unique(np.linspace(0, len(steps_of) - 1, 3).astype(int))]
     figure = pyplot.figure(figsize=(11, 3.6), layout="constrained")
     body = B.points - B._walk.polar.origin
-    for k, r in enumerate(chosen):
+    for k, r in enumerate(steps):
         axes = figure.add_subplot(1, 3, k + 1, projection="3d")
-        level = P.triangles(r.level_p - 1)
-        draw_body(axes, P.points + offset, level, BLUE, 0.9)
+        level = primal.triangles(r.level_p - 1)
+        draw_body(axes, primal.points + offset, level, BLUE, 0.9)
         draw_body(axes, body, convex_hull(body).facets, GREY, 0.9, edge=False)
         normal = r.z / np.linalg.norm(r.z)
         centre = normal / np.linalg.norm(r.z)
-        one = np.cross(normal, (0, 0, 1) if abs(normal[2]) < 0.9 else (1, 0, 0))
-        one /= np.linalg.norm(one)
-        other = np.cross(normal, one)
-        square = [centre + 1.3 * (a * one + b * other) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+        tangent = np.cross(normal, (0, 0, 1) if abs(normal[2]) < 0.9 else (1, 0, 0))
+        tangent /= np.linalg.norm(tangent)
+        bitangent = np.cross(normal, tangent)
+        square = [centre + 1.3 * (a * tangent + b * bitangent) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
         axes.add_collection3d(Poly3DCollection([square], facecolors=(*matplotlib.colors.to_rgb(RED), 0.25)))
-        axes.scatter(*(P.points[r.vertex_p] + offset), color=RED, s=25, depthshade=False)
-        azimuth = np.degrees(np.arctan2(one[1], one[0]))
+        axes.scatter(*(primal.points[r.vertex_p] + offset), color=RED, s=25, depthshade=False)
+        azimuth = np.degrees(np.arctan2(tangent[1], tangent[0]))
         axes.view_init(elev=8, azim=azimuth)
-        tidy(axes, np.concatenate([body, P.points[: len(A.points)] + offset]), f"$P_{{{r.level_p}}}$ beyond ρ(z), j = {r.level_q}")
+        tidy(
+            axes,
+            np.concatenate([body, primal.points[: len(A.points)] + offset]),
+            f"$P_{{{r.level_p}}}$ beyond ρ(z), j = {r.level_q}",
+        )
     figure.savefig(FOLDER / "walk_planes.png", dpi=110)
 
 

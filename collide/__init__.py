@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from collide import errors as errors
     from collide import results as results
     from collide import transforms as transforms
-    from collide.certificates.certificates import Certificate, CertificateRefused, verify
+    from collide.certificates.certificate import Certificate, CertificateRefused
+    from collide.certificates.make_certificate import certify
+    from collide.certificates.verify import verify
     from collide.contact.contact_query import contacts
     from collide.contact.contact_rows import Contacts
     from collide.errors import (
@@ -30,9 +32,10 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
+    from collide.hierarchies.hierarchy_queries import walk
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
-    from collide.query import collide, distance, walk
+    from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
     from collide.robot import Robot
     from collide.shapes import (
@@ -65,14 +68,17 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
-    "collide.certificates.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.certificates.certificate": ("Certificate", "CertificateRefused"),
+    "collide.certificates.make_certificate": ("certify",),
+    "collide.certificates.verify": ("verify",),
     "collide.contact.contact_query": ("contacts",),
     "collide.contact.contact_rows": ("Contacts",),
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.surface_queries.raycast": ("RayHits", "raycast"),
-    "collide.query": ("collide", "distance", "walk"),
+    "collide.hierarchies.hierarchy_queries": ("walk",),
+    "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
     "collide.shapes": (
@@ -92,7 +98,7 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
     "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
-    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
+    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains",
     "distance", "facet_pairs", "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
     "walk",
 ]

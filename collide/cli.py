@@ -135,15 +135,15 @@ def _report(args) -> int:
     if args.geometry:
         from collide.reports import scene_geometry as geometry
 
-        for one in made:
-            one.report.geometry = geometry.of_scene(one.scene)
+        for state_report in made:
+            state_report.report.geometry = geometry.of_scene(state_report.scene)
     _write_reports(made, args.json)
     if args.json != "-" and not args.quiet:
         from collide.reports import state_reports as states
 
         width, whole_names = terminal.output_width(sys.stdout)
-        shown = {"everything": args.all, "proofs": args.proofs or args.all, "width": width, "whole_names": whole_names}
-        terminal.write(states.render(made, **shown))
+        layout = {"everything": args.all, "proofs": args.proofs or args.all, "width": width, "whole_names": whole_names}
+        terminal.write(states.render(made, **layout))
     return FREE
 
 
@@ -157,10 +157,10 @@ def _check(args) -> int:
     made = _make(args, min_depth=args.min_depth)
     checks = [
         checking.check(
-            one.report, one.label, touching_counts=args.touching_is_collision, known=known,
+            result.report, result.label, touching_counts=args.touching_is_collision, known=known,
             tolerance=args.baseline_tolerance,
         )
-        for one in made
+        for result in made
     ]  # fmt: skip
     _write_reports(made, args.json)
     if args.write_baseline:
@@ -168,16 +168,16 @@ def _check(args) -> int:
     if args.junit:
         _write_text(junit.text(checks), args.junit)
     if args.json != "-" and not args.quiet:
-        _print_lines(line for one in checks for line in one.lines(len(checks) > 1))
+        _print_lines(line for result in checks for line in result.lines(len(checks) > 1))
     if not args.quiet:
-        for one in checks:
-            _say(one.verdict())
+        for result in checks:
+            _say(result.verdict())
         _say_what_was_taken(made[0].report)
     if args.write_baseline:
         return FREE
-    if any(one.fails for one in checks):
+    if any(result.fails for result in checks):
         return YES
-    unanswered = [entry for one in checks for entry in one.unanswered]
+    unanswered = [entry for result in checks for entry in result.unanswered]
     if unanswered:
         first = unanswered[0]
         raise UnsupportedQuery(f"whether the scene is free is not known: {first['a']} and {first['b']}: {first['why']}")
@@ -219,11 +219,13 @@ def _make(args, **limits) -> list:
     for label, scene in scenes:
         if trajectory is not None:
             scene = at_start(scene, trajectory)
-        one = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
+        state_report = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
         if trajectory is not None:
             tested = report.without(scene, ignore)
-            one.trajectory = follow(tested, trajectory, resolution=args.resolution, progress=progress, **limits)
-        made.append(states.Stated(label, scene, one))
+            state_report.trajectory = follow(
+                tested, trajectory, resolution=args.resolution, progress=progress, **limits
+            )
+        made.append(states.Stated(label, scene, state_report))
     return made
 
 
@@ -272,14 +274,14 @@ def _load(args, progress: Callable) -> list:
         from collide.scenes import load
 
         options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
-        given = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
+        load_options = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
         words = args.state or []
         if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
-            return [("", load(*args.scenes, state=words[0] if words else None, **given))]
+            return [("", load(*args.scenes, state=words[0] if words else None, **load_options))]
         from collide.scenes.loaders.state_words import in_states
 
-        found = in_states(load(*args.scenes, state=None, **given), words)
-        return found if len(found) > 1 else [("", found[0][1])]
+        states = in_states(load(*args.scenes, state=None, **load_options), words)
+        return states if len(states) > 1 else [("", states[0][1])]
 
 
 def _compare(args) -> int:
@@ -324,11 +326,14 @@ def _stress(args) -> int:
         title = f"STRESS  {args.engine}, {args.cases} cases a family, seed {args.seed}; judged in exact arithmetic"
         terminal.show_table(Table(title, columns, rows))
     if not args.quiet:
-        _say(f"{count(table.wrong, 'wrong answer')}, {table.failed} failed, {table.undecided} left open by {args.engine}")
+        _say(
+            f"{count(table.wrong, 'wrong answer')}, {table.failed} failed, {table.undecided} left open by {args.engine}"
+        )
     return YES if args.engine == "collide" and (table.wrong or table.failed) else FREE
 
 
 def _locality(args) -> int:
+    from collide.hierarchies.tree_figures import tree_figures
     from collide.reports import locality_report as locality
     from collide.reports import terminal
     from collide.scenes.loaders.triangles import read_meshes
@@ -345,9 +350,9 @@ def _locality(args) -> int:
             def about(label: str, name=name):
                 return progress(f"{name}: {label}")
 
-            found = mesh.locality(repeated=args.repeated, progress=about)
+            measures = mesh.locality(repeated=args.repeated, progress=about)
             with progress(f"{name}: building trees"):
-                measured.append(locality.Measured(name, place, found, mesh.tree_figures()))
+                measured.append(locality.Measured(name, place, measures, tree_figures(mesh)))
     if args.plot:
         with progress("drawing"):
             locality.plot(measured, args.plot)

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import weakref
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from collide import argument_checks as reading
-from collide.batches import ask, length_of
+from collide.algorithms import named_algorithm
+from collide.batches import answer_batch, length_of
+from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.lowering.shape_table import ShapeTable
-from collide.narrowphase import convex_queries as run
-from collide.narrowphase.composite.composite import UnionPair
-from collide.pair_arguments import asked_poses, pose_at, pose_batch, shape_at
+from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_queries import close
+from collide.narrowphase.dispatch import REFUSED, Method
+from collide.narrowphase.pair_queries import prepare
+from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
 from collide.security_margin import checked_margin, within
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.threads import check_threads
-from collide.transforms import as_poses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,8 +95,11 @@ def collide(
     margin = checked_margin("security_margin", security_margin)
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
-    if algorithm is not None and not _is_named(algorithm, "gjk"):
-        return _by_algorithm(A, B, X_WA, X_WB, check_poses, threads, axes, algorithm)
+    answer = named_algorithm("collide", algorithm)
+    if answer is not None:
+        if axes is not None or check_threads(threads) != 1:
+            raise InvalidArgument(f'algorithm="{algorithm}" takes no axes, and runs in one thread')
+        return answer(A, B, X_WA, X_WB, check_poses)
     if axes is not None:
         return _with_axes(A, B, X_WA, X_WB, check_poses, threads, axes)
     if margin:
@@ -106,61 +109,16 @@ def collide(
 
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    _prepare(A, B)
-    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads)
+    prepare(A, B)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses), threads)
     return bool(hits[0]) if single else hits
 
 
 def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    rows = ask(A, B, X_WA, X_WB, False, margin, check_poses, threads, depths=False)
+    rows = answer_batch(A, B, X_WA, X_WB, Question(False, margin, depths=False, check=check_poses), threads)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
-
-
-def _by_algorithm(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes, algorithm):
-    if not _is_named(algorithm, "barba-langerman"):
-        raise InvalidArgument(f'algorithm must be "gjk" or "barba-langerman", got {algorithm!r}')
-    if axes is not None or check_threads(threads) != 1:
-        raise InvalidArgument('algorithm="barba-langerman" takes no axes, and runs in one thread')
-    found = walk(A, B, X_WA, X_WB, check_poses=check_poses)
-    return bool(found.hit[0]) if pose_batch(X_WA, "X_WA")[1] and pose_batch(X_WB, "X_WB")[1] else found.hit
-
-
-def _is_named(algorithm, name: str) -> bool:
-    """Whether an algorithm is given by this name; anything but a string, an array among them, is not."""
-    return isinstance(algorithm, str) and algorithm == name
-
-
-def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False):
-    """What `collide` says with ``algorithm="barba-langerman"``, with its counts: `collide.hierarchies.hierarchy_queries.Walks`.
-
-    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`.   X_WA, X_WB, check_poses : as there.
-    trace : also return the rounds of the last pose one by one.
-
-    Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes.
-    """
-    from collide.hierarchies import hierarchy_queries as walks
-
-    for shape in (A, B):
-        walks.walk_body(shape)
-    X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    return walks.walk_poses(A, B, X_WA, X_WB, lambda left: ask_default(left, True, 0.0), trace=trace)
-
-
-def _with_default(A, B, X_WA, X_WB, check_poses: bool):
-    """(poses, poses, whether single, a function that asks the default algorithm at the poses of given numbers).
-
-    Poses are checked and copied: a certificate worked out later is one for these.
-    """
-    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-
-    def ask_default(left: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
-        X_WO, X_WT = (X if len(X) == 1 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        return np.broadcast_to(ask(A, B, X_WO, X_WT, boolean, limit, False, 1, depths=depths), (len(left),))
-
-    return X_WA, X_WB, single, ask_default
 
 
 #: Longest warm-start axis: its square is far from overflow.
@@ -177,7 +135,7 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
         raise InvalidArgument("axes must be contiguous, writeable and finite: it is read and updated in place")
     if len(axes) and np.abs(axes).max() > _LONGEST_AXIS:
         raise InvalidArgument(f"axes must not be longer than {_LONGEST_AXIS:g}: only their directions count")
-    hits = ask(A, B, X_WA, X_WB, True, 0.0, check_poses, threads, axes)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses, axes=axes), threads)
     return bool(hits[0]) if single else hits
 
 
@@ -224,91 +182,36 @@ def distance(
     half-space).
     """
     limit = reading.limit("max_distance", max_distance)
-    if algorithm is not None and not _is_named(algorithm, "gjk"):
-        return _down_hierarchies(A, B, X_WA, X_WB, limit, signed, check_poses, threads, algorithm)
+    answer = named_algorithm("distance", algorithm)
+    if answer is not None:
+        if limit != math.inf or check_threads(threads) != 1:
+            raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')
+        return answer(A, B, X_WA, X_WB, check_poses, signed)
     if limit == math.inf and threads.__class__ is int and threads == 1:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
+                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    kept = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
-    _prepare(A, B)
-    endless = []
+    pose_copies = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
+    prepare(A, B)
+    unbounded = []
 
-    def close(rows: np.ndarray) -> None:
-        if run.close(rows, depths=signed):
-            endless.append(True)
+    def finish(rows: np.ndarray) -> None:
+        if close(rows, depths=signed):
+            unbounded.append(True)
 
-    rows = ask(A, B, X_WA, X_WB, False, limit, check_poses, threads, depths=signed, close=close, kept=kept)
-    if endless:
+    question = Question(False, limit, signed, check_poses)
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads, finish=finish, pose_copies=pose_copies)
+    if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
-        raise UnsupportedQuery(
-            f"distance of {type(shape_at(A, k)).__name__} and {type(shape_at(B, k)).__name__}{where}: their overlap has no "
-            "end, so no translation of finite length separates them; collide() still answers"
-        )
-    return PairResult(rows, single, (_held(A), _held(B), *kept))
+        pair = " and ".join(type(shape_at(S, k)).__name__ for S in (A, B))
+        raise UnsupportedQuery(f"distance of {pair}{where}: {REFUSED[Method.PLANES, 'distance']}")
+    return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies), certify)
 
 
-def _down_hierarchies(A, B, X_WA, X_WB, limit, signed: bool, check_poses: bool, threads: int, algorithm) -> PairResult:
-    if not _is_named(algorithm, "dobkin-kirkpatrick"):
-        raise InvalidArgument(f'algorithm must be "gjk" or "dobkin-kirkpatrick", got {algorithm!r}')
-    if limit != math.inf or check_threads(threads) != 1:
-        raise InvalidArgument('algorithm="dobkin-kirkpatrick" takes no max_distance, and runs in one thread')
-    from collide.hierarchies import hierarchy_queries as walks
-
-    for shape in (A, B):
-        walks.walk_body(shape, algorithm)
-    X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    rows = walks.rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
-    run.close(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB))
-
-
-def _held(shapes):
+def _immutable(shapes):
     return tuple(shapes) if isinstance(shapes, list) else shapes
-
-
-# --- single calls -------------------------------------------------------------------------------
-
-#: Numbers of shapes within this process, never used again.
-_serials = itertools.count()
-#: A shape keeps this many partners prepared for single calls.
-_PARTNERS = 512
-
-
-def _prepare(A, B) -> None:
-    """Make a pair of shapes ready for single calls, and keep it with A, by the number B has then."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape)):
-        return
-    meshed = A.meshed or B.meshed
-    if not run.single_calls_are_safe():
-        return
-    if not hasattr(A, "_prepared"):
-        object.__setattr__(A, "_prepared", {})
-    if not hasattr(B, "_serial"):
-        object.__setattr__(B, "_serial", next(_serials))
-    prepared, serial = A._prepared, B._serial
-    if serial in prepared:
-        return
-    if meshed:
-        pair = _meshed_pair(A, B)
-    elif is_plain(A) and is_plain(B):
-        pair = run.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
-    else:
-        pair = UnionPair(A.laid_out(), B.laid_out())
-    if pair is None:
-        return
-    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _PARTNERS)]:  # a list: other threads add and finalizers take
-        prepared.pop(oldest, None)
-    prepared[serial] = pair
-    weakref.finalize(B, prepared.pop, serial, None)  # what is gone is not held by its partners
-
-
-def _meshed_pair(A: Shape, B: Shape):
-    from collide.narrowphase.facets.single_mesh_call import single_pair
-
-    return single_pair(A, B)

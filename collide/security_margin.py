@@ -14,9 +14,10 @@ from fractions import Fraction
 import numpy as np
 
 from collide import argument_checks as reading
-from collide.batches import ask
+from collide.batches import answer_batch
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.narrowphase.convex_bodies import Question
 from collide.results import UNDECIDED
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.shape import Shape, is_plain
@@ -49,7 +50,7 @@ def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
     grown = _grown(A, B, margin)
     if grown is None:
         return True
-    row = ask(*grown, X_WA[None], X_WB[None], False, 0.0, False, 1, depths=False)[0]
+    row = answer_batch(*grown, X_WA[None], X_WB[None], Question(False, 0.0, depths=False))[0]
     return bool(row["hit"] or row["how"] == UNDECIDED)
 
 

@@ -8,22 +8,21 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide import argument_checks as reading
 from collide import log as journal
 from collide.broadphase.filters import CULLED, count_skipped
+from collide.certificates.make_certificate import certify
+from collide.contact.contact_query import check_margin, check_most, contact_rows
+from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
 from collide.packed_world import PackedWorld
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
-
-if TYPE_CHECKING:
-    from collide.contact.contact_rows import WorldContacts
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
@@ -211,7 +210,7 @@ class World:
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
         rows = self._ask(0.0)
-        return WorldResult(rows[rows["hit"]], dict(self._bodies))
+        return WorldResult(rows[rows["hit"]], dict(self._bodies), certify)
 
     def distances(self, max_distance: float = math.inf) -> WorldResult:
         """Every tested pair at most ``max_distance`` [m] apart, hits included, sorted by (a, b).
@@ -221,7 +220,7 @@ class World:
         """
         limit = reading.limit("World.distances: max_distance", max_distance)
         rows = self._ask(limit)
-        return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
+        return WorldResult(rows[_within(rows, limit)], dict(self._bodies), certify)
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8) -> WorldContacts:
         """Contacts of every tested pair within ``margin`` [m], sorted by (a, b): one row a contact.
@@ -229,9 +228,6 @@ class World:
         margin, max_contacts, and what a row says and promises: as in `collide.contacts`. `stats` stays as it is.
         Raises UnsupportedQuery, naming the bodies, where that does.
         """
-        from collide.contact.contact_query import check_margin, check_most, contact_rows
-        from collide.contact.contact_rows import WorldContacts, no_rows
-
         margin, most = check_margin("World.contacts", margin), check_most("World.contacts", max_contacts)
         bodies = list(self._bodies.values())
         found = []
@@ -268,7 +264,7 @@ class World:
         rows = rows[_within(rows, limit)]
         rows["b"] = self._pack().ids[rows["b"]]
         rows["a"] = -1
-        return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)})
+        return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)}, certify)
 
     @property
     def allowed(self) -> dict[tuple[int, int], str]:

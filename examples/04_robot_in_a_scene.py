@@ -31,5 +31,5 @@ for angle in np.arange(-9, 10, 3) / 10:
     moved = scene.with_state({first: angle})  # a new Scene; the old one stays as it is
     world.set_poses([body.name for body in moved.bodies], np.array([body.X_WB for body in moved.bodies]))
     hits = of_robot(world, world.collisions())
-    told = ", ".join(f"{a} in {b} by {-d * 1000:.1f} mm" for d, a, b in hits[:2]) or "free"
-    print(f"  {angle:5.2f} rad: {told}{', …' if len(hits) > 2 else ''}")
+    report = ", ".join(f"{a} in {b} by {-d * 1000:.1f} mm" for d, a, b in hits[:2]) or "free"
+    print(f"  {angle:5.2f} rad: {report}{', …' if len(hits) > 2 else ''}")

@@ -9,9 +9,9 @@ import collide
 
 # A ring around the z axis, its section a square of 4 cm at 10 cm from the axis.
 n = 48
-turn = 2 * np.pi * np.arange(n) / n
+angles = 2 * np.pi * np.arange(n) / n
 section = np.array([(0.08, -0.02), (0.12, -0.02), (0.12, 0.02), (0.08, 0.02)])
-vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for a in turn for r, z in section])
+vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for a in angles for r, z in section])
 faces = []
 for i in range(n):
     for k in range(4):

@@ -49,26 +49,28 @@ class Placement:
     """A robot in a scene: where its root stands, its joint values, and which bodies its links carry.
 
     X_WR : (4, 4) pose of the root link.   q : (dof,) as `Robot.joint_names` orders it.
-    given : the columns of ``q`` that somebody gave a value; the rest stand at their default.
+    set_columns : names of the columns of ``q`` that were given a value; the others are at their default.
     carried : body name -> (link, X_LB): the body moves with the link.
     """
 
     robot: Robot
     X_WR: np.ndarray
     q: np.ndarray
-    given: frozenset[str] = frozenset()
+    set_columns: frozenset[str] = frozenset()
     carried: dict[str, tuple[str, np.ndarray]] = field(default_factory=dict)
 
     def body_poses(self) -> dict[str, np.ndarray]:
         """body name -> (4, 4) pose X_WB."""
         X_WLs = self.robot.link_poses(self.q, self.X_WR)[0]
         at = {link: X_WLs[k] for k, link in enumerate(self.robot.links)}
-        return {name: self._checked(name, _posed(at[link], X_LB)) for name, (link, X_LB) in self.carried.items()}
+        return {name: self._checked(name, _product(at[link], X_LB)) for name, (link, X_LB) in self.carried.items()}
 
     def _checked(self, name: str, X_WB: np.ndarray) -> np.ndarray:
         """What was multiplied together along the robot; InvalidPose names robot, link and file where it is no pose."""
         try:
-            return as_poses(X_WB, f'{self.robot.place}: the pose of "{cut(name)}", on link "{cut(self.carried[name][0])}",')[0]
+            return as_poses(
+                X_WB, f'{self.robot.place}: the pose of "{cut(name)}", on link "{cut(self.carried[name][0])}",'
+            )[0]
         except InvalidPose as error:
             raise InvalidPose(f"{error}; look at the origins of the joints above it and at their values") from None
 
@@ -111,7 +113,9 @@ class Scene:
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise InvalidArgument(f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}")
+        raise InvalidArgument(
+            f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}"
+        )
 
     def world(self) -> World:
         """A `collide.World` of these bodies, in their order, with the allowed pairs entered."""
@@ -138,19 +142,21 @@ class Scene:
         placements, notes = {}, []
         for name, placement in self.placements.items():
             q, about = placement.robot.configuration(shares[name], start=placement.q)
-            placements[name] = replace(placement, q=q, given=placement.given | shares[name].keys())
-            notes += about + placement.robot.default_notes(placements[name].given, q)
+            placements[name] = replace(placement, q=q, set_columns=placement.set_columns | shares[name].keys())
+            notes += about + placement.robot.default_notes(placements[name].set_columns, q)
         moved = {name: X for placement in placements.values() for name, X in placement.body_poses().items()}
         bodies = [replace(body, X_WB=moved.get(body.name, body.X_WB)) for body in self.bodies]
-        kept = [note for note in self.notes if note not in self.state_notes]
+        own_notes = [note for note in self.notes if note not in self.state_notes]
         return replace(
-            self, bodies=bodies, placements=placements, notes=kept + notes, state_notes=notes,
+            self, bodies=bodies, placements=placements, notes=own_notes + notes, state_notes=notes,
             allowed=list(self.allowed), sources=list(self.sources), seconds=dict(self.seconds),
         )
 
     def _named_state(self, name: str) -> dict[str, float]:
         if name not in self.states:
-            raise InvalidArgument(f"scene {self.name}: unknown state {brief(name)}; it has {listing(self.states) or 'none'}")
+            raise InvalidArgument(
+                f"scene {self.name}: unknown state {brief(name)}; it has {listing(self.states) or 'none'}"
+            )
         return self.states[name]
 
     def joint_shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
@@ -176,7 +182,7 @@ class Scene:
     def add(self, body: SceneBody) -> None:
         """A further body; SceneError where the name is taken."""
         if len(self._sources) != len(self.bodies):  # the list was changed by hand
-            self._sources = {other.name: other.source for other in self.bodies}
+            self._sources = {known.name: known.source for known in self.bodies}
         if body.name in self._sources:
             raise SceneError(
                 f'a body named "{cut(body.name)}" exists already, from {self._sources[body.name] or "this scene"}; '
@@ -205,7 +211,7 @@ class Scene:
         label = free_name(name or robot.name, dict.fromkeys(self.robots, 1))
         q, notes = robot.configuration(values or {})
         placement = Placement(robot, X_WR, q, frozenset(values or ()))
-        notes += robot.default_notes(placement.given, q)
+        notes += robot.default_notes(placement.set_columns, q)
         links: dict[str, SceneBody] = {}
         for link in robot.links:
             if link in robot.geometry:
@@ -246,7 +252,7 @@ def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, n
     return SceneBody(link, shape, np.eye(4), source=source, approximation=approximation), X_LB
 
 
-def _posed(X_WL: np.ndarray, X_LB: np.ndarray) -> np.ndarray:
+def _product(X_WL: np.ndarray, X_LB: np.ndarray) -> np.ndarray:
     """X_WL @ X_LB; the link's own pose, untouched, where the body stands at its origin."""
     return X_WL.copy() if np.array_equal(X_LB, np.eye(4)) else X_WL @ X_LB
 

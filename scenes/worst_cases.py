@@ -51,7 +51,7 @@ def harpsicordion(strings: int, stretch: float = 10.0) -> Mesh:
 
 
 def accordion(strings: int) -> Mesh:
-    """An accordion, above the saddle: ``strings`` of length 1 within x = ±1/4; σ is 3.5 to 7 times their number, Σ 4.47."""
+    """An accordion above the saddle: ``strings`` of length 1 within x = ±1/4; σ is 3.5 to 7 times their number."""
     strings = _whole("strings", strings)
     return Mesh(*_folds([1.0] * (strings + 1), 2.0 ** -(1 + (strings - 1).bit_length())), solid=True)
 
@@ -81,14 +81,14 @@ def chazelle(strings: int) -> Mesh:
         faces += [(a, b, c), (b, d, c)]
     for k in range(0, 2 * n, 2):
         left, ridge, right = low[k], low[k + 1], low[k + 2]
-        for side, turn in ((0, 1), (1, -1)):
+        for side, orientation in ((0, 1), (1, -1)):
             a, b, c = int(left[side]), int(ridge[side]), int(right[side])
-            faces += [t[::turn] for t in ((a, b, c), (a, c, c + 1), (a, c + 1, a + 1))]
+            faces += [t[::orientation] for t in ((a, b, c), (a, c, c + 1), (a, c + 1, a + 1))]
         top = [int(left[0]) + 1, int(right[0]) + 1, int(right[1]) + 1, int(left[1]) + 1]
         faces += [(top[0], top[1], top[2]), (top[0], top[2], top[3])]
-    for (front, back), turn in ((low[0], 1), (low[-1], -1)):
+    for (front, back), orientation in ((low[0], 1), (low[-1], -1)):
         a, b = int(front), int(back)
-        faces += [t[::turn] for t in ((a, b + 1, b), (a, a + 1, b + 1))]
+        faces += [t[::orientation] for t in ((a, b + 1, b), (a, a + 1, b + 1))]
     return Mesh(np.array(vertices), np.array(faces), solid=True)
 
 
@@ -108,14 +108,16 @@ def harpsicordia(n: int, stretch: float = 10.0, spread: float | None = None) -> 
     ratio, spread = _ratio(stretch), n if spread is None else spread
     least = _TEMPLATE_STRETCH * ratio
     if isinstance(spread, bool) or not isinstance(spread, (int, float)) or not least <= spread <= 1e18:
-        raise SceneError(f"spread must lie within [{least:.4g}, 1e18] for strings of stretch {stretch:g}, got {spread!r}")
+        raise SceneError(
+            f"spread must lie within [{least:.4g}, 1e18] for strings of stretch {stretch:g}, got {spread!r}"
+        )
     strings = min(int(math.log(spread / _TEMPLATE_STRETCH) / math.log(ratio)), (n - 3) // 7)
-    one = harpsicordion(strings, stretch)
-    copies = max(1, n // len(one.vertices))
-    pitch = 2.0 ** math.ceil(math.log2(2.0 * float(np.abs(one.vertices).max())))
+    upper = harpsicordion(strings, stretch)
+    copies = max(1, n // len(upper.vertices))
+    pitch = 2.0 ** math.ceil(math.log2(2.0 * float(np.abs(upper.vertices).max())))
     wide = math.ceil(math.sqrt(copies))
     places = [(pitch * (k % wide), pitch * (k // wide), 0.0) for k in range(copies)]
-    return _copies(one, places), _copies(below(one), places), copies * strings**2
+    return _copies(upper, places), _copies(below(upper), places), copies * strings**2
 
 
 def _copies(mesh: Mesh, places: list) -> Mesh:
@@ -128,7 +130,7 @@ def _copies(mesh: Mesh, places: list) -> Mesh:
 
 def _folds(lengths: list[float], step: float) -> tuple[np.ndarray, np.ndarray]:
     """Folds side by side along x, joined through holes. lengths : of the first hole's fold, then of the strings."""
-    many = len(lengths) - 1
+    n_folds = len(lengths) - 1
     vertices: list[tuple] = []
     faces: list[tuple] = []
 
@@ -136,7 +138,7 @@ def _folds(lengths: list[float], step: float) -> tuple[np.ndarray, np.ndarray]:
         vertices.extend((x, length * y, length * z) for y, z in _HOLE)
         return list(range(len(vertices) - 3, len(vertices)))
 
-    start = -many / 2 * step
+    start = -n_folds / 2 * step
     last = hole(start, lengths[0])
     faces.append((last[0], last[2], last[1]))
     for k, length in enumerate(lengths[1:]):

@@ -21,7 +21,7 @@ EYE = np.eye(4)
 
 @pytest.fixture(autouse=True)
 def threads_for_few_poses(monkeypatch):
-    monkeypatch.setattr(batches, "_FEWEST", 1)
+    monkeypatch.setattr(batches, "_MIN_POSES_PER_THREAD", 1)
     monkeypatch.setattr(workers_module, "_ALONE", 0.0)
     monkeypatch.setattr(workers_module, "_SHORTEST", 1e-5)
     monkeypatch.setattr(workers_module, "_LONGEST", 1e-4)

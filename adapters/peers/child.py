@@ -29,7 +29,7 @@ _LENGTH = struct.Struct("<Q")
 #: How long a child may take to start and import its engine [s].
 START_TIMEOUT = 60.0
 #: How many children a question may use up before the rest is given up.
-MOST_RESTARTS = 100
+MAX_RESTARTS = 100
 #: How many characters of a dead child's stderr go into a reason.
 LAST_WORDS = 240
 
@@ -43,8 +43,8 @@ class IsolatedPeer(Peer):
 
     isolated = True
 
-    def __init__(self, spec: str, *, timeout: float = 10.0, most_restarts: int = MOST_RESTARTS):
-        self._spec, self._timeout, self._most_restarts = spec, timeout, most_restarts
+    def __init__(self, spec: str, *, timeout: float = 10.0, max_restarts: int = MAX_RESTARTS):
+        self._spec, self._timeout, self._max_restarts = spec, timeout, max_restarts
         self._peer = load_engine(spec)
         self.name, self.package, self.module = self._peer.name, self._peer.package, self._peer.module
         self.hint = self._peer.hint
@@ -60,32 +60,32 @@ class IsolatedPeer(Peer):
         return self._peer.supports(shape)
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
-        left = list(wanted)
+        unanswered = list(wanted)
         lost: dict[int, str] = {}
-        for _ in range(self._most_restarts + 1):
-            yield from _of_lost_bodies(question, left, lost)
-            left = [k for k in left if not lost.keys() & question.pairs[k]]
-            if not left:
+        for _ in range(self._max_restarts + 1):
+            yield from _of_lost_bodies(question, unanswered, lost)
+            unanswered = [k for k in unanswered if not lost.keys() & question.pairs[k]]
+            if not unanswered:
                 return
             building = None
-            with _child(self._spec, question, left, self._timeout) as child:
+            with _child(self._spec, question, unanswered, self._timeout) as child:
                 for event in child.events():
                     if event.kind in STATUSES:
-                        left.remove(event.at)
+                        unanswered.remove(event.at)
                         yield event
                     building = event.at if event.kind == BUILDING else None
-                if not left:
+                if not unanswered:
                     return
                 reason = child.epitaph()
             if not child.started:
                 break
             if building is None:
-                yield Event(FAILED, left.pop(0), None, reason)
+                yield Event(FAILED, unanswered.pop(0), None, reason)
             else:
                 lost[building] = f"building {question.bodies[building].name!r}: {reason}"
         else:
-            reason = f"given up after {self._most_restarts} restarts; the last: {reason}"
-        yield from (Event(FAILED, k, None, reason) for k in left)
+            reason = f"given up after {self._max_restarts} restarts; the last: {reason}"
+        yield from (Event(FAILED, k, None, reason) for k in unanswered)
 
 
 def _of_lost_bodies(question: Question, rows: list[int], lost: dict[int, str]) -> Iterator[Event]:
@@ -177,8 +177,8 @@ def last_words(stderr: str) -> str:
     anything else the end matters most.
     """
     text = re.sub(r"(?:/[\w.+-]+)+/(?=[\w.+-])", "", " ".join(stderr.split()))
-    _, found, message = text.rpartition("what(): ")
-    return message[:LAST_WORDS] if found else text[-LAST_WORDS:]
+    _, separator, message = text.rpartition("what(): ")
+    return message[:LAST_WORDS] if separator else text[-LAST_WORDS:]
 
 
 def _read(stream) -> Iterator[Event]:

@@ -34,10 +34,10 @@ class CollidePeer(Peer):
         except Exception as error:  # noqa: BLE001 - any failure of the engine under test is a finding
             yield from (Event(FAILED, k, None, complaint(error)) for k in wanted)
             return
-        found = {(int(row["a"]), int(row["b"])): row for row in rows}
+        rows_by_pair = {(int(row["a"]), int(row["b"])): row for row in rows}
         share = (time.perf_counter() - start) / max(len(wanted), 1)
         for k in wanted:
-            yield _timed(k, lambda k=k: _from_world(question, k, hits, found), share)
+            yield _timed(k, lambda k=k: _from_world(question, k, hits, rows_by_pair), share)
 
 
 def _timed(k: int, answer, share: float = 0.0) -> Event:
@@ -67,12 +67,12 @@ def _world(question: Question):
     return world
 
 
-def _from_world(question: Question, k: int, hits: set, found: dict) -> Reply:
+def _from_world(question: Question, k: int, hits: set, rows: dict) -> Reply:
     """What the World says of pair k; its own contradictions stand in the note."""
     pair = question.pairs[k]
     hit = pair in hits
-    if pair in found:
-        return _reply(found[pair])._replace(hit=hit)
+    if pair in rows:
+        return _reply(rows[pair])._replace(hit=hit)
     alone = _pair(question, k)
     note = ""
     if alone.distance <= question.max_distance:

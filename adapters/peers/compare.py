@@ -45,8 +45,8 @@ class Disagreement:
     kind : "hit" (the booleans differ), "distance" (they do, by more than the tolerance, or the exact
         one lies outside a proven bracket), "inside" (the engine sees surfaces that do not meet, and one body is
         inside the other), "contradiction"
-        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a World
-        reports no row where its own pair query finds one).
+        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a
+        World reports no row where its own pair query finds one).
     exact_hit, exact_distance : the verdict of exact arithmetic; None where it cannot tell. Of meshes that meet the
         distance is None: nobody knows how deep they are.
     lower, upper : the bracket that the reference proves; None where there is none, or where it has no end.
@@ -186,7 +186,8 @@ class Comparison:
         """
         headers = [
             "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
-            "contradicts itself", "wrong distances", "furthest off", "largest gap difference", "largest depth difference",
+            "contradicts itself", "wrong distances", "furthest off", "largest gap difference",
+            "largest depth difference",
             "failed", "unsupported",
         ]
         return headers, [_printed(s, s.engine == self.reference) for s in self.summaries]
@@ -217,7 +218,7 @@ def compare(
     judge = _Judge(question, tolerance)
     ours = engine(reference, isolated=False).answer(question)
     summaries = [_counts(question, ours)]
-    disagreements = _own(judge, ours)
+    disagreements = _contradictions(judge, ours)
     for name in dict.fromkeys(n for n in engines if n != reference):
         peer = engine(name, timeout=timeout)
         if peer.missing():
@@ -225,7 +226,7 @@ def compare(
             continue
         theirs = peer.answer(question)
         summaries.append(_counts(question, theirs))
-        disagreements += _own(judge, theirs) + _between(judge, ours, theirs, summaries[-1])
+        disagreements += _contradictions(judge, theirs) + _between(judge, ours, theirs, summaries[-1])
     for summary in summaries:
         _tally(summary, disagreements, reference)
     return Comparison(
@@ -268,7 +269,7 @@ class _Judge:
             self._verdicts[k] = ExactPeer().answer(alone)
         return self._verdicts[k]
 
-    def decide(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> Disagreement:
+    def settle(self, dispute: Disagreement, k: int, parties: list[tuple[str, np.void]]) -> Disagreement:
         """Write the verdict down, and who is wrong by it.
 
         parties : the engines concerned with their rows; where there are two the reference is the first.
@@ -367,43 +368,43 @@ def _dispute(judge: _Judge, k: int, kind: str, theirs: Table, ours: Table | None
     if reference is not None:
         dispute.lower, dispute.upper = _number(reference["lower"]), _number(reference["upper"])
     parties = [(theirs.engine, row)] if ours is None else [(ours.engine, reference), (theirs.engine, row)]
-    return judge.decide(dispute, k, parties)
+    return judge.settle(dispute, k, parties)
 
 
-def _own(judge: _Judge, table: Table) -> list[Disagreement]:
+def _contradictions(judge: _Judge, table: Table) -> list[Disagreement]:
     """Where an engine contradicts itself."""
-    found = []
+    disputes = []
     for k, row in enumerate(table.rows):
         if not row["answered"]:
             continue
         beyond_rounding = row["has_distance"] and abs(row["distance"]) > judge.rounding[k]
         opposed = beyond_rounding and not row["undecided"] and bool(row["hit"]) != bool(row["distance"] < 0)
         if opposed or row["lower"] > row["upper"]:
-            found.append(_dispute(judge, k, "contradiction", table))
+            disputes.append(_dispute(judge, k, "contradiction", table))
         elif "left this pair out" in table.reasons[k]:
-            found.append(_dispute(judge, k, "left out", table))
-    return found
+            disputes.append(_dispute(judge, k, "left out", table))
+    return disputes
 
 
 def _between(judge: _Judge, ours: Table, theirs: Table, summary: Summary) -> list[Disagreement]:
     """Where two engines differ, in their booleans or their distances; the largest differences go into the summary."""
-    found = []
+    disputes = []
     for k in np.flatnonzero(ours.rows["answered"] & theirs.rows["answered"]).tolist():
-        mine, other = ours.rows[k], theirs.rows[k]
-        differing = _dispute(judge, k, "hit", theirs, ours) if mine["hit"] != other["hit"] else None
-        found += [differing] if differing else []
+        ours_row, theirs_row = ours.rows[k], theirs.rows[k]
+        differing = _dispute(judge, k, "hit", theirs, ours) if ours_row["hit"] != theirs_row["hit"] else None
+        disputes += [differing] if differing else []
         summary.agreeing += differing is None
-        if not (mine["has_distance"] and other["has_distance"]) or (differing and differing.kind == "inside"):
+        if not (ours_row["has_distance"] and theirs_row["has_distance"]) or (differing and differing.kind == "inside"):
             continue
-        lower, upper = _bracket(mine)
-        if lower < -judge.rounding[k] and mine["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
+        lower, upper = _bracket(ours_row)
+        if lower < -judge.rounding[k] and ours_row["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
             continue  # engines mean different things by the depth of a union
-        difference = abs(float(mine["distance"]) - float(other["distance"]))
-        (summary.depth if mine["hit"] else summary.gap).see(difference, *judge.question.names(k))
-        missed = theirs.engine == "exact" and judge.misses(k, mine, float(other["distance"]))
-        if missed or outside(other["distance"], lower, upper) > judge.tolerance * judge.size[k]:
-            found.append(_dispute(judge, k, "distance", theirs, ours))
-    return found
+        difference = abs(float(ours_row["distance"]) - float(theirs_row["distance"]))
+        (summary.depth if ours_row["hit"] else summary.gap).see(difference, *judge.question.names(k))
+        missed = theirs.engine == "exact" and judge.misses(k, ours_row, float(theirs_row["distance"]))
+        if missed or outside(theirs_row["distance"], lower, upper) > judge.tolerance * judge.size[k]:
+            disputes.append(_dispute(judge, k, "distance", theirs, ours))
+    return disputes
 
 
 def _bracket(row: np.void) -> tuple[float, float]:
@@ -444,7 +445,8 @@ def _printed(s: Summary, is_reference: bool) -> list[str]:
     agree, differ, inside = ("", "", "") if is_reference else map(str, (s.agreeing, s.hit_disagreements, s.inside))
     largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
     return [
-        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong), str(s.wrong_within_rounding),
+        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong),
+        str(s.wrong_within_rounding),
         str(s.not_judged), str(s.contradictions), str(s.wrong_distances), _length(s.furthest_off), *largest,
         str(len(s.failed)), str(sum(s.unsupported.values())),
     ]

@@ -28,7 +28,7 @@ _MARGIN = 1e-12
 #: Cells in a leaf of the search.
 _LEAF = 4
 #: Pairs of cells looked at in one go, after the first few.
-_FEW, _CHUNK = 64, 4096
+_FIRST_CHUNK, _CHUNK = 64, 4096
 _DIGITS = 40
 #: Directions of rays, changed where a facet is grazed.
 _RAYS = ((7919, 104729, 1299709), (-15485863, 32452843, 49979687), (86028121, -3, 17), (1, -982451653, 57885161))
@@ -119,25 +119,28 @@ def _cells_meet(A: Cells, B: Cells, reach: Fraction) -> bool:
 
 def _candidates(A: Cells, B: Cells, within: float) -> Iterator[tuple[int, int]]:
     """Pairs of cells that may come within a length of each other."""
-    boxes, some = _near_cells(A, B, within), _FEW
-    while batch := list(itertools.islice(boxes, some)):
+    boxes, size = _near_cells(A, B, within), _FIRST_CHUNK
+    while batch := list(itertools.islice(boxes, size)):
         yield from _not_parted(A, B, batch, within)
-        some = _CHUNK
+        size = _CHUNK
 
 
 def _not_parted(A: Cells, B: Cells, pairs: list[tuple[int, int]], within: float) -> list[tuple[int, int]]:
     """Pairs of cells that no guessed axis parts by more than a length and far more than what doubles may be off."""
-    left = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    remaining = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     slack = within + 1e-9 * max(A.size, B.size)
-    open_ = np.ones(len(left), dtype=bool)
-    for axis in _guesses(A, B, left):
+    open_ = np.ones(len(remaining), dtype=bool)
+    for axis in _guesses(A, B, remaining):
         lengths = np.sqrt((axis**2).sum(axis=1))
         axis = axis / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        p, q = ((body.placed[body.faces[ids]] * axis[:, None]).sum(axis=2) for body, ids in ((A, left[:, 0]), (B, left[:, 1])))
+        p, q = (
+            (body.placed[body.faces[ids]] * axis[:, None]).sum(axis=2)
+            for body, ids in ((A, remaining[:, 0]), (B, remaining[:, 1]))
+        )
         apart = np.maximum(q.min(axis=1) - p.max(axis=1), p.min(axis=1) - q.max(axis=1))
         open_ &= ~((apart > slack) & (lengths > 0.0))
-    left = left[open_]
-    return [(i, j) for i, j in left.tolist()]
+    remaining = remaining[open_]
+    return [(i, j) for i, j in remaining.tolist()]
 
 
 def _guesses(A: Cells, B: Cells, pairs: np.ndarray) -> list[np.ndarray]:
@@ -170,11 +173,16 @@ def _near_cells(A: Cells, B: Cells, within: float) -> Iterator[tuple[int, int]]:
         if _between(_around(A, some), _around(B, others)) > within:
             continue
         if max(len(some), len(others)) <= _LEAF:
-            yield from ((i, j) for i in some.tolist() for j in others.tolist() if _between(A.boxes[i].tolist(), B.boxes[j].tolist()) <= within)
+            yield from (
+                (i, j)
+                for i in some.tolist()
+                for j in others.tolist()
+                if _between(A.boxes[i].tolist(), B.boxes[j].tolist()) <= within
+            )
         elif len(some) >= len(others):
-            todo += [(half, others) for half in _halves(A, some)]
+            todo += [(half, others) for half in _split(A, some)]
         else:
-            todo += [(some, half) for half in _halves(B, others)]
+            todo += [(some, half) for half in _split(B, others)]
 
 
 def _around(body: Cells, cells: np.ndarray) -> list[float]:
@@ -187,13 +195,13 @@ def _finer(points, shift: int) -> list[tuple[int, ...]]:
     return [tuple(x << shift for x in point) for point in points]
 
 
-def _between(one: list[float], other: list[float]) -> float:
+def _between(low: list[float], high: list[float]) -> float:
     """A lower bound of the distance of two boxes."""
-    steps = [max(one[k] - other[k + 3], other[k] - one[k + 3], 0.0) for k in range(3)]
+    steps = [max(low[k] - high[k + 3], high[k] - low[k + 3], 0.0) for k in range(3)]
     return math.sqrt(steps[0] ** 2 + steps[1] ** 2 + steps[2] ** 2) * (1 - 1e-12)
 
 
-def _halves(body: Cells, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split(body: Cells, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     centres = body.boxes[cells, :3] + body.boxes[cells, 3:]
     axis = int(np.argmax(np.ptp(centres, axis=0)))
     order = cells[np.argsort(centres[:, axis], kind="stable")]
@@ -218,12 +226,12 @@ def _gap(A: Cells, B: Cells, reach: Fraction) -> float:
                 limit = float(_root(squared)) * (1 + 1e-9)
             continue
         if len(some) >= len(others):
-            parts = [(half, others) for half in _halves(A, some)]
+            parts = [(half, others) for half in _split(A, some)]
         else:
-            parts = [(some, half) for half in _halves(B, others)]
-        for one, other in parts:
+            parts = [(some, half) for half in _split(B, others)]
+        for part_a, part_b in parts:
             count += 1
-            heapq.heappush(queue, (max(0.0, _between(_around(A, one), _around(B, other))), count, one, other))
+            heapq.heappush(queue, (max(0.0, _between(_around(A, part_a), _around(B, part_b))), count, part_a, part_b))
     assert best is not None
     if not reach:
         return float(_root(best))
@@ -260,9 +268,9 @@ def _root(squared: Fraction) -> Decimal:
 # --- insides ----------------------------------------------------------------------------------------
 
 
-def _has_part_inside(solid: Cells, other: Cells) -> bool:
+def _has_part_inside(solid: Cells, body: Cells) -> bool:
     """Whether a connected part of the other body has its vertices in a solid; the surfaces do not meet."""
-    return any((winding(solid, *other.point(k)) or 0) >= 1 for k in _one_of_each_part(other))
+    return any((winding(solid, *body.point(k)) or 0) >= 1 for k in _one_of_each_part(body))
 
 
 def _one_of_each_part(body: Cells) -> list[int]:

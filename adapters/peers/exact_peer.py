@@ -21,7 +21,7 @@ from collide.shapes import Compound, HPolytope, Mesh, Shape
 #: The note of a pair in which no surfaces meet: one body, or a part of it, is inside the other.
 INSIDE = "one lies inside the other"
 #: Pairs of facets that are looked at without complaint.
-MOST_PAIRS = 4_000_000_000
+MAX_PAIRS = 4_000_000_000
 
 
 class ExactPeer(PairwisePeer):
@@ -30,18 +30,22 @@ class ExactPeer(PairwisePeer):
     name = "exact"
 
     def refuses(self, part: Shape) -> str | None:
-        return None if isinstance(part, Mesh) or corners(part) else f"not judged: {type(part).__name__} has no exact form here"
+        return (
+            None
+            if isinstance(part, Mesh) or corners(part)
+            else f"not judged: {type(part).__name__} has no exact form here"
+        )
 
     def build(self, part: Shape) -> tuple | Mesh:
         if isinstance(part, Mesh):
             return part
-        found = corners(part)
-        if found is None:
+        corner_points = corners(part)
+        if corner_points is None:
             raise UnsupportedQuery(str(self.refuses(part)))
-        return found
+        return corner_points
 
     def parts(self, body: Body) -> Iterator[tuple]:
-        """The corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
+        """Corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
         if not isinstance(body.shape, Compound) or _has(body, Mesh):
             yield from super().parts(body)
             return
@@ -67,7 +71,7 @@ class ExactPeer(PairwisePeer):
 def _with_mesh(A, X_WA, B, X_WB) -> Reply:
     from collide.adapters.peers import exact_meshes
 
-    if math.prod(len(body.faces) if isinstance(body, Mesh) else 1 for body in (A, B)) > MOST_PAIRS:
+    if math.prod(len(body.faces) if isinstance(body, Mesh) else 1 for body in (A, B)) > MAX_PAIRS:
         raise UnsupportedQuery("not judged: so many facets would take exact arithmetic in Python too long")
     a, b = (
         exact_meshes.mesh_cells(body.vertices, body.faces, body.solid, X) if isinstance(body, Mesh)

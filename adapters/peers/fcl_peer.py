@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from collide.adapters.peers.hull_facets import triangulate
-from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply, swept
+from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply, has_radius
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
@@ -25,7 +25,7 @@ class FclPeer(PairwisePeer):
     isolated = True
 
     def refuses(self, part: Shape) -> str | None:
-        return "python-fcl has no hull with a radius" if swept(part) else None
+        return "python-fcl has no hull with a radius" if has_radius(part) else None
 
     def build(self, part: Shape):
         import fcl

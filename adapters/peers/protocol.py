@@ -278,7 +278,7 @@ def complaint(error: BaseException) -> str:
     return f"{type(error).__name__}: {' '.join(lines)}"[:300] if lines else type(error).__name__
 
 
-def swept(part: Shape) -> bool:
+def has_radius(part: Shape) -> bool:
     """True for a hull with a ball around it, which most engines do not have."""
     return isinstance(part, ConvexHull) and part.radius > 0
 

@@ -18,7 +18,7 @@ from collide.errors import CollideError, UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 #: Of the arrays that createCollisionShape takes.
-_MOST_VERTICES, _MOST_INDICES = 131_072, 524_288
+_MAX_VERTICES, _MAX_INDICES = 131_072, 524_288
 
 
 class PybulletPeer(PairwisePeer):
@@ -79,10 +79,10 @@ class PybulletPeer(PairwisePeer):
                 body, X_WB_[:3, 3].tolist(), quaternion_xyzw(X_WB_[:3, :3]), physicsClientId=self._client
             )
         limit = _farthest(A, X_WA @ A[1], B, X_WB @ B[1])
-        found = pybullet.getClosestPoints(A[0], B[0], limit, physicsClientId=self._client)
-        if not found:
+        contacts = pybullet.getClosestPoints(A[0], B[0], limit, physicsClientId=self._client)
+        if not contacts:
             raise CollideError(f"pybullet returned no closest points within {limit:g} m")
-        nearest = min(found, key=lambda contact: contact[8])
+        nearest = min(contacts, key=lambda contact: contact[8])
         # Its normal stands on B and points towards A.
         if meshes and nearest[8] <= 0:
             return Reply(True, note=NO_DEPTH)
@@ -100,8 +100,10 @@ def _collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
         kind = pybullet.GEOM_CAPSULE if isinstance(part, Capsule) else pybullet.GEOM_CYLINDER
         return {"shapeType": kind, "radius": part.radius, "height": part.length}, part.radius + part.length
     if isinstance(part, Mesh):
-        if len(part.vertices) > _MOST_VERTICES or 3 * len(part.faces) > _MOST_INDICES:
-            raise UnsupportedQuery(f"pybullet takes meshes of {_MOST_VERTICES} vertices and {_MOST_INDICES} indices at most")
+        if len(part.vertices) > _MAX_VERTICES or 3 * len(part.faces) > _MAX_INDICES:
+            raise UnsupportedQuery(
+                f"pybullet takes meshes of {_MAX_VERTICES} vertices and {_MAX_INDICES} indices at most"
+            )
         return {
             "shapeType": pybullet.GEOM_MESH, "vertices": part.vertices.tolist(), "indices": part.faces.ravel().tolist(),
             "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,

@@ -85,7 +85,7 @@ class Question:
         """What "small" is measured against, pair by pair: the larger bounded body's diagonal [m]."""
         diagonals = [diagonal(*bounds(body)) for body in self.bodies]
         of_pairs = ([d for d in (diagonals[i], diagonals[j]) if np.isfinite(d)] for i, j in self.pairs)
-        return [max(found, default=1.0) for found in of_pairs]
+        return [max(lengths, default=1.0) for lengths in of_pairs]
 
     def names(self, k: int) -> tuple[str, str]:
         """Names of the bodies of pair k."""
@@ -103,20 +103,21 @@ def ask(of, max_distance: float = 0.0, *, every_pair: bool = False) -> Question:
         pairs = list(of)
     except TypeError:
         raise InvalidArgument(
-            f"a question is made from a Scene, a World, a Question or (A, B, X_WA, X_WB) tuples, got {type(of).__name__}"
+            "a question is made from a Scene, a World, a Question or (A, B, X_WA, X_WB) tuples, got "
+            f"{type(of).__name__}"
         ) from None
     return Question.from_pairs(pairs, max_distance)
 
 
 def _read(scene) -> tuple[list[Body], list[tuple[int, int]]]:
     if hasattr(scene, "ids"):  # a World: ids may have gaps where bodies were removed
-        found = [scene.body(i) for i in scene.ids]
+        posed_shapes = [scene.body(i) for i in scene.ids]
         listed = scene._allowed  # pairs of ids; the World shows them nowhere else
-        key = {b.id: k for k, b in enumerate(found)}
+        key = {b.id: k for k, b in enumerate(posed_shapes)}
     else:
-        found, listed = list(scene.bodies), scene.allowed
-        key = {b.name: k for k, b in enumerate(found)}
-    bodies = [Body(b.name, b.shape, np.array(b.X_WB), b.static, b.group, b.mask) for b in found]
+        posed_shapes, listed = list(scene.bodies), scene.allowed
+        key = {b.name: k for k, b in enumerate(posed_shapes)}
+    bodies = [Body(b.name, b.shape, np.array(b.X_WB), b.static, b.group, b.mask) for b in posed_shapes]
     # A body that the scene allows but does not hold has nothing to ask.
     pairs = [(key[a], key[b]) for a, b, *_ in listed if a in key and b in key]
     return bodies, sorted({(min(p), max(p)) for p in pairs})

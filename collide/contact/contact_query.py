@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide import argument_checks as reading
-from collide.batches import ask, length_of
+from collide.batches import answer_batch, length_of
 from collide.contact.contact_rows import Contacts, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.mesh_contacts import surface_contacts
 from collide.errors import InvalidArgument
+from collide.narrowphase.convex_bodies import Question
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape, is_plain
@@ -83,7 +84,7 @@ def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
     # Parts are asked a little beyond the margin, for what rounding may have moved; where that matters the distance tells.
     size = _reach(A) + _reach(B) + float(np.abs(X_WB[:3, 3] - X_WA[:3, 3]).sum())
     near = not len(rows) or rows["upper"].min() <= margin - _ROUNDING * size
-    if near or ask(A, B, X_WA[None], X_WB[None], False, math.inf, False, 1)["lower"][0] <= margin:
+    if near or answer_batch(A, B, X_WA[None], X_WB[None], Question(False, math.inf))["lower"][0] <= margin:
         return rows
     return no_rows()
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from collide.batches import ask
+from collide.batches import answer_batch
 from collide.contact.contact_facets import Pairs, Side, lengths_of, normals_of, turned
 from collide.contact.contact_points import Points, across, points_along
 from collide.contact.contact_rows import GAP, OVERLAP, Finished, no_rows, rows_of, turned_round
@@ -20,6 +20,7 @@ from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import body_of, hull_of
 from collide.lowering.packed_convex import CONE, CYLINDER, HALFSPACE, POINTS, PackedConvex
+from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.facets.facet_queries import NearPairs
 from collide.shapes.shape import Shape
 
@@ -120,7 +121,7 @@ def _joined(nearest: Points, more: Points, facets: np.ndarray, others: np.ndarra
 
 def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
     """The row of `distance`, None where it is proven that they are farther apart than the margin."""
-    row = ask(A, B, X_WA[None], X_WB[None], False, margin, False, 1)[0]
+    row = answer_batch(A, B, X_WA[None], X_WB[None], Question(False, margin))[0]
     if np.isneginf(row["distance"]):
         raise UnsupportedQuery(
             f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the way out; "

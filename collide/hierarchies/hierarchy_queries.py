@@ -7,8 +7,12 @@ narrowphase too, which settles it exactly.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from collide.batches import answer_batch
+from collide.certificates.make_certificate import certificate_from_pairs, certify
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
@@ -16,9 +20,12 @@ from collide.hierarchies.walk import APART, MEETING, OPEN_MEETING
 from collide.hierarchies.walk_bodies import WalkBody
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import ShapeTable, pose_table
-from collide.narrowphase.convex_queries import number_of_poses, settle_proposals
-from collide.results import PAIR_DTYPE
+from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_queries import close, number_of_poses, settle_proposals
+from collide.pair_arguments import asked_poses, pose_batch
+from collide.results import PAIR_DTYPE, PairResult
 from collide.shapes.shape import Shape, is_plain
+from collide.transforms import as_poses
 
 
 class Walks:
@@ -50,8 +57,6 @@ class Walks:
         Found from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, found)``
         checks it against all vertices. The plane or the point in ``rows`` proves the answer too, in doubles.
         """
-        from collide.certificates.certificates import certificate_from
-
         if len(self) != 1:
             raise InvalidArgument(f"a certificate is for one pose, and there are {len(self)}")
         A, B, X_WA, X_WB = self._question
@@ -61,7 +66,7 @@ class Walks:
         own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
         corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
         pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
-        return certificate_from(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
+        return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
@@ -87,6 +92,62 @@ def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
     body = WalkBody(packed.points, getattr(shape, "_hull", None))
     object.__setattr__(shape, "_walk", body)
     return body
+
+
+def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> Walks:
+    """What `collide.collide` says with ``algorithm="barba-langerman"``, with its counts and proofs.
+
+    Parameters
+    ----------
+    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`. Their hierarchies are built when first needed,
+        in O(n log n), and stay with the shapes.
+    X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4), as `collide.collide` takes them.
+    check_poses : refuse matrices that are no rotation.
+    trace : also return the rounds of the last pose one by one.
+
+    Returns
+    -------
+    Walks : a row a pose, also for a single pose.
+
+    Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes. O(log n + log m) rounds a pose (L. Barba and
+    S. Langerman, "Optimal detection of intersections between convex polyhedra", SODA 2015, Theorem 5.8).
+    """
+    for shape in (A, B):
+        walk_body(shape)
+    X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
+    return walk_poses(A, B, X_WA, X_WB, lambda left: ask_default(left, True, 0.0), trace=trace)
+
+
+def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
+    """``collide(..., algorithm="barba-langerman")``: bool for single poses, bool[N] otherwise."""
+    walks = walk(A, B, X_WA, X_WB, check_poses=check_poses)
+    single = pose_batch(X_WA, "X_WA")[1] and pose_batch(X_WB, "X_WB")[1]
+    return bool(walks.hit[0]) if single else walks.hit
+
+
+def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> PairResult:
+    """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default narrowphase."""
+    for shape in (A, B):
+        walk_body(shape, "dobkin-kirkpatrick")
+    X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
+    rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
+    close(rows, depths=signed)
+    return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
+
+
+def _with_default(A, B, X_WA, X_WB, check_poses: bool):
+    """(poses, poses, whether single, a function that asks the default algorithm at the poses of given numbers).
+
+    Poses are checked and copied: a certificate worked out later is one for these.
+    """
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
+    X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+
+    def ask_default(ids: np.ndarray, boolean: bool, limit: float, depths: bool = True) -> np.ndarray:
+        X_A, X_B = (X if len(X) == 1 else np.ascontiguousarray(X[ids]) for X in (X_WA, X_WB))
+        return np.broadcast_to(answer_batch(A, B, X_A, X_B, Question(boolean, limit, depths)), (len(ids),))
+
+    return X_WA, X_WB, single, ask_default
 
 
 def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open, *, trace: bool = False) -> Walks:

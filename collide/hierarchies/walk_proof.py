@@ -60,9 +60,9 @@ def _shrinks_to(R, q):
 @kernel
 def in_ball(pair, ball_at, x, y, z, error):
     """Whether the point (x, y, z) of P, in P's frame, lies in the ball that R holds about its centre."""
-    (_, _, _, _, _, p, _, _, _, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
+    poses, q, t = pair.poses, pair.B.pose_at, pair.t
     centre = view_f64(view_i64(ball_at, BALL)[CENTRE_AT], 4)
-    dx, dy, dz = _apart_by(poses, p, x, y, z, q, centre[0], centre[1], centre[2], tx, ty, tz)
+    dx, dy, dz = _apart_by(poses, pair.A.pose_at, x, y, z, q, centre[0], centre[1], centre[2], t.x, t.y, t.z)
     return math.sqrt(dx * dx + dy * dy + dz * dz) + error < (1.0 - 1e-12) * centre[3] * _shrinks_to(poses, q)
 
 
@@ -157,7 +157,8 @@ def shares_point(Q, pair, ball_at, ids, facet, qx, qy, qz, x, y, z, yx, yy, yz, 
     ids : room for three pairs; the vertices of R named by the proof.
     error : how far the point may be from P, and what follows from being computed, altogether.
     """
-    (_, _, _, _, _, p, coords, _, m, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
+    poses, q, t = pair.poses, pair.B.pose_at, pair.t
+    coords, m = pair.B.coords, pair.B.padded
     ball = view_i64(ball_at, BALL)
     centre = view_f64(ball[CENTRE_AT], 4)
     s = yx * qx + yy * qy + yz * qz
@@ -175,6 +176,6 @@ def shares_point(Q, pair, ball_at, ids, facet, qx, qy, qz, x, y, z, yx, yy, yz, 
     rx = (1.0 - s) * centre[0] + s * fx
     ry = (1.0 - s) * centre[1] + s * fy
     rz = (1.0 - s) * centre[2] + s * fz
-    dx, dy, dz = _apart_by(poses, p, x, y, z, q, rx, ry, rz, tx, ty, tz)
+    dx, dy, dz = _apart_by(poses, pair.A.pose_at, x, y, z, q, rx, ry, rz, t.x, t.y, t.z)
     room = (1.0 - s) * (1.0 - 1e-12) * centre[3] * _shrinks_to(poses, q)
     return math.sqrt(dx * dx + dy * dy + dz * dz) + error < room

@@ -12,8 +12,8 @@ import math
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.kernels.lanes import LANES
 from collide.lowering.packed_convex import POINTS
-from collide.lowering.shape_table import NUMBERS, POSE, RADIUS
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.convex_methods import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.core_distance import (
     FINE_AT,
     OWN_DOUBLES,
@@ -25,7 +25,6 @@ from collide.narrowphase.core_distance import (
     name_plane,
     segments,
 )
-from collide.narrowphase.dispatch import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.epa.polytope_surface import DOUBLES as EPA_DOUBLES
 from collide.narrowphase.epa.polytope_surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.exact.depth_requests import ENTRY, REQUESTS, add_request
@@ -42,7 +41,7 @@ from collide.narrowphase.gap.gap_queue import (
 from collide.narrowphase.gjk.minkowski_difference import POINT, combined
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height, reach_of_plane
-from collide.narrowphase.posed_pair import pair_of
+from collide.narrowphase.posed_pair import ordered_pair, radius_of
 from collide.narrowphase.rows import (
     CERTIFIED,
     COUNT,
@@ -75,22 +74,23 @@ DOUBLES, INTEGERS = _WAITING_DOUBLES_AT + WAITING_DOUBLES, REQUESTS_AT + REQUEST
 
 @kernel(inline=True)
 def _swept(
-    pair, closed_form, terms_at, shape_a, part_a, shape_b, part_b, row, words, marks, doubles_at, integers_at, boolean, depths,
-    limit, size, slop, error, exactly, flip, row_number, given,
+    pair, closed_form, terms_at, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size, slop, error, exactly,
+    flip, row_number, given,
 ):  # fmt: skip
     """Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii.
 
     closed_form : both cores are points or segments.   given : as `gjk` has it.
     Returns the kind of gap of a row that waits for its last digits and is finished then (`gap_queue.py`), or −1.
     """
-    (_, _, _, kind_a, _, p, _, _, _, kind_b, _, q, numbers, poses, _, _, _, _, _, _, _) = pair
-    radius_a = numbers[NUMBERS * shape_a + RADIUS]
-    radius_b = numbers[NUMBERS * shape_b + RADIUS]
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
+    radius_a = radius_of(pair, A)
+    radius_b = radius_of(pair, B)
     radius = radius_a + radius_b
     points = view_f64(doubles_at, 5 * POINT)
     weights = view_f64(doubles_at + 8 * WEIGHTS, 10)
     ids = view_i64(integers_at, 10)
-    curved = kind_a != POINTS or kind_b != POINTS
+    curved = A.kind != POINTS or B.kind != POINTS
     # A boolean may begin with an axis that parted the bodies before; reported numbers never do.
     sign = (-1.0 if flip else 1.0) if boolean else 0.0
     for axis in range(3):
@@ -120,8 +120,8 @@ def _swept(
             write_guess(row, distance, lower, upper, nx, ny, nz)
             write_vertices(words, marks, ids, vertices, flip)
             return put_down(
-                pair, terms_at, ids, weights, n, shape_a, part_a, shape_b, part_b, flip, how, row_number, size, slop,
-                error, doubles_at + 8 * _WAITING_DOUBLES_AT, integers_at + 8 * _WAITING_INTEGERS_AT,
+                pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, error,
+                doubles_at + 8 * _WAITING_DOUBLES_AT, integers_at + 8 * _WAITING_INTEGERS_AT,
             )  # fmt: skip
     # Radii may prove an overlap of cores between which doubles see no clear direction.
     vague = gap and radius > 0.0
@@ -158,9 +158,9 @@ def _swept(
         radius_a = radius_b = 0.0  # a point of both cores is one of both bodies
     # On curved cores the last facet still has a width: what the two points miss of depth·n is shared between them.
     missing = 0.5 if curved and not boolean else 0.0
-    ox = missing * (ax - bx - pair[14] - depth * nx)
-    oy = missing * (ay - by - pair[15] - depth * ny)
-    oz = missing * (az - bz - pair[16] - depth * nz)
+    ox = missing * (ax - bx - pair.t.x - depth * nx)
+    oy = missing * (ay - by - pair.t.y - depth * ny)
+    oz = missing * (az - bz - pair.t.z - depth * nz)
     write_vectors(
         row, nx, ny, nz,
         (ax - ox + radius_a * nx) + poses[p + 9],
@@ -176,32 +176,34 @@ def _swept(
 
 
 @kernel
-def _half(pair, shape_b, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip):
+def _half(pair, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip):
     """A half-space A and a convex B: the point of B deepest behind the plane."""
-    (_, _, _, _, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, tx, ty, tz, _, tree_b, _, _) = pair
+    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
+    p, q = A.pose_at, B.pose_at
+    t = pair.t
     ids = view_i64(integers_at, 10)
-    nx, ny, nz, offset, length = plane_in_world(numbers, at_a, poses, p)
+    nx, ny, nz, offset, length = plane_in_world(numbers, A.params_at, poses, p)
     nx /= length
     ny /= length
     nz /= length
     gx = -(poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz)
     gy = -(poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz)
     gz = -(poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz)
-    k, x, y, z, _ = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, 0, -1, gx, gy, gz)
-    if tree_b != 0:
-        k = settled_vertex(coords_b, n_b, m_b, tree_b, k, gx, gy, gz)
-        x = coords_b[k]
-        y = coords_b[m_b + k]
-        z = coords_b[2 * m_b + k]
+    k, x, y, z, _ = support(B.kind, B.coords, B.n, B.padded, numbers, B.params_at, B.tree, 0, -1, gx, gy, gz)
+    if B.tree != 0:
+        k = settled_vertex(B.coords, B.n, B.padded, B.tree, k, gx, gy, gz)
+        x = B.coords[k]
+        y = B.coords[B.padded + k]
+        z = B.coords[2 * B.padded + k]
     bx = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
     by = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
     bz = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
-    radius = numbers[NUMBERS * shape_b + RADIUS]
-    gap = ((bx + tx) * nx + (by + ty) * ny + (bz + tz) * nz) - offset / length - radius
+    radius = radius_of(pair, B)
+    gap = ((bx + t.x) * nx + (by + t.y) * ny + (bz + t.z) * nz) - offset / length - radius
     lower = gap - error
     upper = gap + error
     decided = lower > 0.0 or upper <= 0.0
-    exactly = known and kind_b == POINTS
+    exactly = known and B.kind == POINTS
     width = 0.0 if exactly else math.inf
     if exactly and lower <= limit and not boolean:
         proven, height, height_low, unsure = polish_height(
@@ -230,8 +232,9 @@ def _halves(pair, row, marks, flip):
 
     Opposite within rounding is left open, for `opposite_halfspaces.py` to settle.
     """
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
-    opposite, nx, ny, nz = opposite_halfspaces(numbers, at_a, p, at_b, q, poses)
+    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
+    p, q = A.pose_at, B.pose_at
+    opposite, nx, ny, nz = opposite_halfspaces(numbers, A.params_at, p, B.params_at, q, poses)
     row[LOWER] = -math.inf
     row[DISTANCE] = -math.inf
     row[UPPER] = 0.0
@@ -318,8 +321,8 @@ def _answer(
     begun : the row may name vertices to begin with. To look costs 1 to 2 % of a gap: rows are seldom in the cache.
     """
     row, words, marks = view_row(rows_at + ROW * row_number)
-    pair, _, numbers, sa, sb, flip, size, slop, known = pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb)
-    how = method(pair[3], pair[1], pair[9], pair[7])
+    pair, _, flip, size, slop, known = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pa, pb)
+    how = method(pair.A.kind, pair.A.n, pair.B.kind, pair.B.n)
     given = _take_vertices(words, marks, view_i64(integers_at, 10), begun)
     if 0.0 < size < SMALLEST:
         marks[HOW] = REFUSED
@@ -328,14 +331,14 @@ def _answer(
         _halves(pair, row, marks, flip)
         return -1
     if how == HALFSPACE_CONVEX:
-        offset, skew = reach_of_plane(numbers, pair[4], pair[13], pair[5])
+        offset, skew = reach_of_plane(pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at)
         size += offset
         error = ERROR * size * skew + slop
         _half(
-            pair, sb, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip
+            pair, row, words, marks, doubles_at, integers_at, boolean, limit, size, error, skew, known, flip
         )
         return -1
     return _swept(
-        pair, how == CAPSULES, terms_at, sa, pair[5] // POSE, sb, pair[11] // POSE, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
+        pair, how == CAPSULES, terms_at, row, words, marks, doubles_at, integers_at, boolean, depths, limit, size,
         slop, ERROR * size + slop, known, flip, row_number, given,
     )  # fmt: skip

@@ -45,17 +45,18 @@ _STARTS = 4
 @kernel
 def _segment_differences(pair, points, ids):
     """The four differences of two cores of at most two points, each core's ends in order."""
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
+    A, B, poses, t = pair.A, pair.B, pair.poses, pair.t
+    p, q = A.pose_at, B.pose_at
     for k in range(4):
-        i = min(k & 1, n_a - 1)
-        j = min(k >> 1, n_b - 1)
+        i = min(k & 1, A.n - 1)
+        j = min(k >> 1, B.n - 1)
         for axis in range(3):
             r = p + 3 * axis
-            a = poses[r] * coords_a[i] + poses[r + 1] * coords_a[m_a + i] + poses[r + 2] * coords_a[2 * m_a + i]
+            a = poses[r] * A.coords[i] + poses[r + 1] * A.coords[A.padded + i] + poses[r + 2] * A.coords[2 * A.padded + i]
             r = q + 3 * axis
-            b = poses[r] * coords_b[j] + poses[r + 1] * coords_b[m_b + j] + poses[r + 2] * coords_b[2 * m_b + j]
-            t = tx if axis == 0 else (ty if axis == 1 else tz)
-            points[POINT * k + axis] = (a - b) - t
+            b = poses[r] * B.coords[j] + poses[r + 1] * B.coords[B.padded + j] + poses[r + 2] * B.coords[2 * B.padded + j]
+            shift = t.x if axis == 0 else (t.y if axis == 1 else t.z)
+            points[POINT * k + axis] = (a - b) - shift
             points[POINT * k + 3 + axis] = a
             points[POINT * k + 6 + axis] = b
         ids[2 * k] = i
@@ -141,7 +142,7 @@ def convex_cores(pair, terms_at, doubles_at, integers_at, boolean, depths, radiu
         return -above, -math.inf, above, -math.inf, math.inf, 0.0, 0.0, 1.0, n, n, rounds
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     roomy = status == ENCLOSED and clearance > ROOMY * size
-    many = depths and not curved and pair[1] + pair[7] > _MANY
+    many = depths and not curved and pair.A.n + pair.B.n > _MANY
     epa_at = doubles_at + 8 * OWN_DOUBLES
     ids_at = integers_at + 8 * OWN_INTEGERS
     shallowest = -math.inf

@@ -1,36 +1,75 @@
-"""Which method answers which pair of convex sets: the pair matrix, one half and its mirror.
+"""THE table: which method answers which pair of shapes. Nothing else decides it.
 
-                 point   segment   points   cylinder   cone   ellipsoid   half-space
-    point          C        C         G         G        G        G            H
-    segment                 C         G         G        G        G            H
-    points                            G         G        G        G            H
-    cylinder                                    G        G        G            H
-    cone                                                 G        G            H
-    ellipsoid                                                     G            H
-    half-space                                                                 P
+`Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it is
+written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the file
+that it names; `pair_queries.py` says with which function each public question goes there.
 
-    C  capsule_capsule.py    closed form (a sphere is a point, a capsule a segment, each swept)
-    H  halfspace_convex.py   closed form, one support query
-    P  halfspaces.py         two planes
-    G  gjk.py, and epa.py where the cores overlap; small hulls go through small_hulls.py first, unless depths are wanted
-
-Every set may be swept by a ball. Bodies of several sets are unions: `collide.narrowphase.composite.composite` combines the
-rows. Triangle meshes are answered over their box-trees (`collide.meshes`), their triangles one by one.
+To add a pair or a kind: a row here, its kind in lowering, its functions in `pair_queries.py`; a test asks for all three.
 """
 
 from __future__ import annotations
 
-from collide.kernels import kernel
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from enum import Enum
 
-CAPSULES, HALFSPACE_CONVEX, HALFSPACES, CONVEX = range(4)
+from collide.lowering.kinds import Kind
 
 
-@kernel(inline=True)
-def method(kind_a, n_a, kind_b, n_b):
-    """CAPSULES, HALFSPACE_CONVEX, HALFSPACES or CONVEX; a half-space stands first."""
-    if kind_a == HALFSPACE:
-        return HALFSPACES if kind_b == HALFSPACE else HALFSPACE_CONVEX
-    if kind_a == POINTS and kind_b == POINTS and n_a <= 2 and n_b <= 2:
-        return CAPSULES
-    return CONVEX
+class Method(Enum):
+    """How a pair is answered: (name of its file or files in this room, what happens there)."""
+
+    #: The four first are those of kernels, which find them in `convex_methods.py` by the packed sets.
+    CLOSED = "capsule_capsule", "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment"
+    PLANE = "halfspace_convex", "closed form: one support query against the plane"
+    PLANES = "halfspace_convex", "two planes: they meet unless exactly opposite"
+    CONVEX = "gjk/gjk", "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open"
+    FACETS = "facets/mesh_rows", "two BVHs of facets traversed together, exact triangle tests"
+    CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
+    HULL = "facets/mesh_rows", "the hull of the mesh answers against the plane"
+    PARTS = "composite/composite", "pairs of convex parts, culled by balls, combined to one row"
+    MESH_PARTS = "composite/composite_meshes", "pairs of parts of which some are meshes, culled by boxes, combined to one row"
+
+    @property
+    def file(self) -> str:
+        return f"narrowphase/{self.value[0]}.py"
+
+    @property
+    def meaning(self) -> str:
+        return self.value[1]
+
+
+C, H, P, G = Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX
+F, E, L = Method.FACETS, Method.CURVED, Method.HULL
+U, M = Method.PARTS, Method.MESH_PARTS
+
+#: Row and column in the order of `Kind`; what stands below the diagonal is mirrored.
+#: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
+# fmt: off
+_UPPER_HALF = (
+    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  mesh compound
+    (Kind.SPHERE,       (C,     C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
+    (Kind.CAPSULE,      (       C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
+    (Kind.POLYTOPE,     (                G,        G,       G,        G,    G,         H,         F,    U,        M)),
+    (Kind.ROUNDED,      (                          G,       G,        G,    G,         H,         E,    U,        M)),
+    (Kind.CYLINDER,     (                                   G,        G,    G,         H,         E,    U,        M)),
+    (Kind.CONE,         (                                             G,    G,         H,         E,    U,        M)),
+    (Kind.ELLIPSOID,    (                                                   G,         H,         E,    U,        M)),
+    (Kind.HALFSPACE,    (                                                              P,         L,    U,        M)),
+    (Kind.MESH,         (                                                                         F,    M,        M)),
+    (Kind.COMPOUND,     (                                                                               U,        M)),
+    (Kind.MESH_COMPOUND,(                                                                                         M,)),
+)
+# fmt: on
+
+#: TABLE[kind of A][kind of B].
+TABLE: tuple[tuple[Method, ...], ...] = tuple(
+    tuple(_UPPER_HALF[min(a, b)][1][max(a, b) - min(a, b)] for b in Kind) for a in Kind
+)
+#: Questions that a method does not answer, and why, in the words of the error.
+REFUSED: dict[tuple[Method, str], str] = {
+    (Method.PLANES, "distance"): "their overlap has no end, so no translation of finite length separates them; collide() still answers",
+}
+
+
+def method_of(kind_a: Kind, kind_b: Kind) -> Method:
+    """The method for a pair of kinds, in either order."""
+    return TABLE[kind_a][kind_b]

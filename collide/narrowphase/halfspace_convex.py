@@ -133,12 +133,13 @@ def polish_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     doubles_at, ties_at : workspace of eight doubles, MOST_TIES + 1 integers.
     Composed poses are left to the exact stage.
     """
-    (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, _, _, _, _, tree_b, _, _) = pair
+    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
+    p, q = A.pose_at, B.pose_at
     if is_composed(poses, p) or is_composed(poses, q) or not (SMALLEST_FINE < size < LARGEST_FINE):
         return False, 0.0, 0.0, 0.0
     plane = view_f64(doubles_at, 8)
     ties = view_i64(ties_at, MOST_TIES + 1)
-    _set_fine_plane(numbers, at_a, poses, p, plane)
+    _set_fine_plane(numbers, A.params_at, poses, p, plane)
     square, square_low = product_of_vectors(
         plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
         plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
@@ -153,17 +154,17 @@ def polish_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     gy = poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz
     gz = poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz
     ties[0] = vertex
-    level, limit = tied_vertices(coords, count, m, tree_b, ties, gx, gy, gz, error)
+    level, limit = tied_vertices(B.coords, B.n, B.padded, B.tree, ties, gx, gy, gz, error)
     many = level > MOST_TIES
     least = math.inf
     least_low = 0.0
-    for k in range(count if many else level):
+    for k in range(B.n if many else level):
         i = k if many else ties[k]
-        if many and coords[i] * gx + coords[m + i] * gy + coords[2 * m + i] * gz > limit:
+        if many and B.coords[i] * gx + B.coords[B.padded + i] * gy + B.coords[2 * B.padded + i] * gz > limit:
             continue
-        x, x_low = _fine_coordinate(coords, m, i, poses, p, q, 0)
-        y, y_low = _fine_coordinate(coords, m, i, poses, p, q, 1)
-        z, z_low = _fine_coordinate(coords, m, i, poses, p, q, 2)
+        x, x_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 0)
+        y, y_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 1)
+        z, z_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 2)
         height, height_low = product_of_vectors(
             x, x_low, y, y_low, z, z_low, plane[0], plane[1], plane[2], plane[3], plane[4], plane[5]
         )

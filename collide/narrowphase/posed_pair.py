@@ -1,4 +1,4 @@
-"""A pair of posed convex sets as the methods take it: one tuple, the body of lower rank first.
+"""A pair of posed convex sets as the kernels of the narrowphase take it, the body of lower rank first.
 
 Bodies are exchanged by the content of their shapes, and for equal shapes by the numbers of their
 poses: whichever way a pair is asked, the same numbers are worked on, and the answer is flipped.
@@ -7,6 +7,7 @@ poses: whichever way a pair is asked, the same numbers are worked on, and the an
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE
@@ -29,6 +30,7 @@ from collide.lowering.shape_table import (
     SLOP,
     TREE,
 )
+from collide.numerics.vec3 import Vec3
 
 #: A matrix is said to stretch by the root of this at least, 3e-151.
 _LEAST_SQUARE = 2.0**-1000
@@ -84,27 +86,70 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     return size, shapes + poses[p + POSE_SLOP] + poses[q + POSE_SLOP], known and shapes == 0.0
 
 
+class PosedBody(NamedTuple):
+    """One body of a pair.
+
+    coords : view of its points, all x, then all y, then all z.   n : points.   padded : length of each of the three runs.
+    kind : of `packed_convex.py`.   shape : its row of the `ShapeTable`.   params_at : its parameters in the table's numbers.
+    pose_at : where its row of the poses begins.   tree, coarse_at : addresses of its support tree and coarse points, or 0.
+    """
+
+    coords: Any
+    n: int
+    padded: int
+    kind: int
+    shape: int
+    params_at: int
+    pose_at: int
+    tree: int
+    coarse_at: int
+
+
+class PosedPair(NamedTuple):
+    """Two posed convex sets, in the order worked on.   numbers, poses : views of both tables.   t : p_WB − p_WA."""
+
+    A: PosedBody
+    B: PosedBody
+    numbers: Any
+    poses: Any
+    t: Vec3
+
+
+class OrderedPair(NamedTuple):
+    """A pair with what the tables say of it.
+
+    ints : view of the `ShapeTable`.   flip : whether A and B were exchanged.   size, slop, exact_numbers : of `size_and_slop`.
+    """
+
+    pair: PosedPair
+    ints: Any
+    flip: bool
+    size: float
+    slop: float
+    exact_numbers: bool
+
+
 @kernel(inline=True)
-def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
-    """(coordinates, n, m, kind, row of numbers, pose row) of A, the same of B, numbers, poses, p_WB − p_WA,
-    support trees of A and B, and their coarse points (addresses, or 0)."""
-    p = POSE * pa
-    q = POSE * pb
-    return (
-        coords_a, ints[INTS * sa + COUNT], ints[INTS * sa + PADDED], ints[INTS * sa + KIND], NUMBERS * sa + PARAMS, p,
-        coords_b, ints[INTS * sb + COUNT], ints[INTS * sb + PADDED], ints[INTS * sb + KIND], NUMBERS * sb + PARAMS, q,
-        numbers, poses,
-        poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11],
-        ints[INTS * sa + TREE], ints[INTS * sb + TREE], ints[INTS * sa + COARSE_AT], ints[INTS * sb + COARSE_AT],
+def _posed_body(ints, coords, shape, part):
+    at = INTS * shape
+    return PosedBody(
+        coords, ints[at + COUNT], ints[at + PADDED], ints[at + KIND], shape, NUMBERS * shape + PARAMS, POSE * part,
+        ints[at + TREE], ints[at + COARSE_AT],
     )  # fmt: skip
 
 
 @kernel(inline=True)
-def pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb):
-    """(`posed_pair`, ints, numbers, shape of A, of B, exchanged, size, slop, known) of two parts, by their numbers.
+def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
+    """The `PosedPair` of shapes sa and sb at the poses of parts pa and pb."""
+    p = POSE * pa
+    q = POSE * pb
+    t = Vec3(poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11])
+    return PosedPair(_posed_body(ints, coords_a, sa, pa), _posed_body(ints, coords_b, sb, pb), numbers, poses, t)
 
-    Everything in the order worked on; the last three are those of `size_and_slop`. Addresses as in `answer_pairs`.
-    """
+
+@kernel(inline=True)
+def ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pa, pb):
+    """The `OrderedPair` of two parts, by their numbers. Addresses as in `answer_pairs`."""
     shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
     sa = shape_of[pa]
     sb = shape_of[pb]
@@ -115,8 +160,20 @@ def pair_of(ints_at, numbers_at, poses_at, shape_of_at, pa, pb):
     at_a, n_a = coordinates_of(ints, sa)
     at_b, n_b = coordinates_of(ints, sb)
     pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
-    size, slop, known = size_and_slop(numbers, poses, sa, pa, sb, pb)
-    return pair, ints, numbers, sa, sb, flip, size, slop, known
+    size, slop, exact_numbers = size_and_slop(numbers, poses, sa, pa, sb, pb)
+    return OrderedPair(pair, ints, flip, size, slop, exact_numbers)
+
+
+@kernel(inline=True)
+def radius_of(pair, body):
+    """By how much a body's core is swept."""
+    return pair.numbers[NUMBERS * body.shape + RADIUS]
+
+
+@kernel(inline=True)
+def reach_of(pair, body):
+    """Greatest distance of a point of a body's core from its frame's origin."""
+    return pair.numbers[NUMBERS * body.shape + REACH]
 
 
 @kernel(inline=True)
@@ -125,8 +182,8 @@ def reach_of_both(pair):
 
     Of a pair whose size is known (`size_and_slop`).
     """
-    (_, _, _, _, at_a, p, _, _, _, _, at_b, q, numbers, poses, _, _, _, _, _, _, _) = pair
-    return sum_of_reaches(numbers, at_a - PARAMS, at_b - PARAMS, poses, p, q)
+    at_a, at_b = NUMBERS * pair.A.shape, NUMBERS * pair.B.shape
+    return sum_of_reaches(pair.numbers, at_a, at_b, pair.poses, pair.A.pose_at, pair.B.pose_at)
 
 
 @kernel(inline=True)

@@ -67,25 +67,25 @@ class Check:
 
     def lines(self, several: bool) -> Iterator[str]:
         """One line a finding, fields separated by tabs; with the state where there are several."""
-        for found in self.findings:
-            measure = "unbounded" if found.distance is None else repr(found.distance)
-            extra = [text for text in (printable(self.label) if several else "", found.where) if text]
-            yield "\t".join((found.what, printable(found.a), printable(found.b), measure, *extra))
+        for finding in self.findings:
+            measure = "unbounded" if finding.distance is None else repr(finding.distance)
+            extra = [text for text in (printable(self.label) if several else "", finding.where) if text]
+            yield "\t".join((finding.what, printable(finding.a), printable(finding.b), measure, *extra))
 
     def verdict(self) -> str:
         label = f"{self.label}: " if self.label else ""
         if not self.against_baseline:
             return label + self.summary
-        counts = {what: sum(found.what == what for found in self.findings) for what in (KNOWN, DEEPER, GONE)}
+        counts = {what: sum(finding.what == what for finding in self.findings) for what in (KNOWN, DEEPER, GONE)}
         new = len(self.failing) - counts[DEEPER]
         parts = [count(new, "new collision") if new else "no new collision"]
         parts += [f"{counts[DEEPER]} known and deeper than before"] if counts[DEEPER] else []
         parts += [f"{counts[what]} {word}" for what, word in ((KNOWN, "known"), (GONE, "gone")) if counts[what]]
-        deeper = next((found for found in self.findings if found.what == DEEPER), None)
-        said = "" if deeper is None else (
+        deeper = next((finding for finding in self.findings if finding.what == DEEPER), None)
+        deepened = "" if deeper is None else (
             f"; {deeper.a} and {deeper.b}: {brief_length(deeper.depth)} deep, was {_length(deeper.before)}"
         )  # fmt: skip
-        return f"{label}{', '.join(parts)}{said} ({self.summary})"
+        return f"{label}{', '.join(parts)}{deepened} ({self.summary})"
 
 
 def _length(depth: float | None) -> str:
@@ -101,19 +101,21 @@ def check(report: Report, label: str, *, touching_counts: bool, known: Baseline 
     made = Check(label, report.scene["name"], report.bodies, report.verdict(), against_baseline=known is not None)
     made.unanswered = [*report.unanswered, *(report.trajectory or {}).get("unanswered", [])]
     if report.trajectory is not None:
-        made.summary = f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
-    left = dict(known.of(label)) if known is not None else {}
-    for found in _pairs(report):
-        counts = found.what == COLLISION or (found.what == TOUCHING and touching_counts)
-        entry = left.pop(_key(found), None)
+        made.summary = (
+            f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
+        )
+    unmatched = dict(known.of(label)) if known is not None else {}
+    for finding in _pairs(report):
+        counts = finding.what == COLLISION or (finding.what == TOUCHING and touching_counts)
+        entry = unmatched.pop(_key(finding), None)
         if counts and entry is not None:
             before = math.inf if entry.distance is None else entry.depth
-            deeper = found.depth > before + tolerance
-            found = found._replace(what=DEEPER if deeper else KNOWN, before=before)
+            deeper = finding.depth > before + tolerance
+            finding = finding._replace(what=DEEPER if deeper else KNOWN, before=before)
             counts = deeper
-        (made.failing if counts else made.findings).append(found)
+        (made.failing if counts else made.findings).append(finding)
     made.findings[:0] = made.failing
-    gone = [entry for entry in left.values() if entry.what == COLLISION or touching_counts]
+    gone = [entry for entry in unmatched.values() if entry.what == COLLISION or touching_counts]
     made.findings += [entry._replace(what=GONE) for entry in gone]
     return made
 
@@ -123,8 +125,8 @@ def _pairs(report: Report) -> Iterator[Finding]:
     followed: dict[frozenset, Finding] = {}
     for what, name in _CLASSES.items():
         for pair in (report.trajectory or {}).get(name, []):
-            found = Finding(what, pair["a"], pair["b"], pair["distance"], trajectory.place(pair["from"]))
-            followed.setdefault(frozenset((pair["a"], pair["b"])), found)
+            finding = Finding(what, pair["a"], pair["b"], pair["distance"], trajectory.place(pair["from"]))
+            followed.setdefault(frozenset((pair["a"], pair["b"])), finding)
     yield from followed.values()
     for what, name in _CLASSES.items():
         for pair in getattr(report, name):
@@ -144,20 +146,20 @@ class Baseline(NamedTuple):
         return self.states.get(label, self.states.get("", {}))
 
 
-def _key(found: Finding) -> tuple:
+def _key(finding: Finding) -> tuple:
     """What makes a pair the same: its bodies in any order, and whether it collides or touches."""
-    return (TOUCHING if found.what == TOUCHING else COLLISION, frozenset((found.a, found.b)))
+    return (TOUCHING if finding.what == TOUCHING else COLLISION, frozenset((finding.a, finding.b)))
 
 
 def baseline_text(checks: Iterable[Check]) -> str:
     """The collisions of checks as the text of a baseline: sorted by name, one a line, for version control."""
     entries = []
-    for one in checks:
-        for found in one.findings:
-            if found.what in _KNOWN_CLASSES:
-                depth = None if math.isinf(found.depth) else found.depth
-                state = {"state": one.label} if one.label else {}
-                entries.append({**state, "class": found.what, "a": found.a, "b": found.b, "depth": depth})
+    for result in checks:
+        for finding in result.findings:
+            if finding.what in _KNOWN_CLASSES:
+                depth = None if math.isinf(finding.depth) else finding.depth
+                state = {"state": result.label} if result.label else {}
+                entries.append({**state, "class": finding.what, "a": finding.a, "b": finding.b, "depth": depth})
     entries.sort(key=lambda entry: (entry.get("state", ""), entry["class"], entry["a"], entry["b"]))
     lines = ",\n    ".join(json.dumps(entry, ensure_ascii=False) for entry in entries)
     listed = f"[\n    {lines}\n  ]" if entries else "[]"
@@ -196,7 +198,7 @@ def _states(data: dict, schema: str) -> dict[str, dict[tuple, Finding]]:
     if schema == SCHEMA:
         entries = [(entry.get("state", ""), entry["class"], entry) for entry in data["collisions"]]
     elif schema.startswith("collide-states/"):
-        entries = [(one["name"], what, e) for one in data["states"] for what, e in _of_report(one["report"])]
+        entries = [(entry["name"], what, e) for entry in data["states"] for what, e in _of_report(entry["report"])]
     elif schema.startswith("collide-report/"):
         entries = [("", what, entry) for what, entry in _of_report(data)]
     else:
@@ -204,10 +206,10 @@ def _states(data: dict, schema: str) -> dict[str, dict[tuple, Finding]]:
     states: dict[str, dict[tuple, Finding]] = {state: {} for state, _, _ in entries}
     for state, what, entry in entries:
         depth = entry["depth"]
-        found = Finding(str(what), str(entry["a"]), str(entry["b"]), None if depth is None else -float(depth))
+        finding = Finding(str(what), str(entry["a"]), str(entry["b"]), None if depth is None else -float(depth))
         if what not in _KNOWN_CLASSES:
             raise ValueError(f"class {what!r}")
-        states[state][_key(found)] = found
+        states[state][_key(finding)] = finding
     return states
 
 

@@ -38,7 +38,7 @@ def verdict(data: dict) -> str:
         f"{count(wrong, 'answer')} of {data['reference']} proven wrong" if wrong else
         f"no answer of {data['reference']} proven wrong",
         f"{count(data['pairs'], 'pair')} asked of {', '.join(asked)}",
-        *(found for summary in data["summaries"][1:] for found in [_wrong_of(summary)] if found),
+        *(complaint for summary in data["summaries"][1:] for complaint in [_wrong_of(summary)] if complaint),
     ]
     inside = sum(dispute["kind"] == "inside" for dispute in disputes)
     unjudged = sum(bool(dispute["not_judged"]) for dispute in disputes)
@@ -57,19 +57,19 @@ def _wrong_of(summary: dict) -> str:
         (summary["wrong"], "wrong boolean"), (summary["wrong_distances"], "wrong distance"),
         (summary["contradictions"], "contradiction"), (len(summary["failed"]), "failure"),
     ]  # fmt: skip
-    found = [count(n, what) for n, what in counts if n]
+    parts = [count(n, what) for n, what in counts if n]
     if summary["wrong_distances"]:
         worst = f" ({brief_length(summary['furthest_off']['difference'])} off at worst)"
-        found = [text + worst if "distance" in text else text for text in found]
-    return f"{summary['engine']}: {', '.join(found)}" if found else ""
+        parts = [text + worst if "distance" in text else text for text in parts]
+    return f"{summary['engine']}: {', '.join(parts)}" if parts else ""
 
 
 def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Table:
     """One column per engine: fifteen counts fit below one another, not beside."""
     skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
-    shown = [row for row in rows if row[0] not in skipped]
-    columns = [Column(headers[0], "label"), *(Column(row[0]) for row in shown)]
-    lines = [[header, *(row[k] or "-" for row in shown)] for k, header in enumerate(headers) if k]
+    listed = [row for row in rows if row[0] not in skipped]
+    columns = [Column(headers[0], "label"), *(Column(row[0]) for row in listed)]
+    lines = [[header, *(row[k] or "-" for row in listed)] for k, header in enumerate(headers) if k]
     notes = [f"{name} was not asked: {why}" for name, why in skipped.items()]
     return Table("ENGINES  counts of pairs", columns, lines, notes=notes)
 
@@ -96,25 +96,25 @@ def _dispute_tables(data: dict, limit: int | None) -> list[Table]:
 
 def _dispute_table(title: str, disputes: list[dict], reference: str, limit: int | None) -> Table:
     disputes = sorted(disputes, key=lambda d: (not d["wrong"], bool(d["not_judged"]), -_off(d)))
-    shown = disputes[:limit]
-    ours = _answers([(d["reference_hit"], d["reference_distance"]) for d in shown])
+    listed = disputes[:limit]
+    ours = _answers([(d["reference_hit"], d["reference_distance"]) for d in listed])
     columns = [
-        (Column("engine", "label"), [d["engine"] for d in shown]),
-        (Column("body A", "name"), [d["a"] for d in shown]),
-        (Column("body B", "name"), [d["b"] for d in shown]),
-        (Column("it says"), _answers([(d["hit"], d["distance"]) for d in shown])),
+        (Column("engine", "label"), [d["engine"] for d in listed]),
+        (Column("body A", "name"), [d["a"] for d in listed]),
+        (Column("body B", "name"), [d["b"] for d in listed]),
+        (Column("it says"), _answers([(d["hit"], d["distance"]) for d in listed])),
         (Column(f"{reference} says", "number", 1), ours),
-        (Column("exact"), _answers([(d["exact_hit"], d["exact_distance"]) for d in shown])),
-        (Column("wrong", "text"), [_blame(d) for d in shown]),
+        (Column("exact"), _answers([(d["exact_hit"], d["exact_distance"]) for d in listed])),
+        (Column("wrong", "text"), [_blame(d) for d in listed]),
     ]
-    if shown[0]["kind"] == "distance":
-        columns.insert(-1, (Column("off by"), lengths([_off(d) for d in shown])))
-    reasons = dict.fromkeys(d["not_judged"].removeprefix("not judged: ") for d in shown if d["not_judged"])
+    if listed[0]["kind"] == "distance":
+        columns.insert(-1, (Column("off by"), lengths([_off(d) for d in listed])))
+    reasons = dict.fromkeys(d["not_judged"].removeprefix("not judged: ") for d in listed if d["not_judged"])
     rows = [list(row) for row in zip(*(cells for _, cells in columns))]
     notes = [f"not judged: {reason}" for reason in reasons]
-    if any(d["judged_by"] == "the proven bracket" for d in shown):
+    if any(d["judged_by"] == "the proven bracket" for d in listed):
         notes.append(f"by bracket: exact arithmetic cannot tell; it is outside the bracket that {reference} proves")
-    return Table(title, [column for column, _ in columns], rows, notes=notes, more=len(disputes) - len(shown))
+    return Table(title, [column for column, _ in columns], rows, notes=notes, more=len(disputes) - len(listed))
 
 
 def _off(dispute: dict) -> float:
@@ -136,5 +136,12 @@ def _blame(dispute: dict) -> str:
     if dispute["not_judged"]:
         return "not judged"
     names = ", ".join(dispute["wrong"]) or "none"
-    said = [word for word, so in (("touching", dispute["touching"]), ("by bracket", dispute["judged_by"] == "the proven bracket")) if so]
-    return f"{names} ({', '.join(said)})" if said else names
+    remarks = [
+        word
+        for word, so in (
+            ("touching", dispute["touching"]),
+            ("by bracket", dispute["judged_by"] == "the proven bracket"),
+        )
+        if so
+    ]
+    return f"{names} ({', '.join(remarks)})" if remarks else names

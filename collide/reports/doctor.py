@@ -40,7 +40,7 @@ class Check:
     """One finding: ``passed`` False means broken, None means worth knowing."""
 
     what: str
-    found: str
+    answer: str
     passed: bool | None = True
 
 
@@ -82,7 +82,7 @@ _WORDS = {True: "ok", False: "BROKEN", None: "-"}
 
 def _table(title: str, checks: list[Check]) -> Table:
     columns = [Column("", "label"), Column("", "label"), Column("", "text")]
-    return Table(title, columns, [[_WORDS[check.passed], check.what, check.found] for check in checks])
+    return Table(title, columns, [[_WORDS[check.passed], check.what, check.answer] for check in checks])
 
 
 def examine(progress=None) -> Examination:
@@ -115,9 +115,11 @@ def _kernels() -> list[Check]:
     if mode.MODE == mode.COMPILED:
         checks = [Check("kernels", f"compiled, level {about['level']} of {about['levels']}")]
     else:
-        numba = f" (numba {package_version('numba')}, kept on disk)" if mode.MODE == mode.JUST_IN_TIME else ", very slow"
-        told = "NO COMPILED KERNELS" if not about else "FALLING BACK"
-        checks = [Check("kernels", f"{told}: run {mode.MODE}{numba}: {mode.WHY}", None)]
+        numba = (
+            f" (numba {package_version('numba')}, kept on disk)" if mode.MODE == mode.JUST_IN_TIME else ", very slow"
+        )
+        state = "NO COMPILED KERNELS" if not about else "FALLING BACK"
+        checks = [Check("kernels", f"{state}: run {mode.MODE}{numba}: {mode.WHY}", None)]
     if about:
         checks += [
             Check("library", f"{about['path']}"),
@@ -160,8 +162,17 @@ def _kept_kernels() -> list[Check]:
     except OSError:  # told below
         why = None
     if why is not None:
-        return [Check("kernels", f"{folder} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR", None)]
-    return [_cache("kernels", folder), Check("kernels are code", "who can write in their folder decides what runs: only its user may")]
+        return [
+            Check(
+                "kernels",
+                f"{folder} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR",
+                None,
+            )
+        ]
+    return [
+        _cache("kernels", folder),
+        Check("kernels are code", "who can write in their folder decides what runs: only its user may"),
+    ]
 
 
 def _cache(what: str, folder: Path) -> Check:
@@ -214,5 +225,5 @@ def _ask(what: str, A, B, x: float, truth: float) -> Check:
     r = collide.distance(A, B, collide.pose(), X_WB)
     hit = collide.collide(A, B, collide.pose(), X_WB)
     held = r.lower <= truth <= r.upper and bool(hit) == bool(r.hit) == (truth <= 0)
-    found = f"{r.distance:.12g} m, known to {widths([r.upper - r.lower])[0]}"
-    return Check(what, found if held else f"{found}: [{r.lower!r}, {r.upper!r}] should hold {truth!r}", held)
+    answer = f"{r.distance:.12g} m, known to {widths([r.upper - r.lower])[0]}"
+    return Check(what, answer if held else f"{answer}: [{r.lower!r}, {r.upper!r}] should hold {truth!r}", held)

@@ -15,18 +15,18 @@ from collide.reports.tables import printable
 
 def text(checks: list[Check]) -> Iterator[str]:
     """The file, piece by piece: a suite for every state."""
-    cases = sum(len(one.bodies) for one in checks)
-    failures = sum(len(_failing(one)) for one in checks)
-    errors = sum(len(_unanswered(one)) for one in checks)
+    cases = sum(len(check.bodies) for check in checks)
+    failures = sum(len(_failing(check)) for check in checks)
+    errors = sum(len(_unanswered(check)) for check in checks)
     yield '<?xml version="1.0" encoding="UTF-8"?>\n'
     yield f'<testsuites name="collide check" tests="{cases}" failures="{failures}" errors="{errors}">\n'
-    for one in checks:
-        yield from _suite(one)
+    for check in checks:
+        yield from _suite(check)
     yield "</testsuites>\n"
 
 
 def _suite(check: Check) -> Iterator[str]:
-    failing, unanswered, told = _failing(check), _unanswered(check), _told(check)
+    failing, unanswered, reported = _failing(check), _unanswered(check), _reported(check)
     name = _attribute(f"{check.scene}: {check.label}" if check.label else check.scene)
     yield (
         f'  <testsuite name={name} tests="{len(check.bodies)}" failures="{len(failing)}" errors="{len(unanswered)}" '
@@ -34,29 +34,37 @@ def _suite(check: Check) -> Iterator[str]:
     )
     for body in check.bodies:
         inside = [
-            *(f"<failure message={_attribute(_message(body, found))} type={_attribute(found[0].what)}>"
-              f"{_text(_lines(body, found))}</failure>" for found in [failing.get(body)] if found),
+            *(
+                f"<failure message={_attribute(_message(body, findings))} type={_attribute(findings[0].what)}>"
+                f"{_text(_lines(body, findings))}</failure>"
+                for findings in [failing.get(body)]
+                if findings
+            ),
             *(f'<error message={_attribute(why)} type="not answered"/>' for why in unanswered.get(body, [])[:1]),
-            *(f"<system-out>{_text(_lines(body, found))}</system-out>" for found in [told.get(body)] if found),
-        ]  # fmt: skip
+            *(
+                f"<system-out>{_text(_lines(body, findings))}</system-out>"
+                for findings in [reported.get(body)]
+                if findings
+            ),
+        ]
         case = f"    <testcase classname={name} name={_attribute(body)}"
         yield f"{case}>\n      " + "\n      ".join(inside) + "\n    </testcase>\n" if inside else f"{case}/>\n"
     yield f"    <system-out>{_text(check.verdict())}</system-out>\n  </testsuite>\n"
 
 
 def _by_body(findings: list[Finding]) -> dict[str, list[Finding]]:
-    found: dict[str, list[Finding]] = {}
+    by_body: dict[str, list[Finding]] = {}
     for finding in findings:
         for body in (finding.a, finding.b):
-            found.setdefault(body, []).append(finding)
-    return found
+            by_body.setdefault(body, []).append(finding)
+    return by_body
 
 
 def _failing(check: Check) -> dict[str, list[Finding]]:
     return _by_body(check.failing)
 
 
-def _told(check: Check) -> dict[str, list[Finding]]:
+def _reported(check: Check) -> dict[str, list[Finding]]:
     """What is worth telling and fails nothing: known, shallow and touching pairs."""
     failing = set(map(id, check.failing))
     return _by_body([finding for finding in check.findings if id(finding) not in failing])
@@ -64,12 +72,12 @@ def _told(check: Check) -> dict[str, list[Finding]]:
 
 def _unanswered(check: Check) -> dict[str, list[str]]:
     failing = _failing(check)
-    found: dict[str, list[str]] = {}
+    by_body: dict[str, list[str]] = {}
     for entry in check.unanswered:
-        for body, other in ((entry["a"], entry["b"]), (entry["b"], entry["a"])):
+        for body, partner in ((entry["a"], entry["b"]), (entry["b"], entry["a"])):
             if body not in failing:
-                found.setdefault(body, []).append(f"whether it collides with {other} is not known: {entry['why']}")
-    return found
+                by_body.setdefault(body, []).append(f"whether it collides with {partner} is not known: {entry['why']}")
+    return by_body
 
 
 def _message(body: str, findings: list[Finding]) -> str:
@@ -82,11 +90,11 @@ def _lines(body: str, findings: list[Finding]) -> str:
 
 
 def _line(body: str, finding: Finding) -> str:
-    other = finding.b if finding.a == body else finding.a
+    partner = finding.b if finding.a == body else finding.a
     depth = "unbounded" if finding.distance is None else brief_length(finding.depth)
     before = "" if finding.before is None else f", {brief_length(finding.before)} in the baseline"
     where = f", from {finding.where} of the path" if finding.where else ""
-    return f"{finding.what} with {other}: {depth} deep{before}{where}"
+    return f"{finding.what} with {partner}: {depth} deep{before}{where}"
 
 
 def _text(words: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 #: Names of facets' defects shown of each mesh; ``mesh.report`` has them all.
-_SHOWN = 3
+_MAX_LISTED = 3
 
 
 def meshes_of(shape) -> Iterator:
@@ -25,7 +25,8 @@ def of_scene(scene) -> list[dict]:
     """A row for every mesh of every body, in the order of the bodies: plain data for `Report.meshes`."""
     return [
         {
-            "body": body.name, "solid": mesh.solid, "facets": len(mesh.faces), "what": describe(mesh), "source": body.source,
+            "body": body.name, "solid": mesh.solid, "facets": len(mesh.faces), "what": describe(mesh),
+            "source": body.source,
         }
         for body in scene.bodies
         for mesh in meshes_of(body.shape)
@@ -38,12 +39,12 @@ def describe(mesh) -> str:
     if mesh.solid:
         return f"solid of {facets}"
     spoilt = [defect for defect in mesh.report.defects if defect.spoils]
-    why = "; ".join(f"{defect.name}: {_brief(defect.facets)}" for defect in spoilt[:_SHOWN])
-    more = f"; {len(spoilt) - _SHOWN} more" if len(spoilt) > _SHOWN else ""
+    why = "; ".join(f"{defect.name}: {_brief(defect.facets)}" for defect in spoilt[:_MAX_LISTED])
+    more = f"; {len(spoilt) - _MAX_LISTED} more" if len(spoilt) > _MAX_LISTED else ""
     return f"surface of {facets} without an inside ({why or mesh.report.why}{more})"
 
 
 def _brief(facets) -> str:
-    shown = ", ".join(map(str, facets[:_SHOWN].tolist()))
-    more = f", … {len(facets)} in all" if len(facets) > _SHOWN else ""
-    return f"facet{'s' * (len(facets) != 1)} {shown}{more}"
+    listed = ", ".join(map(str, facets[:_MAX_LISTED].tolist()))
+    more = f", … {len(facets)} in all" if len(facets) > _MAX_LISTED else ""
+    return f"facet{'s' * (len(facets) != 1)} {listed}{more}"

@@ -67,12 +67,12 @@ class Pairs(Sequence):
         self._rows, self._order, self._names, self._approximated = rows, order, names, approximated
 
     @classmethod
-    def of(cls, result, chosen: np.ndarray, names: Mapping[int, str], approximated: frozenset[str]) -> Pairs:
+    def of(cls, result, indices: np.ndarray, names: Mapping[int, str], approximated: frozenset[str]) -> Pairs:
         """The chosen rows of a `WorldResult`: deepest or nearest first, then by name."""
         rows = result.rows
         rank = _ranks(names)
-        a, b = rank[rows["a"][chosen]], rank[rows["b"][chosen]]
-        order = chosen[np.lexsort((b, a, rows["distance"][chosen]))]
+        a, b = rank[rows["a"][indices]], rank[rows["b"][indices]]
+        order = indices[np.lexsort((b, a, rows["distance"][indices]))]
         return cls(rows, order, names, approximated)
 
     def by_name(self) -> Pairs:
@@ -98,12 +98,12 @@ class Pairs(Sequence):
         for start in range(0, len(self._order), _CHUNK):
             yield from (dict(zip(FIELDS, values)) for values in self._values(self._order[start : start + _CHUNK]))
 
-    def _made(self, chosen: np.ndarray) -> list[Pair]:
-        return [Pair(*values) for values in self._values(chosen)]
+    def _made(self, indices: np.ndarray) -> list[Pair]:
+        return [Pair(*values) for values in self._values(indices)]
 
-    def _values(self, chosen: np.ndarray) -> Iterator[tuple]:
+    def _values(self, indices: np.ndarray) -> Iterator[tuple]:
         """The fields of `Pair`, row by row."""
-        rows = self._rows[chosen]
+        rows = self._rows[indices]
         distance, lower, upper = (_finite(rows[name]) for name in ("distance", "lower", "upper"))
         depth = [
             max(0.0, -d) if hit and d is not None else None for hit, d in zip(rows["hit"].tolist(), distance)
@@ -126,30 +126,30 @@ class Pairs(Sequence):
     def busiest(self) -> list[tuple[str, int]]:
         """(body, how many of these pairs it is in), most first, then by name."""
         ids, counts = np.unique(np.concatenate([self._rows[s][self._order] for s in ("a", "b")]), return_counts=True)
-        found = [(self._names[i], n) for i, n in zip(ids.tolist(), counts.tolist())]
-        return sorted(found, key=lambda item: (-item[1], item[0]))
+        pairs_of_body = [(self._names[i], n) for i, n in zip(ids.tolist(), counts.tolist())]
+        return sorted(pairs_of_body, key=lambda item: (-item[1], item[0]))
 
-    def folded(self, most: int, limit: int) -> tuple[list[Fold], int]:
+    def folded(self, max_pairs: int, limit: int) -> tuple[list[Fold], int]:
         """The first ``limit`` lines that tell these pairs, and how many pairs those leave untold.
 
-        A body that is in more than ``most`` of the pairs not told yet has them told in one line, at the first of
+        A body that is in more than ``max_pairs`` of the pairs not told yet has them told in one line, at the first of
         them; of two such bodies in one pair the one in more of them.
         """
         a, b = (self._rows[side][self._order] for side in ("a", "b"))
-        left = np.ones(len(a), dtype=bool)
+        remaining = np.ones(len(a), dtype=bool)
         folds: list[Fold] = []
-        while len(folds) < limit and left.any():
-            first = int(np.argmax(left))
-            shared = [left & ((a == body) | (b == body)) for body in (a[first], b[first])]
+        while len(folds) < limit and remaining.any():
+            first = int(np.argmax(remaining))
+            shared = [remaining & ((a == body) | (b == body)) for body in (a[first], b[first])]
             k = int(shared[1].sum() > shared[0].sum())
             count = int(shared[k].sum())
             pair = self[first]
-            if count > most:
-                left &= ~shared[k]
+            if count > max_pairs:
+                remaining &= ~shared[k]
             else:
-                left[first], count = False, 1
+                remaining[first], count = False, 1
             folds.append(Fold(pair, (pair.a, pair.b)[k], count))
-        return folds, int(left.sum())
+        return folds, int(remaining.sum())
 
 
 def _ranks(names: Mapping[int, str]) -> np.ndarray:

@@ -11,7 +11,7 @@ import threading
 import time
 from contextlib import contextmanager, nullcontext
 
-_TERMINAL_PATIENCE = 0.4
+_TERMINAL_DELAY = 0.4
 _TICK = 0.2
 
 
@@ -24,17 +24,17 @@ class Progress:
     """``progress = Progress()``, then ``with progress("reading the scene"): ...``
 
     Stages nest: the innermost is shown. ``with`` gives a function that changes its label, None from a silent
-    one. ``patience`` [s] is how long a stage may last unannounced
+    one. ``delay`` [s] is how long a stage may last unannounced
     where stderr is no terminal.
     """
 
-    def __init__(self, stream=None, patience: float = 2.0):
+    def __init__(self, stream=None, delay: float = 2.0):
         self.stream = sys.stderr if stream is None else stream
         self.terminal = bool(getattr(self.stream, "isatty", lambda: False)())
-        self.patience = patience
+        self.delay = delay
         self._stages: list[_Stage] = []
         self._wake = threading.Event()
-        self._shown = False
+        self._visible = False
 
     @contextmanager
     def __call__(self, label: str):
@@ -60,9 +60,9 @@ class Progress:
         self._wake.set()
         self._thread.join()
         self._wake = threading.Event()
-        if self._shown:
+        if self._visible:
             self._write("\r\x1b[2K")
-            self._shown = False
+            self._visible = False
 
     def _watch(self, wake: threading.Event) -> None:
         while not wake.wait(_TICK):
@@ -72,10 +72,10 @@ class Progress:
 
     def _show(self, stage: _Stage) -> None:
         if self.terminal:
-            if stage.seconds >= _TERMINAL_PATIENCE:
-                self._shown = True
+            if stage.seconds >= _TERMINAL_DELAY:
+                self._visible = True
                 self._write(f"\r\x1b[2K{stage.label} … {stage.seconds:.0f} s")
-        elif stage.seconds >= self.patience and not stage.announced:
+        elif stage.seconds >= self.delay and not stage.announced:
             stage.announced = True
             self._write(f"collide: {stage.name} ...\n")
 

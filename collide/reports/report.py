@@ -86,13 +86,13 @@ class Report:
 
     def items(self) -> Iterator[tuple[str, object]]:
         """The JSON that ``schema.json`` describes, key by key, with the classes of pairs as `Pairs`."""
-        found = {name: getattr(self, name) for name in classes.NAMES}
+        by_class = {name: getattr(self, name) for name in classes.NAMES}
         yield "schema", SCHEMA
         yield "verdict", {
-            "text": self.verdict(), "collides": self.collides, **{name: len(pairs) for name, pairs in found.items()},
+            "text": self.verdict(), "collides": self.collides, **{name: len(pairs) for name, pairs in by_class.items()},
         }  # fmt: skip
         yield from ((name, getattr(self, name)) for name in ("scene", "query", "pairs"))
-        yield from found.items()
+        yield from by_class.items()
         yield from (
             (name, getattr(self, name))
             for name in (
@@ -131,7 +131,7 @@ def make(
     ignored = [_known_pair(scene, pair) for pair in ignore]
     if ignored:
         scene = without(scene, ignored)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     with (progress or silent)("testing the scene"):
         sizes = classes.body_sizes(scene.bodies)
         world, result, unanswered = _ask(scene, max(clearance, float(classes.roundings(sizes, 0.0).max(initial=0.0))))
@@ -142,18 +142,18 @@ def make(
     size[list(names)] = sizes
     rounding = classes.roundings(size[result.rows["a"]], size[result.rows["b"]])
     approximated = frozenset(body.name for body in scene.bodies if body.approximation)
-    found = {
-        name: Pairs.of(result, chosen, names, approximated)
-        for name, chosen in classes.classify(result.rows, rounding, clearance=clearance, min_depth=min_depth).items()
+    by_class = {
+        name: Pairs.of(result, indices, names, approximated)
+        for name, indices in classes.classify(result.rows, rounding, clearance=clearance, min_depth=min_depth).items()
     }
     report = Report(
         scene=_scene(scene),
         query={"clearance": clearance, "min_depth": min_depth, "ignored": [list(pair) for pair in ignored]},
         pairs=_pairs(stats),
-        colliding=found[classes.COLLIDING],
-        shallow=found[classes.SHALLOW],
-        touching=found[classes.TOUCHING].by_name(),
-        near=found[classes.NEAR],
+        colliding=by_class[classes.COLLIDING],
+        shallow=by_class[classes.SHALLOW],
+        touching=by_class[classes.TOUCHING].by_name(),
+        near=by_class[classes.NEAR],
         meshes=meshes.of_scene(scene),
         approximations=_approximations(scene),
         unanswered=unanswered,
@@ -164,7 +164,7 @@ def make(
         versions=versions(),
         bodies=[body.name for body in scene.bodies],
     )
-    report.seconds = _seconds(scene, stats, begun, tested, started)
+    report.seconds = _seconds(scene, stats, start, tested, started)
     return report
 
 
@@ -194,8 +194,8 @@ def _ask(scene, limit: float):
     for a, b, _ in refused:
         world.allow(a, b, reason=UNANSWERED)
     names = world.names
-    told = [{"a": names[a], "b": names[b], "why": why} for a, b, why in refused]
-    return world, world.distances(max_distance=limit), told
+    unanswered = [{"a": names[a], "b": names[b], "why": why} for a, b, why in refused]
+    return world, world.distances(max_distance=limit), unanswered
 
 
 def _length(name: str, value: float) -> float:
@@ -256,11 +256,11 @@ def _proofs(stats: dict) -> list[dict]:
 
 def _work(stats: dict) -> dict:
     """Counts for diagnosis, as far as the engine keeps them."""
-    kept = ("convex_pairs", "gjk_iterations", "epa_iterations")
-    return {name: int(stats[name]) for name in kept if name in stats}
+    counters = ("convex_pairs", "gjk_iterations", "epa_iterations")
+    return {name: int(stats[name]) for name in counters if name in stats}
 
 
-def _seconds(scene, stats: dict, begun: float, tested: float, started: float | None) -> dict[str, float]:
+def _seconds(scene, stats: dict, start: float, tested: float, started: float | None) -> dict[str, float]:
     """Stage → seconds. ``other`` is what no stage claims: start-up, imports, building the World."""
     stages = {name: float(s) for name, s in scene.seconds.items()}
     loading = sum(stages.values())
@@ -268,7 +268,7 @@ def _seconds(scene, stats: dict, begun: float, tested: float, started: float | N
         stages[name] = stages.get(name, 0.0) + float(s)
     now = time.perf_counter()
     stages["report"] = now - tested
-    total = now - started if started is not None else loading + now - begun
+    total = now - started if started is not None else loading + now - start
     stages["other"] = max(0.0, total - sum(stages.values()))
     stages["total"] = total
     return stages

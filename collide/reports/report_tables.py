@@ -17,7 +17,7 @@ from collide.reports.tables import Column, Table
 #: Rows shown of each long list, unless all are asked for.
 SHORT = 12
 #: A body that is in more pairs of a list than this has them told in one row.
-MANY = 4
+MAX_PAIRS_OF_BODY = 4
 _MARK = "≈ "
 #: Bodies named in a line that tells a list.
 _NAMED = 3
@@ -27,7 +27,7 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
     """The tables of the page, those with nothing to say left out."""
     shallower = f"SHALLOW  proven less deep than {brief_length(report.query['min_depth'])}, deepest first"
     near = f"NEAR  apart, nearer than {brief_length(report.query['clearance'])}, nearest first"
-    found = [
+    all_tables = [
         _pair_table("COLLIDING  deepest first", "colliding", report.colliding, "depth", everything, proofs),
         _pair_table(shallower, "touching", report.shallow, "depth", everything, proofs),
         _pair_table(near, "near", report.near, "distance", everything, proofs),
@@ -35,14 +35,14 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
     ]
     if everything:
         title = "TOUCHING  gap and overlap below rounding"
-        found += [
+        all_tables += [
             _pair_table(title, "touching", report.touching, "within", True, proofs),
             _mesh_table(report), _approximation_table(report),
         ]  # fmt: skip
-    found.append(_line_table(report, everything, proofs))
+    all_tables.append(_line_table(report, everything, proofs))
     if proofs:
-        found += [_skip_table(report), _proof_table(report)]
-    return [table for table in found if table.rows]
+        all_tables += [_skip_table(report), _proof_table(report)]
+    return [table for table in all_tables if table.rows]
 
 
 # --- pairs --------------------------------------------------------------------------------------
@@ -50,38 +50,40 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
 
 def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: bool, proofs: bool) -> Table:
     """A class of pairs; ``measure`` says what its number is: depth, distance or within."""
-    folds, more = pairs.folded(MANY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
-    shown = [fold.pair for fold in folds]
-    unit, on_a = coordinates([pair.point_a for pair in shown])
+    folds, more = (
+        pairs.folded(MAX_PAIRS_OF_BODY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
+    )
+    listed = [fold.pair for fold in folds]
+    unit, on_a = coordinates([pair.point_a for pair in listed])
     columns = [
-        (Column("body A", "name"), [_marked(pair, pair.a) for pair in shown]),
-        (Column("body B", "name"), [_marked(pair, pair.b) for pair in shown]),
-        (Column(measure), _at_most(shown, lengths([_measured(pair, measure) for pair in shown]))),
+        (Column("body A", "name"), [_marked(pair, pair.a) for pair in listed]),
+        (Column("body B", "name"), [_marked(pair, pair.b) for pair in listed]),
+        (Column(measure), _at_most(listed, lengths([_measured(pair, measure) for pair in listed]))),
         (Column(f"at x y z [{unit}]", "label", 1), on_a),
-        (Column("normal A→B", "label", 2), directions([pair.normal for pair in shown])),
+        (Column("normal A→B", "label", 2), directions([pair.normal for pair in listed])),
     ]
     if any(fold.size > 1 for fold in folds):
         columns.insert(2, (Column("and", "label"), [f"+{fold.size - 1}" if fold.size > 1 else "" for fold in folds]))
     if measure == "within":
-        columns.append((Column("exactly", "label", 3), [_verdict(pair) for pair in shown]))
+        columns.append((Column("exactly", "label", 3), [_verdict(pair) for pair in listed]))
     elif proofs:
-        columns.append((Column("known to", "number", 3), widths([_bracket(pair) for pair in shown])))
+        columns.append((Column("known to", "number", 3), widths([_bracket(pair) for pair in listed])))
     if proofs:
-        columns.append((Column("decided by", "label", 4), [pair.how for pair in shown]))
-        if any(pair.part_a or pair.part_b for pair in shown):
-            columns.append((Column("parts", "label", 5), [f"{pair.part_a}, {pair.part_b}" for pair in shown]))
+        columns.append((Column("decided by", "label", 4), [pair.how for pair in listed]))
+        if any(pair.part_a or pair.part_b for pair in listed):
+            columns.append((Column("parts", "label", 5), [f"{pair.part_a}, {pair.part_b}" for pair in listed]))
     rows = [list(cells) for cells in zip(*(cells for _, cells in columns))]
-    notes = _fold_notes(folds) + _bracket_notes(shown, measure, everything)
+    notes = _fold_notes(folds) + _bracket_notes(listed, measure, everything)
     return Table(title, [column for column, _ in columns], rows, style, notes, more=more)
 
 
 def _fold_notes(folds: list[Fold]) -> list[str]:
     """What the rows stand for that tell several pairs."""
-    told = [f"{fold.body} with {fold.size - 1} more" for fold in folds if fold.size > 1]
-    if not told:
+    folded = [f"{fold.body} with {fold.size - 1} more" for fold in folds if fold.size > 1]
+    if not folded:
         return []
-    rest = f", … ({len(told) - _NAMED} more such)" if len(told) > _NAMED else ""
-    return [f"+: also {', '.join(told[:_NAMED])}{rest} (--all lists them)"]
+    rest = f", … ({len(folded) - _NAMED} more such)" if len(folded) > _NAMED else ""
+    return [f"+: also {', '.join(folded[:_NAMED])}{rest} (--all lists them)"]
 
 
 def _bracket_notes(pairs: list[Pair], measure: str, everything: bool) -> list[str]:
@@ -140,7 +142,8 @@ def _bracket(pair: Pair) -> float:
 def _line_table(report: Report, everything: bool, proofs: bool) -> Table:
     """What a person should know of, a line each; what has a table of its own is left out."""
     lines = [] if everything else [
-        ("touching", _touching_line(report)), ("meshes", _mesh_line(report)), ("stand-ins", _approximation_line(report)),
+        ("touching", _touching_line(report)), ("meshes", _mesh_line(report)),
+        ("stand-ins", _approximation_line(report)),
     ]  # fmt: skip
     lines += [] if proofs else [("never tested", _skip_line(report))]
     lines += [] if everything else [("notes", _note_line(report))]
@@ -181,7 +184,10 @@ def _approximation_line(report: Report) -> str:
     if not entries:
         return ""
     named = [f"{entry['body']} ({entry['what']})" for entry in entries[:2]]
-    return f"{_MARK.strip()} {count(len(entries), 'body', 'bodies')}, answers hold for these: {_and_more(named, len(entries) > 2)}"
+    return (
+        f"{_MARK.strip()} {count(len(entries), 'body', 'bodies')}, answers hold for these: "
+        f"{_and_more(named, len(entries) > 2)}"
+    )
 
 
 def _skip_line(report: Report) -> str:

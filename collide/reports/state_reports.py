@@ -30,26 +30,26 @@ def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
         yield from made[0].report.items()
         return
     yield "schema", SCHEMA
-    yield "verdict", {"text": _verdict(made), "collides": any(one.report.collides for one in made)}
-    yield "states", [{"name": one.label, "report": one.report.to_dict()} for one in made]
+    yield "verdict", {"text": _verdict(made), "collides": any(state.report.collides for state in made)}
+    yield "states", [{"name": state.label, "report": state.report.to_dict()} for state in made]
 
 
 def render(made: list[Stated], *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
     """The page of one report, or a table of the states and the page of each, as `terminal.render` gives it."""
-    shown: dict[str, Any] = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
+    layout: dict[str, Any] = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
     if len(made) == 1:
-        return _page(made[0].report, **shown)
-    style = "colliding" if any(one.report.colliding for one in made) else "free"
+        return _page(made[0].report, **layout)
+    style = "colliding" if any(state.report.colliding for state in made) else "free"
     lines: list[Line] = [[(line, style)] for line in wrapped(_verdict(made), width, hanging=2)]
     table = _state_table(made)
     lines += [[], *table_lines(table, lay_out(table, width, whole_names), width)]
-    for one in made:
-        lines += [[], [(terminal.rule(f"STATE {one.label}", width), "title")], *_page(one.report, **shown)]
+    for state in made:
+        lines += [[], [(terminal.rule(f"STATE {state.label}", width), "title")], *_page(state.report, **layout)]
     return lines
 
 
 def _verdict(made: list[Stated]) -> str:
-    colliding = [one.label for one in made if one.report.colliding]
+    colliding = [state.label for state in made if state.report.colliding]
     if not colliding:
         return f"no collision in {count(len(made), 'state')}"
     return f"collisions in {len(colliding)} of {len(made)} states: {', '.join(colliding)}"
@@ -67,48 +67,57 @@ def _state_table(made: list[Stated]) -> Table:
 
 def _page(report: Report, *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
     page = terminal.render(report, everything=everything, proofs=proofs, width=width, whole_names=whole_names)
-    found = report.trajectory
-    if found is None:
+    trajectory = report.trajectory
+    if trajectory is None:
         return page
-    style = "colliding" if found["collides"] else "free"
-    lines: list[Line] = [[(line, style)] for line in wrapped(verdict(found), width, hanging=2)]
-    lines += [[(line, "note")] for line in wrapped(_how_sampled(found), width, hanging=2)]
-    for table in _trajectory_tables(found, None if everything else _SHORT):
+    style = "colliding" if trajectory["collides"] else "free"
+    lines: list[Line] = [[(line, style)] for line in wrapped(verdict(trajectory), width, hanging=2)]
+    lines += [[(line, "note")] for line in wrapped(_how_sampled(trajectory), width, hanging=2)]
+    for table in _trajectory_tables(trajectory, None if everything else _SHORT):
         lines += [[], *table_lines(table, lay_out(table, width, whole_names), width)]
     return [*lines, [], [(terminal.rule("AT THE START", width), "title")], *page]
 
 
-def _how_sampled(found: dict) -> str:
-    notes = f"; {count(len(found['notes']), 'note')}: {found['notes'][0]}" if found["notes"] else ""
+def _how_sampled(trajectory: dict) -> str:
+    notes = f"; {count(len(trajectory['notes']), 'note')}: {trajectory['notes'][0]}" if trajectory["notes"] else ""
     return (
-        f"{count(found['samples'], 'sample')} through {count(found['waypoints'], 'waypoint')}, no joint moving more than "
-        f"{found['resolution']:g} rad or m between two of them: by sampling, not certified in between{notes}"
+        f"{count(trajectory['samples'], 'sample')} through {count(trajectory['waypoints'], 'waypoint')}, no joint "
+        "moving more than "
+        f"{trajectory['resolution']:g} rad or m between two of them: by sampling, not certified in between{notes}"
     )
 
 
-def _trajectory_tables(found: dict, limit: int | None) -> list[Table]:
+def _trajectory_tables(trajectory: dict, limit: int | None) -> list[Table]:
     tables = [
-        _motion_table("COLLIDING ALONG THE PATH  in the order they begin", found["colliding"], "depth", limit),
-        _motion_table("NEAR ALONG THE PATH  nearest first", found["near"], "distance", limit),
+        _motion_table("COLLIDING ALONG THE PATH  in the order they begin", trajectory["colliding"], "depth", limit),
+        _motion_table("NEAR ALONG THE PATH  nearest first", trajectory["near"], "distance", limit),
         Table(
-            "NOT ANSWERED ALONG THE PATH", [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
-            [[entry["a"], entry["b"], entry["why"]] for entry in found["unanswered"]],
+            "NOT ANSWERED ALONG THE PATH",
+            [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
+            [[entry["a"], entry["b"], entry["why"]] for entry in trajectory["unanswered"]],
         ),
     ]  # fmt: skip
     return [table for table in tables if table.rows]
 
 
 def _motion_table(title: str, pairs: list[dict], measure: str, limit: int | None) -> Table:
-    shown = pairs[:limit]
-    sizes = [abs(pair["distance"]) if pair["distance"] is not None else float("inf") for pair in shown]
-    columns = [Column("body A", "name"), Column("body B", "name"), Column(measure), Column("at"), Column("samples", optional=1)]
+    listed = pairs[:limit]
+    sizes = [abs(pair["distance"]) if pair["distance"] is not None else float("inf") for pair in listed]
+    columns = [
+        Column("body A", "name"),
+        Column("body B", "name"),
+        Column(measure),
+        Column("at"),
+        Column("samples", optional=1),
+    ]
     cells = zip(
-        [pair["a"] for pair in shown], [pair["b"] for pair in shown], lengths(sizes), [place(pair["at"]) for pair in shown],
-        [str(pair["samples"]) for pair in shown],
+        [pair["a"] for pair in listed], [pair["b"] for pair in listed], lengths(sizes),
+        [place(pair["at"]) for pair in listed],
+        [str(pair["samples"]) for pair in listed],
     )  # fmt: skip
     rows = [list(row) for row in cells]
     if measure == "depth":
         columns.insert(2, Column("from"))
-        for row, pair in zip(rows, shown):
+        for row, pair in zip(rows, listed):
             row.insert(2, place(pair["from"]))
-    return Table(title, columns, rows, more=len(pairs) - len(shown))
+    return Table(title, columns, rows, more=len(pairs) - len(listed))

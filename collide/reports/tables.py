@@ -95,7 +95,7 @@ def lay_out(table: Table, width: int, whole_names: bool = False) -> Layout:
 
     whole_names : never shorten a name, whatever the width (output that goes to a file).
     """
-    shown = list(range(len(table.columns)))
+    visible = list(range(len(table.columns)))
     natural = [
         max([width_of(column.title), *(width_of(printable(row[k])) for row in table.rows)])
         for k, column in enumerate(table.columns)
@@ -104,39 +104,39 @@ def lay_out(table: Table, width: int, whole_names: bool = False) -> Layout:
         _least(column, natural[k], natural[k] if whole_names else _NAME_COMFORT)
         for k, column in enumerate(table.columns)
     ]
-    while _total(least, shown) > width - INDENT:
-        candidates = [k for k in shown if table.columns[k].optional]
+    while _total(least, visible) > width - INDENT:
+        candidates = [k for k in visible if table.columns[k].optional]
         if not candidates:
             break
-        shown.remove(max(candidates, key=lambda k: table.columns[k].optional))
-    if not whole_names and _total(least, shown) > width - INDENT:
+        visible.remove(max(candidates, key=lambda k: table.columns[k].optional))
+    if not whole_names and _total(least, visible) > width - INDENT:
         least = [_least(column, natural[k], _NAME_LEAST) for k, column in enumerate(table.columns)]
-    chosen = _share(natural, least, shown, width - INDENT)
-    columns = [table.columns[k] for k in shown]
-    rows = [[_cell(row[k], table.columns[k], w) for k, w in zip(shown, chosen)] for row in table.rows]
-    dropped = [column.title for k, column in enumerate(table.columns) if k not in shown]
-    return Layout(columns, chosen, rows, dropped)
+    widths = _share(natural, least, visible, width - INDENT)
+    columns = [table.columns[k] for k in visible]
+    rows = [[_cell(row[k], table.columns[k], w) for k, w in zip(visible, widths)] for row in table.rows]
+    dropped = [column.title for k, column in enumerate(table.columns) if k not in visible]
+    return Layout(columns, widths, rows, dropped)
 
 
 def _least(column: Column, natural: int, name: int) -> int:
     return min(natural, {"name": name, "text": _TEXT_LEAST}.get(column.kind, natural))
 
 
-def _total(widths: list[int], shown: list[int]) -> int:
-    return sum(widths[k] for k in shown) + GAP * (len(shown) - 1)
+def _total(widths: list[int], visible: list[int]) -> int:
+    return sum(widths[k] for k in visible) + GAP * (len(visible) - 1)
 
 
-def _share(natural: list[int], least: list[int], shown: list[int], width: int) -> list[int]:
+def _share(natural: list[int], least: list[int], visible: list[int], width: int) -> list[int]:
     """Start from the least widths and hand out what is left, a cell at a time, where it is missed most."""
-    widths = {k: least[k] for k in shown}
-    spare = width - _total(least, shown)
+    widths = {k: least[k] for k in visible}
+    spare = width - _total(least, visible)
     while spare > 0:
-        wanting = [k for k in shown if widths[k] < natural[k]]
+        wanting = [k for k in visible if widths[k] < natural[k]]
         if not wanting:
             break
         widths[min(wanting, key=lambda k: widths[k] / natural[k])] += 1
         spare -= 1
-    return [widths[k] for k in shown]
+    return [widths[k] for k in visible]
 
 
 def _cell(text: str, column: Column, width: int) -> list[str]:

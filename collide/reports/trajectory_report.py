@@ -19,7 +19,7 @@ from collide.reports.progress import silent
 #: Largest change of a joint [rad] or [m] between two samples, unless another is asked for.
 RESOLUTION = 0.02
 #: Longer paths are refused: values in another unit, mostly.
-MOST_SAMPLES = 1_000_000
+MAX_SAMPLES = 1_000_000
 #: Samples whose poses are worked out at a time.
 _CHUNK = 256
 
@@ -50,9 +50,10 @@ def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
         raise InvalidArgument(f"resolution must be above 0 [rad or m], got {resolution!r}")
     corners, notes = _corners(scene, trajectory)
     steps = np.max([np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) for q in corners.values()], axis=0)
-    if not steps.sum() / resolution <= MOST_SAMPLES:
+    if not steps.sum() / resolution <= MAX_SAMPLES:
         raise InvalidArgument(
-            f"resolution: the path is {steps.sum():g} rad or m long, more than {MOST_SAMPLES} samples of {resolution:g}: "
+            f"resolution: the path is {steps.sum():g} rad or m long, more than {MAX_SAMPLES} samples of "
+            f"{resolution:g}: "
             "give a larger one (--resolution)"
         )
     counts = np.maximum(1, np.ceil(steps / resolution)).astype(int)
@@ -87,7 +88,7 @@ def _corners(scene, trajectory) -> tuple[dict[str, np.ndarray], list[str]]:
                 notes.update(dict.fromkeys(about))
         except InvalidArgument as error:
             raise SceneError(str(error), path=trajectory.source, element=f"waypoint {k}") from None
-    return {name: np.array(found) for name, found in rows.items()}, list(notes)
+    return {name: np.array(values) for name, values in rows.items()}, list(notes)
 
 
 def at_start(scene, trajectory):
@@ -107,17 +108,17 @@ def follow(
     clearance, min_depth : as in `report.make` [m].   progress : as there.
     """
     path = sample(scene, trajectory, resolution)
-    with (progress or silent)("following the trajectory") as tell:
+    with (progress or silent)("following the trajectory") as set_label:
         watch = _Watch(scene, path, clearance, min_depth)
         for k, poses in watch.poses():
             watch.see(k, poses)
-            if tell:
-                tell(f"following the trajectory: {path.share[k]:.0%}")
+            if set_label:
+                set_label(f"following the trajectory: {path.share[k]:.0%}")
     return {
         "source": str(trajectory.source), "waypoints": len(trajectory.waypoints), "samples": len(path.share),
         "resolution": resolution, "certified": False, "moving": watch.moving,
         "duration": None if path.times is None else float(path.times[-1] - path.times[0]),
-        **watch.found(), "notes": path.notes,
+        **watch.summary(), "notes": path.notes,
     }  # fmt: skip
 
 
@@ -172,11 +173,11 @@ class _Watch:
         self.size[moved] = np.abs(poses[:, :3, 3]).max(axis=1, initial=0.0) + self.reach[moved]
         rows = self._near_rows()
         rounding = classes.roundings(self.size[rows["a"]], self.size[rows["b"]])
-        chosen = classes.classify(rows, rounding, clearance=self.clearance, min_depth=self.min_depth)
-        for name, indices in chosen.items():
+        by_class = classes.classify(rows, rounding, clearance=self.clearance, min_depth=self.min_depth)
+        for name, indices in by_class.items():
             for row in rows[indices]:
                 self._keep(self.worst[name], k, row)
-        hits = rows[chosen[classes.COLLIDING]]
+        hits = rows[by_class[classes.COLLIDING]]
         if self.first is None and len(hits):
             self.first = self._event(k, hits[np.argmin(hits["distance"])])
         apart = rows[~rows["beyond"]]
@@ -212,39 +213,42 @@ class _Watch:
     def _keep(self, worst: dict, k: int, row) -> None:
         """The deepest or nearest row of a pair, where the pair is first in this class, and how often it is."""
         pair = int(row["a"]), int(row["b"])
-        kept = worst.get(pair)
-        if kept is None:
+        previous = worst.get(pair)
+        if previous is None:
             worst[pair] = {"first": k, "samples": 1, "event": self._event(k, row)}
             return
-        kept["samples"] += 1
-        if row["distance"] < kept["event"]["order"]:
-            kept["event"] = self._event(k, row)
+        previous["samples"] += 1
+        if row["distance"] < previous["event"]["order"]:
+            previous["event"] = self._event(k, row)
 
     def _event(self, k: int, row) -> dict:
         return {"order": float(row["distance"]), "sample": k, "row": row.copy()}
 
     # --- plain data -----------------------------------------------------------------------------
 
-    def found(self) -> dict:
+    def summary(self) -> dict:
         listed = {name: self._listed(name) for name in classes.NAMES}
         return {
             "collides": self.first is not None,
-            "first_collision": None if self.first is None else self._told(self.first),
-            "least": None if self.least is None else self._told(self.least),
+            "first_collision": None if self.first is None else self._entry(self.first),
+            "least": None if self.least is None else self._entry(self.least),
             **listed, "unanswered": self.unanswered,
         }  # fmt: skip
 
     def _listed(self, name: str) -> list[dict]:
         """Pairs that are in this class at worst: collisions in the order they begin, others the nearest first."""
-        worse = [self.worst[other] for other in classes.NAMES[: classes.NAMES.index(name)]]
-        kept = [one for pair, one in self.worst[name].items() if not any(pair in other for other in worse)]
+        worse = [self.worst[worse_class] for worse_class in classes.NAMES[: classes.NAMES.index(name)]]
+        events = [
+            event for pair, event in self.worst[name].items() if not any(pair in worse_class for worse_class in worse)
+        ]
         by_start = name in (classes.COLLIDING, classes.SHALLOW)
-        ordered = sorted(kept, key=lambda one: (one["first"] if by_start else 0.0, one["event"]["order"]))
+        ordered = sorted(events, key=lambda event: (event["first"] if by_start else 0.0, event["event"]["order"]))
         return [
-            {**self._told(one["event"]), "from": self._place(one["first"]), "samples": one["samples"]} for one in ordered
-        ]  # fmt: skip
+            {**self._entry(event["event"]), "from": self._place(event["first"]), "samples": event["samples"]}
+            for event in ordered
+        ]
 
-    def _told(self, event: dict) -> dict:
+    def _entry(self, event: dict) -> dict:
         row, k = event["row"], event["sample"]
         ends = {name: _finite(row[name]) for name in ("distance", "lower", "upper")}
         vectors = {name: [float(v) + 0.0 for v in row[name]] for name in ("normal", "point_a", "point_b")}
@@ -272,22 +276,22 @@ def _finite(value) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def verdict(found: dict) -> str:
+def verdict(trajectory: dict) -> str:
     """A trajectory in one line."""
     from collide.reports.number_format import brief_length, count
 
-    if not found["moving"]:
-        return f"the trajectory moves no body: {count(found['samples'], 'sample')} at one place"
-    first, least = found["first_collision"], found["least"]
+    if not trajectory["moving"]:
+        return f"the trajectory moves no body: {count(trajectory['samples'], 'sample')} at one place"
+    first, least = trajectory["first_collision"], trajectory["least"]
     if first is not None:
-        others = len(found["colliding"]) - 1
+        others = len(trajectory["colliding"]) - 1
         more = f"; {count(others, 'more pair collides', 'more pairs collide')} along it" if others else ""
         return f"first collision at {place(first['at'], ' of the path')}: {first['a']} and {first['b']}{more}"
     near = "nothing near" if least is None else (
         f"least clearance {brief_length(max(0.0, least['distance']))} at {place(least['at'], ' of it')}: "
         f"{least['a']} and {least['b']}"
     )  # fmt: skip
-    return f"no collision at {count(found['samples'], 'sample')} of the path; {near}"
+    return f"no collision at {count(trajectory['samples'], 'sample')} of the path; {near}"
 
 
 def place(at: dict, of: str = "") -> str:

@@ -11,12 +11,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from collide import argument_checks as reading
-from collide.batches import ask
+from collide.batches import answer_batch
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import MeshTree
 from collide.mesh.shell_volumes import without_area
+from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
 from collide.numerics.exact_points import cross, inner, integers, minus, on_one_grid, placed
@@ -140,7 +141,7 @@ _POINT = ConvexHull(np.zeros((1, 3)))
 
 
 def _in_convex(shape: Shape, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
-    rows = ask(shape, _POINT, X_WA, _at(points), False, 0.0, False, 1, depths=False)
+    rows = answer_batch(shape, _POINT, X_WA, _at(points), Question(False, 0.0, depths=False))
     answer = rows["hit"].copy()
     for k in np.flatnonzero(answer & (rows["how"] == LEFT_OPEN)).tolist():
         answer[k] = holds(shape, [_pose(X_WA, k)], points[k])

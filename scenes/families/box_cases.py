@@ -13,8 +13,8 @@ from collide.scenes.families.ingredients import (
     power,
     prism,
     rotation,
+    rotation_about,
     sign,
-    turn,
 )
 
 
@@ -37,7 +37,7 @@ def boxes_flush(rng, index) -> Case:
     turned, tilted = index % 4 in (1, 3), index % 4 in (2, 3)
     between = stacked(rng, lower, upper, turned=turned)
     R = rotation(rng) if tilted else np.eye(3)
-    R1, R2 = (R @ turn(2, rng.uniform(0, 2 * np.pi)) if turned else R for _ in range(2))
+    R1, R2 = (R @ rotation_about(2, rng.uniform(0, 2 * np.pi)) if turned else R for _ in range(2))
     return pair(Body(box(lower), R1, R @ base), Body(box(upper), R2, R @ (base + between)))
 
 
@@ -71,7 +71,7 @@ def boxes_rest(rng, index) -> Case:
     R = rotation(rng) if index % 2 else np.eye(3)
     base = decimals(rng, -2, 2)
     between = stacked(rng, lower, upper, gap, turned=True)
-    R1, R2 = (R @ turn(2, rng.uniform(0, 2 * np.pi)) for _ in range(2))
+    R1, R2 = (R @ rotation_about(2, rng.uniform(0, 2 * np.pi)) for _ in range(2))
     return pair(Body(box(lower), R1, R @ base), Body(box(upper), R2, R @ (base + between)))
 
 
@@ -81,12 +81,12 @@ def rot90(rng, index) -> Case:
     gap = float(rng.choice((0.0, 1e-9, -1e-9, 1e-4, -1e-4)))
     lower, upper = decimals(rng, 0.1, 2), decimals(rng, 0.1, 2)
     axis, quarters = int(rng.integers(3)), int(rng.integers(4))
-    R2 = turn(axis, quarters * np.pi / 2)
+    R2 = rotation_about(axis, quarters * np.pi / 2)
     seen = np.abs(np.round(R2)) @ upper  # its lengths along the world's axes
     between = stacked(rng, lower, seen, gap)
     tilt = (0.0, 1e-9, power(rng, -12, -5))[index % 3]
     d = direction(rng) * [1, 1, 0]
-    R2 = turn(0, tilt * d[0]) @ turn(1, tilt * d[1]) @ R2
+    R2 = rotation_about(0, tilt * d[0]) @ rotation_about(1, tilt * d[1]) @ R2
     A = _octagonal(lower) if rng.random() < 0.3 else box(lower)
     B = _octagonal(upper) if rng.random() < 0.3 else box(upper)
     return pair(Body(A, np.eye(3), np.zeros(3)), Body(B, R2, between))
@@ -94,7 +94,7 @@ def rot90(rng, index) -> Case:
 
 def _octagonal(size: np.ndarray) -> np.ndarray:
     """An octagonal prism that just fits a box of these lengths, flush with all its sides."""
-    unit = prism(8, 0.5, 1.0) @ turn(2, np.pi / 8).T
+    unit = prism(8, 0.5, 1.0) @ rotation_about(2, np.pi / 8).T
     return unit / (2 * np.abs(unit).max(axis=0)) * size
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 HULLS, HALFSPACE = KINDS = "hulls", "halfspace"
 #: Above this many points a snippet asks the generator instead of listing them.
-MOST_POINTS_LISTED = 160
+MAX_POINTS_LISTED = 160
 
 
 class Body(NamedTuple):
@@ -98,9 +98,15 @@ class Case(NamedTuple):
         """Python that asks collide this question again: all numbers, or the generator's call where
         there are too many."""
         lines = ["import numpy as np", "", "import collide", ""]
-        if len(self.P) + len(self.Q) > MOST_POINTS_LISTED:
-            call = ", ".join([repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)])
-            lines += ["from collide.scenes.families import generate", "", f"A, B, X_WA, X_WB = generate({call})[-1].shapes()"]
+        if len(self.P) + len(self.Q) > MAX_POINTS_LISTED:
+            call = ", ".join(
+                [repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)]
+            )
+            lines += [
+                "from collide.scenes.families import generate",
+                "",
+                f"A, B, X_WA, X_WB = generate({call})[-1].shapes()",
+            ]
         else:
             lines += [
                 f"A = {self._shape_text(self.P, self.radius_a, self.kind)}",

@@ -38,7 +38,7 @@ def set_gap(case: Case, gap: float, towards: np.ndarray | None = None) -> Case:
     towards : direction (3,) from A in which B comes nearer; from centre to centre by default.
     A depth larger than the bodies allow ends as deep as the search gets; flat pairs have none.
     """
-    case = _clear(case, towards)
+    case = _moved_apart(case, towards)
     distance, normal = measure(case)
     if gap >= 0:
         case = case.moved((gap - distance) * normal)
@@ -66,7 +66,7 @@ def _overlapping(case: Case, distance: float, normal: np.ndarray, depth: float) 
     return pushed.moved((-reached - depth) * outwards) if -reached > depth else pushed
 
 
-def _clear(case: Case, towards: np.ndarray | None) -> Case:
+def _moved_apart(case: Case, towards: np.ndarray | None) -> Case:
     """The pair with B moved out of the ball around A."""
     A, B = case.a.world(), case.b.world()
     centre_a, centre_b = A.mean(axis=0), B.mean(axis=0)

@@ -23,19 +23,19 @@ EXACT_ROTATIONS = np.array(
 )
 
 
-def random_hull(rng: np.random.Generator, most: int = 64) -> np.ndarray:
-    """4 to `most` Gaussian points, with probability 0.6 put on the unit sphere, each axis scaled by
+def random_hull(rng: np.random.Generator, max_points: int = 64) -> np.ndarray:
+    """4 to ``max_points`` Gaussian points, with probability 0.6 put on the unit sphere, each axis scaled by
     0.5 to 1.5, hull vertices kept (n, 3).
 
     Those are kept that are extreme in one of 256 directions: vertices for certain, and found without
     a hull algorithm.
     """
-    points = rng.standard_normal((int(rng.integers(4, most + 1)), 3))
+    points = rng.standard_normal((int(rng.integers(4, max_points + 1)), 3))
     if rng.random() < 0.6:
         points /= np.linalg.norm(points, axis=1)[:, None]
     else:
-        kept = np.unique((points @ _DIRECTIONS.T).argmax(axis=0))
-        points = points[kept] if len(kept) >= 4 else points
+        extreme = np.unique((points @ _DIRECTIONS.T).argmax(axis=0))
+        points = points[extreme] if len(extreme) >= 4 else points
     return points * rng.uniform(0.5, 1.5, 3)
 
 
@@ -86,7 +86,7 @@ def rotation(rng: np.random.Generator) -> np.ndarray:
     )
 
 
-def turn(axis: int, angle: float) -> np.ndarray:
+def rotation_about(axis: int, angle: float) -> np.ndarray:
     """Rotation about a coordinate axis by an angle [rad], from cosine and sine as they round."""
     c, s = np.cos(angle), np.sin(angle)
     R = np.eye(3)

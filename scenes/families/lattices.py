@@ -27,12 +27,12 @@ def box_lattice(rng, index) -> Case:
 def halfspace_touch(rng, index) -> Case:
     """A half-space under a lattice hull: exactly touching, one ulp of its height into it, one ulp out of
     it, in turn; the plane has an integer normal and an exact rotation."""
-    found = contact(rng, ("vf", "ff", "ve")[index // 3 % 3])
-    case, normal = placed(rng, found)
+    placement = contact(rng, ("vf", "ff", "ve")[index // 3 % 3])
+    case, normal = placed(rng, placement)
     # A's lattice hull gives way to the half-space behind the plane of contact, in A's frame.
     n = (case.R1.T @ normal).astype(float)
-    in_plane = next(p for p, w in zip(found.B, found.B @ found.normal) if w == 0)
-    world = _world_of(case, found, in_plane)
+    in_plane = next(p for p, w in zip(placement.B, placement.B @ placement.normal) if w == 0)
+    world = _world_of(case, placement, in_plane)
     offset = float(n @ (case.R1.T @ (world - case.t1)))
     t2 = case.t2.copy()
     axis = int(np.abs(normal).argmax())
@@ -42,9 +42,9 @@ def halfspace_touch(rng, index) -> Case:
     return case._replace(P=n[None], kind=HALFSPACE, offset=offset, t2=t2)
 
 
-def _world_of(case: Case, found, point) -> np.ndarray:
+def _world_of(case: Case, placement, point) -> np.ndarray:
     """Where a lattice point of B stands in the world, exactly."""
-    row = int(np.flatnonzero((found.B == point).all(axis=1))[0])
+    row = int(np.flatnonzero((placement.B == point).all(axis=1))[0])
     return case.R2 @ case.Q[row] + case.t2
 
 
@@ -64,4 +64,4 @@ def halfspace_near(rng, index) -> Case:
     return case._replace(kind=HALFSPACE, offset=offset)
 
 
-OWN = (box_lattice, halfspace_touch, halfspace_near)
+MORE_FAMILIES = (box_lattice, halfspace_touch, halfspace_near)

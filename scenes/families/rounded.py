@@ -14,9 +14,9 @@ from collide.scenes.families.ingredients import (
     prism,
     random_hull,
     rotation,
+    rotation_about,
     sign,
     sphere,
-    turn,
 )
 
 
@@ -56,7 +56,7 @@ def cyl1000(rng, index, sides: int = 1000) -> Case:
         1: np.array([r1 + r2, 0.0, np.round(rng.uniform(-0.4, 0.4) * (h1 + h2), 2)]),
         4: np.array([0.0, 0.0, np.round(rng.uniform(-0.6, 0.6) * (h1 + h2), 2)]),
     }[situation]
-    return pair(A, Body(B, A.R @ turn(2, rng.uniform(0, 2 * np.pi)) if situation == 0 else A.R, A.R @ step))
+    return pair(A, Body(B, A.R @ rotation_about(2, rng.uniform(0, 2 * np.pi)) if situation == 0 else A.R, A.R @ step))
 
 
 def bipyramids(rng, index, sides: int = 300) -> Case:
@@ -78,9 +78,9 @@ def repeats(rng, index, copies: int = 100) -> Case:
         bodies.append(anywhere(rng, hull[rng.permutation(np.repeat(np.arange(len(hull)), copies))]))
     # The gap belongs to the hulls; finding it does not need the copies.
     case = pair(*(b._replace(points=np.unique(b.points, axis=0)) for b in bodies))
-    found = set_gap(case, sign(rng) * power(rng, -12, -1) * mean_diagonal(case), direction(rng))
-    return found._replace(P=bodies[0].points, Q=bodies[1].points)
+    case_with_gap = set_gap(case, sign(rng) * power(rng, -12, -1) * mean_diagonal(case), direction(rng))
+    return case_with_gap._replace(P=bodies[0].points, Q=bodies[1].points)
 
 
 FAMILIES = (spheres_big, cyl1000)
-OWN = (bipyramids, repeats)
+MORE_FAMILIES = (bipyramids, repeats)

@@ -69,4 +69,4 @@ def _matrix(body: Body) -> np.ndarray:
 
 
 FAMILIES = (scale, tiny_vs_huge, far_origin, badrot)
-OWN = (tiny_motions,)
+MORE_FAMILIES = (tiny_motions,)

@@ -14,8 +14,8 @@ def needles(rng, index) -> Case:
     10^U(-4,-1) and ±a·10^U(-2,-0.5)."""
     a = 10.0 ** -(6 + index % 4)
     squeeze = np.array([1.0, a, a])
-    other = random_hull(rng) * (squeeze if rng.random() < 0.5 else 1.0)
-    case = pair(anywhere(rng, random_hull(rng) * squeeze), anywhere(rng, other))
+    B = random_hull(rng) * (squeeze if rng.random() < 0.5 else 1.0)
+    case = pair(anywhere(rng, random_hull(rng) * squeeze), anywhere(rng, B))
     return set_gap(case, _thin_gap(rng, a), direction(rng))
 
 
@@ -135,4 +135,4 @@ def long_boxes(rng, index) -> Case:
 
 
 FAMILIES = (needles, plates, flat, degenerate)
-OWN = (long_boxes,)
+MORE_FAMILIES = (long_boxes,)

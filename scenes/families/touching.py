@@ -78,9 +78,9 @@ def _flats(rng, kind: str) -> tuple[np.ndarray, np.ndarray]:
 def _coordinates(rng, n: int) -> np.ndarray:
     """n integer vectors (n, 2), none of them 0."""
     while True:
-        found = rng.integers(-6, 7, (n, 2))
-        if found.any(axis=1).all():
-            return found
+        points = rng.integers(-6, 7, (n, 2))
+        if points.any(axis=1).all():
+            return points
 
 
 def _edge(rng, d: np.ndarray) -> np.ndarray:
@@ -108,7 +108,7 @@ def _beside(rng, n: np.ndarray, side: int) -> np.ndarray:
     return points
 
 
-def placed(rng, found: Contact) -> tuple[Case, np.ndarray]:
+def placed(rng, touching: Contact) -> tuple[Case, np.ndarray]:
     """A contact as doubles, and its normal in the world (3,); 15 % have a doubled vertex.
 
     No translation of B has a 0 in it, so that one ulp of it is a length like its others'.
@@ -116,15 +116,15 @@ def placed(rng, found: Contact) -> tuple[Case, np.ndarray]:
     G = EXACT_ROTATIONS[rng.integers(24)]
     shift = rng.integers(-64, 65, 3)
     bodies = []
-    for points in (found.A, found.B):
+    for points in (touching.A, touching.B):
         R = EXACT_ROTATIONS[rng.integers(24)]
         t = rng.integers(1, 65, 3) * rng.choice((-1, 1), 3)
         # Rows, so that R.T @ (world - t) is (world - t) @ R; integers, so that nothing rounds.
-        own = (points @ G.T + shift - t) @ R
+        local = (points @ G.T + shift - t) @ R
         if rng.random() < 0.15:
-            own = np.concatenate([own, own[[rng.integers(len(own))]]])
-        bodies.append(Body(own * UNIT, R, t * UNIT))
-    return pair(*bodies), G @ found.normal
+            local = np.concatenate([local, local[[rng.integers(len(local))]]])
+        bodies.append(Body(local * UNIT, R, t * UNIT))
+    return pair(*bodies), G @ touching.normal
 
 
 def touch_vf(rng, index) -> Case:
@@ -177,8 +177,8 @@ def touch_scaled(rng, index) -> Case:
 def touch_tiny_step(rng, index) -> Case:
     """Exactly touching with a translation of B that is 0 along the largest normal component, then moved
     there by ±2^-k, k from 55 to 1074: far less than an ulp of any other number, towards and away in turn."""
-    found = contact(rng, ("vf", "ee", "ff")[index // 2 % 3])
-    case, normal = placed(rng, found)
+    touching = contact(rng, ("vf", "ee", "ff")[index // 2 % 3])
+    case, normal = placed(rng, touching)
     axis = int(np.abs(normal).argmax())
     # The pair as a whole moves along that axis, so that B's translation becomes 0 there, exactly.
     t1, t2 = case.t1.copy(), case.t2.copy()
@@ -189,4 +189,4 @@ def touch_tiny_step(rng, index) -> Case:
 
 
 FAMILIES = (touch_vf, touch_ee, touch_ff, touch_vv, touch_ve, touch_1ulp)
-OWN = (touch_scaled, touch_tiny_step)
+MORE_FAMILIES = (touch_scaled, touch_tiny_step)

@@ -1,4 +1,4 @@
-"""COLLADA: looked at here, then read by pycollada, which takes NaN for 0, ids below 0, and units that are none, without a word."""
+"""COLLADA: checked here, then read by pycollada, which takes NaN for 0, negative ids and bad units without a word."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NoReturn
 import numpy as np
 
 from collide.errors import SceneError, brief, cut
-from collide.scenes.loaders.files import DEEPEST, MOST_NODES
+from collide.scenes.loaders.files import DEEPEST, MAX_NODES
 from collide.scenes.loaders.polygons import refuse
 
 #: How many corners the ids of a primitive make, where no count of its own says it.
@@ -39,7 +39,9 @@ def check(content: bytes, path: Path) -> list[str]:
 
 
 def _at(path: Path, element: ET.Element, what: str, inside: str = "") -> NoReturn:
-    name = "".join(f' {key}="{cut(element.get(key) or "")}"' for key in ("id", "name", "material") if element.get(key))[:100]
+    name = "".join(f' {key}="{cut(element.get(key) or "")}"' for key in ("id", "name", "material") if element.get(key))[
+        :100
+    ]
     raise SceneError(what, path=path, element=f"<{element.tag}{name}>{inside}")
 
 
@@ -52,8 +54,13 @@ def _check_unit(root: ET.Element, path: Path) -> None:
     except ValueError:
         metre = math.nan
     if not 0.0 < metre < math.inf:
-        given = brief(unit.get("meter"))
-        _at(path, unit, f"meter must be a finite number above 0, got {given}: it says how many metres the unit has; 1 is a metre")
+        unit_text = brief(unit.get("meter"))
+        _at(
+            path,
+            unit,
+            f"meter must be a finite number above 0, got {unit_text}: it says how many metres the unit has; 1 is a "
+            "metre",
+        )
 
 
 # --- meshes ---------------------------------------------------------------------------------------
@@ -92,43 +99,68 @@ def _check_primitive(primitive: ET.Element, by_id: dict, path: Path) -> None:
     inputs = primitive.findall("input")
     if not inputs:
         return
-    offsets = [_count(one, "offset", path) or 0 for one in inputs]
+    offsets = [_count(index, "offset", path) or 0 for index in inputs]
     stride = max(offsets) + 1
-    vertex = next((k for k, one in enumerate(inputs) if one.get("semantic") == "VERTEX"), None)
+    vertex = next((k for k, index in enumerate(inputs) if index.get("semantic") == "VERTEX"), None)
     ids = [_numbers(p, int, path) for p in primitive.iter("p")]
     if vertex is not None:
         positions = _positions(inputs[vertex], by_id, path)
-        for one in ids:
-            corners = one[offsets[vertex] :: stride]
+        for index in ids:
+            corners = index[offsets[vertex] :: stride]
             outside = (corners < 0) | (corners >= positions)
             if outside.any():
                 k = int(np.argmax(outside))
-                _at(path, primitive, f"corner {k} is vertex {int(corners[k])}, but there are 0 ... {positions - 1}", " <p>")
-    _check_counts(primitive, [len(one) for one in ids], stride, path)
+                _at(
+                    path,
+                    primitive,
+                    f"corner {k} is vertex {int(corners[k])}, but there are 0 ... {positions - 1}",
+                    " <p>",
+                )
+    _check_counts(primitive, [len(index) for index in ids], stride, path)
 
 
 def _check_counts(primitive: ET.Element, lengths: list[int], stride: int, path: Path) -> None:
     count = _count(primitive, "count", path)
-    said: int | None = None
+    declared: int | None = None
     if primitive.tag == "triangles" and count is not None:
-        said = 3 * count * stride
+        declared = 3 * count * stride
     elif primitive.tag == "polylist":
         corners = _numbers(primitive.find("vcount"), int, path)
         if (corners < 0).any() or (count is not None and len(corners) != count):
-            _at(path, primitive, f"says count {count}, but <vcount> holds {len(corners)} numbers, the least {corners.min() if len(corners) else 0}")
-        said = int(corners.sum()) * stride
+            _at(
+                path,
+                primitive,
+                f"says count {count}, but <vcount> holds {len(corners)} numbers, the least "
+                f"{corners.min() if len(corners) else 0}",
+            )
+        declared = int(corners.sum()) * stride
     elif count is not None and len(lengths) != count:
         _at(path, primitive, f"says count {count}, but has {len(lengths)} of <p>: it was cut short or is damaged")
-    if said is not None and sum(lengths) != said:
-        _at(path, primitive, f"says {said} numbers, {stride} a corner, but <p> holds {sum(lengths)}: it was cut short or is damaged")
+    if declared is not None and sum(lengths) != declared:
+        _at(
+            path,
+            primitive,
+            f"says {declared} numbers, {stride} a corner, but <p> holds {sum(lengths)}: it was cut short or is damaged",
+        )
     if any(length % stride for length in lengths):
-        _at(path, primitive, f"has {stride} numbers a corner, but a <p> of {next(n for n in lengths if n % stride)} numbers")
+        _at(
+            path,
+            primitive,
+            f"has {stride} numbers a corner, but a <p> of {next(n for n in lengths if n % stride)} numbers",
+        )
 
 
 def _positions(vertex: ET.Element, by_id: dict, path: Path) -> int:
     """How many positions a VERTEX input names; they must be finite, and as many as their counts say."""
     vertices = _named(vertex, "source", by_id, path)
-    place = next((one for one in vertices.findall("input") if one.get("semantic") == "POSITION"), None)
+    place = next(
+        (
+            semantic_input
+            for semantic_input in vertices.findall("input")
+            if semantic_input.get("semantic") == "POSITION"
+        ),
+        None,
+    )
     if place is None:
         _at(path, vertices, 'has no <input semantic="POSITION">')
     source = _named(place, "source", by_id, path)
@@ -145,30 +177,35 @@ def _positions(vertex: ET.Element, by_id: dict, path: Path) -> int:
     rows, width = len(values) // 3, 3
     if accessor is not None:
         width = _count(accessor, "stride", path) or 1
-        given = _count(accessor, "count", path)
-        rows = len(values) // width if given is None else given
+        declared_count = _count(accessor, "count", path)
+        rows = len(values) // width if declared_count is None else declared_count
         if width < 3 or rows * width + (_count(accessor, "offset", path) or 0) > len(values):
             _at(path, accessor, f"says {rows} rows of {width}, but there are {len(values)} numbers")
     return rows
 
 
 def _named(element: ET.Element, key: str, by_id: dict, path: Path) -> ET.Element:
-    found = by_id.get((element.get(key) or "").removeprefix("#"))
-    if found is None:
+    referenced = by_id.get((element.get(key) or "").removeprefix("#"))
+    if referenced is None:
         _at(path, element, f"{key} names {brief(element.get(key))}, which is not in the file")
-    return found
+    return referenced
 
 
 # --- nodes ----------------------------------------------------------------------------------------
 
 
 def _check_nodes(root: ET.Element, by_id: dict, path: Path) -> None:
-    """How deep nodes stand in one another, and how many there are with what they repeat: pycollada and trimesh recurse."""
+    """Limit the depth of nodes, and their number with repeats: pycollada and trimesh recurse."""
     sizes: dict[ET.Element, int] = {}  # of nodes that were looked at: how many they are with what stands in them
 
     def inner(node: ET.Element) -> list[ET.Element]:
-        repeated = [by_id.get((one.get("url") or "").removeprefix("#")) for one in node.findall("instance_node")]
-        return [*node.findall("node"), *(one for one in repeated if one is not None and one.tag == "node")]
+        repeated = [
+            by_id.get((instance.get("url") or "").removeprefix("#")) for instance in node.findall("instance_node")
+        ]
+        return [
+            *node.findall("node"),
+            *(instance for instance in repeated if instance is not None and instance.tag == "node"),
+        ]
 
     for start in root.iter("node"):
         waiting: list[ET.Element] = [start]
@@ -179,15 +216,15 @@ def _check_nodes(root: ET.Element, by_id: dict, path: Path) -> None:
             if node in sizes:
                 waiting.pop()
             elif opened and opened[-1] is node:
-                sizes[node] = 1 + sum(sizes[one] for one in below)
-                if sizes[node] > MOST_NODES:
-                    _at(path, node, f"with what it repeats it is {sizes[node]} nodes; read are at most {MOST_NODES:,}")
+                sizes[node] = 1 + sum(sizes[child] for child in below)
+                if sizes[node] > MAX_NODES:
+                    _at(path, node, f"with what it repeats it is {sizes[node]} nodes; read are at most {MAX_NODES:,}")
                 waiting.pop()
                 opened.pop()
             else:
                 opened.append(node)
                 if len(opened) > DEEPEST:
                     _at(path, node, f"nodes stand more than {DEEPEST} deep in one another: nest less")
-                if any(one in opened for one in below):
+                if any(child in opened for child in below):
                     _at(path, node, "stands below itself: nodes are trees")
                 waiting += below

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from collide.errors import MissingExtra, SceneError, brief
-from collide.scenes.loaders.files import DEEPEST, MOST_REPEATED, read_text
+from collide.scenes.loaders.files import DEEPEST, MAX_REPEATED, read_text
 
 #: A double has 309 digits before the point; Python refuses to read integers of more than 4,300.
-_MOST_DIGITS = 400
+_MAX_DIGITS = 400
 
 
 def read_document(path: Path) -> Any:
@@ -68,7 +68,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _integer(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
+    if len(text) > _MAX_DIGITS:
         raise _Refused(f"the integer {text[:20]}... has {len(text)} digits: numbers here are below 1.8e308")
     return int(text)
 
@@ -76,11 +76,11 @@ def _integer(text: str) -> int:
 def _check_depth(data: Any, path: Path) -> None:
     """Refuse lists and mappings too deep in one another, without recursing."""
     level, depth = [data], 0
-    while level := [one for one in level if type(one) in (list, dict)]:
+    while level := [item for item in level if type(item) in (list, dict)]:
         depth += 1
         if depth > DEEPEST:
             raise SceneError(_too_deep(), path=path)
-        level = [entry for one in level for entry in (one.values() if type(one) is dict else one)]
+        level = [entry for item in level for entry in (item.values() if type(item) is dict else item)]
 
 
 def _too_deep(place: str = "") -> str:
@@ -126,12 +126,15 @@ def _check_events(events, path: Path) -> None:
     for event in events:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in sizes and any(anchor == event.anchor for anchor, _ in opened):
-                raise SceneError(f"{_place(event.start_mark)}the alias *{event.anchor} stands inside what it repeats", path=path)
+                raise SceneError(
+                    f"{_place(event.start_mark)}the alias *{event.anchor} stands inside what it repeats", path=path
+                )
             again = sizes.get(event.anchor, 1)  # an alias of nothing is refused when the file is read
             nodes, repeated = nodes + again, repeated + again
-            if repeated > MOST_REPEATED:
+            if repeated > MAX_REPEATED:
                 raise SceneError(
-                    f"{_place(event.start_mark)}aliases repeat more than {MOST_REPEATED:,} nodes: write the file without them",
+                    f"{_place(event.start_mark)}aliases repeat more than {MAX_REPEATED:,} nodes: write the file "
+                    "without them",
                     path=path,
                 )
         elif isinstance(event, yaml.CollectionStartEvent):
@@ -178,7 +181,10 @@ def _yaml_loader():
                 return super().construct_object(node, deep)
             except (ValueError, OverflowError, TypeError, KeyError, AttributeError, IndexError):
                 kind = node.tag.rsplit(":", 1)[-1]
-                problem = f"{brief(node.value) if isinstance(node, yaml.ScalarNode) else 'what stands here'} cannot be read as {kind}"
+                problem = (
+                    f"{brief(node.value) if isinstance(node, yaml.ScalarNode) else 'what stands here'} cannot "
+                    f"be read as {kind}"
+                )
                 raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
 
     # No two ways to read the same digits: a megabyte of them must not be tried in every way.

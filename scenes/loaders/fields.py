@@ -59,11 +59,11 @@ class Fields:
 
     def words(self, key: str) -> list[str]:
         """A list of names; an absent or empty key gives none."""
-        found = self.items(key)
-        for word, place in found:
+        items = self.items(key)
+        for word, place in items:
             if isinstance(word, bool) or not isinstance(word, (str, int)):
                 raise SceneError(f"must be a name, got {brief(word)}", path=self.path, element=place)
-        return [str(word) for word, _ in found]
+        return [str(word) for word, _ in items]
 
     def text(self, key: str, default: str | None = None) -> str:
         value = self.data.get(key, default)
@@ -109,15 +109,15 @@ class Fields:
         """A finite float64 array; None in ``shape`` stands for any length."""
         if key not in self.data:
             self.fail(f"{key!r} is missing")
-        shown = " × ".join("N" if n is None else str(n) for n in shape)
+        expected = " × ".join("N" if n is None else str(n) for n in shape)
         if stranger := _no_number(self.data[key], len(shape)):
-            self.fail(f"must be {shown} numbers, got {stranger}", key)
+            self.fail(f"must be {expected} numbers, got {stranger}", key)
         try:
             array = np.array(self.data[key], dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            self.fail(f"must be {shown} numbers, got {brief(self.data[key])}", key)
+            self.fail(f"must be {expected} numbers, got {brief(self.data[key])}", key)
         if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape)):
-            self.fail(f"must be {shown} numbers, got {brief(self.data[key])}", key)
+            self.fail(f"must be {expected} numbers, got {brief(self.data[key])}", key)
         if not np.isfinite(array).all():
             self.fail(f"must be finite numbers, got {brief(self.data[key])}", key)
         return array
@@ -131,9 +131,9 @@ def read_pose(parent: Fields, key: str, metres: float = 1.0) -> np.ndarray:
     if parent.get(key) is None:
         return np.eye(4)
     fields = parent.sub(key, ("xyz", "rpy", "rpy_deg", "quat_wxyz", "quat_xyzw", "matrix"))
-    given = [name for name in fields.data if name != "xyz"]
-    if len(given) > 1:
-        fields.fail(f"give one of rpy, rpy_deg, quat_wxyz, quat_xyzw and matrix, got {' and '.join(given)}")
+    rotations = [name for name in fields.data if name != "xyz"]
+    if len(rotations) > 1:
+        fields.fail(f"give one of rpy, rpy_deg, quat_wxyz, quat_xyzw and matrix, got {' and '.join(rotations)}")
     try:
         if "matrix" in fields:
             return _matrix(fields, metres)
@@ -174,9 +174,9 @@ def rotation_from_degrees(rpy_deg: np.ndarray) -> np.ndarray:
         else:
             c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
-        R = turn @ R
+        R_axis = np.eye(3)
+        R_axis[i, i], R_axis[i, j], R_axis[j, i], R_axis[j, j] = c, -s, s, c
+        R = R_axis @ R
     return R
 
 

@@ -22,17 +22,18 @@ LARGEST_MESH = 512 * 2**20
 #: Lists and mappings inside one another, in YAML, JSON and the nodes of a mesh file.
 DEEPEST = 100
 #: Nodes that the aliases and merge keys of one YAML file may repeat, counted one by one.
-MOST_REPEATED = 1_000_000
+MAX_REPEATED = 1_000_000
 #: Files that a scene may include, each time that one is included counted.
-MOST_INCLUDED = 1_000
+MAX_INCLUDED = 1_000
 #: Nodes of one mesh file, each time that one is repeated counted.
-MOST_NODES = 100_000
+MAX_NODES = 100_000
 #: Facets that the nodes of one mesh file place, each time that a mesh is placed counted.
-MOST_PLACED = 50_000_000
+MAX_PLACED = 50_000_000
 
 _PIECE = 2**20
 _KINDS = (
-    (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"), (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
 )  # fmt: skip
 
 
@@ -81,12 +82,12 @@ def read_mesh_bytes(path: Path) -> tuple[str, bytes]:
 
 def _unpacked(content: bytes, path: Path) -> bytes:
     """The content of a gzip file, looked at piece by piece: a megabyte may hold a gigabyte."""
-    found = bytearray()
+    unpacked = bytearray()
     try:
         with gzip.GzipFile(fileobj=BytesIO(content)) as packed:
             while piece := packed.read(_PIECE):
-                found += piece
-                if len(found) > LARGEST_MESH:
+                unpacked += piece
+                if len(unpacked) > LARGEST_MESH:
                     raise SceneError(
                         f"unpacks to more than {LARGEST_MESH >> 20} MiB, the most that is read of a mesh: "
                         "make it coarser, or cut it into parts",
@@ -94,7 +95,7 @@ def _unpacked(content: bytes, path: Path) -> bytes:
                     )
     except (OSError, EOFError, zlib.error) as error:
         raise SceneError(f"is not a gzip file that can be unpacked: {error}", path=path) from None
-    return bytes(found)
+    return bytes(unpacked)
 
 
 def starts_like_xml(path: Path) -> bool:

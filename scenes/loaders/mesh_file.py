@@ -69,7 +69,7 @@ def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     # Without scipy the volume of a hull is unknown; once it is installed the mesh is looked at again.
     known = meshes != "mesh" and importlib.util.find_spec("scipy") is not None
     entry = cache.key(opened.blobs, {"meshes": meshes, "suffix": opened.suffix, "volumes": known})
-    file = _kept(entry)
+    file = _from_cache(entry)
     if file is None:
         file, raw = _read(opened, meshes == "mesh")
         if meshes == "pieces":
@@ -83,7 +83,7 @@ def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
     return file
 
 
-def _kept(entry: str) -> MeshFile | None:
+def _from_cache(entry: str) -> MeshFile | None:
     arrays = cache.fetch(entry)
     try:
         return None if arrays is None else _unpack(arrays)
@@ -99,7 +99,9 @@ def check_meshes_option(meshes: str) -> None:
 def size_note(extent: float, what: str) -> str | None:
     """A note where something is so large or small that its unit may be wrong. extent : [m]."""
     if extent > 100.0:
-        return f"{what} is {extent:g} m across: is it in millimetres? A scale of 0.001 would make it {extent / 1000:g} m"
+        return (
+            f"{what} is {extent:g} m across: is it in millimetres? A scale of 0.001 would make it {extent / 1000:g} m"
+        )
     if 0.0 < extent < 1e-5:
         return f"{what} is {extent:g} m across: is its unit right?"
     return None
@@ -109,21 +111,25 @@ def size_note(extent: float, what: str) -> str | None:
 
 
 def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.ndarray, np.ndarray]]]:
-    found, notes = triangles_of(opened)
+    triangles, notes = triangles_of(opened)
     path, notes = opened.path, list(notes)
     parts, raw = [], []
-    for name, vertices, faces in found:
+    for name, vertices, faces in triangles:
         if len(vertices):
             part, about = _describe(as_it_is, name, vertices, faces, path)
             parts.append(part)
             raw.append((vertices, faces))
             notes += about
     if not parts:
-        raise SceneError("has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path)
+        raise SceneError(
+            "has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path
+        )
     return MeshFile(parts, notes), raw
 
 
-def _describe(as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
+def _describe(
+    as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path
+) -> tuple[MeshPart, list[str]]:
     if not np.isfinite(vertices).all():
         row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
         raise SceneError(f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite", path=path)

@@ -1,7 +1,7 @@
 """Wavefront OBJ: the vertices and polygons of its objects; materials, groups, normals and curves are not looked at.
 
-Read here because ids are counted from 1, negative ones back from where they stand, and an id of 0 or of a vertex that is
-not there must be told with its line.
+Read here because ids are counted from 1, negative ones back from where they stand, and an id of 0 or of a vertex that
+is not there must be told with its line.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from collide.scenes.loaders.polygons import (
     Part,
     Read,
     check_ids,
+    degenerate_notes,
     fans,
-    few_corners,
     floats,
     name_of,
+    quoted,
     refuse,
-    shown,
 )
 
 
@@ -40,7 +40,7 @@ def read(content: bytes, path: Path) -> Read:
     name = path.name
     coordinates: list[bytes] = []
     lines: list[int] = []
-    few: list[int] = []
+    degenerate_lines: list[int] = []
     number = 0
     for line in _joined(content):
         number += 1 + line.count(b"\\\n")
@@ -49,12 +49,12 @@ def read(content: bytes, path: Path) -> Read:
             continue
         if words[0] == b"v":
             if len(words) < 4:
-                refuse(path, f"a vertex has three coordinates, got {shown(line)}", number)
+                refuse(path, f"a vertex has three coordinates, got {quoted(line)}", number)
             coordinates += words[1:4]
             lines.append(number)
         elif words[0] == b"f":
             if len(words) < 4:
-                few.append(number)
+                degenerate_lines.append(number)
                 continue
             if here is None:
                 here = objects.setdefault(name, _Object())
@@ -65,10 +65,10 @@ def read(content: bytes, path: Path) -> Read:
             # equal names are one object, wherever its faces stand
             name, here = name_of(line, path.name), None
     vertices = floats(coordinates, lines, path)
-    notes = few_corners(few)
+    notes = degenerate_notes(degenerate_lines)
     if not objects:
         return Read([Part(path.name, vertices, NO_FACES)], notes)
-    return Read([_part(name, one, vertices, path) for name, one in sorted(objects.items())], notes)
+    return Read([_part(name, group, vertices, path) for name, group in sorted(objects.items())], notes)
 
 
 def _joined(content: bytes) -> list[bytes]:
@@ -90,23 +90,23 @@ def _ids(words: list[bytes], so_far: int, number: int, line: bytes, path: Path) 
     try:
         ids = [int(word.split(b"/", 1)[0]) for word in words[1:]]
     except ValueError:
-        refuse(path, f"a face names vertices by whole numbers, got {shown(line)}", number)
+        refuse(path, f"a face names vertices by whole numbers, got {quoted(line)}", number)
     if min(ids) <= 0:
         for id in ids:
             if id == 0 or id < -so_far:
                 why = "ids begin at 1" if id == 0 else f"there are {so_far} so far"
-                refuse(path, f"a face names vertex {id}, but {why}: {shown(line)}", number)
+                refuse(path, f"a face names vertex {id}, but {why}: {quoted(line)}", number)
         return [id - 1 if id > 0 else so_far + id for id in ids]
     return [id - 1 for id in ids]
 
 
-def _part(name: str, one: _Object, vertices: np.ndarray, path: Path) -> Part:
+def _part(name: str, group: _Object, vertices: np.ndarray, path: Path) -> Part:
     """The object with the vertices that it uses, in the order of the file."""
     try:
-        corners, counts = np.array(one.corners, dtype=np.int64), np.array(one.counts, dtype=np.int64)
+        corners, counts = np.array(group.corners, dtype=np.int64), np.array(group.counts, dtype=np.int64)
     except OverflowError:
-        corners = np.array([min(id, 2**62) for id in one.corners], dtype=np.int64)
-        counts = np.array(one.counts, dtype=np.int64)
-    check_ids(corners, counts, len(vertices), 1, one.lines, path)
+        corners = np.array([min(id, 2**62) for id in group.corners], dtype=np.int64)
+        counts = np.array(group.counts, dtype=np.int64)
+    check_ids(corners, counts, len(vertices), 1, group.lines, path)
     used, corners = np.unique(corners, return_inverse=True)
     return Part(name, vertices[used], fans(corners.ravel(), counts))

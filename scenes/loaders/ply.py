@@ -13,18 +13,19 @@ from collide.scenes.loaders.polygons import (
     Part,
     Read,
     check_ids,
+    degenerate_notes,
     fans,
-    few_corners,
     numbers,
+    quoted,
     refuse,
-    shown,
     whole,
     wholes,
 )
 
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
     "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
@@ -45,7 +46,8 @@ class _Element(NamedTuple):
     properties: list[_Property]
 
 
-#: Of one element: property -> its column, or the values of its lists in one row and their lengths; and the line of each row.
+#: Of one element: property -> its column, or the values of its lists in one row and their lengths; and the line of each
+#: row.
 _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 
@@ -66,22 +68,25 @@ def read(content: bytes, path: Path) -> Read:
     if not isinstance(faces, tuple):
         refuse(path, "its faces are no lists")
     corners, counts = faces
-    few = np.flatnonzero(counts < 3)
+    degenerate = np.flatnonzero(counts < 3)
     check_ids(corners, counts, len(vertices), 0, body.lines, path)
-    if len(few):
+    if len(degenerate):
         corners, counts = corners[np.repeat(counts >= 3, counts)], counts[counts >= 3]
-    return Read([Part(path.name, vertices, fans(corners, counts) if len(counts) else NO_FACES)], few_corners(few.tolist(), "face"))
+    return Read(
+        [Part(path.name, vertices, fans(corners, counts) if len(counts) else NO_FACES)],
+        degenerate_notes(degenerate.tolist(), "face"),
+    )
 
 
 def _vertices(columns: dict[str, _Columns], path: Path) -> np.ndarray:
     vertex = columns.get("vertex", {})
     if not all(isinstance(vertex.get(axis), np.ndarray) for axis in "xyz"):
         refuse(path, "its header declares no element vertex with the properties x, y and z")
-    found = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    if not np.isfinite(found).all():
-        row = int(np.argmax(~np.isfinite(found).all(axis=1)))
-        refuse(path, f"vertex {row} is {found[row].tolist()}: coordinates must be finite")
-    return found
+    points = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
+    if not np.isfinite(points).all():
+        row = int(np.argmax(~np.isfinite(points).all(axis=1)))
+        refuse(path, f"vertex {row} is {points[row].tolist()}: coordinates must be finite")
+    return points
 
 
 # --- header -----------------------------------------------------------------------------------------
@@ -91,7 +96,12 @@ def _header(content: bytes, path: Path) -> tuple[str, list[_Element], int]:
     """Byte order (empty: text), elements, and where the data begin."""
     end = re.search(rb"^[ \t]*end_header[ \t]*(\r\n|\n|\r)", content[: 2**20], re.MULTILINE)
     if not content.startswith(b"ply") or end is None:
-        refuse(path, "is no PLY: it must begin with ply and have a line end_header" if end else "its header has no line end_header: is it cut short?")
+        refuse(
+            path,
+            "is no PLY: it must begin with ply and have a line end_header"
+            if end
+            else "its header has no line end_header: is it cut short?",
+        )
     form: str | None = None
     elements: list[_Element] = []
     for number, line in enumerate(content[: end.start()].splitlines(), 1):
@@ -105,10 +115,10 @@ def _header(content: bytes, path: Path) -> tuple[str, list[_Element], int]:
             if count < 0:
                 refuse(path, f"declares {count} of {words[1]}: a count must be 0 or more", number)
             elements.append(_Element(words[1], count, []))
-        elif words[0] == "property" and elements and (found := _property(words)):
-            elements[-1].properties.append(found)
+        elif words[0] == "property" and elements and (prop := _property(words)):
+            elements[-1].properties.append(prop)
         else:
-            refuse(path, f"this line of the header is not understood: {shown(line)}", number)
+            refuse(path, f"this line of the header is not understood: {quoted(line)}", number)
     if form is None:
         refuse(path, "its header has no line format")
     return _ENDIAN[form], elements, end.end()
@@ -140,7 +150,8 @@ class _Text:
         if len(rows) < element.rows:
             refuse(
                 self._path,
-                f"declares {element.rows} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; export it again",
+                f"declares {element.rows} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; "
+                "export it again",
             )
         self._at += element.rows
         if element.name == "face":
@@ -155,17 +166,19 @@ class _Text:
         table = numbers([word for _, words in rows for word in words])
         columns: _Columns = {}
         at = 0
-        for one in element.properties:
+        for prop in element.properties:
             if table is None or at >= width:
                 return None
-            if one.length and (table[at] % 1 or not 0 <= table[at] < width - at or (table[at::width] != table[at]).any()):
+            if prop.length and (
+                table[at] % 1 or not 0 <= table[at] < width - at or (table[at::width] != table[at]).any()
+            ):
                 return None
-            count, at = (int(table[at]), at + 1) if one.length else (1, at)
+            count, at = (int(table[at]), at + 1) if prop.length else (1, at)
             values = table.reshape(-1, width)[:, at : at + count].ravel()
-            if one.kind[0] != "f" and not ((values == np.floor(values)) & (np.abs(values) < 2**53)).all():
+            if prop.kind[0] != "f" and not ((values == np.floor(values)) & (np.abs(values) < 2**53)).all():
                 return None
-            values = _as(values, one)
-            columns[one.name] = (values, np.full(len(rows), count, dtype=np.int64)) if one.length else values
+            values = _as(values, prop)
+            columns[prop.name] = (values, np.full(len(rows), count, dtype=np.int64)) if prop.length else values
             at += count
         return columns if at == width else None
 
@@ -175,52 +188,65 @@ class _Text:
         lines = [line for line, _ in rows]
         for line, words in rows:
             at = 0
-            for k, one in enumerate(element.properties):
+            for k, prop in enumerate(element.properties):
                 count, shift = 1, 0
-                if one.length:
-                    count, shift = whole(self._word(line, words, at, one), f"the length of {one.name}", self._path, line), 1
-                found = words[at + shift : at + shift + count] if count >= 0 else []
-                if len(found) != count:
-                    refuse(self._path, f"{one.name} has {count} numbers, got {len(found)}: {shown(b' '.join(words))}", line)
-                values[k] += found
+                if prop.length:
+                    count, shift = (
+                        whole(self._word(line, words, at, prop), f"the length of {prop.name}", self._path, line),
+                        1,
+                    )
+                lists = words[at + shift : at + shift + count] if count >= 0 else []
+                if len(lists) != count:
+                    refuse(
+                        self._path,
+                        f"{prop.name} has {count} numbers, got {len(lists)}: {quoted(b' '.join(words))}",
+                        line,
+                    )
+                values[k] += lists
                 counts[k].append(count)
                 at += shift + count
             if at != len(words):
-                refuse(self._path, f"a row of {element.name} has {at} numbers, got {len(words)}: {shown(b' '.join(words))}", line)
+                refuse(
+                    self._path,
+                    f"a row of {element.name} has {at} numbers, got {len(words)}: {quoted(b' '.join(words))}",
+                    line,
+                )
         columns: _Columns = {}
-        for k, one in enumerate(element.properties):
-            column = self._column(values[k], one, lines, counts[k])
-            columns[one.name] = (column, np.array(counts[k], dtype=np.int64)) if one.length else column
+        for k, prop in enumerate(element.properties):
+            column = self._column(values[k], prop, lines, counts[k])
+            columns[prop.name] = (column, np.array(counts[k], dtype=np.int64)) if prop.length else column
         return columns
 
-    def _word(self, line: int, words: list[bytes], at: int, one: _Property) -> bytes:
+    def _word(self, line: int, words: list[bytes], at: int, prop: _Property) -> bytes:
         if at >= len(words):
-            refuse(self._path, f"{one.name} is missing: {shown(b' '.join(words))}", line)
+            refuse(self._path, f"{prop.name} is missing: {quoted(b' '.join(words))}", line)
         return words[at]
 
-    def _column(self, words: list[bytes], one: _Property, lines: list[int], counts: list[int]) -> np.ndarray:
-        if one.kind[0] != "f":
-            return wholes(words, one.name, self._path, lines, counts)
-        found = numbers(words)
-        if found is None:
+    def _column(self, words: list[bytes], prop: _Property, lines: list[int], counts: list[int]) -> np.ndarray:
+        if prop.kind[0] != "f":
+            return wholes(words, prop.name, self._path, lines, counts)
+        values = numbers(words)
+        if values is None:
             k = next(k for k, word in enumerate(words) if numbers([word]) is None)
             line = lines[int(np.searchsorted(np.cumsum(counts), k, side="right"))]
-            refuse(self._path, f"{one.name} must be a number, got {shown(words[k])}", line)
-        return _as(found, one)
+            refuse(self._path, f"{prop.name} must be a number, got {quoted(words[k])}", line)
+        return _as(values, prop)
 
     def end(self) -> None:
         if self._at < len(self._rows):
             line, words = self._rows[self._at]
             more = len(self._rows) - self._at
-            refuse(self._path, f"{more} more lines than its header declares, the first is {shown(b' '.join(words))}", line)
+            refuse(
+                self._path, f"{more} more lines than its header declares, the first is {quoted(b' '.join(words))}", line
+            )
 
 
-def _as(values: np.ndarray, one: _Property) -> np.ndarray:
+def _as(values: np.ndarray, prop: _Property) -> np.ndarray:
     """Numbers of the precision that the header declares."""
-    if one.kind[0] != "f":
+    if prop.kind[0] != "f":
         return values.astype(np.int64)
     with np.errstate(over="ignore"):  # beyond the largest float is infinite, and refused as such
-        return values.astype(one.kind)
+        return values.astype(prop.kind)
 
 
 # --- binary -----------------------------------------------------------------------------------------
@@ -237,56 +263,68 @@ class _Binary:
     def element(self, element: _Element) -> _Columns:
         if not element.rows or not element.properties:
             none = np.zeros(0)
-            return {one.name: (none.astype(np.int64), none.astype(np.int64)) if one.length else none for one in element.properties}
+            return {
+                prop.name: (none.astype(np.int64), none.astype(np.int64)) if prop.length else none
+                for prop in element.properties
+            }
         return self._equal_rows(element) or self._row_by_row(element)
 
     def _equal_rows(self, element: _Element) -> _Columns | None:
         """All rows at once, where their lists are as long as those of the first."""
         fields, at = [], self._at
-        for k, one in enumerate(element.properties):
-            if one.length:
-                count = int(self._take(one.length, 1, at, element, 0)[0])
-                fields += [(f"n{k}", self._endian + one.length), (f"v{k}", self._endian + one.kind, (self._sane(count, one),))]
-                at += np.dtype(one.length).itemsize + count * np.dtype(one.kind).itemsize
+        for k, prop in enumerate(element.properties):
+            if prop.length:
+                count = int(self._take(prop.length, 1, at, element, 0)[0])
+                fields += [
+                    (f"n{k}", self._endian + prop.length),
+                    (f"v{k}", self._endian + prop.kind, (self._sane(count, prop),)),
+                ]
+                at += np.dtype(prop.length).itemsize + count * np.dtype(prop.kind).itemsize
             else:
-                fields.append((f"v{k}", self._endian + one.kind))
-                at += np.dtype(one.kind).itemsize
+                fields.append((f"v{k}", self._endian + prop.kind))
+                at += np.dtype(prop.kind).itemsize
         layout = np.dtype(fields)
         if self._at + layout.itemsize * element.rows > len(self._content):
-            if not any(one.length for one in element.properties):
+            if not any(prop.length for prop in element.properties):
                 self._cut_short(element, (len(self._content) - self._at) // layout.itemsize)
             return None
         rows = np.frombuffer(self._content, layout, element.rows, self._at)
-        for k, one in enumerate(element.properties):
-            if one.length and (rows[f"n{k}"] != rows[f"n{k}"][0]).any():
+        for k, prop in enumerate(element.properties):
+            if prop.length and (rows[f"n{k}"] != rows[f"n{k}"][0]).any():
                 return None
         self._at += layout.itemsize * element.rows
         return {
-            one.name: (_native(rows[f"v{k}"]).ravel(), rows[f"n{k}"].astype(np.int64)) if one.length else _native(rows[f"v{k}"])
-            for k, one in enumerate(element.properties)
+            prop.name: (_native(rows[f"v{k}"]).ravel(), rows[f"n{k}"].astype(np.int64))
+            if prop.length
+            else _native(rows[f"v{k}"])
+            for k, prop in enumerate(element.properties)
         }
 
     def _row_by_row(self, element: _Element) -> _Columns:
-        found: list[list[np.ndarray]] = [[] for _ in element.properties]
+        lists: list[list[np.ndarray]] = [[] for _ in element.properties]
         counts: list[list[int]] = [[] for _ in element.properties]
         for row in range(element.rows):
-            for k, one in enumerate(element.properties):
+            for k, prop in enumerate(element.properties):
                 count = 1
-                if one.length:
-                    count = self._sane(int(self._take(one.length, 1, self._at, element, row)[0]), one)
-                    self._at += np.dtype(one.length).itemsize
+                if prop.length:
+                    count = self._sane(int(self._take(prop.length, 1, self._at, element, row)[0]), prop)
+                    self._at += np.dtype(prop.length).itemsize
                     counts[k].append(count)
-                found[k].append(self._take(one.kind, count, self._at, element, row))
-                self._at += np.dtype(one.kind).itemsize * count
+                lists[k].append(self._take(prop.kind, count, self._at, element, row))
+                self._at += np.dtype(prop.kind).itemsize * count
         columns: _Columns = {}
-        for k, one in enumerate(element.properties):
-            values = _native(np.concatenate(found[k]))
-            columns[one.name] = (values, np.array(counts[k], dtype=np.int64)) if one.length else values
+        for k, prop in enumerate(element.properties):
+            values = _native(np.concatenate(lists[k]))
+            columns[prop.name] = (values, np.array(counts[k], dtype=np.int64)) if prop.length else values
         return columns
 
-    def _sane(self, count: int, one: _Property) -> int:
+    def _sane(self, count: int, prop: _Property) -> int:
         if not 0 <= count <= len(self._content):
-            refuse(self._path, f"a list of {one.name} has the length {count}: the file is damaged, or declares other types than it holds")
+            refuse(
+                self._path,
+                f"a list of {prop.name} has the length {count}: the file is damaged, or declares other types than it "
+                "holds",
+            )
         return count
 
     def _take(self, kind: str, count: int, at: int, element: _Element, row: int) -> np.ndarray:
@@ -297,13 +335,18 @@ class _Binary:
     def _cut_short(self, element: _Element, holds: int) -> NoReturn:
         refuse(
             self._path,
-            f"declares {element.rows} of {element.name}, but holds {holds}: it was cut short or is damaged; export it again",
+            f"declares {element.rows} of {element.name}, but holds {holds}: it was cut short or is damaged; export it "
+            "again",
         )
 
     def end(self) -> None:
-        left = self._content[self._at :]
-        if left.strip(b"\0\r\n \t"):
-            refuse(self._path, f"has {len(left)} bytes more than its header declares: the counts are wrong, or the file is damaged")
+        remaining = self._content[self._at :]
+        if remaining.strip(b"\0\r\n \t"):
+            refuse(
+                self._path,
+                f"has {len(remaining)} bytes more than its header declares: the counts are wrong, or the file is "
+                "damaged",
+            )
 
 
 def _native(values: np.ndarray) -> np.ndarray:

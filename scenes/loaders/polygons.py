@@ -34,7 +34,7 @@ def refuse(path: Path, what: str, line: int | None = None) -> NoReturn:
     raise SceneError(what, path=path, element=None if line is None else f"line {line}")
 
 
-def shown(line: bytes) -> str:
+def quoted(line: bytes) -> str:
     """A line of a file for a message."""
     return brief(line.decode("utf-8", errors="replace").strip())
 
@@ -51,11 +51,11 @@ def numbers(words: Sequence[bytes]) -> np.ndarray | None:
 
 def floats(words: Sequence[bytes], lines: Sequence[int], path: Path) -> np.ndarray:
     """(n, 3) of three words a line; SceneError with line and value for what is no finite number."""
-    found = numbers(words)
-    if found is None or not np.isfinite(found).all():
-        k = next(k for k, word in enumerate(words) if (one := numbers([word])) is None or not np.isfinite(one[0]))
-        refuse(path, f"a coordinate must be a finite number, got {shown(words[k])}", lines[k // 3])
-    return found.reshape(-1, 3)
+    values = numbers(words)
+    if values is None or not np.isfinite(values).all():
+        k = next(k for k, word in enumerate(words) if (value := numbers([word])) is None or not np.isfinite(value[0]))
+        refuse(path, f"a coordinate must be a finite number, got {quoted(words[k])}", lines[k // 3])
+    return values.reshape(-1, 3)
 
 
 def wholes(words: Sequence[bytes], what: str, path: Path, lines: Sequence[int], counts: Sequence[int]) -> np.ndarray:
@@ -68,12 +68,12 @@ def wholes(words: Sequence[bytes], what: str, path: Path, lines: Sequence[int], 
             return np.array(list(map(int, words)), dtype=np.int64)
     except (ValueError, OverflowError):
         pass
-    found = [_whole(word) for word in words]
-    if None in found:
-        k = found.index(None)
+    values = [_whole(word) for word in words]
+    if None in values:
+        k = values.index(None)
         line = lines[int(np.searchsorted(np.cumsum(counts), k, side="right"))]
-        refuse(path, f"{what} must be a whole number, got {shown(words[k])}", line)
-    return np.array(found, dtype=np.int64)
+        refuse(path, f"{what} must be a whole number, got {quoted(words[k])}", line)
+    return np.array(values, dtype=np.int64)
 
 
 def whole(word: bytes, what: str, path: Path, line: int) -> int:
@@ -101,7 +101,9 @@ def fans(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.stack([corners[first], corners[first + k + 1], corners[first + k + 2]], axis=1)
 
 
-def check_ids(corners: np.ndarray, counts: np.ndarray, vertices: int, first: int, lines: Sequence[int] | None, path: Path) -> None:
+def check_ids(
+    corners: np.ndarray, counts: np.ndarray, vertices: int, first: int, lines: Sequence[int] | None, path: Path
+) -> None:
     """Refuse polygons with a corner that is no vertex, by line or by number.
 
     corners : from 0.   first : what the file calls the first vertex, for the message.
@@ -114,7 +116,7 @@ def check_ids(corners: np.ndarray, counts: np.ndarray, vertices: int, first: int
         refuse(path, what, None if lines is None else lines[k])
 
 
-def few_corners(lines: Sequence[int], what: str = "line") -> list[str]:
+def degenerate_notes(lines: Sequence[int], what: str = "line") -> list[str]:
     """A note about polygons of one or two corners."""
     if not lines:
         return []

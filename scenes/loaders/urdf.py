@@ -77,14 +77,14 @@ def load_robot(
     return robot
 
 
-def find_srdf(urdf: Path, robot_name: str | None, given) -> Path | None:
+def find_srdf(urdf: Path, robot_name: str | None, srdf) -> Path | None:
     """The SRDF given, or the one beside the URDF: same stem, or ../srdf/NAME.srdf; None where none is."""
-    if given is False:
+    if srdf is False:
         return None
-    if given is not None:
-        if not is_file(Path(given)):
-            raise SceneError("no such file", path=given)
-        return Path(given)
+    if srdf is not None:
+        if not is_file(Path(srdf)):
+            raise SceneError("no such file", path=srdf)
+        return Path(srdf)
     for folder in (urdf.parent, urdf.resolve().parent.parent / "srdf"):
         for stem in dict.fromkeys(filter(None, (urdf.stem, robot_name))):
             if is_file(folder / f"{stem}.srdf"):
@@ -98,7 +98,9 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
         reading.fail("<robot>", "has no <link>" + _expand_advice(root))
-    joints = [_joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))]
+    joints = [
+        _joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))
+    ]
     geometry = {name: _link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
     _note_unchecked(root, geometry, reading)
     semantics = read_srdf(srdf, links, [joint.name for joint in joints]) if srdf is not None else None
@@ -145,10 +147,10 @@ def parse_xml(path: Path, notes: list[str]) -> ET.Element:
     except (ValueError, LookupError) as error:
         raise SceneError(f"cannot be decoded as XML: {error}", path=path) from None
     if root.tag.startswith("{"):
-        own = root.tag[: root.tag.index("}") + 1]
+        namespace = root.tag[: root.tag.index("}") + 1]
         for element in root.iter():
-            if isinstance(element.tag, str) and element.tag.startswith(own):
-                element.tag = element.tag[len(own) :]
+            if isinstance(element.tag, str) and element.tag.startswith(namespace):
+                element.tag = element.tag[len(namespace) :]
     foreign = sorted({element.tag.rsplit("}", 1)[-1] for element in root.iter() if str(element.tag).startswith("{")})
     if foreign:
         notes.append(f"elements of another namespace were not read: {listing(foreign)}")
@@ -168,7 +170,9 @@ def _with_prefixes_declared(blob: bytes, path: Path, notes: list[str]) -> ET.Ele
     try:
         root = ET.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text[: start.end()]) + names + text[start.end() :])
     except ET.ParseError as error:
-        raise SceneError(f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path) from None
+        raise SceneError(
+            f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path
+        ) from None
     notes.append(f"XML prefix not declared: {listing(unbound)}; what carries it was not read")
     return root
 
@@ -190,7 +194,9 @@ def _place(kind: str, name: str) -> str:
     return f'{kind} "{cut(name)}"'
 
 
-def floats(element: ET.Element, attribute: str, count: int, place: str, reading: Reading, default: str | None = None) -> np.ndarray:
+def floats(
+    element: ET.Element, attribute: str, count: int, place: str, reading: Reading, default: str | None = None
+) -> np.ndarray:
     """``count`` finite numbers of an attribute, separated by blanks or commas."""
     text = element.get(attribute, default)
     if text is None:
@@ -250,7 +256,9 @@ def _limits(element: ET.Element, kind: str, place: str, reading: Reading) -> tup
     lower = float(floats(limit, "lower", 1, place, reading, "0")[0])
     upper = float(floats(limit, "upper", 1, place, reading, "0")[0])
     if lower > upper:
-        reading.notes.append(f"{place} has limits [{lower:g}, {upper:g}] the wrong way round: read as [{upper:g}, {lower:g}]")
+        reading.notes.append(
+            f"{place} has limits [{lower:g}, {upper:g}] the wrong way round: read as [{upper:g}, {lower:g}]"
+        )
         lower, upper = upper, lower
     return lower, upper
 
@@ -301,17 +309,17 @@ def _element_shapes(collision: ET.Element, link: str, place: str, reading: Readi
 
 
 def _primitive(element: ET.Element, place: str, reading: Reading):
-    def one(attribute: str) -> float:
+    def number(attribute: str) -> float:
         return float(floats(element, attribute, 1, place, reading)[0])
 
     if element.tag == "box":
         return Box(floats(element, "size", 3, place, reading))
     if element.tag == "sphere":
-        return Sphere(one("radius"))
+        return Sphere(number("radius"))
     if element.tag == "cylinder":
-        return Cylinder(one("radius"), one("length"))
+        return Cylinder(number("radius"), number("length"))
     if element.tag == "capsule":
-        return Capsule(one("radius"), one("length"))
+        return Capsule(number("radius"), number("length"))
     reading.fail(place, f"unknown shape <{cut(element.tag)}>; known are box, sphere, cylinder, capsule and mesh")
 
 
@@ -334,7 +342,9 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
     if file not in reading.mesh_files:
         reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
         reading.notes += reading.mesh_files[file].notes
-    shapes = [(shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")]
+    shapes = [
+        (shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")
+    ]
     _note_size(extent(reading.mesh_files[file], scale), place, reading)
     reading.seconds += time.perf_counter() - started
     return shapes
@@ -358,7 +368,7 @@ def _note_size(extent: float, place: str, reading: Reading) -> None:
 
 
 def _as_paths(package_path) -> list[Path]:
-    given = [package_path] if isinstance(package_path, (str, Path)) else list(package_path)
-    return [Path(entry) for entry in given]
+    folders = [package_path] if isinstance(package_path, (str, Path)) else list(package_path)
+    return [Path(entry) for entry in folders]
 
 

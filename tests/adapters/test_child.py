@@ -94,7 +94,7 @@ def test_a_hang_loses_its_pair_only(fakes):
 
 
 def test_an_exception_needs_no_new_process(fakes):
-    table = IsolatedPeer("fake_engines:Fake", most_restarts=0).answer(spheres(1, 4, 1, 4))
+    table = IsolatedPeer("fake_engines:Fake", max_restarts=0).answer(spheres(1, 4, 1, 4))
     assert outcome(table) == "AFAF"
     assert table.reasons[1] == "RuntimeError: origin outside"
 
@@ -114,13 +114,13 @@ def test_a_body_that_cannot_be_built_costs_one_restart_not_one_per_pair(fakes):
     pairs = Question.from_pairs((Box((13, 1, 1)), Sphere(1), pose(), pose()) for _ in range(1))
     bodies = [*pairs.bodies, pairs.bodies[1]._replace(name="c"), pairs.bodies[1]._replace(name="d")]
     question = Question(bodies, [(0, 1), (0, 2), (0, 3), (1, 2), (2, 3)], isolated=True)
-    table = IsolatedPeer("fake_engines:Fake", most_restarts=1).answer(question)
+    table = IsolatedPeer("fake_engines:Fake", max_restarts=1).answer(question)
     assert outcome(table) == "FFFAA"
     assert table.reasons[2].startswith("building 'a0': process aborted (SIGABRT)")
 
 
 def test_restarts_are_bounded(fakes):
-    table = IsolatedPeer("fake_engines:Fake", most_restarts=2).answer(spheres(2, 1, 2, 2, 2, 1))
+    table = IsolatedPeer("fake_engines:Fake", max_restarts=2).answer(spheres(2, 1, 2, 2, 2, 1))
     assert outcome(table) == "FAFFFF"
     assert table.reasons[5].startswith("given up after 2 restarts; the last: process aborted (SIGABRT)")
 

@@ -37,15 +37,15 @@ print(wrong, broken)
 """
 
 MUTATIONS = {
-    "none": ("proof.py", "", ""),
-    "planes need no room for rounding": ("proof.py", "> 1.000001 * error", "> -1e-3"),
-    "points need no room": ("proof.py", "+ error < room", "- 1e-3 < room"),
-    "the ball does not shrink towards the facet": ("proof.py", "room = (1.0 - s) * ", "room = 1.0 * "),
-    "cones are not looked at": ("steps.py", "t = min(t, before / (before - after))", "t = 1.0"),
-    "case 1 in the primal space always": ("steps.py", "if height + shift > 1.0:", "if height + shift > -1e300:"),
-    "case 1 in the polar space always": ("steps.py", "if -height <= 1.0:", "if -height <= 1e300:"),
-    "the vertex beyond is not looked for": ("ladder.py", "        if other < height:", "        if other < -1e300:"),
-    "the star keeps the old plane": ("steps.py", "state[Z_STAR + k] = state[Z + k]", "state[Z_STAR + k] = state[Z_STAR + k] + 0.0"),
+    "none": ("walk_proof.py", "", ""),
+    "planes need no room for rounding": ("walk_proof.py", "> 1.000001 * error", "> -1e-3"),
+    "points need no room": ("walk_proof.py", "+ error < room", "- 1e-3 < room"),
+    "the ball does not shrink towards the facet": ("walk_proof.py", "room = (1.0 - s) * ", "room = 1.0 * "),
+    "cones are not looked at": ("walk_steps.py", "t = min(t, before / (before - after))", "t = 1.0"),
+    "case 1 in the primal space always": ("walk_steps.py", "if height + shift > 1.0:", "if height + shift > -1e300:"),
+    "case 1 in the polar space always": ("walk_steps.py", "if -height <= 1.0:", "if -height <= 1e300:"),
+    "the vertex beyond is not looked for": ("packed_hierarchy.py", "        if other < height:", "        if other < -1e300:"),
+    "the star keeps the old plane": ("walk_steps.py", "state[Z_STAR + k] = state[Z + k]", "state[Z_STAR + k] = state[Z_STAR + k] + 0.0"),
 }  # fmt: skip
 
 
@@ -54,7 +54,7 @@ def test_faults_are_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]
     for folder, target in (("collide", "collide"), ("adapters", "collide/adapters"), ("scenes", "collide/scenes")):
         shutil.copytree(ROOT / folder, tmp_path / target, ignore=shutil.ignore_patterns("__pycache__"))
-    source = tmp_path / "collide/narrowphase/barba_langerman" / file
+    source = tmp_path / "collide/hierarchies" / file
     text = source.read_text(encoding="utf-8")
     assert old in text, f"{file} no longer has {old!r}"
     source.write_text(text.replace(old, new, 1) if old else text, encoding="utf-8")

@@ -11,6 +11,7 @@ from mesh_shapes import box, bumpy_sphere
 
 import collide
 from collide.cli import main
+from collide.hierarchies.tree_figures import tree_figures
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 
@@ -22,12 +23,12 @@ def test_figures_keep_their_bounds(name):
         "box": box, "sphere": lambda: bumpy_sphere(2000), "soup": lambda: soup(rng, 400), "one facet": lambda: (np.eye(3), np.array([[0, 1, 2]])),
     }[name]()  # fmt: skip
     mesh = collide.Mesh(vertices, faces, solid=False)
-    figures = mesh.tree_figures()
+    figures = tree_figures(mesh)
     assert figures.facets == len(faces) and figures.depth == mesh.tree.depth and figures.nodes == len(mesh.tree.nodes)
     assert len(faces) / 7 <= figures.leaves <= len(faces)
     assert figures.graded_size <= figures.node_bound == max(2 * len(faces) - 1, 2)
     assert 0 <= figures.graded_level <= figures.level_bound and figures.graded_depth <= figures.graded_level + 1
-    assert 0 <= figures.outliers <= len(faces) and figures.most_outliers <= figures.outliers
+    assert 0 <= figures.outliers <= len(faces) and figures.max_outliers <= figures.outliers
     assert figures.outlier_share == figures.outliers / len(faces)
 
 

@@ -19,8 +19,8 @@ def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
     rng = rng_of("single gaps")
     kinds = [kind for kind in naive.KINDS if kind != "Halfspace"]
     hits, long_way = [], []
-    ask = query.ask
-    monkeypatch.setattr(query, "ask", lambda *given, **named: (long_way.append(1), ask(*given, **named))[1])
+    answer_batch = query.answer_batch
+    monkeypatch.setattr(query, "answer_batch", lambda *args, **named: (long_way.append(1), answer_batch(*args, **named))[1])
     for kind_a, kind_b in combinations_with_replacement(kinds, 2):
         A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
         X, Y = (np.array([random_pose(rng, 0.8) for _ in range(12)]) for _ in range(2))

@@ -33,7 +33,7 @@ from curved_search import AXES, search_cells
 _SLACK = Decimal("1e-66")
 _ZERO, _INF = Decimal(0), Decimal("inf")
 #: Pairs of cells that are looked at one by one.
-MOST_PAIRS = 600
+MAX_PAIRS = 600
 
 # --- bodies -------------------------------------------------------------------------------------
 
@@ -279,7 +279,7 @@ def search_union(a: Body, b: Body, *, enough=_ZERO, guesses=()):
         _cull(bounds, a, b, np.asarray(guess, dtype=float))
     todo = np.ones(bounds.shape, dtype=bool)
     low, high, best_n = _INF, _INF, None
-    for _ in range(MOST_PAIRS):
+    for _ in range(MAX_PAIRS):
         at = int(np.argmin(np.where(todo, bounds, np.inf)))
         i, j = np.unravel_index(at, bounds.shape)
         if not todo[i, j] or Decimal(float(bounds[i, j])) >= high:

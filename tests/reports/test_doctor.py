@@ -31,7 +31,7 @@ def test_a_wrong_answer_and_a_crash_are_findings(monkeypatch):
     monkeypatch.setattr(doctor, "_known_pairs", two_pairs)
     examination = doctor.examine()
     assert [check.passed for check in examination.answers] == [False, False]
-    assert "should hold 1.0" in examination.answers[0].found
+    assert "should hold 1.0" in examination.answers[0].answer
     assert examination.verdict() == "BROKEN: 2 findings: wrong, crash"
 
 
@@ -40,14 +40,14 @@ def test_how_kernels_run_is_told(monkeypatch):
 
     told = {check.what: check for check in doctor.examine().installed}
     if mode.MODE == mode.COMPILED:
-        assert told["kernels"].passed and f"level {library.level} of" in told["kernels"].found
-        assert Path(told["library"].found) == Path(collide.get_library()) and told["built by"].found.startswith("numba ")
+        assert told["kernels"].passed and f"level {library.level} of" in told["kernels"].answer
+        assert Path(told["library"].answer) == Path(collide.get_library()) and told["built by"].answer.startswith("numba ")
     monkeypatch.setattr(mode, "MODE", mode.JUST_IN_TIME)
     monkeypatch.setattr(mode, "WHY", "this installation was built without compiled kernels")
     monkeypatch.setattr(library, "_built", lambda: None)
     told = {check.what: check for check in doctor.examine().installed}
-    assert told["kernels"].passed is None and "NO COMPILED KERNELS" in told["kernels"].found
-    assert mode.WHY in told["kernels"].found and "library" not in told
+    assert told["kernels"].passed is None and "NO COMPILED KERNELS" in told["kernels"].answer
+    assert mode.WHY in told["kernels"].answer and "library" not in told
 
 
 def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
@@ -55,7 +55,7 @@ def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
     blocked.write_text("a file where a folder should be")
     monkeypatch.setenv("COLLIDE_CACHE_DIR", str(blocked))
     caches = doctor.examine().caches
-    assert caches and all(check.passed is None and "COLLIDE_CACHE_DIR" in check.found for check in caches)
+    assert caches and all(check.passed is None and "COLLIDE_CACHE_DIR" in check.answer for check in caches)
 
 
 @pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
@@ -67,7 +67,7 @@ def test_a_cache_of_kernels_that_others_may_write_is_worth_knowing(monkeypatch, 
     tmp_path.chmod(0o777)
     told, *_ = doctor.examine().caches
     assert told.what == "kernels" and told.passed is None
-    assert "code" in told.found and f"{tmp_path} may be written by others" in told.found
+    assert "code" in told.answer and f"{tmp_path} may be written by others" in told.answer
     tmp_path.chmod(0o700)
     kernels, warning, _ = doctor.examine().caches
     assert kernels.passed and warning.what == "kernels are code"

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import collide
 from collide.errors import InvalidArgument
 from collide.reports import number_format as units
 from collide.reports import report, tables, terminal
@@ -70,6 +71,7 @@ def make_scene(rows=ROWS, names=NAMES):
         distances=lambda max_distance: WorldResult(
             stacked[stacked["hit"] | (stacked["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
+            collide.certify,
         ),
         stats=stats,
         names=dict(names),
@@ -350,17 +352,17 @@ def test_coordinates_choose_a_unit_that_shows_digits():
 
 def test_progress_is_silent_about_short_work_and_names_long_work():
     stream = io.StringIO()
-    with Progress(stream, patience=60.0)("short"):
+    with Progress(stream, delay=60.0)("short"):
         pass
     assert stream.getvalue() == ""
-    progress = Progress(stream, patience=0.0)
+    progress = Progress(stream, delay=0.0)
     with progress("long"):
         wait_until(lambda: stream.getvalue())
     assert stream.getvalue().startswith("collide: long ...\ncollide: long: done in ")
 
 
 def test_progress_on_a_terminal_leaves_no_trace(monkeypatch):
-    monkeypatch.setattr("collide.reports.progress._TERMINAL_PATIENCE", 0.0)
+    monkeypatch.setattr("collide.reports.progress._TERMINAL_DELAY", 0.0)
     stream = Terminal()
     progress = Progress(stream)
     with progress("outer"), progress("inner"):

@@ -136,13 +136,13 @@ def test_what_is_counted_is_what_a_walk_meets(tmp_path):
 
         text = "\n".join(lines)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("collide.scenes.loaders.documents.MOST_REPEATED", 10**9)
+            patch.setattr("collide.scenes.loaders.documents.MAX_REPEATED", 10**9)
             met = walk(parse_document(text, tmp_path / "a.yaml"))
             written = sum(1 + line.count(",") + ("[" in line or "{" in line) for line in lines)
         assert met >= written // 4
         try:
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("collide.scenes.loaders.documents.MOST_REPEATED", 40)
+                patch.setattr("collide.scenes.loaders.documents.MAX_REPEATED", 40)
                 parse_document(text, tmp_path / "a.yaml")
             assert met <= 40 + 100
         except SceneError:

@@ -110,9 +110,9 @@ def capped_tetrahedron(pair, points, ids, size):
     the way out, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
     """
     spare = EPA_VERTICES
-    ux = pair[14]
-    uy = pair[15]
-    uz = pair[16]
+    ux = pair.t.x
+    uy = pair.t.y
+    uz = pair.t.z
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
     if not length > _CENTRED * size:
         return False

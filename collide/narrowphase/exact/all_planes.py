@@ -77,12 +77,12 @@ def depth_by_all_planes(
 
     Returns (proven, depth, low part, nx, ny, nz): the last three the unit vector outwards of A ⊖ B.
     """
-    n_a = pair[1]
-    n_b = pair[7]
+    n_a = pair.A.n
+    n_b = pair.B.n
     if n_a + n_b > MOST_VERTICES or planes_of(n_a, n_b) > MOST_PLANES or not (SMALLEST_FINE < size < LARGEST_FINE):
         return False, 0.0, 0.0, 0.0, 0.0, 1.0
-    pose_a = exact_pose(pair[13], pair[5], terms)
-    pose_b = exact_pose(pair[13], pair[11], terms)
+    pose_a = exact_pose(pair.poses, pair.A.pose_at, terms)
+    pose_b = exact_pose(pair.poses, pair.B.pose_at, terms)
     scale = scale_of(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, 0.0, 0.0, size)
     if scale[0] > LONGEST:
         return False, 0.0, 0.0, 0.0, 0.0, 1.0
@@ -331,7 +331,8 @@ def _find_corners(pair, room_at, ids, nx, ny, nz, depth, error):
 @kernel
 def _facet(pair, corners, nx, ny, nz, depth, error):
     """Points of A ⊖ B that are level with the farthest along n, less the foot, with their vertices; their number."""
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
+    A, B, poses, t = pair.A, pair.B, pair.poses, pair.t
+    p, q = A.pose_at, B.pose_at
     ax = poses[p] * nx + poses[p + 3] * ny + poses[p + 6] * nz
     ay = poses[p + 1] * nx + poses[p + 4] * ny + poses[p + 7] * nz
     az = poses[p + 2] * nx + poses[p + 5] * ny + poses[p + 8] * nz
@@ -339,24 +340,24 @@ def _facet(pair, corners, nx, ny, nz, depth, error):
     by = poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz
     bz = poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz
     high = -math.inf
-    for i in range(n_a):
-        high = max(high, ax * coords_a[i] + ay * coords_a[m_a + i] + az * coords_a[2 * m_a + i])
+    for i in range(A.n):
+        high = max(high, ax * A.coords[i] + ay * A.coords[A.padded + i] + az * A.coords[2 * A.padded + i])
     low = math.inf
-    for j in range(n_b):
-        low = min(low, bx * coords_b[j] + by * coords_b[m_b + j] + bz * coords_b[2 * m_b + j])
+    for j in range(B.n):
+        low = min(low, bx * B.coords[j] + by * B.coords[B.padded + j] + bz * B.coords[2 * B.padded + j])
     count = 0
-    for i in range(n_a):
-        if ax * coords_a[i] + ay * coords_a[m_a + i] + az * coords_a[2 * m_a + i] < high - error:
+    for i in range(A.n):
+        if ax * A.coords[i] + ay * A.coords[A.padded + i] + az * A.coords[2 * A.padded + i] < high - error:
             continue
-        for j in range(n_b):
-            if bx * coords_b[j] + by * coords_b[m_b + j] + bz * coords_b[2 * m_b + j] > low + error or count == _CORNERS:
+        for j in range(B.n):
+            if bx * B.coords[j] + by * B.coords[B.padded + j] + bz * B.coords[2 * B.padded + j] > low + error or count == _CORNERS:
                 continue
             for axis in range(3):
                 r = p + 3 * axis
                 s = q + 3 * axis
-                a = poses[r] * coords_a[i] + poses[r + 1] * coords_a[m_a + i] + poses[r + 2] * coords_a[2 * m_a + i]
-                b = poses[s] * coords_b[j] + poses[s + 1] * coords_b[m_b + j] + poses[s + 2] * coords_b[2 * m_b + j]
-                shift = tx if axis == 0 else (ty if axis == 1 else tz)
+                a = poses[r] * A.coords[i] + poses[r + 1] * A.coords[A.padded + i] + poses[r + 2] * A.coords[2 * A.padded + i]
+                b = poses[s] * B.coords[j] + poses[s + 1] * B.coords[B.padded + j] + poses[s + 2] * B.coords[2 * B.padded + j]
+                shift = t.x if axis == 0 else (t.y if axis == 1 else t.z)
                 n = nx if axis == 0 else (ny if axis == 1 else nz)
                 corners[5 * count + axis] = (a - b) - shift - depth * n
             corners[5 * count + 3] = i

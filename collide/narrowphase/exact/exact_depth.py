@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collide.kernels import entry, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import POINTS
-from collide.lowering.shape_table import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.lowering.shape_table import INTS, LOWEST, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact.all_planes import depth_by_all_planes
 from collide.narrowphase.exact.settle_hulls import DIGITS, set_normal
-from collide.narrowphase.posed_pair import pair_of
+from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
 from collide.narrowphase.rows import LOWER, ROW, UPPER, write_verdict
 from collide.numerics.double_double import add, bracket
 from collide.numerics.error_free import two_sum
@@ -38,19 +38,19 @@ def deepen_pairs(
             continue
         row = view_f64(rows_at + ROW * k, 12)
         marks = view_u8(rows_at + ROW * k, ROW)
-        pair, ints, numbers, sa, sb, flip, size, slop, _ = pair_of(
+        pair, ints, flip, size, slop, _ = ordered_pair(
             ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1]
         )
-        if pair[3] != POINTS or pair[9] != POINTS:
+        if pair.A.kind != POINTS or pair.B.kind != POINTS:
             continue
         proven, depth, depth_low, vx, vy, vz = depth_by_all_planes(
-            pair, terms, terms_at, digits, digits_at + 8 * (DIGITS + 24), corners, ints[INTS * sa + LOWEST],
-            ints[INTS * sb + LOWEST], numbers[NUMBERS * sa + REACH], numbers[NUMBERS * sb + REACH], size, ERROR * size + slop,
+            pair, terms, terms_at, digits, digits_at + 8 * (DIGITS + 24), corners, ints[INTS * pair.A.shape + LOWEST],
+            ints[INTS * pair.B.shape + LOWEST], reach_of(pair, pair.A), reach_of(pair, pair.B), size, ERROR * size + slop,
         )  # fmt: skip
         if not proven:
             continue
-        radius_a = numbers[NUMBERS * sa + RADIUS]
-        radius_b = numbers[NUMBERS * sb + RADIUS]
+        radius_a = radius_of(pair, pair.A)
+        radius_b = radius_of(pair, pair.B)
         # Relative errors do not hold among subnormal doubles.
         slack = SUBNORMAL if 0.0 < depth < SMALLEST_NORMAL else 0.0
         swept, swept_low = two_sum(radius_a, radius_b)

@@ -46,8 +46,8 @@ def touch_exactly(
     vx, vy, vz : unit vector from B to A, exact but for its own rounding.
     rounds used.
     """
-    pose_a = exact_pose(pair[13], pair[5], terms)
-    pose_b = exact_pose(pair[13], pair[11], terms)
+    pose_a = exact_pose(pair.poses, pair.A.pose_at, terms)
+    pose_b = exact_pose(pair.poses, pair.B.pose_at, terms)
     scale = scale_of(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, radius_a, radius_b, size)
     d = scale[0]
     if d > LONGEST:

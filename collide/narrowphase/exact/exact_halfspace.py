@@ -82,12 +82,14 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     Arguments as in `exact.touch_exactly`. The vertex is the deepest, the excess its signed distance minus the
     radius, to EXACT_ERROR.
     """
-    (_, _, _, _, at_a, p, coords, count, m, _, _, q, numbers, poses, tx, ty, tz, _, _, _, _) = pair
+    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
+    p, q = A.pose_at, B.pose_at
+    t = pair.t
     pose_a = exact_pose(poses, p, terms)
     pose_b = exact_pose(poses, q, terms)
     rot, n_rot = span_of_entries(pose_a, 0, 9)
-    low_m, n_m = _span(numbers, at_a, 3)
-    low_b, n_b = _span(numbers, at_a + 3, 1)
+    low_m, n_m = _span(numbers, A.params_at, 3)
+    low_b, n_b = _span(numbers, A.params_at + 3, 1)
     rot_b, n_rot_b = span_of_entries(pose_b, 0, 9)
     low_s, n_s = span_of_entries(pose_a, 9, 3)
     low_t, n_t = span_of_entries(pose_b, 9, 3)
@@ -108,17 +110,17 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     n_sum = max(n_plane + d + low_first - low, 3 * n_rot + 2 + n_b + low_second - low) + 1
     if n_sum > _LONGEST or d > _LONGEST // 2:
         return UNDONE, 0, 0.0, 0.0
-    _set_plane(digits, pose_a, numbers, at_a, rot, n_rot, low_m, n_m)
+    _set_plane(digits, pose_a, numbers, A.params_at, rot, n_rot, low_m, n_m)
     # The part of s that no vertex changes, in slot 17: −b·det R.
-    add_double(digits, _slot(18), numbers[at_a + 3], low_b)
+    add_double(digits, _slot(18), numbers[A.params_at + 3], low_b)
     constant = _slot(17)
     clear(digits, constant, n_sum)
     add_product(digits, constant + low_second - low, _slot(15), 3 * n_rot + 2, _slot(18), n_b, -1)
     carry(digits, constant, n_sum)
-    nx, ny, nz, offset, length = plane_in_world(numbers, at_a, poses, p)
+    nx, ny, nz, offset, length = plane_in_world(numbers, A.params_at, poses, p)
     lowest = math.inf
-    for k in range(count):
-        lowest = min(lowest, _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset))
+    for k in range(B.n):
+        lowest = min(lowest, _height(B.coords, B.padded, k, poses, q, t.x, t.y, t.z, nx, ny, nz, offset))
     # Only vertices that may be the lowest are looked at exactly: usually one.
     threshold = lowest + 2.0 * error * length
     best = 0
@@ -129,11 +131,11 @@ def reach_plane_exactly(pair, terms, digits, lowest_b, reach_b, radius, size, er
     for k in range(9):
         add_entry(digits, _slot(20 + k), pose_b, k, rot_b, 1.0)
         carry(digits, _slot(20 + k), n_rot_b)
-    for k in range(count):
-        if _height(coords, m, k, poses, q, tx, ty, tz, nx, ny, nz, offset) > threshold:
+    for k in range(B.n):
+        if _height(B.coords, B.padded, k, poses, q, t.x, t.y, t.z, nx, ny, nz, offset) > threshold:
             continue
         verdict, excess, excess_low = _reaches(
-            digits, pose_a, pose_b, coords, m, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
+            digits, pose_a, pose_b, B.coords, B.padded, k, n_rot_b, core, n_core, rot_b + core - grid, grid, d, n_plane,
             low_first - low, n_sum, low, 2 * rot + low_m, radius,
         )  # fmt: skip
         if verdict == UNDONE:

@@ -15,15 +15,16 @@ from collide.support.support_tree_query import extreme_vertex, rings_of
 def support_pair(digits, scale, pair, length, error):
     """(vertex of A, vertex of B) whose difference is the last one against the direction; unit v in doubles."""
     d, _, _, digits_rot_a, core_a, digits_a, _, digits_rot_b, core_b, digits_b = scale
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
     vx, vy, vz = direction_double(digits, d, length)
     along = math.sqrt(vx * vx + vy * vy + vz * vz)
     slack = 2.0 * error * along
     i = _extreme_vertex(
-        digits, d, length, coords_a, n_a, m_a, tree_a, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0
+        digits, d, length, A.coords, A.n, A.padded, A.tree, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0
     )
     j = _extreme_vertex(
-        digits, d, length, coords_b, n_b, m_b, tree_b, poses, q, 9, digits_rot_b, core_b, digits_b, vx, vy, vz, slack, -1.0
+        digits, d, length, B.coords, B.n, B.padded, B.tree, poses, q, 9, digits_rot_b, core_b, digits_b, vx, vy, vz, slack, -1.0
     )
     return i, j, vx / along, vy / along, vz / along
 

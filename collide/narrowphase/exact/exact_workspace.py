@@ -174,11 +174,11 @@ def set_point(digits, scale, pair, k, i, j):
     clear(digits, out, 3 * d)
     if digits_a > 0:
         _add_vertex(
-            digits, d, out, 0, digits_rot_a, pair[0], pair[2], i, core_a, digits_a, rot_a + core_a - grid, 1
+            digits, d, out, 0, digits_rot_a, pair.A.coords, pair.A.padded, i, core_a, digits_a, rot_a + core_a - grid, 1
         )
     if digits_b > 0:
         _add_vertex(
-            digits, d, out, 9, digits_rot_b, pair[6], pair[8], j, core_b, digits_b, rot_b + core_b - grid, -1
+            digits, d, out, 9, digits_rot_b, pair.B.coords, pair.B.padded, j, core_b, digits_b, rot_b + core_b - grid, -1
         )
     for axis in range(3):
         add_number(digits, out + axis * d, shift_at(d) + axis * d, d, -1)

@@ -34,12 +34,12 @@ def nearest_plane(pair, terms, digits, requests, at, lowest_a, lowest_b, reach_a
     all facets of a closed surface within A ⊖ B that may be nearest; the least of their exact distances is a
     lower bound of the depth, and an upper one if no vertex lies beyond that facet's plane.
     """
-    if pair[1] * pair[7] <= 3:
+    if pair.A.n * pair.B.n <= 3:
         return True, 0.0, 0.0  # so few points span no volume
     if at == 0:
         return False, 0.0, 0.0
-    pose_a = exact_pose(pair[13], pair[5], terms)
-    pose_b = exact_pose(pair[13], pair[11], terms)
+    pose_a = exact_pose(pair.poses, pair.A.pose_at, terms)
+    pose_b = exact_pose(pair.poses, pair.B.pose_at, terms)
     scale = scale_of(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, 0.0, 0.0, size)
     if scale[0] > LONGEST:
         return False, 0.0, 0.0

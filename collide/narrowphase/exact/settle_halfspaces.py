@@ -9,13 +9,13 @@ import math
 
 from collide.kernels import entry, view_f64, view_i32, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.shape_table import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.lowering.shape_table import INTS, LOWEST, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE
 from collide.narrowphase.exact.exact_halfspace import reach_plane_exactly
 from collide.narrowphase.exact.settle_hulls import DIGITS
 from collide.narrowphase.halfspace_convex import reach_of_plane
-from collide.narrowphase.posed_pair import pair_of
+from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
 from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, write_verdict, write_vertices
 from collide.numerics.double_double import bracket
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
@@ -37,14 +37,14 @@ def decide_planes(
         marks = view_u8(rows_at + ROW * k, ROW)
         if marks[HOW] != UNDECIDED:
             continue
-        pair, ints, numbers, _, sb, flip, size, slop, known = pair_of(
+        pair, ints, flip, size, slop, known = ordered_pair(
             ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1]
         )
-        if not known or pair[3] != HALFSPACE or pair[9] != POINTS:
+        if not known or pair.A.kind != HALFSPACE or pair.B.kind != POINTS:
             continue
-        _, skew = reach_of_plane(numbers, pair[4], pair[13], pair[5])
+        _, skew = reach_of_plane(pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at)
         verdict, vertex, excess, excess_low = reach_plane_exactly(
-            pair, terms, digits, ints[INTS * sb + LOWEST], numbers[NUMBERS * sb + REACH], numbers[NUMBERS * sb + RADIUS], size,
+            pair, terms, digits, ints[INTS * pair.B.shape + LOWEST], reach_of(pair, pair.B), radius_of(pair, pair.B), size,
             (ERROR * size + slop) * skew,
         )  # fmt: skip
         lower = row[LOWER]

@@ -9,7 +9,7 @@ import math
 
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.shape_table import INTS, LOWEST, NUMBERS, RADIUS, REACH, TERM_ROW
+from collide.lowering.shape_table import INTS, LOWEST, TERM_ROW
 from collide.narrowphase.bounds import ERROR, EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.epa.origin_foot import weigh_corners
 from collide.narrowphase.exact.all_planes import ROOM
@@ -28,7 +28,7 @@ from collide.narrowphase.gap.precise_pair import (
 )
 from collide.narrowphase.gjk.minkowski_difference import POINT, combined, place_vertices
 from collide.narrowphase.gjk.simplex import weigh_enclosed
-from collide.narrowphase.posed_pair import pair_of
+from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
 from collide.narrowphase.rows import (
     COUNT,
     DISTANCE,
@@ -48,6 +48,7 @@ from collide.narrowphase.rows import (
 )
 from collide.numerics.double_double import add, bracket
 from collide.numerics.error_free import two_sum
+from collide.numerics.vec3 import column_at
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: Digits of workspace; 24 integers for ids follow them, and doubles for planes.
@@ -96,20 +97,20 @@ def _set_points(row, pair, terms_at, ids, n, room_at, radius_a, radius_b, size, 
     weigh_corners(
         corners, FINE, n, weights, shift * row[NORMAL], shift * row[NORMAL + 1], shift * row[NORMAL + 2]
     )
-    poses = pair[13]
+    A, B, poses = pair.A, pair.B, pair.poses
     for axis in range(3):
         a = 0.0
         b = 0.0
-        p = pair[5] + 3 * axis
-        q = pair[11] + 3 * axis
+        p = A.pose_at + 3 * axis
+        q = B.pose_at + 3 * axis
         for k in range(n):
-            i = ids[2 * k]
-            j = ids[2 * k + 1]
-            a += weights[k] * (poses[p] * pair[0][i] + poses[p + 1] * pair[0][pair[2] + i] + poses[p + 2] * pair[0][2 * pair[2] + i])
-            b += weights[k] * (poses[q] * pair[6][j] + poses[q + 1] * pair[6][pair[8] + j] + poses[q + 2] * pair[6][2 * pair[8] + j])
-        v = own * row[NORMAL + axis]
-        a += poses[pair[5] + 9 + axis] + radius_a * v
-        b += poses[pair[11] + 9 + axis] - radius_b * v
+            u = column_at(A.coords, A.padded, ids[2 * k])
+            v = column_at(B.coords, B.padded, ids[2 * k + 1])
+            a += weights[k] * (poses[p] * u.x + poses[p + 1] * u.y + poses[p + 2] * u.z)
+            b += weights[k] * (poses[q] * v.x + poses[q + 1] * v.y + poses[q + 2] * v.z)
+        along = own * row[NORMAL + axis]
+        a += poses[A.pose_at + 9 + axis] + radius_a * along
+        b += poses[B.pose_at + 9 + axis] - radius_b * along
         row[POINT_A + axis] = b if flip else a
         row[POINT_B + axis] = a if flip else b
 
@@ -127,10 +128,10 @@ def _set_common_point(row, pair, ids, n, room_at, flip):
     miss, extent = weigh_enclosed(points, weights) if n == 4 else (math.inf, 0.0)
     if not miss <= _NEAR_MISS * extent:
         weigh_corners(points, POINT, n, weights, 0.0, 0.0, 0.0)
-    poses = pair[13]
+    poses = pair.poses
     for axis in range(3):
-        a = combined(points, weights, n, 3 + axis) + poses[pair[5] + 9 + axis]
-        b = combined(points, weights, n, 6 + axis) + poses[pair[11] + 9 + axis]
+        a = combined(points, weights, n, 3 + axis) + poses[pair.A.pose_at + 9 + axis]
+        b = combined(points, weights, n, 6 + axis) + poses[pair.B.pose_at + 9 + axis]
         row[POINT_A + axis] = b if flip else a
         row[POINT_B + axis] = a if flip else b
 
@@ -169,13 +170,13 @@ def decide_pairs(
         marks = view_u8(rows_at + ROW * k, ROW)
         if marks[HOW] != UNDECIDED:
             continue
-        pair, ints, numbers, sa, sb, flip, size, slop, known = pair_of(
+        pair, ints, flip, size, slop, known = ordered_pair(
             ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1]
         )
-        if not known or pair[9] != POINTS:
+        if not known or pair.B.kind != POINTS:
             continue
-        if pair[3] != POINTS:
-            left += 1 if pair[3] == HALFSPACE else 0
+        if pair.A.kind != POINTS:
+            left += 1 if pair.A.kind == HALFSPACE else 0
             continue
         error = ERROR * size + slop
         count = max(int(marks[COUNT]), 1)
@@ -184,12 +185,12 @@ def decide_pairs(
         for j in range(marks[COUNT]):
             ids[2 * j] = words[(VERTICES_B if flip else VERTICES_A) + j]
             ids[2 * j + 1] = words[(VERTICES_A if flip else VERTICES_B) + j]
-        low_b = ints[INTS * sb + LOWEST]
-        reach_b = numbers[NUMBERS * sb + REACH]
-        radius_b = numbers[NUMBERS * sb + RADIUS]
+        low_a, low_b = ints[INTS * pair.A.shape + LOWEST], ints[INTS * pair.B.shape + LOWEST]
+        reach_a, reach_b = reach_of(pair, pair.A), reach_of(pair, pair.B)
+        radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
         verdict, shown, apart, excess, excess_low, vx, vy, vz, rounds = touch_exactly(
-            pair, terms, digits, boolean, ids, count, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
-            numbers[NUMBERS * sa + RADIUS], radius_b, size, error,
+            pair, terms, digits, boolean, ids, count, low_a, low_b, reach_a, reach_b,
+            radius_a, radius_b, size, error,
         )  # fmt: skip
         distance = row[DISTANCE]
         lower = row[LOWER]
@@ -215,12 +216,12 @@ def decide_pairs(
             asked_at = entry_at - 1
             if not boolean:
                 proven, depth, depth_low = nearest_plane(
-                    pair, terms, digits, requests, entry_at if asked else 0, ints[INTS * sa + LOWEST], low_b, numbers[NUMBERS * sa + REACH], reach_b,
+                    pair, terms, digits, requests, entry_at if asked else 0, low_a, low_b, reach_a, reach_b,
                     size, error,
                 )  # fmt: skip
                 if proven:
                     slack = SUBNORMAL if 0.0 < depth < SMALLEST_NORMAL else 0.0
-                    swept, swept_low = two_sum(numbers[NUMBERS * sa + RADIUS], radius_b)
+                    swept, swept_low = two_sum(radius_a, radius_b)
                     total, total_low = add(depth, depth_low, swept, swept_low)
                     low, distance, high = bracket(-total, -total_low, EXACT_ERROR * total + slack)
                     lower = max(lower, low)
@@ -228,14 +229,14 @@ def decide_pairs(
         if apart:
             # The digits have done their work; their place is as good as any for doubles.
             set_normal(
-                row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, vx, vy, vz,
+                row, pair, terms_at, ids, shown, digits_at, radius_a, radius_b, size, vx, vy, vz,
                 distance, flip,
             )  # fmt: skip
         width = math.inf if boolean else 0.0
         write_verdict(row, marks, distance, lower, upper, EXACT, width, limit)
         if proven and not apart and SMALLEST_FINE < size < LARGEST_FINE and _points_miss(row, size, row[DISTANCE]):
             _set_points(
-                row, pair, terms_at, ids, shown, digits_at, numbers[NUMBERS * sa + RADIUS], radius_b, size, row[DISTANCE],
+                row, pair, terms_at, ids, shown, digits_at, radius_a, radius_b, size, row[DISTANCE],
                 flip,
             )  # fmt: skip
         if not (boolean or depths) and verdict == TOUCHING and not apart and _points_miss(row, size, 0.0):

@@ -84,13 +84,13 @@ def place(A, XA, B, XB, placing, frame_a, frame_b):
 
 
 @kernel
-def balls_apart(XA, numbers_a, XB, numbers_b):
-    """Whether the balls around two bodies are certainly apart; False of matrices that are not close to rotations.
+def balls_apart(XA, numbers_a, XB, numbers_b, margin):
+    """Whether the balls around two bodies are certainly farther apart than a margin [m].
 
-    With d the largest row sum of |RᵀR − I|, lengths grow by a factor of at most 1 + d.
+    False of matrices that are not close to rotations. With d the largest row sum of |RᵀR − I|, lengths grow by a factor of at most 1 + d.
     """
-    stretch_a = _deviation_from_rotation(XA)
-    stretch_b = _deviation_from_rotation(XB)
+    stretch_a = deviation_from_rotation(XA)
+    stretch_b = deviation_from_rotation(XB)
     if not (stretch_a <= _MAX_DEVIATION and stretch_b <= _MAX_DEVIATION):
         return False
     square = 0.0
@@ -103,12 +103,13 @@ def balls_apart(XA, numbers_a, XB, numbers_b):
         size += 2.0 * (abs(numbers_a[CENTRE + i]) + abs(numbers_b[CENTRE + i]))
         square += gap * gap
     reach = numbers_a[RADIUS] * (1.0 + stretch_a) + numbers_b[RADIUS] * (1.0 + stretch_b)
+    reach += margin
     reach += 2.0**-40 * (reach + size)
     return square > reach * reach and reach > _MIN_LENGTH
 
 
 @kernel(inline=True)
-def _deviation_from_rotation(X):
+def deviation_from_rotation(X):
     """Largest row sum of |RᵀR − I|, rounded upwards; infinite where R mirrors."""
     x = Vec3(X[0], X[4], X[8])
     y = Vec3(X[1], X[5], X[9])

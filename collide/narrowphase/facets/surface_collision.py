@@ -170,7 +170,9 @@ def walk_surfaces(
         swapped = same_tree and is_swapped_order(view_f64(pose_a, 12), view_f64(pose_b, 12))
         if swapped:
             pose_a, pose_b = pose_b, pose_a
-        if progress[TOP] > 0 or not balls_apart(view_f64(pose_a, 16), A.numbers, view_f64(pose_b, 16), B.numbers):
+        XA = view_f64(pose_a, 16)
+        XB = view_f64(pose_b, 16)
+        if progress[TOP] > 0 or not balls_apart(XA, A.numbers, XB, B.numbers, 0.0):
             trees, invertible = pose_trees(
                 A, pose_a, B, pose_b, doubles_at, doubles_at + 8 * DOUBLES, PRISM, integers_at, decide
             )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collide.kernels import kernel, view_f64, view_i64, view_u8
 from collide.kernels.lanes import LANES, view_lanes
-from collide.lowering.shape_table import ADDRESS, COUNT, INTS, NUMBERS, PADDED, POSE, RADIUS, TREE
+from collide.lowering.shape_table import ADDRESS, COUNT, INTS, NUMBERS, PADDED, POSE, TREE
 from collide.narrowphase.gap.precise_pair import (
     FINE,
     LARGEST_FINE,
@@ -62,7 +62,7 @@ from collide.narrowphase.gap.refine_gap import (
     unsure_of,
 )
 from collide.narrowphase.gap.tied_vertices import no_other_is_level, settle_level
-from collide.narrowphase.posed_pair import coordinates_of, posed_pair
+from collide.narrowphase.posed_pair import coordinates_of, posed_pair, radius_of
 from collide.narrowphase.rows import (
     BEYOND,
     CERTIFIED,
@@ -127,14 +127,13 @@ def nobody_waits(integers_at):
 
 @kernel(inline=True)
 def put_down(
-    pair, terms_at, ids, weights, n, shape_a, pose_a, shape_b, pose_b, flip, how, row_number, size, slop, error,
-    doubles_at, integers_at,
+    pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, error, doubles_at, integers_at
 ):  # fmt: skip
     """Note a row whose gap is to be polished; returns its kind.
 
     ids, weights : n vertex pairs; those with a weight are the feature, of four of two segments three corners.
     """
-    composed = is_composed(pair[13], pair[5]) or is_composed(pair[13], pair[11])
+    composed = is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)
     feature = view_i64(integers_at + 8 * _FEATURE, 6)
     points = 0
     for k in range(n):
@@ -158,10 +157,10 @@ def put_down(
     waiting[kind] = lane + 1
     note = view_i64(integers_at + 8 * (_NOTES + _NOTE * (LANES * kind + lane)), _NOTE)
     note[_ROW] = row_number
-    note[_SHAPE_A] = shape_a
-    note[_POSE_A] = pose_a
-    note[_SHAPE_B] = shape_b
-    note[_POSE_B] = pose_b
+    note[_SHAPE_A] = pair.A.shape
+    note[_POSE_A] = pair.A.pose_at // POSE
+    note[_SHAPE_B] = pair.B.shape
+    note[_POSE_B] = pair.B.pose_at // POSE
     note[_FLIP] = 1 if flip else 0
     note[_HOW] = how
     for k in range(points):
@@ -175,12 +174,11 @@ def put_down(
         low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
         for k in range(24):
             question[LANES * (LOW_A + k)] = low[k]
-    numbers = pair[12]
     question[LANES * SCALE] = scale_of(size)
     question[LANES * SLOP] = slop
     question[LANES * ERROR] = error
-    question[LANES * RADIUS_A] = numbers[NUMBERS * shape_a + RADIUS]
-    question[LANES * RADIUS_B] = numbers[NUMBERS * shape_b + RADIUS]
+    question[LANES * RADIUS_A] = radius_of(pair, pair.A)
+    question[LANES * RADIUS_B] = radius_of(pair, pair.B)
     question[LANES * PARALLELOGRAM] = 1.0 if n == 4 else 0.0
     return kind
 
@@ -188,15 +186,16 @@ def put_down(
 @kernel(inline=True)
 def _ask(pair, question, note, points, parts):
     """Poses and vertices of a question, into one lane of it."""
-    (coords_a, _, m_a, _, _, p, coords_b, _, m_b, _, _, q, _, poses, _, _, _, _, _, _, _) = pair
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
     for k in range(12):
         question[LANES * (POSE_A + k)] = poses[p + k]
         question[LANES * (POSE_B + k)] = poses[q + k]
     a = note[_IDS]
     b = note[_IDS + 1]
     for axis in range(3):
-        question[LANES * (CORNER_A + axis)] = coords_a[m_a * axis + a]
-        question[LANES * (CORNER_B + axis)] = coords_b[m_b * axis + b]
+        question[LANES * (CORNER_A + axis)] = A.coords[A.padded * axis + a]
+        question[LANES * (CORNER_B + axis)] = B.coords[B.padded * axis + b]
     for k in range(1, points):
         at = LANES * (EDGES + EDGE * (k - 1))
         i = note[_IDS + 2 * k]
@@ -204,8 +203,8 @@ def _ask(pair, question, note, points, parts):
         of_a = parts == 2 or i != a
         question[at + LANES * OF_A] = 1.0 if of_a else 0.0
         # One code for both bodies: which one it is could not be guessed.
-        coordinates = coords_a if of_a else coords_b
-        m = m_a if of_a else m_b
+        coordinates = A.coords if of_a else B.coords
+        m = A.padded if of_a else B.padded
         head = i if of_a else b
         tail = a if of_a else j
         for axis in range(3):
@@ -215,8 +214,8 @@ def _ask(pair, question, note, points, parts):
             at += LANES * PART
             question[at + LANES * OF_A] = 0.0
             for axis in range(3):
-                question[at + LANES * (HEAD + axis)] = coords_b[m_b * axis + b]
-                question[at + LANES * (TAIL + axis)] = coords_b[m_b * axis + j]
+                question[at + LANES * (HEAD + axis)] = B.coords[B.padded * axis + b]
+                question[at + LANES * (TAIL + axis)] = B.coords[B.padded * axis + j]
 
 
 @kernel

@@ -90,13 +90,14 @@ def fine_point(pair, low, fine, k, i, j, scale):
 
     low : `write_low_parts` of both poses, or no doubles where both are as given.
     """
-    (coords_a, _, m_a, _, _, p, coords_b, _, m_b, _, _, q, _, poses, _, _, _, _, _, _, _) = pair
-    ax = coords_a[i]
-    ay = coords_a[m_a + i]
-    az = coords_a[2 * m_a + i]
-    bx = coords_b[j]
-    by = coords_b[m_b + j]
-    bz = coords_b[2 * m_b + j]
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
+    ax = A.coords[i]
+    ay = A.coords[A.padded + i]
+    az = A.coords[2 * A.padded + i]
+    bx = B.coords[j]
+    by = B.coords[B.padded + j]
+    bz = B.coords[2 * B.padded + j]
     for axis in range(3):
         r = p + 3 * axis
         s = q + 3 * axis
@@ -235,18 +236,18 @@ def fine_length(direction):
 
 @kernel
 def _write_low_parts(pair, terms_at, low_at):
-    poses = pair[13]
-    rows = int(max(poses[pair[5] + POSE_TERMS], poses[pair[11] + POSE_TERMS])) + 1
+    poses = pair.poses
+    rows = int(max(poses[pair.A.pose_at + POSE_TERMS], poses[pair.B.pose_at + POSE_TERMS])) + 1
     low = view_f64(low_at, 24)
     terms = view_f64(terms_at, TERM_ROW * rows)
-    low_parts(poses, pair[5], terms, low, 0)
-    low_parts(poses, pair[11], terms, low, 12)
+    low_parts(poses, pair.A.pose_at, terms, low, 0)
+    low_parts(poses, pair.B.pose_at, terms, low, 12)
     return 24
 
 
 @kernel(inline=True)
 def write_low_parts(pair, terms_at, low_at):
     """Put the low parts of both poses at an address; returns their number, none where both poses are as given."""
-    if not (is_composed(pair[13], pair[5]) or is_composed(pair[13], pair[11])):
+    if not (is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)):
         return 0
     return _write_low_parts(pair, terms_at, low_at)

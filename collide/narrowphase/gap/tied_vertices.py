@@ -24,7 +24,8 @@ def are_alone(pair, ids, n, direction, slack):
     ids : their vertex pairs.   slack : how far doubles may be wrong along |direction| = 1. False also where a pair of
     their vertices might not be level with them: n pairs over n + 1 vertices hang together, so that it must be.
     """
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
     own_a, own_b = own_vertices(ids, n)
     if own_a + own_b != n + 1:
         return False
@@ -34,8 +35,8 @@ def are_alone(pair, ids, n, direction, slack):
     dz = direction[4] / largest
     slack *= abs(dx) + abs(dy) + abs(dz)
     for body in range(2):
-        coordinates = coords_a if body == 0 else coords_b
-        m = m_a if body == 0 else m_b
+        coordinates = A.coords if body == 0 else B.coords
+        m = A.padded if body == 0 else B.padded
         at = p if body == 0 else q
         sign = 1.0 if body == 0 else -1.0
         gx = sign * (poses[at] * dx + poses[at + 3] * dy + poses[at + 6] * dz)
@@ -45,7 +46,7 @@ def are_alone(pair, ids, n, direction, slack):
         for k in range(n):
             least = min(least, _product(coordinates, m, ids[2 * k + body], gx, gy, gz))
         if not no_other_is_level(
-            coordinates, n_a if body == 0 else n_b, m, tree_a if body == 0 else tree_b, ids, n, body,
+            coordinates, A.n if body == 0 else B.n, m, A.tree if body == 0 else B.tree, ids, n, body,
             own_a if body == 0 else own_b, gx, gy, gz, least + slack,
         ):  # fmt: skip
             return False
@@ -167,9 +168,10 @@ def settle_level(pair, low, ids, direction, terms_at, scale):
     Asked where they are not alone (`are_alone`). O(log n) where there are support trees, but for vertices of very many
     neighbours; else O(n).
     """
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
-    i, excess, excess_low = _lowest(coords_a, n_a, m_a, tree_a, ids[0], poses, p, low, 0, direction, 1.0, terms_at)
-    j, more, more_low = _lowest(coords_b, n_b, m_b, tree_b, ids[1], poses, q, low, 12, direction, -1.0, terms_at)
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
+    i, excess, excess_low = _lowest(A.coords, A.n, A.padded, A.tree, ids[0], poses, p, low, 0, direction, 1.0, terms_at)
+    j, more, more_low = _lowest(B.coords, B.n, B.padded, B.tree, ids[1], poses, q, low, 12, direction, -1.0, terms_at)
     excess, excess_low = add(excess, excess_low, more, more_low)
     return excess * scale, excess_low * scale, i, j
 

@@ -94,11 +94,11 @@ def _direction(pair, weights):
     ty = weights[8]
     tz = weights[9]
     if tx == 0.0 and ty == 0.0 and tz == 0.0:
-        tx = pair[14]
-        ty = pair[15]
-        tz = pair[16]
+        tx = pair.t.x
+        ty = pair.t.y
+        tz = pair.t.z
     largest = max(abs(tx), abs(ty), abs(tz))
-    between = largest > 0.0 and tx == pair[14] and ty == pair[15] and tz == pair[16]
+    between = largest > 0.0 and tx == pair.t.x and ty == pair.t.y and tz == pair.t.z
     if largest == 0.0:
         return 1.0, ty, tz, largest, False
     if 2.0**-400 < largest < 2.0**400:
@@ -124,7 +124,7 @@ def _approach(pair, points, ids, weights, given, touch_suffices, radius, limit, 
     tx, ty, tz, largest, between = _direction(pair, weights)
     span = math.sqrt(tx * tx + ty * ty + tz * tz)
     # Coarse hulls that overlap are a proof, at a tenth of the price.
-    coarse = pair[19] != 0 or pair[20] != 0
+    coarse = pair.A.coarse_at != 0 or pair.B.coarse_at != 0
     look = False
     if between:
         # Balls about the origins of the bodies' frames: no support is asked.
@@ -308,8 +308,8 @@ def _begin_with_given(pair, points, ids, weights):
 @kernel(inline=True)
 def _tilt(pair):
     """How far to tilt a direction so that vertices around the one found are met; 0 for curved cores and few vertices."""
-    n = min(pair[1], pair[7])
-    return _TILT / math.sqrt(n) if n > _FEW and pair[3] == POINTS and pair[9] == POINTS else 0.0
+    n = min(pair.A.n, pair.B.n)
+    return _TILT / math.sqrt(n) if n > _FEW and pair.A.kind == POINTS and pair.B.kind == POINTS else 0.0
 
 
 @kernel(cold=True)
@@ -353,9 +353,9 @@ def _of_same_lists(pair):
     A curved core never repeats a point. Runs would converge towards what lies in one list, and again in the next: some
     came to the last round.
     """
-    if pair[3] != POINTS or pair[9] != POINTS:
+    if pair.A.kind != POINTS or pair.B.kind != POINTS:
         return 2.0
-    n = max(pair[1] if pair[17] != 0 else 64, pair[7] if pair[18] != 0 else 64)
+    n = max(pair.A.n if pair.A.tree != 0 else 64, pair.B.n if pair.B.tree != 0 else 64)
     return 1.0 - _SAME_LISTS / n
 
 

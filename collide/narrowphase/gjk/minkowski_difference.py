@@ -36,17 +36,18 @@ def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse, listed_a,
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
     listed_a, listed_b : lists to look in alone, or −1.
     """
-    (coords_a, n_a, m_a, kind_a, at_a, p, coords_b, n_b, m_b, kind_b, at_b, q, numbers, poses, _, _, _, tree_a, tree_b, coarse_a, coarse_b) = pair
+    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
+    p, q = A.pose_at, B.pose_at
     ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
     fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
-    if tree_a != 0 and tree_b != 0 and not coarse:
+    if A.tree != 0 and B.tree != 0 and not coarse:
         ia, ax, ay, az, listed_a, ib, bx, by, bz, listed_b = two_extreme_vertices(
-            tree_a, listed_a, ex, ey, ez, tree_b, listed_b, fx, fy, fz
+            A.tree, listed_a, ex, ey, ez, B.tree, listed_b, fx, fy, fz
         )
     else:
-        one, other = (coarse_a, coarse_b) if coarse else (0, 0)
-        ia, ax, ay, az, listed_a = support(kind_a, coords_a, n_a, m_a, numbers, at_a, tree_a, one, listed_a, ex, ey, ez)
-        ib, bx, by, bz, listed_b = support(kind_b, coords_b, n_b, m_b, numbers, at_b, tree_b, other, listed_b, fx, fy, fz)
+        one, other = (A.coarse_at, B.coarse_at) if coarse else (0, 0)
+        ia, ax, ay, az, listed_a = support(A.kind, A.coords, A.n, A.padded, numbers, A.params_at, A.tree, one, listed_a, ex, ey, ez)
+        ib, bx, by, bz, listed_b = support(B.kind, B.coords, B.n, B.padded, numbers, B.params_at, B.tree, other, listed_b, fx, fy, fz)
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
     _place(pair, points, k, ax, ay, az, bx, by, bz)
@@ -66,7 +67,10 @@ def _turned_back(poses, p, dx, dy, dz):
 @kernel(inline=True)
 def _place(pair, points, k, ax, ay, az, bx, by, bz):
     """Point k becomes the difference of a and b, given in their bodies' frames."""
-    (_, _, _, _, _, p, _, _, _, _, _, q, _, poses, tx, ty, tz, _, _, _, _) = pair
+    p = pair.A.pose_at
+    q = pair.B.pose_at
+    poses = pair.poses
+    t = pair.t
     at = POINT * k
     points[at + 3] = poses[p] * ax + poses[p + 1] * ay + poses[p + 2] * az
     points[at + 4] = poses[p + 3] * ax + poses[p + 4] * ay + poses[p + 5] * az
@@ -74,20 +78,20 @@ def _place(pair, points, k, ax, ay, az, bx, by, bz):
     points[at + 6] = poses[q] * bx + poses[q + 1] * by + poses[q + 2] * bz
     points[at + 7] = poses[q + 3] * bx + poses[q + 4] * by + poses[q + 5] * bz
     points[at + 8] = poses[q + 6] * bx + poses[q + 7] * by + poses[q + 8] * bz
-    points[at] = (points[at + 3] - points[at + 6]) - tx
-    points[at + 1] = (points[at + 4] - points[at + 7]) - ty
-    points[at + 2] = (points[at + 5] - points[at + 8]) - tz
+    points[at] = (points[at + 3] - points[at + 6]) - t.x
+    points[at + 1] = (points[at + 4] - points[at + 7]) - t.y
+    points[at + 2] = (points[at + 5] - points[at + 8]) - t.z
 
 
 @kernel
 def place_vertices(pair, points, ids, k, i, j):
     """Point k becomes the difference of vertex i of A and vertex j of B."""
-    (coords_a, _, m_a, _, _, _, coords_b, _, m_b, _, _, _, _, _, _, _, _, _, _, _, _) = pair
+    A, B = pair.A, pair.B
     ids[2 * k] = i
     ids[2 * k + 1] = j
     _place(
-        pair, points, k, coords_a[i], coords_a[m_a + i], coords_a[2 * m_a + i],
-        coords_b[j], coords_b[m_b + j], coords_b[2 * m_b + j],
+        pair, points, k, A.coords[i], A.coords[A.padded + i], A.coords[2 * A.padded + i],
+        B.coords[j], B.coords[B.padded + j], B.coords[2 * B.padded + j],
     )  # fmt: skip
 
 
@@ -97,44 +101,45 @@ def settle_point(pair, points, ids, k, dx, dy, dz):
 
     Support trees propose; nothing may be concluded from a plane before their vertices are settled.
     """
-    (coords_a, n_a, m_a, _, _, p, coords_b, n_b, m_b, _, _, q, _, poses, _, _, _, tree_a, tree_b, _, _) = pair
+    A, B, poses = pair.A, pair.B, pair.poses
+    p, q = A.pose_at, B.pose_at
     ia = ids[2 * k]
     ib = ids[2 * k + 1]
-    if tree_a != 0:
+    if A.tree != 0:
         ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
-        ia = settled_vertex(coords_a, n_a, m_a, tree_a, ia, ex, ey, ez)
-    if tree_b != 0:
+        ia = settled_vertex(A.coords, A.n, A.padded, A.tree, ia, ex, ey, ez)
+    if B.tree != 0:
         fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
-        ib = settled_vertex(coords_b, n_b, m_b, tree_b, ib, fx, fy, fz)
+        ib = settled_vertex(B.coords, B.n, B.padded, B.tree, ib, fx, fy, fz)
     if ia == ids[2 * k] and ib == ids[2 * k + 1]:
         return
     at = POINT * k
     # A curved core has no id; its point stays as it is.
     if ia != ids[2 * k]:
-        x = coords_a[ia]
-        y = coords_a[m_a + ia]
-        z = coords_a[2 * m_a + ia]
+        x = A.coords[ia]
+        y = A.coords[A.padded + ia]
+        z = A.coords[2 * A.padded + ia]
         points[at + 3] = poses[p] * x + poses[p + 1] * y + poses[p + 2] * z
         points[at + 4] = poses[p + 3] * x + poses[p + 4] * y + poses[p + 5] * z
         points[at + 5] = poses[p + 6] * x + poses[p + 7] * y + poses[p + 8] * z
     if ib != ids[2 * k + 1]:
-        x = coords_b[ib]
-        y = coords_b[m_b + ib]
-        z = coords_b[2 * m_b + ib]
+        x = B.coords[ib]
+        y = B.coords[B.padded + ib]
+        z = B.coords[2 * B.padded + ib]
         points[at + 6] = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
         points[at + 7] = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
         points[at + 8] = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
-    points[at] = (points[at + 3] - points[at + 6]) - pair[14]
-    points[at + 1] = (points[at + 4] - points[at + 7]) - pair[15]
-    points[at + 2] = (points[at + 5] - points[at + 8]) - pair[16]
+    points[at] = (points[at + 3] - points[at + 6]) - pair.t.x
+    points[at + 1] = (points[at + 4] - points[at + 7]) - pair.t.y
+    points[at + 2] = (points[at + 5] - points[at + 8]) - pair.t.z
 
 
 @kernel(inline=True)
 def has_trees(pair):
     """Whether a support point of the pair is to be settled before anything is concluded from it."""
-    return pair[17] != 0 or pair[18] != 0
+    return pair.A.tree != 0 or pair.B.tree != 0
 
 
 @kernel(inline=True)

@@ -197,7 +197,7 @@ def _pairs_of_unions():
 
 
 def test_unions_have_the_same_bits_single_batched_swapped_in_threads_lists_and_sets(monkeypatch):
-    monkeypatch.setattr(batches, "_FEWEST", 8)
+    monkeypatch.setattr(batches, "_MIN_POSES_PER_THREAD", 8)
     hits = []
     for A, B, X_WA, X_WB in _pairs_of_unions():
         n = len(X_WA)
@@ -288,7 +288,7 @@ def test_a_single_union_is_one_call(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("the long way")
 
-    monkeypatch.setattr(query, "ask", refuse)
+    monkeypatch.setattr(query, "answer_batch", refuse)
     after = [collide.collide(A, B, X, Y), collide.distance(A, B, X, Y), collide.distance(A, B, X, Y, signed=False)]
     assert before[0] == after[0] and all(r.rows.tobytes() == s.rows.tobytes() for r, s in zip(before[1:], after[1:]))
     with pytest.raises(AssertionError, match="the long way"):

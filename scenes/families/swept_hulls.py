@@ -13,8 +13,8 @@ from collide.scenes.families.ingredients import (
     random_body,
     random_hull,
     rotation,
+    rotation_about,
     sign,
-    turn,
 )
 from collide.scenes.families.thin import flat
 from collide.scenes.families.touching import UNIT, Contact, contact, placed
@@ -91,7 +91,7 @@ def turned_balls(rng, index) -> Case:
     where = np.round(rng.uniform(-1, 1, 3) * half * 64) / 64
     axis = int(rng.integers(3))
     where[axis] = sign(rng) * (half[axis] + radius[0])
-    turned = turn(int(rng.integers(3)), np.pi / 2 * int(rng.integers(1, 4))) if index % 2 else rotation(rng)
+    turned = rotation_about(int(rng.integers(3)), np.pi / 2 * int(rng.integers(1, 4))) if index % 2 else rotation(rng)
     ball = Body(np.zeros((1, 3)), turned, where)
     box = Body(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half, np.eye(3), np.zeros(3))
     reach = float((radius[0], np.nextafter(radius[0], np.inf), np.nextafter(radius[0], 0.0))[index % 3])
@@ -100,4 +100,4 @@ def turned_balls(rng, index) -> Case:
     return pair(ball, box)._replace(radius_a=reach)
 
 
-OWN = (turned_balls, swept_touch, swept_1ulp, padded_touch, swept_near, swept_deep)
+MORE_FAMILIES = (turned_balls, swept_touch, swept_1ulp, padded_touch, swept_near, swept_deep)

@@ -1,0 +1,65 @@
+"""What kind of body a shape is to the narrowphase: the row and the column of `narrowphase/dispatch.py`."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
+from collide.shapes.compound import Compound
+from collide.shapes.shape import Shape
+from collide.shapes.shape_set import ShapeSet
+
+
+class Kind(IntEnum):
+    """SPHERE, CAPSULE and POLYTOPE are one, two, or more points swept by a ball, whatever class they come from."""
+
+    SPHERE = 0
+    CAPSULE = 1
+    POLYTOPE = 2
+    ROUNDED = 3
+    CYLINDER = 4
+    CONE = 5
+    ELLIPSOID = 6
+    HALFSPACE = 7
+    MESH = 8
+    COMPOUND = 9
+    MESH_COMPOUND = 10
+
+
+#: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.
+WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
+_CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, HALFSPACE: Kind.HALFSPACE}
+
+
+def kind_of(shape: Shape) -> Kind:
+    """The kind of a shape; worked out once and kept with it."""
+    try:
+        return shape._kind
+    except AttributeError:
+        shape._store(_kind=_kind_of(shape))
+        return shape._kind
+
+
+def _kind_of(shape: Shape) -> Kind:
+    if isinstance(shape, Compound):
+        return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
+    return Kind.MESH if shape.meshed else _kind_of_convex(shape.parts()[0][0])
+
+
+def _kind_of_convex(packed: PackedConvex) -> Kind:
+    if packed.kind != POINTS:
+        return _CURVED[packed.kind]
+    if packed.slop != 0.0:
+        return Kind.ROUNDED
+    return Kind(min(len(packed.points), 3) - 1)
+
+
+def kinds_of(shape_set: ShapeSet) -> np.ndarray:
+    """(shapes,) kinds of a set's shapes."""
+    try:
+        return shape_set._kinds
+    except AttributeError:
+        shape_set._kinds = np.array([kind_of(shape) for shape in shape_set.shapes])
+        return shape_set._kinds

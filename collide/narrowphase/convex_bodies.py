@@ -1,0 +1,97 @@
+"""Bodies of convex parts at many poses: one convex set each, or several.
+
+Pairs of convex sets in their own frames, by far the most, go through `pose_batches.py` as they are; bodies of several parts
+are taken apart and put together again by `composite/`.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.lowering.compound_table import UnionTable
+from collide.lowering.shape_table import ShapeTable
+from collide.narrowphase import convex_queries
+from collide.narrowphase.composite.composite import UnionPair, run_unions
+from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.results import PAIR_DTYPE
+from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape_set import Picked
+
+
+class Question(NamedTuple):
+    """What is asked of a pair at every pose.
+
+    boolean : whether they meet, and no more; else rows.
+    limit : how far apart bodies may be for their distance to matter [m].
+    depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
+    check : refuse matrices that are no rotation.
+    axes : (n, 3) for booleans of convex sets: an axis to try first, pose by pose, replaced by one that parts the bodies.
+    """
+
+    boolean: bool
+    limit: float = 0.0
+    depths: bool = True
+    check: bool = False
+    axes: np.ndarray | None = None
+
+
+def convex_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether two bodies of convex parts meet at checked poses (n, 4, 4) or (1, 4, 4)."""
+    out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=bool)
+    answer_convex(out, A, B, X_WA, X_WB, Question(True))
+    return out
+
+
+def convex_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float = math.inf, depths: bool = True) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` of two bodies of convex parts at checked poses (n, 4, 4) or (1, 4, 4)."""
+    out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
+    answer_convex(out, A, B, X_WA, X_WB, Question(False, limit, depths))
+    return out
+
+
+def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    """Answer pairs of bodies of convex parts; False where a pose is none, and ``out`` is to be zeroed before it is used again.
+
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
+    A, B : two shapes, or shapes `Picked` from one set pose by pose.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    """
+    if not len(out):
+        return True
+    if _one_part(A) and _one_part(B) and not convex_queries.distrust_doubles:
+        run = partial(convex_queries.run_poses, out, *_shape_table(A, B), X_WA, X_WB, axes=question.axes)
+    else:
+        run = partial(run_unions, out, *_compound_table(A, B), X_WA, X_WB)
+    return run(boolean=question.boolean, limit=question.limit, check=question.check, depths=question.depths)
+
+
+def prepare_convex(A: Shape, B: Shape):
+    """The pair made ready for single calls."""
+    if is_plain(A) and is_plain(B):
+        return convex_queries.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
+    return UnionPair(A.laid_out(), B.laid_out())
+
+
+def _one_part(shapes) -> bool:
+    return bool(shapes.shape_set.plain[shapes.rows].all()) if isinstance(shapes, Picked) else is_plain(shapes)
+
+
+def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
+    """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
+    if isinstance(A, Picked):
+        return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)
+    prepared = prepared_pair(A, B)
+    return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
+
+
+def _compound_table(A, B) -> tuple[UnionTable, np.ndarray | None]:
+    """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
+    if isinstance(A, Picked):
+        return A.shape_set.unions, np.stack([A.rows, B.rows], axis=1)
+    prepared = prepared_pair(A, B)
+    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None
+

@@ -1,0 +1,75 @@
+"""Every method of the table (`dispatch.py`) with the functions that carry it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.lowering.kinds import kind_of
+from collide.narrowphase.convex_bodies import Question, answer_convex, prepare_convex
+from collide.narrowphase.convex_queries import single_calls_are_safe
+from collide.narrowphase.dispatch import TABLE, Method, method_of
+from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows, single_pair
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
+from collide.shapes.shape import Shape
+
+
+class Answer(NamedTuple):
+    """How a method is asked.
+
+    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_bodies.answer_convex` describes it.
+    prepare : ``prepare(A, B)`` gives the pair ready for single calls, or None where they are batches of one.
+    of_one_pair : whether a batch is of one pair of shapes; else shapes may be `Picked` from a set pose by pose.
+    """
+
+    batch: Callable[..., bool]
+    prepare: Callable[[Shape, Shape], Any]
+    of_one_pair: bool
+
+
+def _answer_meshes(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    if question.boolean:
+        out[:] = pair_hits(A, B, X_WA, X_WB, check=question.check)
+    else:
+        pair_rows(A, B, X_WA, X_WB, limit=question.limit, depths=question.depths, check=question.check, out=out)
+    return True
+
+
+def _unprepared(A: Shape, B: Shape) -> None:
+    return None
+
+
+_CONVEX = Answer(answer_convex, prepare_convex, False)
+_FACETS = Answer(_answer_meshes, single_pair, True)
+_MESHES = Answer(_answer_meshes, _unprepared, True)
+
+ANSWERS: dict[Method, Answer] = {
+    Method.CLOSED: _CONVEX,
+    Method.PLANE: _CONVEX,
+    Method.PLANES: _CONVEX,
+    Method.CONVEX: _CONVEX,
+    Method.PARTS: _CONVEX,
+    Method.FACETS: _FACETS,
+    Method.CURVED: _MESHES,
+    Method.HULL: _MESHES,
+    Method.MESH_PARTS: _MESHES,
+}
+
+
+#: [kind of A, kind of B]: whether a batch is of one pair of shapes.
+OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row in TABLE])
+
+
+def prepare(A, B) -> None:
+    """Make a pair of shapes ready for single calls, and keep it with A; nothing for sequences of shapes."""
+    if isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe() and prepared_pair(A, B) is None:
+        pair = answer_of(A, B).prepare(A, B)
+        if pair is not None:
+            keep_prepared(A, B, pair)
+
+
+def answer_of(A: Shape, B: Shape) -> Answer:
+    """What answers a pair of shapes."""
+    return ANSWERS[method_of(kind_of(A), kind_of(B))]

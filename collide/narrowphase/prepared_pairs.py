@@ -1,0 +1,31 @@
+"""Pairs of shapes made ready for single calls: kept with A, by the number that B has."""
+
+from __future__ import annotations
+
+import itertools
+import weakref
+from typing import Any
+
+from collide.shapes.shape import Shape
+
+#: Numbers of shapes within this process, never used again.
+_serials = itertools.count()
+#: A shape keeps this many partners.
+_MAX_PARTNERS = 512
+
+
+def prepared_pair(A: Shape, B: Shape) -> Any:
+    """The pair, or None where it has not been prepared. `query.collide` reads the same two attributes by itself."""
+    return getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+
+
+def keep_prepared(A: Shape, B: Shape, pair: Any) -> None:
+    if not hasattr(A, "_prepared"):
+        A._store(_prepared={})
+    if not hasattr(B, "_serial"):
+        B._store(_serial=next(_serials))
+    prepared, serial = A._prepared, B._serial
+    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:  # a list: other threads add and finalizers take
+        prepared.pop(oldest, None)
+    prepared[serial] = pair
+    weakref.finalize(B, prepared.pop, serial, None)  # a partner that is gone is not held
