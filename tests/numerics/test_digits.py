@@ -57,7 +57,7 @@ def test_sums_of_doubles():
             assert all(0 <= digits[k] < 2**D.BITS for k in range(11))
             value, exponent = D.as_double(digits, 0, 12)
             assert value == float(exact / Fraction(2) ** exponent)  # Fraction → float rounds to nearest
-            value, low, exponent = D.as_double_double(digits, 0, 12)
+            (value, low), exponent = D.as_double_double(digits, 0, 12)
             both = (Fraction(value) + Fraction(low)) * Fraction(2) ** exponent
             assert abs(both - exact) <= abs(exact) / 2**80
         signs[found] += 1
