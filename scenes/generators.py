@@ -38,11 +38,26 @@ from collide.transforms import pose
 
 
 def generate(name: str, seed: int = 0, **size) -> Scene:
-    """A generated scene.
+    """A generated scene: the same name, seed and size give the same scene.
 
-    name : one of `names`.   seed : a whole number ≥ 0.   size : the generator's own arguments.
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    seed : int
+        ≥ 0.
+    **size
+        The generator's own arguments, for example ``n`` of "stack".
 
-    Raises SceneError for an unknown name or argument, listing the known ones.
+    Returns
+    -------
+    Scene
+        Its ``sources`` say how it was made.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, seed or argument, listing the known ones.
     """
     if name not in _GENERATORS:
         raise SceneError(

@@ -52,17 +52,39 @@ def load(
 ) -> Scene:
     """A scene from one file, several files together, or the name of a shipped scene.
 
-    state : the name of a state the files define, a file of joint values, or joint -> value.
-    robot : for MoveIt planning scenes: the robot or its URDF.
-    srdf : the SRDF of a URDF; None looks beside it, False does without.
-    meshes : "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
-        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two
-        leave out.
-    package_path : folders in which ``package://`` names are looked for first.
-    scale : factor on the vertices of mesh files given directly, 0.001 for millimetres.
-    missing_meshes : "error", or "skip": links whose mesh is absent are not checked, which is noted.
+    Parameters
+    ----------
+    path : str or Path
+        A URDF (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene file (docs/scene-format.md), or
+        the name of a shipped scene.
+    *more_paths
+        Further files of the same scene.
+    state : str, Path or mapping of str to float, optional
+        The name of a state that the files define, a file of joint values, or joint → value [rad or m].
+    robot : Robot, str or Path, optional
+        For MoveIt planning scenes: the robot, or its URDF.
+    srdf : str, Path or bool, optional
+        The SRDF of a URDF; None looks beside it, False does without.
+    meshes : {"mesh", "hull", "pieces"}
+        "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
+        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two leave
+        out.
+    package_path : str, Path or iterable of them
+        Folders in which ``package://`` names are looked for first.
+    scale : float, optional
+        Factor on the vertices of mesh files that are named directly: 0.001 for millimetres.
+    missing_meshes : {"error", "skip"}
+        "skip": links whose mesh is absent are not checked, which is noted.
 
-    Raises SceneError (and InvalidShape, InvalidPose, MissingExtra) naming file, element and value.
+    Returns
+    -------
+    Scene
+        With everything in metres and radians, at the state named or the default configuration.
+
+    Raises
+    ------
+    SceneError, InvalidShape, InvalidPose, MissingExtra
+        Naming file, element and value.
     """
     started = time.perf_counter()
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), scale, missing_meshes)
