@@ -65,7 +65,7 @@ def test_nearest_point(n, kind):
     features: Counter = Counter()
     for _ in range(60):
         corners = corners_of(rng, n, kind)
-        if n == 4 and S.faces_in_sight(rows_of(corners), 0.0)[0] == 0:
+        if n == 4 and least_depth(exact(corners)) is not None:
             continue  # the origin is inside: not asked then
         with reproducing(SOURCE, corners=corners):
             square, weights, point = nearest(corners)
