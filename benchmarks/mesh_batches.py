@@ -3,9 +3,10 @@
     python benchmarks/mesh_batches.py            # about a minute; prints a table, and writes results/mesh_batches_*.csv
     python benchmarks/mesh_batches.py --quick    # fewer repeats, no file
 
-A torus of 2304 facets against itself, against a box and against a sphere; poses far apart (none within the limit), mixed
-(half of them touch or nearly do) or near. Asked are booleans, and gaps no farther than a limit of a hundredth of the size.
-coal (OBBRSS) is asked in a loop over transforms and requests made beforehand. Both take turns; compared are medians.
+A torus of 2304 facets against itself, against a box and against a sphere; poses far apart (none within the limit),
+mixed (half of them touch or nearly do) or near. Asked are booleans, and gaps no farther than a limit of a hundredth of
+the size. coal (OBBRSS) is asked in a loop over transforms and requests made beforehand. Both take turns; compared are
+medians.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from collide.errors import SceneError, brief
+
 if TYPE_CHECKING:
     from collide.scenes.description import Scene, SceneBody
     from collide.scenes.generators import generate
@@ -60,8 +62,6 @@ def path(name: str) -> Path:
     SceneError
         For an unknown name; the known ones are listed.
     """
-    from collide.errors import SceneError, brief
-
     for file in _assets().iterdir():
         if file.suffix in _SUFFIXES and file.stem == name:
             return file

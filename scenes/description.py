@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
+from collide.robot import LinkShape, Robot
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
-
-if TYPE_CHECKING:
-    from collide.robot import LinkShape, Robot
-    from collide.world import World
+from collide.world import World
 
 
 @dataclass
@@ -170,8 +168,6 @@ class Scene:
         World
             A new one at each call.
         """
-        from collide.world import World
-
         world = World()
         for body in self.bodies:
             world.add(
@@ -357,8 +353,6 @@ class Scene:
 
 def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
     """One body for a link, and its pose X_LB in the link: several elements become a compound."""
-    from collide.shapes.compound import Compound
-
     about = [element.approximation for element in elements if element.approximation]
     if len(elements) == 1:
         shape, X_LB, approximation = elements[0].shape, elements[0].X_LG, elements[0].approximation

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 
+from collide import World, collide, distance
 from collide.adapters.peers.protocol import ANSWERED, FAILED, UNSUPPORTED, Event, Peer, Question, Reply, complaint
 from collide.errors import UnsupportedQuery
 from collide.results import UNDECIDED
@@ -53,8 +54,6 @@ def _timed(k: int, answer, share: float = 0.0) -> Event:
 
 def _world(question: Question):
     """A World whose ids are the question's indices."""
-    from collide import World
-
     world = World()
     ids = [
         world.add(b.shape, b.X_WB, name=b.name, static=b.static, group=b.group, mask=b.mask)
@@ -81,8 +80,6 @@ def _from_world(question: Question, k: int, hits: set, rows: dict) -> Reply:
 
 
 def _pair(question: Question, k: int) -> Reply:
-    from collide import collide, distance
-
     A, B = (question.bodies[i] for i in question.pairs[k])
     reply = _reply(distance(A.shape, B.shape, A.X_WB, B.X_WB).rows[0])
     # The boolean is asked by itself: it takes shorter ways, which are under test too.

@@ -52,6 +52,8 @@ ENGINES = {
     "pybullet": "collide.adapters.peers.pybullet_peer:PybulletPeer",
     "exact": "collide.adapters.peers.exact_peer:ExactPeer",
 }
+#: Asks one of them in a child process.
+_ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
 
 #: The note of meshes that meet, of engines that look at one pair of facets at a time.
 NO_DEPTH = "boolean only: it gives no depth of meshes"
@@ -369,8 +371,13 @@ def has_radius(part: Shape) -> bool:
 
 def load_engine(spec: str) -> Peer:
     """The engine that a ``module:class`` text names."""
+    return _named(spec)()
+
+
+def _named(spec: str) -> Any:
+    """A class that is found when it is first needed, as engines are: `ENGINES`."""
     module, _, name = spec.partition(":")
-    return getattr(import_module(module), name)()
+    return getattr(import_module(module), name)
 
 
 def engine(name: str, *, isolated: bool | None = None, timeout: float = 10.0) -> Peer:
@@ -399,7 +406,5 @@ def engine(name: str, *, isolated: bool | None = None, timeout: float = 10.0) ->
         raise InvalidArgument(f"no engine {name!r}; there are {', '.join(sorted(ENGINES))}")
     peer = load_engine(ENGINES[name])
     if peer.isolated if isolated is None else isolated:
-        from collide.adapters.peers.child import IsolatedPeer
-
-        return IsolatedPeer(ENGINES[name], timeout=timeout)
+        return _named(_ISOLATED)(ENGINES[name], timeout=timeout)
     return peer

@@ -21,6 +21,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
+from collide import collide, distance
 from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import InvalidArgument, UnsupportedQuery
@@ -309,8 +310,6 @@ def _from_row(row, reason: str) -> Reply:
 
 def _ask_collide(case: Case | MeshCase) -> Reply:
     """The engine's boolean and its distance; an exception is a failure, whatever its kind."""
-    from collide import collide, distance
-
     try:
         question = case.shapes()
         hit = bool(collide(*question))

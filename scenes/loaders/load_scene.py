@@ -15,8 +15,11 @@ from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
+from collide.scenes.loaders import moveit, scene_yaml, states, urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.files import starts_like_xml
+from collide.scenes.loaders.mesh_shapes import part_shape
+from collide.scenes.loaders.xml_text import parse_xml
 
 FORMATS = (
     "URDF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
@@ -130,9 +133,7 @@ def _in_state(scene: Scene, state: str | Path | Mapping[str, float]) -> Scene:
     if isinstance(state, Path) or (
         isinstance(state, str) and state not in scene.states and _exists(Path(state)) and not Path(state).is_dir()
     ):
-        from collide.scenes.loaders.states import read_state
-
-        path, state = state, read_state(state)
+        path, state = state, states.read_state(state)
     else:
         path = None
     try:
@@ -156,9 +157,7 @@ def _load_one(path: Path, options: Options) -> Scene:
 
 
 def _load_xml(path: Path, options: Options) -> Scene:
-    from collide.scenes.loaders import urdf
-
-    root = urdf.parse_xml(path, [])
+    root = parse_xml(path, [])
     if root.tag == "mujoco":
         raise SceneError("is an MJCF model (<mujoco>): MJCF is not read yet; export the model as URDF", path=path)
     if root.tag in ("sdf", "world"):
@@ -175,8 +174,6 @@ def _load_xml(path: Path, options: Options) -> Scene:
 
 
 def _load_document(path: Path, options: Options) -> Scene:
-    from collide.scenes.loaders import moveit, scene_yaml, states
-
     data = read_document(path)
     if moveit.is_planning_scene(data):
         return moveit.load_planning_scene(
@@ -200,8 +197,6 @@ def load_meshes(path: Path, options: Options) -> Scene:
     scale = 1.0 if options.scale is None else options.scale
     if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not np.isfinite(scale) or scale == 0:
         raise SceneError(f"scale must be a finite number other than 0, got {scale!r}")
-    from collide.scenes.loaders.mesh_shapes import part_shape
-
     started = time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))

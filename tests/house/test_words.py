@@ -81,6 +81,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
 }
 #: Rooms that are being rebuilt, and how many names each may still have. Numbers only go down.
 ALLOWED_FOR_NOW: dict[str, int] = {
+    "benchmarks": 1,
     "collide/__init__.py": 1,
     "collide/algorithms.py": 1,
     "collide/argument_checks.py": 2,
@@ -93,13 +94,13 @@ ALLOWED_FOR_NOW: dict[str, int] = {
     "collide/hull": 13,
     "collide/kernels": 23,
     "collide/log.py": 1,
-    "collide/lowering": 19,
+    "collide/lowering": 18,
     "collide/mesh": 28,
     "collide/narrowphase": 29,
     "collide/narrowphase/composite": 27,
     "collide/narrowphase/epa": 22,
     "collide/narrowphase/exact": 23,
-    "collide/narrowphase/facets": 129,
+    "collide/narrowphase/facets": 95,
     "collide/narrowphase/gap": 17,
     "collide/narrowphase/gjk": 22,
     "collide/numerics": 7,
