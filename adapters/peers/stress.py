@@ -21,7 +21,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
-from collide import collide, distance
+import collide
 from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import InvalidArgument, UnsupportedQuery
@@ -312,8 +312,8 @@ def _ask_collide(case: Case | MeshCase) -> Reply:
     """The engine's boolean and its distance; an exception is a failure, whatever its kind."""
     try:
         question = case.shapes()
-        hit = bool(collide(*question))
-        row = distance(*question).rows[0]
+        hit = bool(collide.collide(*question))
+        row = collide.distance(*question).rows[0]
     except UnsupportedQuery as error:
         return Reply(unsupported=complaint(error))
     except Exception as error:  # noqa: BLE001 - any failure of the engine under test is a finding
