@@ -108,13 +108,13 @@ def main() -> None:
     others = {"torus": mesh, "box": collide.Box((1, 1, 1)), "sphere": collide.Sphere(0.6)}
     rows = []
     print("  ".join(f"{name:>17}" for name in HEADER))
-    for name, other in others.items():
+    for name, B in others.items():
         for kind, spread in SPREADS.items():
             for n in SIZES:
                 rng = np.random.default_rng(n)
                 X_WA, X_WB = poses(rng, n, (0.0, 0.0)), poses(rng, n, spread)
-                peer = Coal(mesh, other, X_WA, X_WB)
-                pair = mesh, other, X_WA, X_WB
+                peer = Coal(mesh, B, X_WA, X_WB)
+                pair = mesh, B, X_WA, X_WB
                 questions = {
                     "boolean": partial(collide.collide, *pair),
                     "distance": partial(collide.distance, *pair, max_distance=LIMIT, signed=False),
