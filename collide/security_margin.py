@@ -1,8 +1,8 @@
 """Booleans with a security margin: whether two bodies come within a distance of each other.
 
-The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its last
-digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is. What is
-left open, next to curved surfaces, meshes and unions, counts as within.
+The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its
+last digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is.
+What is left open, next to curved surfaces, meshes and unions, counts as within.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
 def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     """Two shapes that meet exactly where A and B are within the margin; None where they are not to be had.
 
-    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space stays.
+    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
+    stays.
     """
     if not (is_plain(A) and is_plain(B)):
         return None

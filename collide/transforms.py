@@ -228,7 +228,7 @@ def _are_surely_poses(batch: np.ndarray) -> bool:
 
 def _block_is_sure(block: np.ndarray) -> bool:
     columns = np.ascontiguousarray(block.reshape(-1, 16).T)
-    a, b, c, x, d, e, f, y, g, h, i, z = columns[:12]
+    a, b, c, _, d, e, f, _, g, h, i, _ = columns[:12]
     worst = np.abs(a * a + d * d + g * g - 1.0)
     for length in (b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0):
         np.maximum(worst, np.abs(length), out=worst)  # NaN stays

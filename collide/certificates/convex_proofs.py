@@ -38,7 +38,10 @@ def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hi
 
 
 def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
-    """The same where one part is a half-space {x : n·x ≤ offset}: a vertex p reaches it where n·p − offset ≤ radius·|n|."""
+    """The same where one part is a half-space {x : n·x ≤ offset}.
+
+    A vertex p reaches it where n·p − offset ≤ radius·|n|.
+    """
     if A.kind == B.kind:
         return "two half-spaces have no certificate"
     halfspace, body = (A, B) if A.kind == HALFSPACE else (B, A)

@@ -1,4 +1,4 @@
-"""The point of a hull of integer points nearest the origin, exactly: Johnson's subalgorithm by definition, and GJK on it."""
+"""The point of a hull of integer points nearest the origin: Johnson's subalgorithm by definition, and GJK on it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def nearest_vertex_pairs(P: list[Point], Q: list[Point], pairs: Sequence[VertexP
 
 
 def _weights(points: Sequence[Point]) -> list[int] | None:
-    """Integer weights of the point of the affine hull nearest the origin; None where the points are affinely dependent."""
+    """Integer weights of the point of the affine hull nearest the origin; None for affinely dependent points."""
     base, edges = points[0], [minus(p, points[0]) for p in points[1:]]
     gram = [[inner(e, f) for f in edges] for e in edges]
     right = [-inner(e, base) for e in edges]
