@@ -11,7 +11,7 @@ from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, pose_table
+from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
 from collide.narrowphase.facets.hull_culling import rows_within
@@ -52,7 +52,7 @@ class PackedWorld:
         self._meshed = is_meshed[self._shape_of]
         self._any_meshed = bool(is_meshed.any())
         self._lay_out_parts()
-        self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach)
+        self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
         self._part_boxes = boxes_of(self._table, self._poses.rows, self._row_of)
         self._tree = BoxTree(self._body_boxes()) if n else None
 
@@ -70,6 +70,7 @@ class PackedWorld:
         self._body_of = np.repeat(np.arange(len(counts)), counts)
         which = _runs(first[self._shape_of], counts)
         self._row_of, self._X_BP, self._reach = row_of[which], X_SP[which], reach[which]
+        self._has_pose = has_own_pose(X_SP)[which]
 
     def _body_boxes(self) -> np.ndarray:
         """(n, 6) boxes around the parts of each body."""
@@ -85,7 +86,8 @@ class PackedWorld:
         """
         self.X_WBs[bodies] = X_WBs
         parts = bodies if self._all_of_one_part else self._parts_of(bodies)
-        moved = pose_table(self.X_WBs[self._body_of[parts]], self._X_BP[parts], self._reach[parts])
+        X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
+        moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
         before = self._poses.rows[parts, POSE_TERMS]
         own = before >= 0.0
         if np.array_equal(own, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
@@ -94,7 +96,7 @@ class PackedWorld:
                 moved.rows[own, POSE_TERMS] = before[own]
             self._poses.rows[parts] = moved.rows
         else:
-            self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach)
+            self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
         self._part_boxes[parts] = boxes_of(self._table, moved.rows, self._row_of[parts])
         assert self._tree is not None
         self._tree.refit(self._body_boxes())
