@@ -14,8 +14,8 @@ from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
-from collide.narrowphase.facets.hull_culling import rows_within
-from collide.narrowphase.facets.mesh_pairs import APART, OPEN, pair_states
+from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
+from collide.narrowphase.facets.surface_pairs import APART, OPEN
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.world_bodies import Roster
@@ -240,8 +240,7 @@ class PackedWorld:
         pairs = np.repeat(bodies[meshed][:, None], 2, axis=1)
         for batch in _batches(pairs, self._shape_of, len(self._shapes)):
             b = batch[:, 0]
-            X_WSs = np.repeat(X_WS[None], len(b), axis=0)
-            rows.append(rows_within(shape, self._shapes[self._shape_of[b[0]]], X_WSs, self.X_WBs[b], limit))
+            rows.append(rows_within(shape, self._shapes[self._shape_of[b[0]]], X_WS[None], self.X_WBs[b], limit))
             rows[-1]["a"], rows[-1]["b"] = 0, b
         answered = np.concatenate(rows)
         return answered[np.argsort(answered["b"], kind="stable")]

@@ -68,7 +68,9 @@ class Placement:
     def _checked(self, name: str, X_WB: np.ndarray) -> np.ndarray:
         """What was multiplied together along the robot; InvalidPose names robot, link and file where it is no pose."""
         try:
-            return as_poses(X_WB, f'{self.robot.place}: the pose of "{cut(name)}", on link "{cut(self.carried[name][0])}",')[0]
+            return as_poses(
+                X_WB, f'{self.robot.place}: the pose of "{cut(name)}", on link "{cut(self.carried[name][0])}",'
+            )[0]
         except InvalidPose as error:
             raise InvalidPose(f"{error}; look at the origins of the joints above it and at their values") from None
 
@@ -111,7 +113,9 @@ class Scene:
         for body in self.bodies:
             if body.name == name:
                 return body
-        raise InvalidArgument(f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}")
+        raise InvalidArgument(
+            f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}"
+        )
 
     def world(self) -> World:
         """A `collide.World` of these bodies, in their order, with the allowed pairs entered."""
@@ -150,7 +154,9 @@ class Scene:
 
     def _named_state(self, name: str) -> dict[str, float]:
         if name not in self.states:
-            raise InvalidArgument(f"scene {self.name}: unknown state {brief(name)}; it has {listing(self.states) or 'none'}")
+            raise InvalidArgument(
+                f"scene {self.name}: unknown state {brief(name)}; it has {listing(self.states) or 'none'}"
+            )
         return self.states[name]
 
     def joint_shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:

@@ -45,8 +45,8 @@ class Disagreement:
     kind : "hit" (the booleans differ), "distance" (they do, by more than the tolerance, or the exact
         one lies outside a proven bracket), "inside" (the engine sees surfaces that do not meet, and one body is
         inside the other), "contradiction"
-        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a World
-        reports no row where its own pair query finds one).
+        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a
+        World reports no row where its own pair query finds one).
     exact_hit, exact_distance : the verdict of exact arithmetic; None where it cannot tell. Of meshes that meet the
         distance is None: nobody knows how deep they are.
     lower, upper : the bracket that the reference proves; None where there is none, or where it has no end.
@@ -186,7 +186,8 @@ class Comparison:
         """
         headers = [
             "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
-            "contradicts itself", "wrong distances", "furthest off", "largest gap difference", "largest depth difference",
+            "contradicts itself", "wrong distances", "furthest off", "largest gap difference",
+            "largest depth difference",
             "failed", "unsupported",
         ]
         return headers, [_printed(s, s.engine == self.reference) for s in self.summaries]
@@ -444,7 +445,8 @@ def _printed(s: Summary, is_reference: bool) -> list[str]:
     agree, differ, inside = ("", "", "") if is_reference else map(str, (s.agreeing, s.hit_disagreements, s.inside))
     largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
     return [
-        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong), str(s.wrong_within_rounding),
+        s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong),
+        str(s.wrong_within_rounding),
         str(s.not_judged), str(s.contradictions), str(s.wrong_distances), _length(s.furthest_off), *largest,
         str(len(s.failed)), str(sum(s.unsupported.values())),
     ]

@@ -30,7 +30,11 @@ class ExactPeer(PairwisePeer):
     name = "exact"
 
     def refuses(self, part: Shape) -> str | None:
-        return None if isinstance(part, Mesh) or corners(part) else f"not judged: {type(part).__name__} has no exact form here"
+        return (
+            None
+            if isinstance(part, Mesh) or corners(part)
+            else f"not judged: {type(part).__name__} has no exact form here"
+        )
 
     def build(self, part: Shape) -> tuple | Mesh:
         if isinstance(part, Mesh):
@@ -41,7 +45,7 @@ class ExactPeer(PairwisePeer):
         return corner_points
 
     def parts(self, body: Body) -> Iterator[tuple]:
-        """The corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
+        """Corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
         if not isinstance(body.shape, Compound) or _has(body, Mesh):
             yield from super().parts(body)
             return

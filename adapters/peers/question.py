@@ -103,7 +103,8 @@ def ask(of, max_distance: float = 0.0, *, every_pair: bool = False) -> Question:
         pairs = list(of)
     except TypeError:
         raise InvalidArgument(
-            f"a question is made from a Scene, a World, a Question or (A, B, X_WA, X_WB) tuples, got {type(of).__name__}"
+            "a question is made from a Scene, a World, a Question or (A, B, X_WA, X_WB) tuples, got "
+            f"{type(of).__name__}"
         ) from None
     return Question.from_pairs(pairs, max_distance)
 

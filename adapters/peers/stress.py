@@ -42,7 +42,8 @@ class Reply(NamedTuple):
 
     hits : every boolean it gave: one, or that of the boolean query and that of the distance.
     how : which of its arguments decided (collide only).   undecided : it says rounding leaves the
-        boolean open.   certified : it calls its answer certified (collide only).   failed, unsupported : the reason where there is no answer, else "".
+        boolean open.   certified : it calls its answer certified (collide only).
+        failed, unsupported : the reason where there is no answer, else "".
     """
 
     hits: tuple[bool, ...] = ()
@@ -202,7 +203,9 @@ def run(
     """
     if engine not in ENGINES:
         raise InvalidArgument(f"no engine {engine!r}; there are {', '.join(sorted(ENGINES))}")
-    wanted = [*names(), *mesh_names()] if families is None else [families] if isinstance(families, str) else list(families)
+    wanted = (
+        [*names(), *mesh_names()] if families is None else [families] if isinstance(families, str) else list(families)
+    )
     for family in wanted:
         generate(family, 0, seed)  # complain before the work begins
     ask, version = _asker(engine, timeout)

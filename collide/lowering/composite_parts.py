@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.facets.facet_convex import Posed
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import IDENTITY, Shape
@@ -37,7 +37,7 @@ class Part(NamedTuple):
     turn: float
     shift: float
 
-    def at(self, X_WB: np.ndarray, about: np.ndarray) -> Posed:
+    def at(self, X_WB: np.ndarray, about: np.ndarray) -> PosesWithSlop:
         """Its poses in the world, for poses (n, 4, 4) of the union.
 
         about : (n,) how far from it half-spaces are looked at [m].
@@ -46,7 +46,7 @@ class Part(NamedTuple):
         reach = np.full(len(X_WB), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
         X, slop = moved_pose(X_WB, self.X, reach)
         stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
-        return Posed(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
+        return PosesWithSlop(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
 
     @property
     def bound(self) -> PackedConvex:

@@ -21,9 +21,6 @@ from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, is_plain
 
-#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
-_FAR = 1e20
-
 
 class Body(NamedTuple):
     """A set in its own frame: facets, the points they enclose where it is solid, and a ball swept over all.
@@ -46,6 +43,25 @@ class Body(NamedTuple):
     def key(self) -> tuple:
         """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
         return self.tree.content, self.radius, self.solid
+
+
+class PosesWithSlop(NamedTuple):
+    """Poses of one body.
+
+    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from where they put it [m].
+    """
+
+    X: np.ndarray
+    slop: np.ndarray
+
+    def of(self, some) -> PosesWithSlop:
+        """Those of the given numbers, or where a mask says so."""
+        return PosesWithSlop(self.X[some], self.slop[some])
+
+
+def as_given(X: np.ndarray) -> PosesWithSlop:
+    """Poses that are exact as they were given."""
+    return PosesWithSlop(X, np.zeros(len(X)))
 
 
 def is_halfspace(shape: Shape) -> bool:
@@ -99,11 +115,6 @@ def hull_of(body: Body) -> Shape:
     if not body.hull:
         body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
     return body.hull[0]
-
-
-def farthest_told(A: Body, B: Body) -> float:
-    """The largest gap [m] that box-trees tell: their boxes are floats, in units of the smaller body's size."""
-    return _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
 
 
 def reach_of(body: Body) -> float:

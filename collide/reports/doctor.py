@@ -115,7 +115,9 @@ def _kernels() -> list[Check]:
     if mode.MODE == mode.COMPILED:
         checks = [Check("kernels", f"compiled, level {about['level']} of {about['levels']}")]
     else:
-        numba = f" (numba {package_version('numba')}, kept on disk)" if mode.MODE == mode.JUST_IN_TIME else ", very slow"
+        numba = (
+            f" (numba {package_version('numba')}, kept on disk)" if mode.MODE == mode.JUST_IN_TIME else ", very slow"
+        )
         state = "NO COMPILED KERNELS" if not about else "FALLING BACK"
         checks = [Check("kernels", f"{state}: run {mode.MODE}{numba}: {mode.WHY}", None)]
     if about:
@@ -160,8 +162,17 @@ def _kept_kernels() -> list[Check]:
     except OSError:  # told below
         why = None
     if why is not None:
-        return [Check("kernels", f"{folder} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR", None)]
-    return [_cache("kernels", folder), Check("kernels are code", "who can write in their folder decides what runs: only its user may")]
+        return [
+            Check(
+                "kernels",
+                f"{folder} is not used, for kernels are code: {why}: compiled anew in every run; set COLLIDE_CACHE_DIR",
+                None,
+            )
+        ]
+    return [
+        _cache("kernels", folder),
+        Check("kernels are code", "who can write in their folder decides what runs: only its user may"),
+    ]
 
 
 def _cache(what: str, folder: Path) -> Check:

@@ -52,7 +52,8 @@ def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
     steps = np.max([np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) for q in corners.values()], axis=0)
     if not steps.sum() / resolution <= MAX_SAMPLES:
         raise InvalidArgument(
-            f"resolution: the path is {steps.sum():g} rad or m long, more than {MAX_SAMPLES} samples of {resolution:g}: "
+            f"resolution: the path is {steps.sum():g} rad or m long, more than {MAX_SAMPLES} samples of "
+            f"{resolution:g}: "
             "give a larger one (--resolution)"
         )
     counts = np.maximum(1, np.ceil(steps / resolution)).astype(int)
@@ -237,12 +238,15 @@ class _Watch:
     def _listed(self, name: str) -> list[dict]:
         """Pairs that are in this class at worst: collisions in the order they begin, others the nearest first."""
         worse = [self.worst[worse_class] for worse_class in classes.NAMES[: classes.NAMES.index(name)]]
-        events = [event for pair, event in self.worst[name].items() if not any(pair in worse_class for worse_class in worse)]
+        events = [
+            event for pair, event in self.worst[name].items() if not any(pair in worse_class for worse_class in worse)
+        ]
         by_start = name in (classes.COLLIDING, classes.SHALLOW)
         ordered = sorted(events, key=lambda event: (event["first"] if by_start else 0.0, event["event"]["order"]))
         return [
-            {**self._entry(event["event"]), "from": self._place(event["first"]), "samples": event["samples"]} for event in ordered
-        ]  # fmt: skip
+            {**self._entry(event["event"]), "from": self._place(event["first"]), "samples": event["samples"]}
+            for event in ordered
+        ]
 
     def _entry(self, event: dict) -> dict:
         row, k = event["row"], event["sample"]

@@ -37,22 +37,34 @@ if TYPE_CHECKING:
 class Mesh(Shape):
     """Triangles: a solid, or a surface.
 
-    vertices : (n, 3) [m]; equal ones are welded, so that an STL's loose triangles close. Some may be unused. Or, with no
-        faces, an object that has ``vertices`` and ``faces``, as a trimesh.Trimesh does.
-    faces : (m, 3) vertex ids, counter-clockwise seen from outside.
-    solid : None takes a mesh that closes as a solid and any other as a surface; ``mesh.solid`` says which, and
-        ``mesh.report`` why. True insists: a mesh without an inside is refused, with its defects and facet
-        numbers. False takes the surface alone.
+    Parameters
+    ----------
+    vertices : (n, 3) array_like, float64, or an object with ``vertices`` and ``faces``
+        [m], in the frame of the shape. Equal ones are welded, so that the loose triangles of an STL close; some may be
+        unused. With no ``faces``, an object such as a trimesh.Trimesh.
+    faces : (m, 3) array_like of int
+        Rows of ``vertices``, counter-clockwise seen from outside.
+    solid : bool, optional
+        None takes a mesh that closes as a solid and any other as a surface: ``mesh.solid`` says which, ``mesh.report``
+        why. True insists: a mesh without an inside is refused, with its defects and facet numbers. False takes the
+        surface alone.
 
-    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a
-    part that runs the other way round within another is a cavity. A **surface** is its facets. Facets need
-    not be manifold for that: every edge must be run along as often one way as the other. That the facets of
-    a solid do not cross each other is not looked at here.
+    Raises
+    ------
+    InvalidShape
+        For anything but finite vertices and at least one row of ids in range; with ``solid=True`` also where the mesh
+        has no inside.
 
-    Ids in results are rows of ``faces``, as given. Looking at a mesh takes about 0.3 µs a facet; its box-tree
-    (`tree`) is made when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and
-    the choice of ``solid``; what proofs rest on is worked out anew from them.
-    Raises InvalidShape for anything but finite vertices and at least one row of ids in range.
+    Notes
+    -----
+    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a part that
+    runs the other way round within another is a cavity. A **surface** is its facets. Facets need not be manifold for
+    that: every edge must be run along as often one way as the other. Whether the facets of a solid cross each other is
+    not checked here (`collide.self_collisions`).
+
+    Ids in results are rows of ``faces``, as given. Surveying a mesh takes about 0.3 µs a facet; its box-tree (`tree`)
+    is built when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and the
+    choice of ``solid``; what proofs rest on is computed anew from them.
     """
 
     __slots__ = ("_copied", "_hull", "_survey", "_tree", "faces", "scale", "solid", "vertices")
@@ -91,7 +103,7 @@ class Mesh(Shape):
 
     @classmethod
     def _known(cls, vertices, faces, solid: bool) -> Mesh:
-        """A mesh that was looked at before, as prepared input tells: it is looked at again when a query first needs it."""
+        """A mesh whose ``solid`` a cache knows: it is surveyed again when a query first needs that."""
         made = cls(vertices, faces, solid=False)
         made._store(solid=bool(solid))
         return made
@@ -158,10 +170,25 @@ class Mesh(Shape):
         return report._replace(volume=report.volume * self.scale**3)
 
     def scaled(self, factor: float) -> Mesh:
-        """The mesh with every coordinate times ``factor`` > 0, rounded once; its search tree is shared.
+        """The mesh with every coordinate times a factor, rounded once; its search tree is shared.
 
-        The copy's ``base`` is the mesh that is copied and ``scale`` the factor; factors of copies of
-        copies are multiplied first. What is solid stays so.
+        The copy's ``base`` is the mesh that is copied and ``scale`` the factor; factors of copies of copies are
+        multiplied first. What is solid stays so.
+
+        Parameters
+        ----------
+        factor : float
+            > 0, without a unit.
+
+        Returns
+        -------
+        Mesh
+            The scaled copy; ``base`` itself where the product of the factors is 1.
+
+        Raises
+        ------
+        InvalidShape
+            Where the factor is no positive finite number, or coordinates leave the supported range.
         """
         factor = positive("Mesh.scaled", "factor", factor) * self.scale
         if factor == 1.0:
@@ -173,10 +200,24 @@ class Mesh(Shape):
         return made
 
     def locality(self, *, repeated: bool = False, progress=None) -> Locality:
-        """How local the mesh is: Σ and σ_1 … σ_10 with their distributions; see `collide.mesh.locality`.
+        """How local the mesh is: Erickson's global stretch Σ and local stretches σ_1 … σ_10, with their distributions.
 
-        repeated : count equal vertices one by one.   progress : called with a label, gives a context manager.
-        O(n log n), a second for 437,645 vertices. Scaling changes nothing but rounding.
+        Parameters
+        ----------
+        repeated : bool
+            Count vertices with equal coordinates one by one, as Table 1 of the paper does.
+        progress : callable, optional
+            Called with a label, gives a context manager; for long work.
+
+        Returns
+        -------
+        Locality
+            See `collide.mesh.locality`. Scaling changes nothing but rounding.
+
+        Notes
+        -----
+        O(n log n), a second for 437,645 vertices. J. Erickson, "Local polyhedra and geometric graphs", Computational
+        Geometry 31 (2005), sections 2.1 and 8.
         """
         from collide.mesh.locality import locality
 
@@ -184,14 +225,36 @@ class Mesh(Shape):
         return locality(self.vertices, self.faces, repeated=repeated, **options)
 
     def save(self, path) -> None:
-        """Write the mesh to an ``.npz`` file."""
+        """Write vertices, faces, ``solid`` and ``scale`` to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is overwritten.
+        """
         arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
         arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
         write_arrays("Mesh", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> Mesh:
-        """A mesh from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
+        """A mesh from a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Mesh
+            Equal to the one that was saved.
+
+        Raises
+        ------
+        InvalidShape
+            Where the file is another one, or damaged, or says solid of a mesh that has no inside.
+        """
         arrays = read_arrays("Mesh", path, _FILE_FORMAT, _FILE_FIELDS, "mesh_")
         try:
             return cls._from_fields(arrays["vertices"], arrays["faces"], arrays["solid"], float(arrays["scale"]))
@@ -200,11 +263,19 @@ class Mesh(Shape):
 
     def _pack(self):
         raise UnsupportedQuery(
-            "Mesh: a mesh is no union of convex parts, which this query needs. collide() and distance() of one mesh and "
+            "Mesh: a mesh is no union of convex parts, which this query needs. collide() and distance() of one mesh "
+            "and "
             "another shape, and World, take it as it is; elsewhere ConvexHull(mesh.vertices) may do instead"
         )
 
     def bounding_parts(self):
+        """One convex set that holds all facets, of at most a few hundred points.
+
+        Returns
+        -------
+        tuple of (PackedConvex, (4, 4) float64)
+            One entry.
+        """
         if not hasattr(self, "_bounds"):
             used = np.zeros(len(self.vertices), dtype=bool)
             used[self.faces] = True
@@ -239,7 +310,8 @@ _MANY = 512
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
 _FILE_FIELDS = {
-    "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()), "scale": Field("f8", ()),
+    "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()),
+    "scale": Field("f8", ()),
 }  # fmt: skip
 
 
@@ -261,7 +333,8 @@ def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
         return mesh.vertices, mesh.faces
     except AttributeError:
         raise InvalidShape(
-            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and no faces"
+            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and "
+            "no faces"
         ) from None
 
 
@@ -270,7 +343,8 @@ def _check_vertices(vertices) -> np.ndarray:
     largest = float(np.abs(vertices).max())
     if 0.0 < largest < SMALLEST:
         raise InvalidShape(
-            f"Mesh: vertices: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: scale the scene"
+            f"Mesh: vertices: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: scale the "
+            "scene"
         )
     return vertices
 

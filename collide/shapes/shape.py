@@ -22,7 +22,10 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
+    __slots__ = (
+        "__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology",
+        "_union", "_walk",
+    )  # fmt: skip
     _fields: tuple[str, ...] = ()
     _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
@@ -83,7 +86,12 @@ class Shape:
     def parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
         """The convex sets whose union this is, each with its (4, 4) pose in the shape's frame.
 
-        Packed when first asked for and kept, since a shape never changes.
+        Packed when first needed and kept, since a shape never changes.
+
+        Returns
+        -------
+        tuple of (PackedConvex, (4, 4) float64)
+            One entry a convex part.
         """
         try:
             return self._parts
@@ -92,11 +100,23 @@ class Shape:
             return self._parts
 
     def bounding_parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
-        """Convex sets that hold this: its parts, or something larger and simpler. Boxes are made of them."""
+        """Convex sets that hold this shape, for bounding boxes: its parts, or something larger and simpler.
+
+        Returns
+        -------
+        tuple of (PackedConvex, (4, 4) float64)
+            As of `parts`.
+        """
         return self.parts()
 
     def laid_out(self) -> LaidOut:
-        """Its bounding parts as kernels of unions read them, kept like these."""
+        """Its bounding parts in the rows that kernels of unions read, made when first needed and kept.
+
+        Returns
+        -------
+        LaidOut
+            See `collide.lowering.compound_table`.
+        """
         if not hasattr(self, "_laid_out"):
             from collide.lowering.compound_table import lay_out
 
@@ -154,7 +174,8 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
         raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {reading.told(value)}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the scene"
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the "
+            "scene"
         )
     return number
 

@@ -1,9 +1,11 @@
-"""Shapes in ``.npz`` files: the arrays that define them, by name, the version of their format, and a digest of everything.
+"""Shapes in ``.npz`` files: the arrays that define them, by name, the version of their format, and a digest of
+everything.
 
-A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are worked
-out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The digest
-tells damage; it is no signature. Before any array is read its header is held against what the format has, and its length
-against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
+A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are
+    worked
+out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The
+digest tells damage; it is no signature. Before any array is read its header is held against what the format has, and
+its length against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ if TYPE_CHECKING:
 
 
 class Field(NamedTuple):
-    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether it
-    must be there."""
+    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether
+    it must be there."""
 
     type: str
     shape: tuple[int | None, ...]

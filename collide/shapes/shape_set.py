@@ -18,12 +18,21 @@ if TYPE_CHECKING:
 
 
 class ShapeSet:
-    """Shapes laid out once, however often they are asked about.
+    """Shapes laid out once, however often queries ask about them.
 
         library = collide.ShapeSet(shapes)
         collide.collide(library[i], library[j], X_WA, X_WB)     # i, j: (N,) numbers of shapes
 
-    shapes : a sequence of shapes. Picking by an integer gives the shape, by an integer array a `Picked`.
+    Parameters
+    ----------
+    shapes : sequence of Shape
+        At least one. Indexing by an integer gives the shape, by an integer array (N,) or a slice a `Picked`, a sequence
+        that queries accept as N shapes.
+
+    Raises
+    ------
+    InvalidShape
+        Where ``shapes`` is empty or holds what is no shape.
     """
 
     #: Kinds of the shapes, once asked for (`lowering/kinds.py`).
@@ -55,7 +64,9 @@ class ShapeSet:
         if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
             raise InvalidArgument(f"ShapeSet: pick by integers (N,), got {numbers.dtype} {numbers.shape}")
         if len(numbers) and not (0 <= numbers.min() and numbers.max() < len(self)):
-            raise InvalidArgument(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}")
+            raise InvalidArgument(
+                f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}"
+            )
         return Picked(self, numbers.astype(np.int64))
 
     @cached_property

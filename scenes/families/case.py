@@ -99,8 +99,14 @@ class Case(NamedTuple):
         there are too many."""
         lines = ["import numpy as np", "", "import collide", ""]
         if len(self.P) + len(self.Q) > MAX_POINTS_LISTED:
-            call = ", ".join([repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)])
-            lines += ["from collide.scenes.families import generate", "", f"A, B, X_WA, X_WB = generate({call})[-1].shapes()"]
+            call = ", ".join(
+                [repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)]
+            )
+            lines += [
+                "from collide.scenes.families import generate",
+                "",
+                f"A, B, X_WA, X_WB = generate({call})[-1].shapes()",
+            ]
         else:
             lines += [
                 f"A = {self._shape_text(self.P, self.radius_a, self.kind)}",

@@ -90,7 +90,10 @@ def _resolve(path) -> Path:
         return scenes.path(str(path))
     if file.suffix or len(file.parts) > 1:
         raise SceneError("no such file", path=cut(str(path), LONGEST_PLACE))
-    raise SceneError(f"no such file, and no shipped scene of that name; there are {', '.join(scenes.shipped())}", path=cut(str(path), LONGEST_PLACE))
+    raise SceneError(
+        f"no such file, and no shipped scene of that name; there are {', '.join(scenes.shipped())}",
+        path=cut(str(path), LONGEST_PLACE),
+    )
 
 
 def _exists(file: Path) -> bool:
@@ -102,7 +105,9 @@ def _exists(file: Path) -> bool:
 
 def _in_state(scene: Scene, state: str | Path | Mapping[str, float]) -> Scene:
     """The scene with its robots at a named state, at values, or at the values in a file."""
-    if isinstance(state, Path) or (isinstance(state, str) and state not in scene.states and _exists(Path(state)) and not Path(state).is_dir()):
+    if isinstance(state, Path) or (
+        isinstance(state, str) and state not in scene.states and _exists(Path(state)) and not Path(state).is_dir()
+    ):
         from collide.scenes.loaders.states import read_state
 
         path, state = state, read_state(state)
@@ -195,13 +200,20 @@ def _together(parts: list[Scene]) -> Scene:
     names: dict[str, int] = {}
     for part in parts:
         for body in part.bodies:
-            if body.owner is None and not part.robots and len(part.sources) == 1 and Path(part.sources[0]).suffix.lower() in mesh_loader.SUFFIXES:
+            if (
+                body.owner is None
+                and not part.robots
+                and len(part.sources) == 1
+                and Path(part.sources[0]).suffix.lower() in mesh_loader.SUFFIXES
+            ):
                 body = replace(body, name=free_name(body.name, names))
             names.setdefault(body.name, 1)
             whole.add(body)
         for name in part.robots:
             if name in whole.robots:
-                raise SceneError(f"two robots are called {name}; write a scene file that gives them prefixes", path=part.sources[0])
+                raise SceneError(
+                    f"two robots are called {name}; write a scene file that gives them prefixes", path=part.sources[0]
+                )
         whole.robots.update(part.robots)
         whole.placements.update(part.placements)
         whole.allowed += part.allowed

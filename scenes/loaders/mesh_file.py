@@ -99,7 +99,9 @@ def check_meshes_option(meshes: str) -> None:
 def size_note(extent: float, what: str) -> str | None:
     """A note where something is so large or small that its unit may be wrong. extent : [m]."""
     if extent > 100.0:
-        return f"{what} is {extent:g} m across: is it in millimetres? A scale of 0.001 would make it {extent / 1000:g} m"
+        return (
+            f"{what} is {extent:g} m across: is it in millimetres? A scale of 0.001 would make it {extent / 1000:g} m"
+        )
     if 0.0 < extent < 1e-5:
         return f"{what} is {extent:g} m across: is its unit right?"
     return None
@@ -119,11 +121,15 @@ def _read(opened: MeshBytes, as_it_is: bool) -> tuple[MeshFile, list[tuple[np.nd
             raw.append((vertices, faces))
             notes += about
     if not parts:
-        raise SceneError("has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path)
+        raise SceneError(
+            "has no vertices; a mesh needs at least one (is the file cut short, or of another format?)", path=path
+        )
     return MeshFile(parts, notes), raw
 
 
-def _describe(as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[MeshPart, list[str]]:
+def _describe(
+    as_it_is: bool, label: str, vertices: np.ndarray, faces: np.ndarray, path: Path
+) -> tuple[MeshPart, list[str]]:
     if not np.isfinite(vertices).all():
         row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
         raise SceneError(f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite", path=path)

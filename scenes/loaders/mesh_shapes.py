@@ -180,10 +180,13 @@ def _about_hull(part: MeshPart) -> str | None:
 
 
 def _is_convex(part: MeshPart) -> bool:
-    """Whether the mesh is its own hull by its volume: then that hull is nearer to it than a decomposition, which resamples."""
+    """Whether the mesh has its hull's volume: then that hull is nearer to it than a decomposition, which resamples."""
     return part.closed and part.fill >= CONVEX_RATIO
 
 
 def _about_pieces(part: MeshPart) -> str:
     pieces = part.pieces or []
-    return f"{len(pieces)} convex {'piece' if len(pieces) == 1 else 'pieces'} of a mesh of {len(part.points)} vertices (coacd)"
+    return (
+        f"{len(pieces)} convex {'piece' if len(pieces) == 1 else 'pieces'} of a mesh of {len(part.points)} "
+        "vertices (coacd)"
+    )

@@ -57,7 +57,11 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
     if unknown or len(kinds.data) != 1:
-        complaint = f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
+        complaint = (
+            f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}"
+            if unknown
+            else f"needs one shape, got {brief(data)}"
+        )
         kinds.fail(f"{complaint}; known shapes are {', '.join(KINDS)}")
     kind = next(iter(kinds.data))
     try:

@@ -61,12 +61,18 @@ def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> N
             label, text = joint.get("name", ""), joint.get("value", "")
             words = text.split()
             if label not in known or len(words) != 1:
-                semantics.notes.append(f'state "{cut(name)}": joint "{cut(label)}" with value "{cut(text)}" was left out')
+                semantics.notes.append(
+                    f'state "{cut(name)}": joint "{cut(label)}" with value "{cut(text)}" was left out'
+                )
                 continue
             try:
                 value = float(words[0])
             except ValueError:
                 value = math.nan
             if not math.isfinite(value):
-                raise SceneError(f'the value must be a finite number, got "{cut(text)}"', path=path, element=f'state "{cut(name)}" joint "{cut(label)}"')
+                raise SceneError(
+                    f'the value must be a finite number, got "{cut(text)}"',
+                    path=path,
+                    element=f'state "{cut(name)}" joint "{cut(label)}"',
+                )
             values[label] = value

@@ -98,7 +98,9 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
         reading.fail("<robot>", "has no <link>" + _expand_advice(root))
-    joints = [_joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))]
+    joints = [
+        _joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))
+    ]
     geometry = {name: _link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
     _note_unchecked(root, geometry, reading)
     semantics = read_srdf(srdf, links, [joint.name for joint in joints]) if srdf is not None else None
@@ -168,7 +170,9 @@ def _with_prefixes_declared(blob: bytes, path: Path, notes: list[str]) -> ET.Ele
     try:
         root = ET.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text[: start.end()]) + names + text[start.end() :])
     except ET.ParseError as error:
-        raise SceneError(f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path) from None
+        raise SceneError(
+            f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path
+        ) from None
     notes.append(f"XML prefix not declared: {listing(unbound)}; what carries it was not read")
     return root
 
@@ -190,7 +194,9 @@ def _place(kind: str, name: str) -> str:
     return f'{kind} "{cut(name)}"'
 
 
-def floats(element: ET.Element, attribute: str, count: int, place: str, reading: Reading, default: str | None = None) -> np.ndarray:
+def floats(
+    element: ET.Element, attribute: str, count: int, place: str, reading: Reading, default: str | None = None
+) -> np.ndarray:
     """``count`` finite numbers of an attribute, separated by blanks or commas."""
     text = element.get(attribute, default)
     if text is None:
@@ -250,7 +256,9 @@ def _limits(element: ET.Element, kind: str, place: str, reading: Reading) -> tup
     lower = float(floats(limit, "lower", 1, place, reading, "0")[0])
     upper = float(floats(limit, "upper", 1, place, reading, "0")[0])
     if lower > upper:
-        reading.notes.append(f"{place} has limits [{lower:g}, {upper:g}] the wrong way round: read as [{upper:g}, {lower:g}]")
+        reading.notes.append(
+            f"{place} has limits [{lower:g}, {upper:g}] the wrong way round: read as [{upper:g}, {lower:g}]"
+        )
         lower, upper = upper, lower
     return lower, upper
 
@@ -334,7 +342,9 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
     if file not in reading.mesh_files:
         reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
         reading.notes += reading.mesh_files[file].notes
-    shapes = [(shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")]
+    shapes = [
+        (shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")
+    ]
     _note_size(extent(reading.mesh_files[file], scale), place, reading)
     reading.seconds += time.perf_counter() - started
     return shapes

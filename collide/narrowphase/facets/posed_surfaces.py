@@ -72,13 +72,13 @@ def place(header_a, numbers_a, XA, header_b, numbers_b, XB, out, frames):
 
 
 @kernel
-def balls_apart(XA, numbers_a, XB, numbers_b):
-    """Whether the balls around two bodies are certainly apart; False of matrices that are not close to rotations.
+def balls_apart(XA, numbers_a, XB, numbers_b, margin):
+    """Whether balls around two bodies are certainly farther apart than a margin [m]; False unless matrices are close to rotations.
 
     For a rotation but for d, the largest row sum of |RᵀR − I|, lengths grow by no more than 1 + d.
     """
-    stretch_a = _off_rotation(XA)
-    stretch_b = _off_rotation(XB)
+    stretch_a = off_rotation(XA)
+    stretch_b = off_rotation(XB)
     if not (stretch_a <= _LITTLE and stretch_b <= _LITTLE):
         return False
     square = 0.0
@@ -91,12 +91,13 @@ def balls_apart(XA, numbers_a, XB, numbers_b):
         size += 2.0 * (abs(numbers_a[CENTRE + i]) + abs(numbers_b[CENTRE + i]))
         square += gap * gap
     reach = numbers_a[RADIUS] * (1.0 + stretch_a) + numbers_b[RADIUS] * (1.0 + stretch_b)
+    reach += margin
     reach += 2.0**-40 * (reach + size)
     return square > reach * reach and reach > _VANISHING
 
 
 @kernel(inline=True)
-def _off_rotation(X):
+def off_rotation(X):
     """Largest row sum of |RᵀR − I|, rounded upwards; infinite where R mirrors."""
     xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8]
     yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9]

@@ -330,7 +330,7 @@ def walk_surfaces(
         XA = view_f64(pose_a, 16)
         XB = view_f64(pose_b, 16)
         counters = view_i64(counters_at + 8 * COUNTERS * k, COUNTERS)
-        if top == 0 and balls_apart(XA, numbers_a, XB, numbers_b):
+        if top == 0 and balls_apart(XA, numbers_a, XB, numbers_b, 0.0):
             starts[k] = found
             k += 1
             starts[k] = found

@@ -20,7 +20,7 @@ import pytest
 import collide
 from collide.kernels import sources as kernel_sources
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "collide.scenes"}
 
 #: What the modules of a room of the engine may import; a room may always import itself.
