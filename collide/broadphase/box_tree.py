@@ -57,30 +57,30 @@ class BoxTree:
 
         Pairs of static bodies, and pairs whose groups and masks exclude each other, are left out.
         """
-        found = self._search(self.boxes[self.order], margin, True, static, group, mask)
+        pairs = self._search(self.boxes[self.order], margin, True, static, group, mask)
         if len(self.unbounded):
-            found = np.concatenate([found, _with_unbounded(self.unbounded, len(self.boxes), static, group, mask)])
-        found = np.sort(found, axis=1)
-        return found[np.lexsort((found[:, 1], found[:, 0]))]
+            pairs = np.concatenate([pairs, _with_unbounded(self.unbounded, len(self.boxes), static, group, mask)])
+        pairs = np.sort(pairs, axis=1)
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
     def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
         """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
         everything = np.zeros(len(self.boxes), dtype=np.int64)
-        found = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
-        return np.sort(np.concatenate([found[:, 1], self.unbounded]))
+        pairs = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
+        return np.sort(np.concatenate([pairs[:, 1], self.unbounded]))
 
     def _search(self, queries, margin, among_themselves, static, group, mask) -> np.ndarray:
         queries = np.ascontiguousarray(queries)
         capacity = 64 + 8 * len(queries)
         while True:
-            found = np.empty((capacity, 2), dtype=np.int64)
+            pairs = np.empty((capacity, 2), dtype=np.int64)
             count = meeting_boxes(
                 address_of(queries), len(queries), address_of(self.nodes), self.leaves, address_of(self.order),
                 len(self.order), margin, among_themselves, address_of(static), address_of(group), address_of(mask),
-                address_of(found), capacity,
+                address_of(pairs), capacity,
             )  # fmt: skip
             if count <= capacity:
-                return found[:count]
+                return pairs[:count]
             capacity = count
 
 
@@ -125,7 +125,7 @@ def _with_unbounded(unbounded, n, static, group, mask) -> np.ndarray:
 
 @kernel(inline=True)
 def _next_subtree(node):
-    """The subtree to the right of a node's: sibling of its nearest ancestor that is a left child; 0 where there is none."""
+    """The next subtree to the right: sibling of the node's nearest ancestor that is a left child; 0 at the end."""
     while node & 1:
         node >>= 1
     return node + 1 if node > 0 else 0
@@ -135,7 +135,8 @@ def _next_subtree(node):
 def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
     """Write all nodes of a tree; False where the box of a leaf is not finite.
 
-    boxes : 6·n_boxes doubles, low x, y, z, high x, y, z.   order : the body of each leaf.   nodes : 12·leaves doubles out.
+    boxes : 6·n_boxes doubles, low x, y, z, high x, y, z.   order : the body of each leaf.   nodes : 12·leaves doubles
+        out.
     """
     boxes = view_f64(boxes_at, 6 * n_boxes)
     order = view_i64(order_at, n_order)
@@ -153,17 +154,17 @@ def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
                 is_bounded = is_bounded and -math.inf < value < math.inf
     for node in range(leaves - 1, 0, -1):
         at = 6 * node
-        left = 12 * node
+        child = 12 * node
         for axis in range(3):
-            nodes[at + axis] = min(nodes[left + axis], nodes[left + 6 + axis])
-            nodes[at + 3 + axis] = max(nodes[left + 3 + axis], nodes[left + 9 + axis])
+            nodes[at + axis] = min(nodes[child + axis], nodes[child + 6 + axis])
+            nodes[at + 3 + axis] = max(nodes[child + 3 + axis], nodes[child + 9 + axis])
     return is_bounded
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)")
 def meeting_boxes(
     queries_at, n_queries, nodes_at, leaves, order_at, n_order, margin, among_themselves, static_at, group_at, mask_at,
-    found_at, capacity,
+    pairs_at, capacity,
 ):  # fmt: skip
     """Pairs (query, body) of boxes within ``margin`` along every axis; returns how many there are.
 
@@ -173,7 +174,7 @@ def meeting_boxes(
     queries = view_f64(queries_at, 6 * n_queries)
     nodes = view_f64(nodes_at, 12 * leaves)
     order = view_i64(order_at, n_order)
-    found = view_i64(found_at, 2 * capacity)
+    pairs = view_i64(pairs_at, 2 * capacity)
     n_bodies = 0
     for k in range(n_order):
         n_bodies = max(n_bodies, order[k] + 1)
@@ -188,8 +189,8 @@ def meeting_boxes(
         high0 = queries[6 * k + 3] + margin
         high1 = queries[6 * k + 4] + margin
         high2 = queries[6 * k + 5] + margin
-        # Depth first without a stack: down to the left while boxes meet, else on to the next subtree to the right. Among
-        # themselves, it begins to the right of the query's own leaf.
+        # Depth first without a stack: down to the left while boxes meet, else on to the next subtree to the right.
+        # Among themselves, it begins to the right of the query's own leaf.
         node = _next_subtree(leaves + k) if among_themselves else 1
         while node > 0:
             at = 6 * node
@@ -212,8 +213,8 @@ def meeting_boxes(
                     )  # fmt: skip
                 if tested:
                     if count < capacity:
-                        found[2 * count] = i
-                        found[2 * count + 1] = j
+                        pairs[2 * count] = i
+                        pairs[2 * count + 1] = j
                     count += 1
             node = _next_subtree(node)
     return count
