@@ -59,10 +59,10 @@ class PackedWorld:
     def _lay_out_parts(self) -> None:
         """Parts of all bodies, one body after another: those of its shape."""
         parts = [shape.bounding_parts() for shape in self._shapes]
-        row_of, self._table = _table_of([packed for own in parts for packed, _ in own])
-        X_SP = np.array([X for own in parts for _, X in own]).reshape(-1, 4, 4)
-        reach = np.array([packed.reach for own in parts for packed, _ in own])
-        n_parts = np.array([len(own) for own in parts], dtype=np.int64)
+        row_of, self._table = _table_of([packed for of_shape in parts for packed, _ in of_shape])
+        X_SP = np.array([X for of_shape in parts for _, X in of_shape]).reshape(-1, 4, 4)
+        reach = np.array([packed.reach for of_shape in parts for packed, _ in of_shape])
+        n_parts = np.array([len(of_shape) for of_shape in parts], dtype=np.int64)
         first = np.cumsum(n_parts) - n_parts
         self._counts = counts = n_parts[self._shape_of]
         self._all_of_one_part = bool((counts == 1).all())
@@ -89,11 +89,11 @@ class PackedWorld:
         X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
         moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
         before = self._poses.rows[parts, POSE_TERMS]
-        own = before >= 0.0
-        if np.array_equal(own, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
-            if own.any():
-                self._poses.terms[before[own].astype(np.int64)] = moved.terms
-                moved.rows[own, POSE_TERMS] = before[own]
+        has_terms = before >= 0.0
+        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
+            if has_terms.any():
+                self._poses.terms[before[has_terms].astype(np.int64)] = moved.terms
+                moved.rows[has_terms, POSE_TERMS] = before[has_terms]
             self._poses.rows[parts] = moved.rows
         else:
             self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
@@ -283,11 +283,11 @@ def _table_of(packed: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:
     rows: dict[tuple[bytes, float], int] = {}
     distinct: list[PackedConvex] = []
     row_of = np.empty(len(packed), dtype=np.int64)
-    for k, one in enumerate(packed):
-        key = one.content, one.slop
+    for k, part in enumerate(packed):
+        key = part.content, part.slop
         if key not in rows:
             rows[key] = len(distinct)
-            distinct.append(one)
+            distinct.append(part)
         row_of[k] = rows[key]
     return row_of, ShapeTable(distinct)
 

@@ -256,9 +256,16 @@ def _row_number(k, count: int) -> int:
 class WorldResult:
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows; ``rows`` is the
-    structured array (n,) of `PAIR_DTYPE` itself. ``names`` resolves the ids; ``pair(k)`` is row k as a `PairResult`,
-    with its certificate.
+    Parameters
+    ----------
+    rows : (n,) `PAIR_DTYPE`, a and b the ids of bodies.
+    bodies : {id: body as it stood}, with ``name``, ``shape`` and ``X_WB`` (4, 4).
+    certify : what makes certificates of a row, `collide.certify`.
+
+    Notes
+    -----
+    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names`` resolves
+    the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
     """
 
     __slots__ = ("_bodies", "_certify", "rows")
@@ -269,7 +276,17 @@ class WorldResult:
     def pair(self, k: int) -> PairResult[Single]:
         """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate.
 
-        Raises IndexError.
+        Parameters
+        ----------
+        k : its number; negative ones count from the end.
+
+        Returns
+        -------
+        PairResult : of the bodies as they stood.
+
+        Raises
+        ------
+        IndexError, InvalidArgument
         """
         row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]

@@ -63,7 +63,7 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     if not (is_plain(A) and is_plain(B)):
         return None
     packed = [shape.parts()[0][0] for shape in (A, B)]
-    swept = [p.kind == POINTS and p.slop == 0.0 for p in packed]
+    is_swept_points = [p.kind == POINTS and p.slop == 0.0 for p in packed]
     total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
     first = float(total)
     if first > total:
@@ -71,10 +71,10 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     rest = float(total - Fraction(first))
     if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
         return None
-    if all(swept):
+    if all(is_swept_points):
         return ConvexHull(packed[0].points, radius=first), ConvexHull(packed[1].points, radius=rest)
-    if rest == 0.0 and swept[0] and packed[1].kind == HALFSPACE:
+    if rest == 0.0 and is_swept_points[0] and packed[1].kind == HALFSPACE:
         return ConvexHull(packed[0].points, radius=first), B
-    if rest == 0.0 and swept[1] and packed[0].kind == HALFSPACE:
+    if rest == 0.0 and is_swept_points[1] and packed[0].kind == HALFSPACE:
         return A, ConvexHull(packed[1].points, radius=first)
     return None

@@ -15,7 +15,7 @@ from collide import argument_checks as reading
 from collide import log as journal
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.certificates.make_certificate import certify
-from collide.contact.contact_query import check_margin, check_most, contact_rows
+from collide.contact.contact_query import check_margin, check_max_contacts, contact_rows
 from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.packed_world import PackedWorld
@@ -181,7 +181,20 @@ class World:
         return self._bodies.names
 
     def body(self, body: int | str) -> Body:
-        """The body of this id or name, as it stands now. Raises UnknownBody."""
+        """The body of this id or name, as it stands now.
+
+        Parameters
+        ----------
+        body : its id or name.
+
+        Returns
+        -------
+        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves do not reach it.
+
+        Raises
+        ------
+        UnknownBody
+        """
         return self._bodies.body(self._bodies.id_of(body))
 
     # --- queries --------------------------------------------------------------------------------
@@ -269,7 +282,7 @@ class World:
         ------
         InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
         """
-        margin, max_contacts = check_margin("World.contacts", margin), check_most("World.contacts", max_contacts)
+        margin, max_contacts = check_margin("World.contacts", margin), check_max_contacts("World.contacts", max_contacts)
         packed = self._pack()
         names, shapes, X_WBs = packed.roster.names, packed.roster.shapes, packed.X_WBs
         of_pairs = [no_rows()]
@@ -284,8 +297,9 @@ class World:
         return WorldContacts(rows, self._to_ids(rows))
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
-        """Pairs for which `distances` raises UnsupportedQuery. Allow these pairs, and the rest of the World is
-        answered.
+        """Pairs for which `distances` raises UnsupportedQuery.
+
+        Allow these pairs, and the rest of the World is answered.
 
         Parameters
         ----------

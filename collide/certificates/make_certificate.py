@@ -101,8 +101,8 @@ def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair
 
 
 def _search(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair] = ((0, 0),)) -> list[VertexPair]:
-    P, Q, _ = common_vertices(A, B)
-    return nearest_vertex_pairs(P, Q, pairs)
+    points_a, points_b, _ = common_vertices(A, B)
+    return nearest_vertex_pairs(points_a, points_b, pairs)
 
 
 # --- pairs with a mesh --------------------------------------------------------------------------
