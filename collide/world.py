@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from collide import argument_checks as reading
-from collide import log as journal
+from collide import argument_checks as checks
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.certificates.make_certificate import certify
 from collide.contact.contact_query import check_margin, check_max_contacts, contact_rows
 from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.log import log_duration
 from collide.packed_world import PackedWorld
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.security_margin import checked_margin, within
@@ -146,7 +146,7 @@ class World:
         UnknownBody; InvalidArgument : the same body twice, or a matrix of another form.
         """
         if b is None:
-            matrix = reading.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
+            matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
             self._allow_matrix(matrix, reason)
         else:
             i, j = self._bodies.id_of(a), self._bodies.id_of(b)
@@ -260,7 +260,7 @@ class World:
         InvalidArgument; UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names
         them.
         """
-        limit = reading.limit("World.distances: max_distance", max_distance)
+        limit = checks.limit("World.distances: max_distance", max_distance)
         rows = self._answer(limit)
         return self._result(rows[_within(rows, limit)])
 
@@ -309,7 +309,7 @@ class World:
         -------
         [(id, id, reason), …], sorted. Such are some shapes against a mesh.
         """
-        limit = reading.limit("World.unanswerable: max_distance", max_distance)
+        limit = checks.limit("World.unanswerable: max_distance", max_distance)
         packed = self._pack()
         ids = packed.roster.ids.tolist()
         return [(ids[a], ids[b], reason) for a, b, reason in packed.refused(packed.candidates(limit), limit)]
@@ -334,9 +334,9 @@ class World:
         ------
         InvalidArgument, InvalidPose; UnsupportedQuery : for pairs that `collide.distance` does not answer.
         """
-        limit = reading.limit("World.query: max_distance", max_distance)
+        limit = checks.limit("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.query: shape must be a shape, got {reading.told(shape)}")
+            raise InvalidArgument(f"World.query: shape must be a shape, got {checks.describe(shape)}")
         X_WS = as_pose(X_WS, "World.query: X_WS").copy()
         rows = self._pack().against(shape, X_WS, limit)
         rows = rows[_within(rows, limit)]
@@ -400,7 +400,7 @@ class World:
     def _pack(self) -> PackedWorld:
         moved = self._bodies.take_moved()
         if self._packed is None:
-            with journal.told("tables and box-tree of a World of %d bodies made", len(self)):
+            with log_duration("tables and box-tree of a World of %d bodies made", len(self)):
                 roster = self._bodies.roster()
                 position = {identity: k for k, identity in enumerate(roster.ids.tolist())} if self._allowed else {}
                 allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose, as_poses
@@ -131,14 +131,14 @@ class WorldBodies:
         """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
         if not isinstance(shape, Shape):
             raise InvalidArgument(
-                f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {reading.told(shape)}"
+                f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {checks.describe(shape)}"
             )
         X_WB = _IDENTITY if X_WB is None else as_pose(X_WB, "World.add: X_WB")
         identity, row = self._next, len(self._ids)
         if name is None:
             name = f"body {identity}"
         elif not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {reading.told(name)}")
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.describe(name)}")
         if name in self._id_of:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
         flags = _flag("static", static), _bits("group", group), _bits("mask", mask)
@@ -190,10 +190,10 @@ class WorldBodies:
             raise UnknownBody(
                 f'no body is named "{body}"; there are: {known}{", …" if len(self._id_of) > 12 else ""}'
             )
-        if not reading.is_whole(body):
-            raise UnknownBody(f"a body is named by its id or its name, got {reading.told(body)}")
+        if not checks.is_integer(body):
+            raise UnknownBody(f"a body is named by its id or its name, got {checks.describe(body)}")
         if body not in self._row_of:
-            raise UnknownBody(f"no body has id {reading.told(body)}; it may have been removed")
+            raise UnknownBody(f"no body has id {checks.describe(body)}; it may have been removed")
         return int(body)
 
     def name_of(self, identity: int) -> str:
@@ -259,10 +259,10 @@ def _flag(field: str, value) -> bool:
         return value
     if isinstance(value, np.bool_) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"World.add: {field} must be True or False, got {reading.told(value)}")
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.describe(value)}")
 
 
 def _bits(field: str, value) -> int:
-    if not reading.is_whole(value) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {reading.told(value)}")
+    if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.describe(value)}")
     return int(value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import Body, facet_body
 from collide.transforms import as_poses
@@ -12,7 +12,7 @@ from collide.transforms import as_poses
 
 def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
     """((n, 3) finite float64, whether a single vector was handed in). Raises InvalidArgument."""
-    array = reading.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
+    array = checks.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {array.shape}")
     rows = np.ascontiguousarray(array.reshape(-1, 3))

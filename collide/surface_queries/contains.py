@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
@@ -64,7 +64,7 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     """
     if not isinstance(shape, Shape):
         raise InvalidArgument(
-            f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}"
+            f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
         )
     points, single_point = vectors("contains", "points_W", points_W)
     refuse_rows("contains", "points_W", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.lowering.facet_bodies import Body, facet_body
 from collide.narrowphase.facets import ray_surface as layout
 from collide.narrowphase.facets.facet_queries import facets_on_rays
@@ -101,7 +101,7 @@ def raycast(
     that doubles leave open (through edges, along facets) take some 0.1 ms a facet.
     """
     body = facet_body(shape, "raycast")
-    limit = reading.limit("raycast: max_distance", max_distance, "")
+    limit = checks.limit("raycast: max_distance", max_distance, "")
     X_WA, rays, exponents, single = _checked_rays(body, X_WA, origins_W, directions_W, limit, check_poses)
     n = len(rays)
     hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], rays, not all_hits)
