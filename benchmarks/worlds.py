@@ -36,7 +36,7 @@ RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (100, 1000, 10_000, 100_000)
 #: Metres of the cube's side, by the third root of the number of bodies.
 SPREAD = {"sparse": 12.0, "crowded": 1.6}
-#: Seconds that the turns of one size may take, and how many there are.
+#: Seconds that the turns of obj size may take, and how many there are.
 SECONDS, TURNS = 40.0, 9
 
 SHAPES = (collide.Box((1.0, 0.8, 0.6)), collide.Sphere(0.5), collide.Capsule(0.3, 0.6))
@@ -57,7 +57,7 @@ class Ours:
     """`collide.World`."""
 
     def __init__(self, X: np.ndarray):
-        self.X, self.turn, self.ids = X, 0, np.arange(len(X[0]))
+        self.X, self.at, self.ids = X, 0, np.arange(len(X[0]))
         self.world = self.add()
 
     def add(self) -> collide.World:
@@ -67,8 +67,8 @@ class Ours:
         return world
 
     def move(self) -> None:
-        self.turn = 1 - self.turn
-        self.world.set_poses(self.ids, self.X[self.turn])
+        self.at = 1 - self.at
+        self.world.set_poses(self.ids, self.X[self.at])
 
     def hits(self) -> set[tuple[int, int]]:
         rows = self.world.collisions()
@@ -91,7 +91,7 @@ class Coal:
     def __init__(self, X: np.ndarray):
         import coal
 
-        self.coal, self.X, self.turn = coal, X, 0
+        self.coal, self.X, self.at = coal, X, 0
         box, ball, capsule = coal.Box(*SHAPES[0].size), coal.Sphere(0.5), coal.Capsule(0.3, 0.6)
         self.geometries = box, ball, capsule
         self.transforms = [
@@ -103,16 +103,16 @@ class Coal:
         coal, n = self.coal, len(self.X[0])
         manager = coal.DynamicAABBTreeCollisionManager()
         objects = [coal.CollisionObject(self.geometries[k % 3], self.transforms[0][k]) for k in range(n)]
-        for one in objects:
-            manager.registerObject(one)
+        for obj in objects:
+            manager.registerObject(obj)
         manager.setup()
         return manager, objects
 
     def move(self) -> None:
-        self.turn = 1 - self.turn
-        for one, transform in zip(self.objects, self.transforms[self.turn]):
-            one.setTransform(transform)
-            one.computeAABB()
+        self.at = 1 - self.at
+        for obj, transform in zip(self.objects, self.transforms[self.at]):
+            obj.setTransform(transform)
+            obj.computeAABB()
         self.manager.update()
 
     def collides(self) -> bool:
@@ -132,7 +132,7 @@ class Coal:
         coal = self.coal
         callback = coal.CollisionCallBackCollect(1 << 24)
         self.manager.collide(callback)
-        place = {one: k for k, one in enumerate(self.objects)}
+        place = {obj: k for k, obj in enumerate(self.objects)}
         hits, request = set(), coal.CollisionRequest()
         for a, b in callback.getCollisionPairs():
             result = coal.CollisionResult()
@@ -154,7 +154,7 @@ class Fcl:
     def __init__(self, X: np.ndarray):
         import fcl
 
-        self.fcl, self.X, self.turn = fcl, X, 0
+        self.fcl, self.X, self.at = fcl, X, 0
         self.geometries = fcl.Box(*SHAPES[0].size), fcl.Sphere(0.5), fcl.Capsule(0.3, 0.6)
         self.transforms = [[fcl.Transform(x[:3, :3], x[:3, 3]) for x in some] for some in X]
         self.manager, self.objects = self.add()
@@ -168,19 +168,19 @@ class Fcl:
         return manager, objects
 
     def move(self) -> None:
-        self.turn = 1 - self.turn
-        for one, transform in zip(self.objects, self.transforms[self.turn]):
-            one.setTransform(transform)
+        self.at = 1 - self.at
+        for obj, transform in zip(self.objects, self.transforms[self.at]):
+            obj.setTransform(transform)
         self.manager.update()
 
-    def collisions(self, most: int):
-        data = self.fcl.CollisionData(request=self.fcl.CollisionRequest(num_max_contacts=most))
+    def collisions(self, max_contacts: int):
+        data = self.fcl.CollisionData(request=self.fcl.CollisionRequest(num_max_contacts=max_contacts))
         self.manager.collide(data, self.fcl.defaultCollisionCallback)
         return data.result
 
     def hits(self) -> set[tuple[int, int]]:
         # The callback gets objects of its own: they are known by where they are.
-        place = {tuple(one.getTranslation()): k for k, one in enumerate(self.objects)}
+        place = {tuple(obj.getTranslation()): k for k, obj in enumerate(self.objects)}
         hits, request = set(), self.fcl.CollisionRequest()
 
         def ask(a, b, _data) -> bool:
@@ -235,10 +235,10 @@ def measure(n: int, density: str) -> list[dict]:
     tasks = {(name, task): call for name, engine in made.items() for task, call in engine.tasks().items()}
     times: dict[tuple[str, str], list[float]] = {key: [] for key in tasks}
     started = time.perf_counter()
-    for turn in range(TURNS):
+    for round_number in range(TURNS):
         for key, call in tasks.items():
             times[key].append(cpu_time(call) / n * 1e6)
-        if turn >= 2 and time.perf_counter() - started > SECONDS:
+        if round_number >= 2 and time.perf_counter() - started > SECONDS:
             break
     ours = {task: statistics.median(values) for (name, task), values in times.items() if name == "collide"}
     return [

@@ -264,8 +264,8 @@ class WorldResult:
 
     Notes
     -----
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names`` resolves
-    the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
+    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names``
+    resolves the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
     """
 
     __slots__ = ("_bodies", "_certify", "rows")

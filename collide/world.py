@@ -282,7 +282,8 @@ class World:
         ------
         InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
         """
-        margin, max_contacts = check_margin("World.contacts", margin), check_max_contacts("World.contacts", max_contacts)
+        margin = check_margin("World.contacts", margin)
+        max_contacts = check_max_contacts("World.contacts", max_contacts)
         packed = self._pack()
         names, shapes, X_WBs = packed.roster.names, packed.roster.shapes, packed.X_WBs
         of_pairs = [no_rows()]

@@ -264,5 +264,7 @@ def _flag(field: str, value) -> bool:
 
 def _bits(field: str, value) -> int:
     if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.describe(value)}")
+        raise InvalidArgument(
+            f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.describe(value)}"
+        )
     return int(value)

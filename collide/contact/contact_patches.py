@@ -101,8 +101,11 @@ def _overlapping(
     them.
     """
     n_facets_b = len(frame.B.tree.ids)
-    wanted = touching.near.facets[translation.pairs]
-    seeds = np.isin(pairs.near.facets[:, 0] * n_facets_b + pairs.near.facets[:, 1], wanted[:, 0] * n_facets_b + wanted[:, 1])
+    keys, wanted = (
+        facets[:, 0] * n_facets_b + facets[:, 1]
+        for facets in (pairs.near.facets, touching.near.facets[translation.pairs])
+    )
+    seeds = np.isin(keys, wanted)
     deepest = _DEEPEST * translation.length + STEP_ERRORS * frame.error
     whole, points = _grow_patch(frame, pairs, links, translation.normal, seeds, reach, deepest)
     patches, unexplained = [], False
@@ -123,7 +126,9 @@ def _overlapping(
     return patches, unexplained
 
 
-def _gaps(frame: ContactFrame, pairs: Pairs, links: Links, covered: np.ndarray, overlapping: list, reach: float) -> list[Patch]:
+def _gaps(
+    frame: ContactFrame, pairs: Pairs, links: Links, covered: np.ndarray, overlapping: list, reach: float
+) -> list[Patch]:
     """Patches of pairs that are apart, the nearest first."""
     A, B = frame.A, frame.B
     has_direction = (pairs.near.point_a != pairs.near.point_b).any(axis=1)
@@ -141,7 +146,8 @@ def _gaps(frame: ContactFrame, pairs: Pairs, links: Links, covered: np.ndarray, 
     starts = np.zeros(len(pairs), dtype=bool)
     starts[asked[least]] = True
     nearest = asked[int(np.argmin(length))]
-    if not overlapping and pairs.near.lower[starts].min(initial=np.inf) > pairs.near.length[nearest] + STEP_ERRORS * frame.error:
+    rounding = STEP_ERRORS * frame.error
+    if not overlapping and pairs.near.lower[starts].min(initial=np.inf) > pairs.near.length[nearest] + rounding:
         starts[nearest] = True  # nothing is nearer, whatever rounding makes of its neighbours
     for patch, members in overlapping:  # gaps connected with an overlap, in its direction, are part of it
         same = starts & (lengths_of(u - patch.normal) <= slack + 2.0**-20)

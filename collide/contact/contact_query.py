@@ -33,8 +33,9 @@ _LARGEST_MARGIN = 1e50
 
 
 def contacts(
-    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8, check_poses: bool = True
-) -> Contacts:
+    A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8,
+    check_poses: bool = True,
+) -> Contacts:  # fmt: skip
     """Contact manifolds of A and B: where they touch, overlap, or come within a margin.
 
     Parameters
@@ -90,7 +91,9 @@ def contacts(
     return Contacts(np.concatenate([no_rows(), *of_pairs]), starts)
 
 
-def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int) -> np.ndarray:
+def contact_rows(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int
+) -> np.ndarray:
     """Rows of two shapes at checked poses (4, 4): none where `distance` proves them farther apart than the margin."""
     rows = _rows_of_parts(A, B, X_WA, X_WB, margin, max_contacts)
     # Parts are asked a little beyond the margin, for what rounding may have moved; where it matters `distance` decides.
@@ -101,7 +104,7 @@ def contact_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
     return no_rows()
 
 
-def _rows_of_parts(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int) -> np.ndarray:
+def _rows_of_parts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     parts_a, parts_b = _parts(A, X_WA), _parts(B, X_WB)
     if len(parts_a) == len(parts_b) == 1 and parts_a[0][2] == parts_b[0][2] == 0.0:
         return contacts_of_pair(parts_a[0][0], parts_b[0][0], parts_a[0][1], parts_b[0][1], margin, max_contacts)

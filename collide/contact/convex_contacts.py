@@ -41,12 +41,14 @@ def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts:
         if packed_a.kind == HALFSPACE:
             return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
         return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
-    if packed_b.content < packed_a.content or (packed_b.content == packed_a.content and X_WA[:3].tolist() > X_WB[:3].tolist()):
+    if (packed_b.content, X_WB[:3].tolist()) < (packed_a.content, X_WA[:3].tolist()):
         return flipped_contacts(_ordered(B, A, packed_b, packed_a, X_WB, X_WA, margin, max_contacts))
     return _ordered(A, B, packed_a, packed_b, X_WA, X_WB, margin, max_contacts)
 
 
-def _ordered(A: Shape, B: Shape, packed_a: PackedConvex, packed_b: PackedConvex, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
+def _ordered(
+    A: Shape, B: Shape, packed_a: PackedConvex, packed_b: PackedConvex, X_WA, X_WB, margin: float, max_contacts: int
+) -> np.ndarray:
     row = _answer(A, B, X_WA, X_WB, margin)
     if row is None:
         return no_rows()
@@ -61,7 +63,9 @@ def _ordered(A: Shape, B: Shape, packed_a: PackedConvex, packed_b: PackedConvex,
     if len(a[0]) and len(b[0]):
         pairs = _product(a, b)
         overlap_corners = points_along(pairs, n, True, True, error)
-        overlap_corners = overlap_corners.take((overlap_corners.gap - radius <= margin + overlap_corners.error) & (overlap_corners.gap - radius >= row["lower"] - _ERRORS * error))
+        gap = overlap_corners.gap - radius
+        is_near = (gap <= margin + overlap_corners.error) & (gap >= row["lower"] - _ERRORS * error)
+        overlap_corners = overlap_corners.take(is_near)
         points, facets = _with_nearest(points, overlap_corners, facets, pairs.near.facets[overlap_corners.pair], error)
     flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
     size = float((flat.max(axis=0) - flat.min(axis=0)).max())
@@ -99,7 +103,8 @@ def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: i
     low, gap = low[near], gap[near]
     slack = float(row["upper"] - row["lower"]) + 32.0 * error
     corners_of_faces = Points(np.arange(len(gap)), low - gap[:, None] * n, low, gap, np.full(len(gap), slack))
-    points, facets = _with_nearest(points, corners_of_faces, facets, np.stack([np.full(len(gap), -1), numbers[near]], axis=1), error)
+    corner_facets = np.stack([np.full(len(gap), -1), numbers[near]], axis=1)
+    points, facets = _with_nearest(points, corners_of_faces, facets, corner_facets, error)
     flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
     size = float((flat.max(axis=0) - flat.min(axis=0)).max())
     selected = reduce_manifold(flat, points.gap, points.error, max_contacts, max(_ERRORS * error, _EQUAL * size))
@@ -111,7 +116,9 @@ def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: i
     return rows_of([PatchContacts(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
 
 
-def _with_nearest(nearest: Points, corners_of_faces: Points, facets: np.ndarray, others: np.ndarray, error: float) -> tuple[Points, np.ndarray]:
+def _with_nearest(
+    nearest: Points, corners_of_faces: Points, facets: np.ndarray, others: np.ndarray, error: float
+) -> tuple[Points, np.ndarray]:
     """The corners of faces; and the nearest points, with their facets, where no corner is as near."""
     known = nearest.gap[0] + nearest.error[0] + _ERRORS * error
     if len(corners_of_faces.gap) and (corners_of_faces.gap - corners_of_faces.error).min() <= known:
@@ -150,9 +157,11 @@ def _nearest(row, packed_a: PackedConvex, packed_b: PackedConvex, n, origin) -> 
 
 def _error(packed_a: PackedConvex, X_WA, packed_b: PackedConvex, X_WB) -> float:
     """Bound of the error of a coordinate seen from A's origin."""
-    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in ((packed_a, X_WA), (packed_b, X_WB)))
+    both = packed_a, packed_b
+    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in zip(both, (X_WA, X_WB)))
     if HALFSPACE in (packed_a.kind, packed_b.kind):
-        reach += sum(abs(float(p.params[3])) / max(1e-300, float(lengths_of(p.params[:3]))) for p in (packed_a, packed_b) if p.kind == HALFSPACE)
+        planes = (p.params for p in both if p.kind == HALFSPACE)
+        reach += sum(abs(float(plane[3])) / max(1e-300, float(lengths_of(plane[:3]))) for plane in planes)
     return 8.0 * _U * reach
 
 
@@ -164,8 +173,8 @@ def _product(a, b) -> Pairs:
         Side(ids[k], corners[k], normals_of(corners)[k], np.zeros((len(k), 3), dtype=np.int64))
         for corners, ids, k in ((corners_a, ids_a, i), (corners_b, ids_b, j))
     ]
-    none = np.zeros(len(i))
-    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), none > 0.0, none, none, np.zeros((len(i), 3)), np.zeros((len(i), 3)))
+    zeros, points = np.zeros(len(i)), np.zeros((len(i), 3))
+    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), zeros > 0.0, zeros, zeros, points, points)
     return Pairs(near, *sides)
 
 

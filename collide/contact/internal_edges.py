@@ -63,7 +63,8 @@ def _leaves(side: Side, point, u, slack, topology: Topology, body: Body, R, shif
     corners = rotated(R, body.tree.triangles[topology.place[facet]].reshape(-1, 3, 3)) + shift
     away = corners - point[pair][:, None]
     rise = (away * u[pair][:, None]).sum(axis=2)
-    steep = (rise > slack[pair][:, None] * lengths_of(away) + _ON * lengths_of(corners[:, 1] - corners[:, 0])[:, None]).any(axis=1)
+    least = slack[pair][:, None] * lengths_of(away) + _ON * lengths_of(corners[:, 1] - corners[:, 0])[:, None]
+    steep = (rise > least).any(axis=1)
     good = np.ones(len(point), dtype=bool)
     good[pair[steep]] = False
     if topology.solid:

@@ -44,7 +44,9 @@ def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
     return rows
 
 
-def _ordered(body_a: Body, body_b: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
+def _ordered(
+    body_a: Body, body_b: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int
+) -> np.ndarray:
     frame = contact_frame(body_a, body_b, X_WA, X_WB)
     rounding = 0.0 if margin + body_a.radius + body_b.radius == 0.0 else STEP_ERRORS * frame.error
     patches, deep = patches_of(frame, margin + rounding)
@@ -98,6 +100,5 @@ def _as_contact(A: Shape, B: Shape, row) -> PatchContacts:
     facets = np.array([[row[part] if has_facets(shape) else -1 for part, shape in (("part_a", A), ("part_b", B))]])
     distance = np.array([row["distance"]])
     apart = -float(row["lower"]) if kind == TRANSLATION else 0.0
-    return PatchContacts(
-        row["normal"], row["point_a"][None], row["point_b"][None], distance, distance - row["lower"], facets, kind, apart
-    )
+    point_a, point_b = row["point_a"][None], row["point_b"][None]
+    return PatchContacts(row["normal"], point_a, point_b, distance, distance - row["lower"], facets, kind, apart)

@@ -8,7 +8,9 @@ import numpy as np
 _STEEP, _LOWEST = 2.0, 512
 
 
-def reduce_manifold(flat: np.ndarray, gap: np.ndarray, error: np.ndarray, max_points: int, tolerance: float) -> list[int]:
+def reduce_manifold(
+    flat: np.ndarray, gap: np.ndarray, error: np.ndarray, max_points: int, tolerance: float
+) -> list[int]:
     """Indices of at most ``max_points`` points, the one of least gap first, then around the patch.
 
     flat : (k, 2) places in the plane across the normal.   gap, error : (k,).   tolerance : lengths below it are

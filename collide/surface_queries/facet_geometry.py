@@ -47,7 +47,9 @@ def facet_normals(X: np.ndarray, corners: np.ndarray) -> np.ndarray:
     u, v = c[1] - c[0], c[2] - c[0]  # a row an axis: quicker by far than rows of three
     sizes = np.maximum(np.abs(u).max(axis=0), np.abs(v).max(axis=0))
     sizes[sizes == 0.0] = 1.0
-    u, v = ([X[:, i, 0] * w[0] + X[:, i, 1] * w[1] + X[:, i, 2] * w[2] for i in range(3)] for w in (u / sizes, v / sizes))
+    u, v = (
+        [X[:, i, 0] * w[0] + X[:, i, 1] * w[1] + X[:, i, 2] * w[2] for i in range(3)] for w in (u / sizes, v / sizes)
+    )
     n = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1)
     lengths = np.sqrt(n[:, 0] * n[:, 0] + n[:, 1] * n[:, 1] + n[:, 2] * n[:, 2])
     for k in np.flatnonzero(~(lengths > _MIN_LENGTH)).tolist():
