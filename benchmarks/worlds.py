@@ -36,7 +36,7 @@ RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (100, 1000, 10_000, 100_000)
 #: Metres of the cube's side, by the third root of the number of bodies.
 SPREAD = {"sparse": 12.0, "crowded": 1.6}
-#: Seconds that the turns of obj size may take, and how many there are.
+#: Seconds that the turns of one size may take, and how many there are.
 SECONDS, TURNS = 40.0, 9
 
 SHAPES = (collide.Box((1.0, 0.8, 0.6)), collide.Sphere(0.5), collide.Capsule(0.3, 0.6))
