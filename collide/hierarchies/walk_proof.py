@@ -79,11 +79,11 @@ def planes_apart(proof, d, error):
     if not span > 0.0:
         return False
     n = divide(d, span)
-    difference_point(proof.pair, proof.points, proof.ids, 0, n.x, n.y, n.z)
+    difference_point(proof.pair, proof.points, proof.ids, 0, n)
     if has_trees(proof.pair):
         if dot(vec3_at(proof.points, 0), n) >= 0.0:
             return False  # a point that is there, farthest or not
-        settle_point(proof.pair, proof.points, proof.ids, 0, n.x, n.y, n.z)
+        settle_point(proof.pair, proof.points, proof.ids, 0, n)
     return -dot(vec3_at(proof.points, 0), n) > 1.000001 * error
 
 
