@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.algorithms import named_algorithm
 from collide.batches import answer_batch, length_of
 from collide.certificates.make_certificate import certify
@@ -181,7 +181,7 @@ def distance(
     Raises InvalidPose, InvalidArgument; UnsupportedQuery where the depth has no end (half-space in
     half-space).
     """
-    limit = reading.limit("max_distance", max_distance)
+    limit = checks.limit("max_distance", max_distance)
     answer = named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidPose
 
 if TYPE_CHECKING:
@@ -77,9 +77,9 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
 
 
 def _finite(name: str, values, shape) -> np.ndarray:
-    array = reading.array(f"pose: {name}", values, str(shape), InvalidPose)
+    array = checks.array(f"pose: {name}", values, str(shape), InvalidPose)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {reading.told(values)}")
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.describe(values)}")
     return array
 
 
@@ -163,7 +163,7 @@ def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.nd
 
 
 def _to_floats(X, name: str) -> np.ndarray:
-    return reading.array(name, X, "(4, 4)", InvalidPose)
+    return checks.array(name, X, "(4, 4)", InvalidPose)
 
 
 def _from_object(X, name: str) -> np.ndarray:
@@ -228,7 +228,7 @@ def _are_surely_poses(batch: np.ndarray) -> bool:
 
 def _block_is_sure(block: np.ndarray) -> bool:
     columns = np.ascontiguousarray(block.reshape(-1, 16).T)
-    a, b, c, x, d, e, f, y, g, h, i, z = columns[:12]
+    (a, b, c), (d, e, f), (g, h, i) = columns[0:3], columns[4:7], columns[8:11]
     worst = np.abs(a * a + d * d + g * g - 1.0)
     for length in (b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0):
         np.maximum(worst, np.abs(length), out=worst)  # NaN stays

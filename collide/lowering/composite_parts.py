@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.extents import extent_of
 from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
@@ -18,7 +19,6 @@ from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import IDENTITY, Shape
-from collide.support.extents import extent_of
 
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.packed_convex import HALFSPACE, POINTS
@@ -93,7 +93,7 @@ def facet_body(shape, caller: str) -> Body:
     Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
+        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}")
     name = type(shape).__name__
     if is_halfspace(shape):
         raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")

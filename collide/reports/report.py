@@ -283,6 +283,6 @@ def versions() -> dict[str, str | None]:
         "collide": collide.__version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "kernels": mode.told(),
+        "kernels": mode.describe_mode(),
         "machine": platform.machine() or None,
     }

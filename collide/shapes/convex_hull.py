@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import log as journal
 from collide.errors import InvalidShape
+from collide.log import log_duration
 from collide.lowering.packed_convex import pack_points
 from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
@@ -96,7 +96,7 @@ class ConvexHull(Shape):
         from collide.hull.exact_hull import convex_hull
 
         if not hasattr(self, "_hull"):
-            with journal.told("convex hull of %d points made", len(self.points)):
+            with log_duration("convex hull of %d points made", len(self.points)):
                 hull = convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from collide import argument_checks as reading
-from collide import log as journal
+from collide import argument_checks as checks
 from collide.errors import InvalidShape, UnsupportedQuery
+from collide.log import log_duration
 from collide.lowering.packed_convex import pack_points
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
@@ -116,7 +116,7 @@ class Mesh(Shape):
     def tree(self) -> MeshTree:
         """The box-tree that queries walk: made when first asked for. A scaled copy's is its base's, boxes scaled."""
         if not hasattr(self, "_tree"):
-            with journal.told("box-tree of a mesh of %d facets made", len(self.faces)):
+            with log_duration("box-tree of a mesh of %d facets made", len(self.faces)):
                 if self._copied is None:
                     from collide.mesh.build_bvh import build_mesh_tree
 
@@ -132,7 +132,7 @@ class Mesh(Shape):
         """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
         if not hasattr(self, "_hull"):
             used = self.vertices[np.unique(self.faces)]
-            with journal.told("convex hull around a mesh of %d facets made", len(self.faces)):
+            with log_duration("convex hull around a mesh of %d facets made", len(self.faces)):
                 if len(used) > _MANY:
                     from collide.hull.exact_hull import convex_hull
 
@@ -153,7 +153,7 @@ class Mesh(Shape):
         if self._copied is not None:
             return self._copied.survey
         if not hasattr(self, "_survey"):
-            with journal.told("surface of a mesh of %d facets looked at", len(self.faces)):
+            with log_duration("surface of a mesh of %d facets looked at", len(self.faces)):
                 survey = survey_surface(self.vertices, self.faces)
             spoilt = self.solid and _what_spoils(len(self.vertices), survey)
             if spoilt:
@@ -351,7 +351,7 @@ def _check_vertices(vertices) -> np.ndarray:
 
 def _check_faces(faces, n: int) -> np.ndarray:
     """(m, 3) int32 ids, read-only, m ≥ 1."""
-    array = reading.plain_array("Mesh: faces", faces, "(m, 3)", InvalidShape)
+    array = checks.plain_array("Mesh: faces", faces, "(m, 3)", InvalidShape)
     if array.size == 0:
         raise InvalidShape(f"Mesh: no facets: faces has shape {array.shape}; at least one row of three ids is needed")
     return facet_ids("Mesh", array, n, np.int32, "vertices 0 … {last}")

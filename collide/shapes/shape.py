@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.lowering.packed_convex import PackedConvex
 from collide.transforms import LARGEST, SMALLEST
@@ -171,10 +171,10 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
     if zero and number == 0.0:
         return 0.0
     if not number > 0:
-        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {checks.describe(value)}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the "
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.describe(value)}; scale the "
             "scene"
         )
     return number
@@ -182,13 +182,15 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
 
 def scalar(shape: str, field: str, value: Any) -> float:
     """A finite real number."""
-    number = reading.number(value)
+    number = checks.number(value)
     if number is None:
-        raise InvalidShape(f"{shape}: {field} must be a number, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be a number, got {checks.describe(value)}")
     if not math.isfinite(number):
-        raise InvalidShape(f"{shape}: {field} must be finite, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be finite, got {checks.describe(value)}")
     if abs(number) > LARGEST:
-        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {reading.told(value)}; scale the scene")
+        raise InvalidShape(
+            f"{shape}: {field} must not exceed {LARGEST:g}, got {checks.describe(value)}; scale the scene"
+        )
     return number
 
 
@@ -205,7 +207,7 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
 def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
     shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
-    array = np.array(reading.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
+    array = np.array(checks.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
     if array.shape[0] == 0:
@@ -222,7 +224,7 @@ def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
 
 def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.ndarray:
     """(m, 3) ids of corners 0 … n − 1, as a read-only copy. corners : what the ids count, for messages."""
-    array = reading.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
+    array = checks.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
     if array.ndim != 2 or array.shape[1] != 3:
         cut = "; cut polygons into triangles" if array.ndim == 2 and array.shape[1] > 3 else ""
         raise InvalidShape(f"{shape}: faces must have shape (m, 3), got {array.shape}{cut}")

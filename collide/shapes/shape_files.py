@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) ->
         with Path(path).open("wb") as file:
             np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
     except (OSError, TypeError, ValueError) as error:
-        raise InvalidShape(f"{who}.save: {reading.told(path)}: {getattr(error, 'strerror', None) or error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidShape(f"{who}.save: {checks.describe(path)}: {reason}") from None
 
 
 def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped: str) -> dict[str, np.ndarray]:
@@ -57,7 +58,7 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     """
     import zipfile  # here, and below: a start of the library need not load it
 
-    named = f"{who}.load: {reading.told(path) if not isinstance(path, (str, Path)) else path}"
+    named = f"{who}.load: {checks.describe(path) if not isinstance(path, (str, Path)) else path}"
     other = f"{named} is of another format; save the shape again"
     try:
         if Path(path).exists() and not Path(path).is_file():

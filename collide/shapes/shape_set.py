@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidShape
 from collide.shapes.shape import Shape, is_plain
 
@@ -53,12 +53,12 @@ class ShapeSet:
         return len(self.shapes)
 
     def __getitem__(self, rows):
-        if reading.is_whole(rows):
+        if checks.is_integer(rows):
             if not -len(self) <= rows < len(self):
                 raise IndexError(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {rows}")
             return self.shapes[rows]
         rows = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
-        numbers = reading.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
+        numbers = checks.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
         if numbers.size == 0 and numbers.ndim == 1:
             numbers = numbers.astype(np.int64)
         if numbers.ndim != 1 or numbers.dtype.kind not in "iu":

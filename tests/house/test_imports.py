@@ -80,7 +80,6 @@ ROOMS = {
 #: Imports against the flow that are still there: rooms, and what they have to let go of. Each is asserted to be needed.
 TO_GO = {
     "shapes": {"lowering"},
-    "support": {"lowering"},
     "lowering": {"broadphase", "narrowphase"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
