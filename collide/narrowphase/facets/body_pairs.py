@@ -22,7 +22,14 @@ from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
 from collide.narrowphase.facets.exact_triangles import decide_exactly
-from collide.narrowphase.facets.facet_queries import HEAP, Workspace, not_invertible, stack_of, surface_distances, workspace
+from collide.narrowphase.facets.facet_queries import (
+    HEAP,
+    Workspace,
+    not_invertible,
+    stack_of,
+    surface_distances,
+    workspace,
+)
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.surface_pairs import (
     APART,
