@@ -14,7 +14,7 @@ from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
 from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT
-from collide.narrowphase.exact.settle_hulls import WORKSPACE
+from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import surface_pairs as pairs

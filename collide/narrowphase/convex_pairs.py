@@ -30,17 +30,17 @@ from collide.narrowphase.epa.polytope_surface import INTEGERS as EPA_INTEGERS
 from collide.narrowphase.exact.depth_requests import ENTRY, REQUESTS, add_request
 from collide.narrowphase.gap.gap_queue import (
     KINDS,
-    WAITING_DOUBLES,
-    WAITING_INTEGERS,
-    can_wait,
-    nobody_waits,
-    polish_waiting,
-    put_down,
+    QUEUE_DOUBLES,
+    QUEUE_INTEGERS,
+    clear_queue,
+    enqueue,
+    refine_queued,
     write_guess,
 )
+from collide.narrowphase.gap.precise_pair import is_refinable
 from collide.narrowphase.gjk.minkowski_difference import POINT, combined
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
-from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, polish_height, reach_of_plane
+from collide.narrowphase.halfspace_convex import opposite_halfspaces, plane_in_world, reach_of_plane, refine_height
 from collide.narrowphase.posed_pair import ordered_pair, radius_of
 from collide.narrowphase.rows import (
     CERTIFIED,
@@ -61,15 +61,17 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
-from collide.numerics.double_double import add, bracket
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD
+from collide.numerics.vec3 import Vec3
 from collide.results import FORMULA, PLANE, REFUSED, SIMPLEX, SWEPT, UNDECIDED
 from collide.support.support_mapping import settled_vertex, support
 from collide.transforms import SMALLEST
 
 #: Workspace of one thread: behind EPA's what waits for its last digits; the requests to the exact stage stand last.
-_WAITING_DOUBLES_AT, _WAITING_INTEGERS_AT = OWN_DOUBLES + EPA_DOUBLES, OWN_INTEGERS + EPA_INTEGERS
-REQUESTS_AT = _WAITING_INTEGERS_AT + WAITING_INTEGERS
-DOUBLES, INTEGERS = _WAITING_DOUBLES_AT + WAITING_DOUBLES, REQUESTS_AT + REQUESTS
+_QUEUE_DOUBLES_AT, _QUEUE_INTEGERS_AT = OWN_DOUBLES + EPA_DOUBLES, OWN_INTEGERS + EPA_INTEGERS
+REQUESTS_AT = _QUEUE_INTEGERS_AT + QUEUE_INTEGERS
+DOUBLES, INTEGERS = _QUEUE_DOUBLES_AT + QUEUE_DOUBLES, REQUESTS_AT + REQUESTS
 
 
 @kernel(inline=True)
@@ -116,12 +118,12 @@ def _swept(
     if not boolean:
         width = PROMISE_CURVED * size if curved else (0.0 if exactly else PROMISE_STORED * size)
         gap = exactly and not curved and depth < -error and lower <= limit
-        if gap and can_wait(size):
-            write_guess(row, distance, lower, upper, nx, ny, nz)
+        if gap and is_refinable(size):
+            write_guess(row, distance, lower, upper, Vec3(nx, ny, nz))
             write_vertices(words, marks, ids, vertices, flip)
-            return put_down(
+            return enqueue(
                 pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, error,
-                doubles_at + 8 * _WAITING_DOUBLES_AT, integers_at + 8 * _WAITING_INTEGERS_AT,
+                doubles_at + 8 * _QUEUE_DOUBLES_AT, integers_at + 8 * _QUEUE_INTEGERS_AT,
             )  # fmt: skip
     # Radii may prove an overlap of cores between which doubles see no clear direction.
     vague = gap and radius > 0.0
@@ -206,14 +208,12 @@ def _half(pair, row, words, marks, doubles_at, integers_at, boolean, limit, size
     exactly = known and B.kind == POINTS
     width = 0.0 if exactly else math.inf
     if exactly and lower <= limit and not boolean:
-        proven, height, height_low, unsure = polish_height(
-            pair, doubles_at + 8 * FINE_AT, integers_at + 8 * TIES, k, size, error, skew
-        )
-        if proven:
-            height, height_low = add(height, height_low, -radius, 0.0)
-            low, gap, high = bracket(height, height_low, unsure)
-            lower = max(lower, low)
-            upper = min(upper, high)
+        refined = refine_height(pair, doubles_at + 8 * FINE_AT, integers_at + 8 * TIES, k, size, error, skew)
+        if refined.proven:
+            bracket = dd.bracket(dd.sub(refined.height, DD(radius, 0.0)), refined.error)
+            gap = bracket.nearest
+            lower = max(lower, bracket.lower)
+            upper = min(upper, bracket.upper)
     write_verdict(row, marks, gap, lower, upper, FORMULA, math.inf if boolean else width, limit)
     if exactly and (not decided or (marks[CERTIFIED] == 0 and not boolean)):
         marks[HOW] = UNDECIDED  # the sign or the last digits are for integers to find
@@ -268,17 +268,17 @@ def answer_pairs(
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     view_i64(integers_at + 8 * REQUESTS_AT, 1)[0] = 0
-    waiting_at = integers_at + 8 * _WAITING_INTEGERS_AT
-    waiting = view_i64(waiting_at, KINDS)
+    queue_at = integers_at + 8 * _QUEUE_INTEGERS_AT
+    n_queued = view_i64(queue_at, KINDS)
     # Whoever still waits when all pairs have had their turn is seen to then, kind by kind.
     most = 1 if stop_at_hit else LANES
     begun = 0
     if not depths and not stop_at_hit:
         begun = answer_small_hulls(
             ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at,
-            doubles_at + 8 * _WAITING_DOUBLES_AT, waiting_at,
+            doubles_at + 8 * _QUEUE_DOUBLES_AT, queue_at,
         )  # fmt: skip
-    nobody_waits(waiting_at)
+    clear_queue(queue_at)
     for turn in range(n_pairs if boolean else n_pairs + KINDS):
         kind = turn - n_pairs
         if begun > 0 and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
@@ -288,9 +288,9 @@ def answer_pairs(
                 ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1], turn, begun > 0, boolean,
                 depths, limit, rows_at, doubles_at, integers_at,
             )  # fmt: skip
-        if kind >= 0 and waiting[kind] >= (most if turn < n_pairs else 1):
-            polish_waiting(
-                ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, doubles_at + 8 * _WAITING_DOUBLES_AT, waiting_at
+        if kind >= 0 and n_queued[kind] >= (most if turn < n_pairs else 1):
+            refine_queued(
+                ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, doubles_at + 8 * _QUEUE_DOUBLES_AT, queue_at
             )
         if stop_at_hit and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HIT] == 1:
             return turn + 1

@@ -16,11 +16,12 @@ from collide.narrowphase.epa.origin_foot import weigh_nearest, weigh_origin
 from collide.narrowphase.epa.polytope_surface import FACET, number, workspace
 from collide.narrowphase.epa.refine_depth import refine
 from collide.narrowphase.exact.depth_requests import ENTRY
-from collide.narrowphase.gap.precise_pair import FINE
-from collide.narrowphase.gap.tied_vertices import MOST_TIES
+from collide.narrowphase.gap.precise_pair import LOW_PARTS_OF_PAIR
+from collide.narrowphase.gap.tied_vertices import MAX_TIES
 from collide.narrowphase.gjk.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.gjk.minkowski_difference import POINT, combined
 from collide.narrowphase.gjk.simplex import face_weights, nearest_of_all, weigh_enclosed
+from collide.numerics.double_double import STRIDE
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
 
 # Workspace ahead of what EPA needs: five difference points and their ids, weights; what the last digits of depths and
@@ -28,8 +29,8 @@ from collide.numerics.exact_dot_sign import PRODUCT_TERMS
 WEIGHTS = 5 * POINT
 FINE_AT = 64
 _NEAREST, TIES = 10, 16
-TIED = TIES + max(MOST_TIES + 1, PRODUCT_TERMS)
-OWN_DOUBLES, OWN_INTEGERS = FINE_AT + 5 * FINE + 24, TIED + ENTRY
+TIED = TIES + max(MAX_TIES + 1, PRODUCT_TERMS)
+OWN_DOUBLES, OWN_INTEGERS = FINE_AT + 5 * STRIDE + LOW_PARTS_OF_PAIR, TIED + ENTRY
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
 _NEAR_MISS = 2.0**-48
 #: Of a bracket's width, what weighted points of curved cores may miss the foot by.

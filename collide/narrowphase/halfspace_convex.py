@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.gap.precise_pair import (
     HEIGHT_ERROR,
-    LARGEST_FINE,
-    SMALLEST_FINE,
+    add_products,
     is_composed,
-    scale_of,
+    is_refinable,
+    unit_scale,
 )
-from collide.narrowphase.gap.tied_vertices import MOST_TIES, tied_vertices
-from collide.numerics.double_double import add, divide, multiply, product_of_vectors, square_root, subtract
+from collide.narrowphase.gap.tied_vertices import MAX_TIES, tied_vertices, vertices_of
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD, DDVec3
 from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.vec3 import column_at, divide, dot, rotate_back
 
 
 @kernel
@@ -85,93 +88,74 @@ def _cofactor(poses, p, i, j):
     s = p + 3 * ((i + 2) % 3)
     c = (j + 1) % 3
     d = (j + 2) % 3
-    x, x_low = two_product(poses[r + c], poses[s + d])
-    y, y_low = two_product(poses[r + d], poses[s + c])
-    return subtract(x, x_low, y, y_low)
+    return dd.sub(two_product(poses[r + c], poses[s + d]), two_product(poses[r + d], poses[s + c]))
 
 
 @kernel
-def _set_fine_plane(numbers, at, poses, p, plane):
+def _put_fine_plane(numbers, at, poses, p, plane):
     """`plane_in_world` in double-doubles: n and the offset, eight doubles."""
-    for i in range(3):
-        total = 0.0
-        total_low = 0.0
+    for i in range(4):
+        total = DD(0.0, 0.0)
         for j in range(3):
-            c, c_low = _cofactor(poses, p, i, j)
-            c, c_low = multiply(c, c_low, numbers[at + j], 0.0)
-            total, total_low = add(total, total_low, c, c_low)
-        plane[2 * i] = total
-        plane[2 * i + 1] = total_low
-    total = 0.0
-    total_low = 0.0
-    for j in range(3):
-        c, c_low = _cofactor(poses, p, 0, j)
-        c, c_low = multiply(c, c_low, poses[p + j], 0.0)
-        total, total_low = add(total, total_low, c, c_low)
-    total, total_low = multiply(total, total_low, numbers[at + 3], 0.0)
-    plane[6] = total
-    plane[7] = total_low
+            # The offset's determinant is expanded along the first row.
+            factor = numbers[at + j] if i < 3 else poses[p + j]
+            total = dd.add(total, dd.mul(_cofactor(poses, p, i % 3, j), DD(factor, 0.0)))
+        if i == 3:
+            total = dd.mul(total, DD(numbers[at + 3], 0.0))
+        plane[2 * i] = total.high
+        plane[2 * i + 1] = total.low
 
 
 @kernel(inline=True)
-def _fine_coordinate(coordinates, m, k, poses, p, q, axis):
-    """A coordinate of R_B b + p_WB − p_WA for vertex k, a double-double as good as `fine.fine_point`."""
-    r = q + 3 * axis
+def _fine_coordinate(b, poses, p, q, axis):
+    """A coordinate of R_B b + p_WB − p_WA, as good as those of `precise_pair.put_difference`."""
     total, rest = two_sum(poses[q + 9 + axis], -poses[p + 9 + axis])
-    for j in range(3):
-        term, e = two_product(poses[r + j], coordinates[j * m + k])
-        total, f = two_sum(total, term)
-        rest += e + f
+    total, rest = add_products(total, rest, poses, q + 3 * axis, b)
     return two_sum(total, rest)
 
 
+class RefinedHeight(NamedTuple):
+    """Signed distance of a core from a half-space [m], within ``error``, if proven."""
+
+    proven: bool
+    height: DD
+    error: float
+
+
 @kernel
-def polish_height(pair, doubles_at, ties_at, vertex, size, error, skew):
-    """(proven, height, low part, error): the signed distance of B's core from a half-space A, to its last digit.
+def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
+    """The signed distance of B's core from a half-space A, to its last digit.
 
     vertex : the deepest, as doubles say.   size, error, skew : as `reach_of_plane` makes them.
-    doubles_at, ties_at : workspace of eight doubles, MOST_TIES + 1 integers.
+    doubles_at, ties_at : workspace of eight doubles, MAX_TIES + 1 integers.
     Composed poses are left to the exact stage.
     """
     A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
     p, q = A.pose_at, B.pose_at
-    if is_composed(poses, p) or is_composed(poses, q) or not (SMALLEST_FINE < size < LARGEST_FINE):
-        return False, 0.0, 0.0, 0.0
+    if is_composed(poses, p) or is_composed(poses, q) or not is_refinable(size):
+        return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     plane = view_f64(doubles_at, 8)
-    ties = view_i64(ties_at, MOST_TIES + 1)
-    _set_fine_plane(numbers, A.params_at, poses, p, plane)
-    square, square_low = product_of_vectors(
-        plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
-        plane[0], plane[1], plane[2], plane[3], plane[4], plane[5],
-    )  # fmt: skip
-    length, length_low = square_root(square, square_low)
-    if not (2.0**-300 < length < 2.0**300):
-        return False, 0.0, 0.0, 0.0
-    dx = plane[0] / length
-    dy = plane[2] / length
-    dz = plane[4] / length
-    gx = poses[q] * dx + poses[q + 3] * dy + poses[q + 6] * dz
-    gy = poses[q + 1] * dx + poses[q + 4] * dy + poses[q + 7] * dz
-    gz = poses[q + 2] * dx + poses[q + 5] * dy + poses[q + 8] * dz
+    ties = view_i64(ties_at, MAX_TIES + 1)
+    _put_fine_plane(numbers, A.params_at, poses, p, plane)
+    normal = dd.vec3_at(plane, 0)
+    length = dd.sqrt(dd.inner(normal, normal))
+    if not (2.0**-300 < length.high < 2.0**300):
+        return RefinedHeight(False, DD(0.0, 0.0), 0.0)
+    g = rotate_back(poses, q, divide(dd.leading(normal), length.high))
     ties[0] = vertex
-    level, limit = tied_vertices(B.coords, B.n, B.padded, B.tree, ties, gx, gy, gz, error)
-    many = level > MOST_TIES
-    least = math.inf
-    least_low = 0.0
-    for k in range(B.n if many else level):
-        i = k if many else ties[k]
-        if many and B.coords[i] * gx + B.coords[B.padded + i] * gy + B.coords[2 * B.padded + i] * gz > limit:
+    n_tied, limit = tied_vertices(vertices_of(B), ties, g, error)
+    too_many = n_tied > MAX_TIES
+    least = DD(math.inf, 0.0)
+    for k in range(B.n if too_many else n_tied):
+        b = column_at(B.coords, B.padded, k if too_many else ties[k])
+        if too_many and dot(b, g) > limit:
             continue
-        x, x_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 0)
-        y, y_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 1)
-        z, z_low = _fine_coordinate(B.coords, B.padded, i, poses, p, q, 2)
-        height, height_low = product_of_vectors(
-            x, x_low, y, y_low, z, z_low, plane[0], plane[1], plane[2], plane[3], plane[4], plane[5]
+        point = DDVec3(
+            _fine_coordinate(b, poses, p, q, 0), _fine_coordinate(b, poses, p, q, 1), _fine_coordinate(b, poses, p, q, 2)
         )
-        if height < least or (height == least and height_low < least_low):
+        height = dd.inner(point, normal)
+        if dd.less(height, least):
             least = height
-            least_low = height_low
-    least, least_low = subtract(least, least_low, plane[6], plane[7])
-    least, least_low = divide(least, least_low, length, length_low)
+    distance = dd.div(dd.sub(least, DD(plane[6], plane[7])), length)
     # The normal, too, is rounded here, to 2⁻¹⁰⁰·3 of |row|²|m|, and the offset to as much of |row|³ times it.
-    return True, least, least_low, 8.0 * skew * HEIGHT_ERROR / scale_of(size)
+    return RefinedHeight(True, distance, 8.0 * skew * HEIGHT_ERROR / unit_scale(size))

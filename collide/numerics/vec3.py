@@ -6,6 +6,7 @@ A Vec3 costs nothing in machine code: its three doubles are registers.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
@@ -45,6 +46,26 @@ def scale(factor, a):
 @kernel(inline=True)
 def neg(a):
     return Vec3(-a.x, -a.y, -a.z)
+
+
+@kernel(inline=True)
+def norm(a):
+    """|a|. Squares of components below 2⁻⁵³⁷ vanish, above 2⁵¹¹ they overflow."""
+    return math.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+
+
+@kernel(inline=True)
+def norm1(a):
+    """Sum of magnitudes of the components: what rounding errors of a dot product are measured by."""
+    return abs(a.x) + abs(a.y) + abs(a.z)
+
+
+@kernel(inline=True)
+def component(a, axis):
+    """Component 0, 1 or 2: kernels cannot index a tuple by a variable."""
+    if axis == 0:
+        return a.x
+    return a.y if axis == 1 else a.z
 
 
 @kernel(inline=True)

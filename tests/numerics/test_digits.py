@@ -7,21 +7,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from digit_numbers import number_at, put_number
 from reproduction import reproducing
 
 from collide.numerics import digits as D
 
 pytestmark = pytest.mark.plain_kernels
-
-
-def number_at(digits, at: int, n: int) -> int:
-    return sum(int(digits[at + k]) << (D.BITS * k) for k in range(n))
-
-
-def put_number(digits, at: int, n: int, number: int) -> None:
-    for k in range(n):
-        digits[at + k] = (abs(number) >> (D.BITS * k) & (2**D.BITS - 1)) * (1 if number >= 0 else -1)
-    D.carry(digits, at, n)
 
 
 def random_double(rng) -> float:
@@ -66,7 +57,7 @@ def test_sums_of_doubles():
             assert all(0 <= digits[k] < 2**D.BITS for k in range(11))
             value, exponent = D.as_double(digits, 0, 12)
             assert value == float(exact / Fraction(2) ** exponent)  # Fraction → float rounds to nearest
-            value, low, exponent = D.as_double_double(digits, 0, 12)
+            (value, low), exponent = D.as_double_double(digits, 0, 12)
             both = (Fraction(value) + Fraction(low)) * Fraction(2) ** exponent
             assert abs(both - exact) <= abs(exact) / 2**80
         signs[found] += 1

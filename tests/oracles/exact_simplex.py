@@ -17,7 +17,9 @@ class Nearest(NamedTuple):
 
 
 def exact(points) -> list[tuple[Fraction, ...]]:
-    return [tuple(map(Fraction, map(float, point))) for point in points]
+    """Rows of doubles, integers or fractions."""
+    rows = [row.tolist() if hasattr(row, "tolist") else row for row in points]
+    return [tuple(Fraction(x) for x in row) for row in rows]
 
 
 def inner(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:

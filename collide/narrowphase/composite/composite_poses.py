@@ -28,7 +28,7 @@ from collide.narrowphase.composite.composite_rows import (
     first_upper_of,
 )
 from collide.narrowphase.convex_pairs import SIGNATURE
-from collide.narrowphase.exact.depth_requests import ROWS_TOGETHER
+from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
 from collide.results import REFUSED, UNDECIDED
@@ -37,7 +37,7 @@ answer_at = native_call(SIGNATURE)
 
 #: Poses that go through together, and pairs of parts on a list.
 BLOCK = 64
-LIST = ROWS_TOGETHER
+LIST = ROWS_PER_BATCH
 
 #: What `answer_unions` says besides 0: rows of the list are open, or a pose is no pose.
 OPEN, BAD_POSE = range(1, 3)

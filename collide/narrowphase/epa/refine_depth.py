@@ -25,23 +25,22 @@ from collide.narrowphase.epa.polytope_surface import (
     has_room,
     workspace,
 )
-from collide.narrowphase.exact.depth_requests import MOST_TIED
+from collide.narrowphase.exact.depth_requests import MAX_TIED_FACETS
 from collide.narrowphase.gap.precise_pair import (
-    FINE,
     HEIGHT_ERROR,
-    LARGEST_FINE,
     SLOP_ERROR,
-    SMALLEST_FINE,
     fine_height,
     fine_length,
     fine_point,
-    scale_of,
+    is_refinable,
+    put_low_parts,
     set_plane,
-    write_low_parts,
+    unit_scale,
 )
-from collide.narrowphase.gap.tied_vertices import are_alone, settle_level
+from collide.narrowphase.gap.tied_vertices import is_unique_minimiser, lowest_pair
 from collide.narrowphase.gjk.minkowski_difference import place_vertices
-from collide.numerics.double_double import divide, subtract
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import STRIDE
 from collide.support.block_scan import least
 
 #: Vertices added, diagonals flipped and planes taken again before a run hands over the bracket it has.
@@ -77,14 +76,14 @@ def _set_distance(pair, low, surface, fine, distances, known, direction, f, unsu
     _load(pair, low, fine, known, ids, b, scale)
     _load(pair, low, fine, known, ids, c, scale)
     set_plane(fine, a, b, c, direction)
-    length, length_low = fine_length(direction)
-    if length == 0.0:
+    length = fine_length(direction)
+    if length.high == 0.0:
         distances[2 * f] = math.inf
         distances[2 * f + 1] = 0.0
         clearances[f] = math.inf
         return 0.0, 0.0
-    height, height_low = fine_height(fine, a, direction)
-    distance, distance_low = divide(height, height_low, length, length_low)
+    height = fine_height(fine, a, direction)
+    distance, distance_low = dd.div(height, length)
     distances[2 * f] = distance
     distances[2 * f + 1] = distance_low
     # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle lies
@@ -92,24 +91,23 @@ def _set_distance(pair, low, surface, fine, distances, known, direction, f, unsu
     most = 0.0
     least_height = 0.0
     for corner in range(1, 3):
-        other, other_low = fine_height(fine, facets[FACET * f + corner], direction)
-        other, other_low = subtract(other, other_low, height, height_low)
-        most = max(most, other)
-        least_height = min(least_height, other)
+        other = dd.sub(fine_height(fine, facets[FACET * f + corner], direction), height)
+        most = max(most, other.high)
+        least_height = min(least_height, other.high)
     # Corners off by E move the normal by E(|e| + |f|) at most, so its height at a corner by |corner| times that.
     corner = 0.0
     sides = 0.0
     for axis in range(3):
-        x = fine[FINE * a + 2 * axis]
+        x = fine[STRIDE * a + 2 * axis]
         corner += abs(x)
-        sides += abs(fine[FINE * b + 2 * axis] - x) + abs(fine[FINE * c + 2 * axis] - x)
+        sides += abs(fine[STRIDE * b + 2 * axis] - x) + abs(fine[STRIDE * c + 2 * axis] - x)
     tilt = (_PLANE_ERROR + unsure) * corner * sides
-    if height > tilt + unsure * length:
-        nearest = distance + least_height / length
+    if height.high > tilt + unsure * length.high:
+        nearest = distance + least_height / length.high
         clearances[f] = nearest - _ROUNDED * abs(nearest) - unsure
     else:
         clearances[f] = min(distance, 0.0) - unsure
-    return length, (2.0 * most - least_height) / length
+    return length.high, (2.0 * most - least_height) / length.high
 
 
 @kernel
@@ -169,11 +167,8 @@ def _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale)
         _load(pair, low, fine, known, ids, facets[FACET * h + corner], scale)
     a = facets[FACET * h]
     set_plane(fine, a, facets[FACET * h + 1], facets[FACET * h + 2], direction)
-    length, _ = fine_length(direction)
-    height, height_low = fine_height(fine, apex, direction)
-    base, base_low = fine_height(fine, a, direction)
-    height, height_low = subtract(height, height_low, base, base_low)
-    return height > 4.0 * unsure * length
+    height = dd.sub(fine_height(fine, apex, direction), fine_height(fine, a, direction))
+    return height.high > 4.0 * unsure * fine_length(direction).high
 
 
 @kernel(inline=True)
@@ -198,7 +193,7 @@ def _name_tied(surface, distance, f, count, tied):
         g = f if turn == 0 else turn - 1
         if clearances[g] > distance or (turn > 0 and g == f):
             continue
-        if tied[1] == MOST_TIED:
+        if tied[1] == MAX_TIED_FACETS:
             tied[0] = 0
             break
         at = 2 + 6 * tied[1]
@@ -215,7 +210,7 @@ def refine(
 ):  # fmt: skip
     """Grow the surface that `epa` left until its nearest facet is final to the last digits.
 
-    direction_at, corners_at, exact_at : further workspace: FINE + 24 doubles, 6 integers and `settle_level`'s.
+    direction_at, corners_at, exact_at : further workspace: STRIDE + 24 doubles, 6 integers and `lowest_pair`'s.
     tied : an entry of `depth_requests.py` out, where the depth is near rounding.
     count, vertices : as left.   size, slop, error : of the pair.
 
@@ -223,15 +218,15 @@ def refine(
     the distance of the facet's plane, and its direction; no lower one unless the origin is proven to lie inside.
     Not sound: nothing was gained.
     """
-    if not (SMALLEST_FINE < size < LARGEST_FINE):
+    if not is_refinable(size):
         return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count
     surface = workspace(doubles_at, integers_at)
     points, _, _, clearances, ids, facets, starts, _, _ = surface
     fine, distances, known = fine_workspace(doubles_at, integers_at)
-    direction = view_f64(direction_at, FINE)
+    direction = view_f64(direction_at, STRIDE)
     corners = view_i64(corners_at, 6)
-    low = view_f64(direction_at + 8 * FINE, write_low_parts(pair, terms_at, direction_at + 8 * FINE))
-    scale = scale_of(size)
+    low = view_f64(direction_at + 8 * STRIDE, put_low_parts(pair, terms_at, direction_at + 8 * STRIDE))
+    scale = unit_scale(size)
     over = 1.0 / scale
     unsure = HEIGHT_ERROR + SLOP_ERROR * slop * scale
     for v in range(vertices):
@@ -245,17 +240,17 @@ def refine(
         if not taken and least(clearances, max(count, 8)) != f:
             continue
         distance = distances[2 * f]
-        for k in range(FINE):
+        for k in range(STRIDE):
             direction[k] = -direction[k]
         for k in range(3):
             corners[2 * k] = ids[2 * facets[FACET * f + k]]
             corners[2 * k + 1] = ids[2 * facets[FACET * f + k] + 1]
         beyond = 0.0
-        final = are_alone(pair, corners, 3, direction, error)
+        final = is_unique_minimiser(pair, corners, 3, direction, error)
         i = j = -1
         if not final:
-            excess, _, i, j = settle_level(pair, low, corners, direction, exact_at, scale)
-            beyond = -excess / length
+            excess, i, j = lowest_pair(pair, low, corners, direction, exact_at, scale)
+            beyond = -excess.high / length
             # Three heights make a level pair's; what is as good as a corner cannot be added, and widens the bracket.
             final = beyond <= max(_LEVEL * distance, 3.0 * unsure) or beyond <= spread
         if final:
