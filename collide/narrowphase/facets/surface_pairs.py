@@ -16,7 +16,7 @@ from collide.kernels import entry, kernel, native_call, prepared, view_f64, view
 from collide.mesh.bvh import CENTRE, EXPONENT, INTS, NUMBERS, NUMBERS_AT, RADIUS, REACH
 from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
-from collide.narrowphase.facets.posed_surfaces import balls_apart, later, off_rotation
+from collide.narrowphase.facets.posed_surfaces import balls_apart, deviation_from_rotation, is_swapped_order
 from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, MARKS, MEETS, RESULT
 from collide.narrowphase.pose_batches import is_pose
 from collide.narrowphase.rows import ROW, open_row, view_row
@@ -159,7 +159,7 @@ def _may_hold(X, numbers, Y, point):
     for i in range(3):
         size += abs(X[4 * i + 3]) + abs(Y[4 * i + 3]) + 2.0 * (abs(numbers[CENTRE + i]) + numbers[REACH + i])
     size += 2.0 * (abs(point.x) + abs(point.y) + abs(point.z))
-    reach = numbers[RADIUS] * (1.0 + off_rotation(X))
+    reach = numbers[RADIUS] * (1.0 + deviation_from_rotation(X))
     return not math.sqrt(dot(across, across)) > 1.001 * reach + 1e-9 * size
 
 
@@ -548,7 +548,7 @@ def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, hull_at, row_at)
     words = view_i64(header_at, HEADER)
     exchanged = words[EXCHANGED] != 0
     pair = _posed_pair(header_at, XA_at, XB_at, exchanged)
-    if words[SAME_BODY] != 0 and later(view_f64(pair.XA_at, 12), view_f64(pair.XB_at, 12)):
+    if words[SAME_BODY] != 0 and is_swapped_order(view_f64(pair.XA_at, 12), view_f64(pair.XB_at, 12)):
         pair = PosedPair(pair.B, pair.A, pair.XB_at, pair.XA_at, pair.same_tree)
         exchanged = not exchanged
     lacks = _write_row(space, pair, limit, reach, hull_at, exchanged, row_at)
