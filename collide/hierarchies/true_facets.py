@@ -154,7 +154,7 @@ def _triangulated(triangles, twins, patch, n_facets, extreme, ranks) -> np.ndarr
     )  # fmt: skip
     border = border[: start[-1]]
     size = np.diff(start)
-    owner = np.repeat(np.arange(many), size)
+    owner = np.repeat(np.arange(n_facets), size)
     order = np.ascontiguousarray(np.lexsort((-ranks[border], owner)))
     made = np.empty((int((size - 2).sum()), 3), dtype=np.int32)
     before, after = np.empty(len(border), dtype=np.int64), np.empty(len(border), dtype=np.int64)
@@ -285,7 +285,7 @@ def trace_borders(corners_at, twins_at, count, patch_at, n_facets, strict_at, po
 def cut_ears(border_at, start_at, n_polygons, order_at, before_at, after_at, made_at, total):
     """Triangulate polygons by cutting their vertices off in a given order."""
     border = view_i32(border_at, total)
-    start = view_i64(start_at, n_facets + 1)
+    start = view_i64(start_at, n_polygons + 1)
     order = view_i64(order_at, total)
     before = view_i64(before_at, total)
     after = view_i64(after_at, total)
