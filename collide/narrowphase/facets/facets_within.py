@@ -97,7 +97,7 @@ def _widen_probe(query, which, probe):
     """Enlarge a probe's half lengths and slab by the reach."""
     reaches = query.reaches
     probe_axes = 3 * which
-    node_axes = 3 - own
+    node_axes = 3 - probe_axes
     half_width = float(probe[16])
     for i in range(3):
         probe[3 + i] = np.float32((float(probe[3 + i]) + reaches[node_axes + i]) * (1.0 + 2.0**-20))
