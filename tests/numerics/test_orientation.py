@@ -113,7 +113,7 @@ def test_stages_agree_and_are_needed():
                     needed[kind, "digits"] += 1
                 else:
                     assert O.by_expansions(cloud.work) == true
-                    pairs = O.pair_determinant(cloud.work)
+                    pairs = O.dd_determinant(cloud.work)
                     known = abs(pairs) > 2.0**-100 * size
                     assert not known or sign(pairs) == true
                     needed[kind, "pairs" if known else "expansions"] += 1
