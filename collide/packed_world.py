@@ -8,6 +8,7 @@ from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, ShapeTable, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
@@ -31,7 +32,7 @@ class PackedWorld:
         self._ready: dict = {}  # pairs with a mesh, made ready for booleans
         self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
         self._any_meshed = bool(self._meshed.any())
-        parts = [shape.bounding_parts() for shape in self._shapes]
+        parts = [bounding_parts_of(shape) for shape in self._shapes]
         self._parts = [[packed for packed, _ in own] for own in parts]
         self._counts = counts = np.array([len(own) for own in parts], dtype=np.int64)
         self._all_of_one_part = bool((counts == 1).all())
@@ -171,7 +172,7 @@ class PackedWorld:
 
     def against(self, shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
         """Rows of one outside shape against all bodies near it; b is a position, a is 0."""
-        own = shape.bounding_parts()
+        own = bounding_parts_of(shape)
         packed = [part for part, _ in own]
         reach = np.array([part.reach for part in packed])
         poses = pose_table(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)

@@ -25,6 +25,7 @@ import numpy as np
 
 from collide.errors import CollideError, InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import parts_of
 from collide.results import UNDECIDED
 from collide.transforms import as_poses
 
@@ -189,7 +190,7 @@ def _matrix(X_WB: np.ndarray, X_BP: np.ndarray) -> list[list]:
 
 
 def _posed(shape, X_WB: np.ndarray) -> list[_Posed]:
-    return [_Posed(packed, X_WB, X_BP) for packed, X_BP in shape.parts()]
+    return [_Posed(packed, X_WB, X_BP) for packed, X_BP in parts_of(shape)]
 
 
 def _to_integers(P, Q) -> tuple[list[Vector], list[Vector], int]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from collide.certificates.certificates import Certificate, _minus, _Posed, _refused, _refused_by_plane, _search
 from collide.lowering.packed_convex import HALFSPACE, POINTS, pack_points
+from collide.lowering.parts import convex_set_of, parts_of
 
 _IDENTITY = np.eye(4)
 #: Directions of the segments that count how often a surface winds around a point; the next one where an edge is met.
@@ -55,10 +56,10 @@ class _Side:
 
     def __init__(self, shape, X: np.ndarray):
         self.shape, self.X, self.meshed = shape, X, shape.meshed and hasattr(shape, "faces")
-        self.packed = None if shape.meshed else shape.parts()[0][0]
+        self.packed = None if shape.meshed else convex_set_of(shape)
         self.kind = POINTS if self.packed is None else self.packed.kind
         plain = self.meshed or (
-            not shape.meshed and len(shape.parts()) == 1 and np.array_equal(shape.parts()[0][1], _IDENTITY)
+            not shape.meshed and len(parts_of(shape)) == 1 and np.array_equal(parts_of(shape)[0][1], _IDENTITY)
         )
         self.served = plain and self.kind in (POINTS, HALFSPACE) and (self.packed is None or self.packed.slop == 0.0)
         self.used = np.unique(shape.faces) if self.meshed else None

@@ -14,10 +14,11 @@ from collide.contact.contact_rows import Contacts, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.mesh_contacts import surface_contacts
 from collide.errors import InvalidArgument
+from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.narrowphase.convex_bodies import Question
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.shapes.compound import Compound
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def _parts(shape: Shape, X: np.ndarray) -> list[tuple[Shape, np.ndarray, float]]
 
 
 def _reach(shape: Shape) -> float:
-    parts = shape.bounding_parts()
+    parts = bounding_parts_of(shape)
     return max(4.0 * (part.reach + part.radius) + float(np.abs(X[:3, 3]).sum()) for part, X in parts)
 
 
@@ -147,4 +148,4 @@ def check_most(name: str, value) -> int:
 
 def is_answered(shape: Shape) -> bool:
     """Whether a shape is one that `contacts` takes apart or takes whole."""
-    return shape.meshed or isinstance(shape, Compound) or is_plain(shape)
+    return shape.meshed or isinstance(shape, Compound) or is_single_convex(shape)

@@ -8,21 +8,20 @@ import numpy as np
 
 from collide import log as journal
 from collide.errors import InvalidShape
-from collide.lowering.packed_convex import pack_points
-from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
+from collide.lazy_modules import lazy_module
+from collide.shapes.shape import Shape, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from collide.hull import exact_hull, validate_hull
     from collide.hull.exact_hull import Hull
 
-# Hulls and support trees are kernels: imported where used, so that shapes can be made without a compiler.
-
-#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
-#: so that an answer does not depend on what was asked before.
-FEWEST_POINTS = 224
+if not TYPE_CHECKING:
+    exact_hull = lazy_module("collide.hull.exact_hull")
+    validate_hull = lazy_module("collide.hull.validate_hull")
 
 
 class ConvexHull(Shape):
@@ -34,12 +33,12 @@ class ConvexHull(Shape):
         hull's surface. The set does not depend on them.
     radius : of the ball swept over the hull [m], ≥ 0.
 
-    Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support
+    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support
     tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point) and kept with the shape.
     Files and pickles hold the points alone: proofs rest on the tree, so it is made from them and never believed.
     """
 
-    __slots__ = ("_hull", "_tree", "faces", "points", "radius")
+    __slots__ = ("_hull", "faces", "points", "radius")
     _fields = ("points", "faces", "radius")
     points: np.ndarray
     faces: np.ndarray | None
@@ -64,23 +63,13 @@ class ConvexHull(Shape):
     def _from_fields(cls, points, faces, radius) -> ConvexHull:
         return cls(points, faces=faces, radius=radius)
 
-    def _pack(self):
-        if not hasattr(self, "_tree"):
-            from collide.support.lazy_support_tree import PlantedTree
-
-            large = len(self.points) >= FEWEST_POINTS
-            object.__setattr__(self, "_tree", PlantedTree(self.points) if large else None)
-        return alone(pack_points(self.points, self.radius, tree=self._tree))
-
     @property
     def hull(self) -> Hull:
         """The surface, exactly: ``dimension`` (3 solid … 0 point), ``vertices`` and ``facets`` by rows of
         ``points``, facets counter-clockwise from outside. Worked out when first asked for, O(n log n)."""
-        from collide.hull.exact_hull import convex_hull
-
         if not hasattr(self, "_hull"):
             with journal.told("convex hull of %d points made", len(self.points)):
-                hull = convex_hull(self.points)
+                hull = exact_hull.convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False
             object.__setattr__(self, "_hull", hull)
@@ -91,8 +80,6 @@ class ConvexHull(Shape):
 
         Raises InvalidShape with the defect and where it is. For tests and for data of doubtful origin.
         """
-        from collide.hull.validate_hull import validate_hull
-
         given = self.hull._replace(facets=self.faces) if self.faces is not None else None
         for what, surface in (("hull", self.hull), ("faces", given)):
             if surface is None:
@@ -101,7 +88,7 @@ class ConvexHull(Shape):
                 facets = surface.facets.astype(np.int32)
                 surface = surface._replace(facets=facets, vertices=np.unique(facets))
             try:
-                validate_hull(self.points, surface)
+                validate_hull.validate_hull(self.points, surface)
             except AssertionError as error:
                 raise InvalidShape(f"ConvexHull: {what}: {error}") from None
 

@@ -9,6 +9,7 @@ import pytest
 
 import collide
 from collide.errors import InvalidShape
+from collide.lowering.parts import parts_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
 from collide.shapes import convex_hull as hull_shape
@@ -132,7 +133,7 @@ def test_large_clouds_without_volume(flatten):
 
 def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     A = collide.ConvexHull(_ball(np.random.default_rng(12), 2000))
-    A.parts()
+    parts_of(A)
     assert A._tree._tree is None, "packing alone needs no tree"
     seen = []
     threads = [threading.Thread(target=lambda: seen.append(A._tree.address)) for _ in range(8)]
