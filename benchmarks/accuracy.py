@@ -103,7 +103,9 @@ class Tally:
         if not answer.certified:
             self.uncertified[kind] += 1
             width = (answer.upper - answer.lower) / size_of(case)
-            self.example = self.example or f"seed {case.seed} index {case.index}: {float(value):.2e}, bracket {width:.0e} L"
+            self.example = (
+                self.example or f"seed {case.seed} index {case.index}: {float(value):.2e}, bracket {width:.0e} L"
+            )
 
     def row(self) -> dict:
         timed = {path: [us for us in taken if not math.isnan(us)] for path, taken in self.us.items()}
@@ -123,7 +125,9 @@ class Tally:
             timings = timed.get(path, [])
             row[f"share_{path}"] = f"{len(timings) / count:.3f}" if self.engine == "collide" and count else ""
             row[f"us_{path}"] = f"{statistics.median(timings):.1f}" if timings else ""
-        row["us"] = f"{statistics.median(every):.1f}" if (every := [us for timings in timed.values() for us in timings]) else ""
+        row["us"] = (
+            f"{statistics.median(every):.1f}" if (every := [us for timings in timed.values() for us in timings]) else ""
+        )
         return row
 
 
@@ -147,7 +151,8 @@ def show_families(rows: list[dict]) -> None:
     if ours:
         columns = {
             "family": "family", "gaps": "gaps", "depths": "overlaps", "touchs": "touching",
-            "gap_error_certified": "gap error", "depth_error_certified": "depth error", "normal_excess": "normal excess", "missed": "missed",
+            "gap_error_certified": "gap error", "depth_error_certified": "depth error",
+            "normal_excess": "normal excess", "missed": "missed",
         }  # fmt: skip
         lines = [[*columns.values(), "uncertified", "doubles / exact / other", "µs", "µs exact"]]
         for r in ours:
@@ -167,7 +172,9 @@ def show_families(rows: list[dict]) -> None:
         lines = [["family", *others]]
         for family in dict.fromkeys(r["family"] for r in rows):
             cells = [by_key[family, name] for name in others]
-            lines.append([family, *(f"{r['gap_error'] or '-'} {r['depth_error'] or '-'} {r['normal_excess']}" for r in cells)])
+            lines.append(
+                [family, *(f"{r['gap_error'] or '-'} {r['depth_error'] or '-'} {r['normal_excess']}" for r in cells)]
+            )
         aligned("the others: largest error of gaps, of depths, excess of normals", lines)
 
 
@@ -183,7 +190,9 @@ def curved(seeds: range, count: int) -> list[dict]:
     for a, b in PAIRS:
         for kind in POSES:
             per_seed = [widths(a, b, kind, count, seed) for seed in seeds]
-            width, hits, certified = (np.concatenate([getattr(f, name) for f in per_seed]) for name in per_seed[0]._fields[:3])
+            width, hits, certified = (
+                np.concatenate([getattr(f, name) for f in per_seed]) for name in per_seed[0]._fields[:3]
+            )
             row: dict = {"a": a, "b": b, "poses": kind, "gaps": int((~hits).sum()), "depths": int(hits.sum())}
             for name, of in (("gap", width[~hits]), ("depth", width[hits])):
                 row[f"{name}_width"] = f"{of.max():.2e}" if len(of) else ""
@@ -218,9 +227,13 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--engines", default="collide,coal,coal_t9,fcl,pybullet",
                         help="whom to ask: collide, coal, coal_t9 (tolerance 1e-9), fcl, pybullet, commas between "
                              "(default: all); what is not installed is left out with a word")  # fmt: skip
-    parser.add_argument("--plot", metavar="FILE", type=Path,
-                        help="draw the parts \"time\" and \"curved\": FILE.png becomes FILE-time.png, FILE-gaps.png and "
-                             "FILE-curved.png (needs the extra plots)")  # fmt: skip
+    parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        type=Path,
+        help='draw the parts "time" and "curved": FILE.png becomes FILE-time.png, FILE-gaps.png and '
+        "FILE-curved.png (needs the extra plots)",
+    )
     parser.add_argument("--quick", action="store_true", help="a look: 1 seed, 3 cases, small hulls, no CSV")
     parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
     args = parser.parse_args()

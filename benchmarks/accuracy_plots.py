@@ -76,7 +76,9 @@ def _against_time(rows: list[dict]):
     for axis in axes[-1]:
         axis.set_xlabel("µs a pair, least of the repeats", fontsize=8)
     engines = [Line2D([], [], marker="o", ls="", color=c, label=e) for e, c in _COLOURS.items()]
-    levels = [Line2D([], [], marker=m, ls="", color="grey", label=f"{float(v):.0e} of the length") for v, m in _LEVELS.items()]
+    levels = [
+        Line2D([], [], marker=m, ls="", color="grey", label=f"{float(v):.0e} of the length") for v, m in _LEVELS.items()
+    ]
     figure.legend(handles=[*engines, *levels], loc="lower center", ncols=4, fontsize=8, frameon=False)
     figure.tight_layout(rect=(0, 0.07, 1, 1))
     return figure
@@ -89,8 +91,15 @@ def _against_gap(rows: list[dict]):
             at = [r for r in cell_rows if (r["engine"], r["setting"]) == (engine, setting)]
             if at:
                 label = engine if setting in ("signed",) else f"{engine} {setting}"
-                axis.plot([float(r["level"]) for r in at], [_error(r) for r in at], style, color=_COLOURS[engine], label=label,
-                          marker=".", lw=1.3)  # fmt: skip
+                axis.plot(
+                    [float(r["level"]) for r in at],
+                    [_error(r) for r in at],
+                    style,
+                    color=_COLOURS[engine],
+                    label=label,
+                    marker=".",
+                    lw=1.3,
+                )
     axes[0][0].invert_xaxis()  # they share it
     for axis in axes[-1]:
         axis.set_xlabel("gap or depth, as a part of the length", fontsize=8)
@@ -109,8 +118,15 @@ def _widths(rows: list[dict]):
     for axis, side in zip(axes, ("gap", "depth")):
         for r in rows:
             if r[f"{side}_width"]:
-                axis.scatter(float(r["us"]), float(r[f"{side}_width"]), color=colours[r["poses"]], marker=markers[r["a"]], s=26, lw=0,
-                             alpha=0.85)  # fmt: skip
+                axis.scatter(
+                    float(r["us"]),
+                    float(r[f"{side}_width"]),
+                    color=colours[r["poses"]],
+                    marker=markers[r["a"]],
+                    s=26,
+                    lw=0,
+                    alpha=0.85,
+                )
         axis.set_xscale("log")
         axis.set_yscale("log", base=2)
         axis.grid(alpha=0.25)

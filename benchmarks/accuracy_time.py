@@ -1,4 +1,4 @@
-"""Error against time, for `benchmarks/accuracy.py`: hulls of points on a sphere at gaps and depths from 1e-1 down to 1e-12.
+"""Error against time, for `benchmarks/accuracy.py`: hulls of points on a sphere, gaps and depths 1e-1 to 1e-12.
 
 Every pair is placed by collide's own distances, B moved along the normal; the truth of each pose as it then stands is
 exact arithmetic's. All poses are timed, the first few are judged. Ours is one batch call; coal and python-fcl are
@@ -44,7 +44,9 @@ def placed(A, B, target: float, count: int, random) -> np.ndarray:
 
 
 def truths(A, B, X: np.ndarray) -> list[Decimal]:
-    return [exact.signed_distance(A.points, _EYE[:3, :3], _EYE[:3, 3], B.points, X_WB[:3, :3], X_WB[:3, 3]) for X_WB in X]
+    return [
+        exact.signed_distance(A.points, _EYE[:3, :3], _EYE[:3, 3], B.points, X_WB[:3, :3], X_WB[:3, 3]) for X_WB in X
+    ]
 
 
 def error_against_time(sizes: tuple[int, ...], engines: list[str], quick: bool) -> list[dict]:

@@ -2,8 +2,8 @@
 
     python benchmarks/c_interface.py
 
-Compiles a loop in C against the installed library with the system's compiler ($CC, else cc). ns a call, the least of several
-rounds; both ask the same pairs at the same poses.
+Compiles a loop in C against the installed library with the system's compiler ($CC, else cc). ns a call, the least of
+several rounds; both ask the same pairs at the same poses.
 """
 
 from __future__ import annotations
@@ -25,7 +25,12 @@ LOOP = r"""
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
-static double now(void) { struct timespec t; clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); return t.tv_sec + 1e-9 * t.tv_nsec; }
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return t.tv_sec + 1e-9 * t.tv_nsec;
+}
 int main(int count, char **given)
 {
     static double A[64 * 16], B[64 * 16], points[3 * 128];
@@ -35,16 +40,21 @@ int main(int count, char **given)
     int which, round, k, r, hit = 0;
     collide_pair pair;
     FILE *file = fopen(given[1], "rb");
-    if (count != 2 || fread(A, 8, 1024, file) != 1024 || fread(B, 8, 1024, file) != 1024 || fread(points, 8, 384, file) != 384) return 1;
+    if (count != 2 || fread(A, 8, 1024, file) != 1024 || fread(B, 8, 1024, file) != 1024) return 1;
+    if (fread(points, 8, 384, file) != 384) return 1;
     collide_workspace_create(&w);
     for (which = 0; which < 2; which++) {
         if (which == 0) collide_box(size, &shapes[0]); else collide_hull(points, 128, 0.0, &shapes[1]);
         best[0] = best[1] = 1e9;
         for (round = 0; round < 15; round++) {
             double t0 = now(), t1, t2;
-            for (r = 0; r < 20; r++) for (k = 0; k < 64; k++) collide_collide(w, shapes[which], shapes[which], A + 16 * k, B + 16 * k, 0, &hit);
+            for (r = 0; r < 20; r++)
+                for (k = 0; k < 64; k++)
+                    collide_collide(w, shapes[which], shapes[which], A + 16 * k, B + 16 * k, 0, &hit);
             t1 = now();
-            for (r = 0; r < 20; r++) for (k = 0; k < 64; k++) collide_distance(w, shapes[which], shapes[which], A + 16 * k, B + 16 * k, INFINITY, 0, &pair);
+            for (r = 0; r < 20; r++)
+                for (k = 0; k < 64; k++)
+                    collide_distance(w, shapes[which], shapes[which], A + 16 * k, B + 16 * k, INFINITY, 0, &pair);
             t2 = now();
             if (t1 - t0 < best[0]) best[0] = t1 - t0;
             if (t2 - t1 < best[1]) best[1] = t2 - t1;
@@ -96,7 +106,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         c = in_c(Path(folder), X_WA, X_WB, points)
     print(f"{'ns a call':20} {'C boolean':>10} {'Python':>8} {'C distance':>11} {'Python':>8}")
-    for (boolean, distance), (name, shape) in zip(c, (("two boxes", collide.Box((1, 1.2, 0.8))), ("hulls of 128", collide.ConvexHull(points)))):
+    for (boolean, distance), (name, shape) in zip(
+        c, (("two boxes", collide.Box((1, 1.2, 0.8))), ("hulls of 128", collide.ConvexHull(points)))
+    ):
         python_seconds = in_python(shape, X_WA, X_WB)
         print(f"{name:20} {boolean:10.0f} {python_seconds[0]:8.0f} {distance:11.0f} {python_seconds[1]:8.0f}")
 

@@ -3,8 +3,9 @@
     python benchmarks/compounds.py               # about two minutes
     python benchmarks/compounds.py --quick       # fewer parts and poses
 
-Compounds of random boxes against a box, and against each other (every part against every part), at poses of which about half
-overlap ("near") or few do ("far"). Parts stand where the compound has them: their poses are multiplied out beforehand. Both
+Compounds of random boxes against a box, and against each other (every part against every part), at poses of which about
+half overlap ("near") or few do ("far"). Parts stand where the compound has them: their poses are multiplied out
+beforehand. Both
 are asked in turn, and the medians of their times compared: a ratio of 1 is the sum of the parts.
 """
 
@@ -39,7 +40,9 @@ def random_poses(rng, n: int, spread: float) -> np.ndarray:
 
 
 def compound(rng, parts: int) -> collide.Compound:
-    return collide.Compound([(collide.Box(rng.uniform(0.2, 0.6, 3)), random_poses(rng, 1, 0.7)[0]) for _ in range(parts)])
+    return collide.Compound(
+        [(collide.Box(rng.uniform(0.2, 0.6, 3)), random_poses(rng, 1, 0.7)[0]) for _ in range(parts)]
+    )
 
 
 def compared(whole, parts, poses: int) -> list[str]:
@@ -79,7 +82,14 @@ def batches(rng, counts, sizes):
             X = random_poses(rng, n, spread), random_poses(rng, n, spread)
             pairs = pairs_of(A, box, *X)
             for what, ask in QUESTIONS.items():
-                yield ["batch", what, name, parts, n, *compared(partial(ask, A, box, *X), partial(one_by_one, ask, pairs), n)]
+                yield [
+                    "batch",
+                    what,
+                    name,
+                    parts,
+                    n,
+                    *compared(partial(ask, A, box, *X), partial(one_by_one, ask, pairs), n),
+                ]
 
 
 def singles(rng, counts, n: int):
@@ -129,7 +139,10 @@ def main(quick: bool) -> None:
         measured.append([str(cell) for cell in row])
         print("  ".join(f"{cell:>11}" for cell in measured[-1]), flush=True)
     ratios = np.array([float(row[-1]) for row in measured[1:]])
-    print(f"\nmedian ratio {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: {int((ratios > 1.2).sum())} of {len(ratios)}")
+    print(
+        f"\nmedian ratio {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: {int((ratios > 1.2).sum())} "
+        f"of {len(ratios)}"
+    )
     target = ROOT / "benchmarks" / "results" / "compounds.csv"
     target.parent.mkdir(exist_ok=True)
     with target.open("w", newline="", encoding="utf-8") as file:

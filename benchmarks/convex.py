@@ -8,7 +8,8 @@ Tables: hulls of n points on a sphere, an ellipsoid 1:3:10, a pancake 1:50, and 
 "shapes", random pairs of hundreds of different hulls, whose data are in no cache; "single", one Python call
 a pair; "threads", large batches with `threads=2`, and plain arithmetic in two threads, µs in all (two cores
 shared with others are less than two); "cgal", our boolean beside the times published for CGAL's hull
-hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of touching, a third 5 to 50 % deep, shuffled into one batch; all engines get the same. Engines take turns in
+hierarchy, on other hardware. Poses: a third 0.05 to 1 lengths apart, a third within 1 % of touching, a third 5 to 50 %
+    deep, shuffled into one batch; all engines get the same. Engines take turns in
 one run, and ratios are of medians. Ours is a batch call, coal and python-fcl are Python loops, each at
 its best: objects and transforms are ready beforehand, and booleans want no contacts. Our times by class
 are of batches a third as long, which spread the cost of a call over fewer pairs.

@@ -1,6 +1,7 @@
 """Hierarchies: depth, size, degrees and build times against the number of vertices, with the lines fitted.
 
-    python benchmarks/hierarchies.py               # some ten minutes to 10^6 vertices; --sizes, --kinds, --no-csv, --plot FILE
+    python benchmarks/hierarchies.py
+    # some ten minutes to 10^6 vertices; --sizes, --kinds, --no-csv, --plot FILE
     python benchmarks/hierarchies.py --bounds      # depth and size against the bound on the degrees
     python benchmarks/hierarchies.py --distance    # distances down the hierarchies, beside the default
 
@@ -52,7 +53,8 @@ def measured(kind: str, which: str, n: int, hierarchy: Hierarchy, hull_s: float,
     return {
         "kind": kind, "which": which, "bound": hierarchy.degree_bound, "vertices": n, "n": int(sizes[0]),
         "depth": hierarchy.depth, "total_per_n": sizes.sum() / sizes[0], "largest_per_n": sizes.max() / sizes[0],
-        "degree_1": degrees[0], "degree_2": degrees[1] if len(degrees) > 1 else 0, "degree": max(degrees[1:], default=0),
+        "degree_1": degrees[0], "degree_2": degrees[1] if len(degrees) > 1 else 0,
+        "degree": max(degrees[1:], default=0),
         "over": sum(d > bound for d in degrees[1:]), "added": int((hierarchy.birth > 0).sum()),
         "bytes_per_n": sum(a.nbytes for a in hierarchy if isinstance(a, np.ndarray)) / sizes[0],
         "hull_s": hull_s, "build_s": build_s,
@@ -60,7 +62,7 @@ def measured(kind: str, which: str, n: int, hierarchy: Hierarchy, hull_s: float,
 
 
 def timed(task):
-    """(result, seconds of the processor): some tasks take a minute, and a machine with other work stops them meanwhile."""
+    """(result, seconds of the processor), which do not count what other processes take meanwhile."""
     started = time.process_time()
     result = task()
     return result, time.process_time() - started
@@ -104,7 +106,8 @@ def distance_row(n: int, bound: int, count: int = 200) -> dict:
     levels_a, levels_b, problems, looked_at = np.mean([f.counters for f in results], axis=0)
     return {
         "n": n, "bound": bound, "depth": body.hierarchy.depth, "levels_a": levels_a, "levels_b": levels_b,
-        "problems": problems, "looked_at": looked_at, "us": best / count * 1e6, "default_us": best_default / count * 1e6,
+        "problems": problems, "looked_at": looked_at, "us": best / count * 1e6,
+        "default_us": best_default / count * 1e6,
     }  # fmt: skip
 
 
@@ -134,7 +137,9 @@ def fitted(rows: list[dict]) -> list[str]:
             of = [r for r in rows if r["which"] == which and r["kind"] in (kind or r["kind"])]
             if len({r["n"] for r in of}) >= 3:
                 a, b, off = line(of)
-                lines.append(f"{which:>5} {kind or 'all':<16} depth = {a:5.1f} + {b:.2f}·log2 n, at most {off:.1f} off the line")
+                lines.append(
+                    f"{which:>5} {kind or 'all':<16} depth = {a:5.1f} + {b:.2f}·log2 n, at most {off:.1f} off the line"
+                )
     return lines
 
 
@@ -154,7 +159,9 @@ def drawn(rows: list[dict], path: str) -> None:
             for axis, field in zip(axes, ("depth", "degree", "build_s")):
                 (drawing,) = axis.plot(n, [r[field] for r in of], style, color=colour, label=label, markersize=4)
                 colour = drawing.get_color()
-    axes[0].set(title="levels: bounded (—), DK (···), of the polar (– –)", xscale="log", xlabel="vertices", ylim=(0, None))
+    axes[0].set(
+        title="levels: bounded (—), DK (···), of the polar (– –)", xscale="log", xlabel="vertices", ylim=(0, None)
+    )
     axes[1].set(title="largest degree but for the finest level", xscale="log", yscale="log", xlabel="vertices")
     axes[1].axhline(DEGREE_BOUND, color="k", linewidth=0.7)
     axes[2].set(title="time to build [s]", xscale="log", yscale="log", xlabel="vertices")

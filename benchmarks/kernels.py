@@ -83,16 +83,22 @@ def hashed(answer):
 box, sphere, cylinder = collide.Box((1, 1.2, 0.8)), collide.Sphere(0.6), collide.Cylinder(0.5, 1.0)
 cases = {}
 for name, A, B, n, reach in (
-    ("boxes", box, box, 20000, 1.0), ("box and sphere", box, sphere, 20000, 0.8), ("box and cylinder", box, cylinder, 4000, 0.8),
+    ("boxes", box, box, 20000, 1.0), ("box and sphere", box, sphere, 20000, 0.8),
+    ("box and cylinder", box, cylinder, 4000, 0.8),
     ("hulls of 8", ball(8), ball(8), 8000, 1.2), ("hulls of 128", ball(128), ball(128), 4000, 1.2),
     ("hulls of 2048", ball(2048), ball(2048), 4000, 1.2), ("meshes of 800", grid(20), grid(20), 400, 1.0),
 ):
     X = poses(n, reach)
     cases[f"{name}: boolean"] = (lambda A=A, B=B, X=X: collide.collide(A, B, *X), n)
-    cases[f"{name}: distance"] = (lambda A=A, B=B, X=X, s=not name.startswith("mesh"): collide.distance(A, B, *X, signed=s), n)
+    signed = not name.startswith("mesh")
+    cases[f"{name}: distance"] = (lambda A=A, B=B, X=X, s=signed: collide.distance(A, B, *X, signed=s), n)
 X = poses(10000, 3.0)
 for n in (1, 10, 100, 1000, 10000):
-    cases[f"batch of {n}, boxes: boolean"] = (lambda n=n: [collide.collide(box, box, X[0][:n], X[1][:n]) for _ in range(1 + 500 // n)][-1], n * (1 + 500 // n))
+    calls = 1 + 500 // n
+    cases[f"batch of {n}, boxes: boolean"] = (
+        lambda n=n, calls=calls: [collide.collide(box, box, X[0][:n], X[1][:n]) for _ in range(calls)][-1],
+        n * calls,
+    )
 X1 = poses(64, 1.5)
 for name, A, B in (("boxes", box, box), ("hulls of 128", ball(128), ball(128)), ("sphere and box", sphere, box)):
     def singles(ask, A=A, B=B):
@@ -116,7 +122,8 @@ print(json.dumps(told))
 def run(python: str, level: str, only: str) -> dict:
     environment = {**os.environ, **({"COLLIDE_CPU": level} if level else {})}
     done = subprocess.run(
-        [python, "-c", WORK, only], cwd=tempfile.gettempdir(), env=environment, capture_output=True, text=True, check=False
+        [python, "-c", WORK, only], cwd=tempfile.gettempdir(), env=environment, capture_output=True, text=True,
+        check=False
     )
     if done.returncode:
         raise SystemExit(done.stderr)
@@ -125,7 +132,9 @@ def run(python: str, level: str, only: str) -> dict:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--against", metavar="PYTHON", help="an interpreter that has another version of collide installed")
+    parser.add_argument(
+        "--against", metavar="PYTHON", help="an interpreter that has another version of collide installed"
+    )
     parser.add_argument("--levels", nargs="*", default=[""], help="levels of this one's library, by default the best")
     parser.add_argument("--rounds", type=int, default=5, help="processes of each contestant (default: 5)")
     parser.add_argument("--only", default="", help="cases whose names hold this")
@@ -137,13 +146,21 @@ def main() -> None:
         for k, contestant in enumerate(contestants):
             runs_by_contestant[k].append(run(*contestant, args.only))
         print(f"round {round_ + 1} of {args.rounds}", file=sys.stderr, flush=True)
-    print("ns a pair: median of the processes (their spread), × against the last column by medians and by least times\n")
+    print(
+        "ns a pair: median of the processes (their spread), × against the last column by medians and by least times\n"
+    )
     print(f"{'case':34}", *(f"{name:>27}" for name in names))
     for case in runs_by_contestant[0][0]:
         medians = [statistics.median(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
-        spreads = [(max(by_case[case][0] for by_case in runs) / min(by_case[case][0] for by_case in runs) - 1) * 100 for runs in runs_by_contestant]
+        spreads = [
+            (max(by_case[case][0] for by_case in runs) / min(by_case[case][0] for by_case in runs) - 1) * 100
+            for runs in runs_by_contestant
+        ]
         least = [min(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
-        cells = [f"{m:7.0f} ±{s:2.0f} % ×{m / medians[-1]:5.2f} ×{b / least[-1]:5.2f}" for m, s, b in zip(medians, spreads, least)]
+        cells = [
+            f"{m:7.0f} ±{s:2.0f} % ×{m / medians[-1]:5.2f} ×{b / least[-1]:5.2f}"
+            for m, s, b in zip(medians, spreads, least)
+        ]
         bits = {by_case[case][1] for runs in runs_by_contestant for by_case in runs}
         print(f"{case:34}", *(f"{cell:>27}" for cell in cells), "" if len(bits) == 1 else "  OTHER BITS")
 

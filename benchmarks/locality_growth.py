@@ -2,12 +2,12 @@
 
     python benchmarks/locality_growth.py         # three minutes; --parts growth build meshes, --no-files
 
-* growth: pairs of boxes that the walk looks at for all pairs of facets, on harpsicordia (local: n log n is proven; with Σ = n, and
-  with Σ ≤ 1000 whatever n, where meetings are linear), accordions and
+* growth: pairs of boxes that the walk looks at for all pairs of facets, on harpsicordia (local: n log n is proven; with
+  Σ = n, and with Σ ≤ 1000 whatever n, where meetings are linear), accordions and
   Chazelle's polyhedra (not local: n² is proven), touching and 1e-12 apart, with exponents fitted.
 * build: seconds of both trees up to a million facets, over n log2 n.
-* meshes: stretches of all meshes of shared/data and of a sample of pybullet_data's, beside what queries about them look at;
-  rank correlations between the two.
+* meshes: stretches of all meshes of shared/data and of a sample of pybullet_data's, beside what queries about them look
+  at; rank correlations between the two.
 
 Writes benchmarks/results/locality-*.csv and docs/pictures/locality-*.png. Counts are the same on every machine.
 """
@@ -65,7 +65,8 @@ def growth() -> list[dict]:
                 hits = all_hits(A.tree, B.tree, X, np.eye(4))
                 boxes, triangles, exact = hits.counters[0].tolist()
                 rows.append({
-                    "family": family, "gap": gap, "vertices": len(A.vertices), "meetings": meetings, "pairs": len(hits.pairs),
+                    "family": family, "gap": gap, "vertices": len(A.vertices), "meetings": meetings,
+                    "pairs": len(hits.pairs),
                     "boxes": boxes, "triangles": triangles, "exact": exact,
                 })  # fmt: skip
         for gap in (0.0, 1e-12):
@@ -73,8 +74,11 @@ def growth() -> list[dict]:
             n, boxes = (np.array([r[key] for r in of], dtype=float) for key in ("vertices", "boxes"))
             slope = np.polyfit(np.log(n), np.log(boxes), 1)[0]
             units = {"n²": n**2} if not family.startswith("harpsicordia") else {
-                "n log2 n": n * np.log2(n), "n log2² n": n * np.log2(n) ** 2, "meetings": np.array([r["meetings"] for r in of])}  # fmt: skip
-            text = "; ".join(f"over {unit}: {', '.join(f'{x:.3f}' for x in boxes / size)}" for unit, size in units.items())
+                "n log2 n": n * np.log2(n), "n log2² n": n * np.log2(n) ** 2,
+                "meetings": np.array([r["meetings"] for r in of])}  # fmt: skip
+            text = "; ".join(
+                f"over {unit}: {', '.join(f'{x:.3f}' for x in boxes / size)}" for unit, size in units.items()
+            )
             print(f"{family:20} gap {gap:5g}: n^{slope:.2f}; {text}", flush=True)
     return rows
 
@@ -92,10 +96,15 @@ def build() -> list[dict]:
                 made = make(vertices, faces)
                 times.append(time.perf_counter() - started)
             taken[name] = min(times)
-        rows.append({"facets": len(faces), **{f"{k}_s": f"{t:.5f}" for k, t in taken.items()}, "graded_size": made.size()})
+        rows.append(
+            {"facets": len(faces), **{f"{k}_s": f"{t:.5f}" for k, t in taken.items()}, "graded_size": made.size()}
+        )
         each = {k: t / (len(faces) * np.log2(len(faces))) * 1e9 for k, t in taken.items()}
-        print(f"{len(faces):8} facets: {taken['queries']:.4f} s, graded {taken['graded']:.4f} s; "
-              f"{each['queries']:.1f}, {each['graded']:.1f} ns · F log2 F; nodes {made.size() / (2 * len(faces) - 1):.2f} (2F − 1)")  # fmt: skip
+        print(
+            f"{len(faces):8} facets: {taken['queries']:.4f} s, graded {taken['graded']:.4f} s; "
+            f"{each['queries']:.1f}, {each['graded']:.1f} ns · F log2 F; nodes "
+            f"{made.size() / (2 * len(faces) - 1):.2f} (2F − 1)"
+        )
     return rows
 
 
@@ -107,7 +116,9 @@ def sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
     vertices = np.stack([r * np.sin(theta) * np.cos(phi), r * np.sin(theta) * np.sin(phi), r * np.cos(theta)], axis=-1)
     i, j = (k.ravel() for k in np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij"))
     a, b = i * around + j, i * around + (j + 1) % around
-    return vertices.reshape(-1, 3), np.concatenate([np.stack([a, a + around, b], 1), np.stack([b, a + around, b + around], 1)])
+    return vertices.reshape(-1, 3), np.concatenate(
+        [np.stack([a, a + around, b], 1), np.stack([b, a + around, b + around], 1)]
+    )
 
 
 # --- many meshes --------------------------------------------------------------------------------
@@ -134,7 +145,10 @@ def all_meshes() -> dict[str, tuple[np.ndarray, np.ndarray]]:
             if MIN_VERTICES <= len(part.faces) <= MAX_VERTICES:
                 used = part.vertices[part.faces].reshape(-1, 3)
                 low, high = used.min(axis=0), used.max(axis=0)
-                by_name[file.relative_to(root).as_posix()] = (part.vertices - (low + high) / 2) / np.linalg.norm(high - low), part.faces
+                by_name[file.relative_to(root).as_posix()] = (
+                    (part.vertices - (low + high) / 2) / np.linalg.norm(high - low),
+                    part.faces,
+                )
     return by_name
 
 
@@ -148,17 +162,19 @@ def meshes() -> list[dict]:
         rows.append({
             "mesh": name, "facets": len(faces), "Σ": locality.global_stretch, "σ": locality.local_stretches[0],
             "σ4": locality.local_stretches[3], "σ10": locality.local_stretches[9], "σ mean": locality.means[0],
-            "σ10 mean": locality.means[9], "σ10 90 %": spread[1, 9], "outliers": trees.outlier_share, "graded depth": trees.graded_depth,
+            "σ10 mean": locality.means[9], "σ10 90 %": spread[1, 9], "outliers": trees.outlier_share,
+            "graded depth": trees.graded_depth,
             **{key: float(f"{value:.6g}") for key, value in counted(mesh).items()},
         })  # fmt: skip
         print(f"{name[-40:]:40} {len(faces):7} σ {rows[-1]['σ']:9.3g} σ10 {rows[-1]['σ10']:8.3g} "
-              f"shells {rows[-1]['shells']:6.1f} shallow {rows[-1]['shallow']:8.4f} boolean {rows[-1]['boolean']:7.1f}", flush=True)  # fmt: skip
+              f"shells {rows[-1]['shells']:6.1f} shallow {rows[-1]['shallow']:8.4f} boolean {rows[-1]['boolean']:7.1f}",
+              flush=True)  # fmt: skip
     return rows
 
 
 def counted(mesh: Mesh) -> dict[str, float]:
-    """Pairs of boxes and of facets looked at: a facet, of two shells nearly alike and of shallow overlaps, all pairs; a boolean
-    at a gap of 1e-4, whole."""
+    """Pairs of boxes and of facets looked at: a facet, of two shells nearly alike and of shallow overlaps, all pairs; a
+    boolean at a gap of 1e-4, whole."""
     rng = np.random.default_rng(1)
     tree = mesh.tree
     shift = np.eye(4)
@@ -174,7 +190,8 @@ def counted(mesh: Mesh) -> dict[str, float]:
             Y[:3, 3] = X[:3, 3] + (way + further) * direction
             into.append(int(ask(tree, tree, X, Y).counters[0, :2].sum()))
     return {
-        "shells": shells / len(mesh.faces), "shallow": float(np.mean(shallow)) / len(mesh.faces), "boolean": float(np.mean(boolean)),
+        "shells": shells / len(mesh.faces), "shallow": float(np.mean(shallow)) / len(mesh.faces),
+        "boolean": float(np.mean(boolean)),
         "shallow / √F": float(np.mean(shallow)) / np.sqrt(len(mesh.faces)),
     }  # fmt: skip
 
@@ -218,11 +235,18 @@ def draw_growth(rows: list[dict]) -> None:
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(7, 4.2), layout="constrained")
-    for family, colour in (("harpsicordia", "#3b6ea5"), ("harpsicordia, Σ 1000", "#d9a441"), ("accordions", "#c0504d"), ("chazelle", "#4f8a4f")):
+    for family, colour in (
+        ("harpsicordia", "#3b6ea5"),
+        ("harpsicordia, Σ 1000", "#d9a441"),
+        ("accordions", "#c0504d"),
+        ("chazelle", "#4f8a4f"),
+    ):
         for gap, style in ((0.0, "o-"), (1e-12, "x:")):
             of = [r for r in rows if r["family"] == family and r["gap"] == gap]
             label = f"{family}, {'touching' if gap == 0 else '1e-12 apart'}"
-            axes.loglog([r["vertices"] for r in of], [r["boxes"] for r in of], style, color=colour, label=label, markersize=4)
+            axes.loglog(
+                [r["vertices"] for r in of], [r["boxes"] for r in of], style, color=colour, label=label, markersize=4
+            )
     n = np.array([60.0, 2e5])
     axes.loglog(n, 2 * n * np.log2(n), color="#9a9a9a", linewidth=0.8)
     axes.text(n[1], 2 * n[1] * np.log2(n[1]), " 2 n log n", fontsize=8, va="center")
@@ -250,7 +274,9 @@ def draw_meshes(rows: list[dict]) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--parts", nargs="*", default=["growth", "build", "meshes"], choices=["growth", "build", "meshes"])
+    parser.add_argument(
+        "--parts", nargs="*", default=["growth", "build", "meshes"], choices=["growth", "build", "meshes"]
+    )
     parser.add_argument("--no-files", action="store_true")
     options = parser.parse_args()
     for part in options.parts:

@@ -2,9 +2,9 @@
 
     python benchmarks/mesh_coplanar.py       # two minutes; --no-csv
 
-Equal meshes in equal poses, turned and not; meshes whose vertices are rounded to a grid, one moved by a cell; flat grids
-of 32,768 facets in one plane. The share of pairs of facets that needed more than doubles is told, and how many pairs coal
-finds. Times are the fastest of three, engines in turn.
+Equal meshes in equal poses, turned and not; meshes whose vertices are rounded to a grid, one moved by a cell; flat
+grids of 32,768 facets in one plane. The share of pairs of facets that needed more than doubles is told, and how many
+pairs coal finds. Times are the fastest of three, engines in turn.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ def flat_grid(n: int) -> tuple[np.ndarray, np.ndarray]:
     """(vertices, faces): 2·n² triangles over the unit square."""
     x, y = np.meshgrid(np.arange(n + 1) / n, np.arange(n + 1) / n, indexing="ij")
     corner = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :n].ravel()
-    lower, upper = np.stack([corner, corner + n + 1, corner + 1], axis=1), np.stack([corner + 1, corner + n + 1, corner + n + 2], axis=1)
+    lower, upper = (
+        np.stack([corner, corner + n + 1, corner + 1], axis=1),
+        np.stack([corner + 1, corner + n + 1, corner + n + 2], axis=1),
+    )
     return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), np.concatenate([lower, upper])
 
 

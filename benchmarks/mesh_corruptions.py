@@ -4,8 +4,9 @@
     python benchmarks/mesh_corruptions.py --minutes 20 --share 0/2
     python benchmarks/mesh_corruptions.py --only duck.obj --case 17
 
-One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/families/mesh_corruptions.py`). Files
-are gone through in rounds of a few corruptions, so that a run cut short has seen all of them. A file and the number
+One case is one question of a probe beside the mesh, judged by exact arithmetic (`tests/families/mesh_corruptions.py`).
+Files are gone through in rounds of a few corruptions, so that a run cut short has seen all of them. A file and the
+number
 of a case give the same case again. Exit status: 0 nothing wrong, 1 something is.
 """
 
@@ -104,7 +105,11 @@ def main() -> None:
                     print(f"WRONG --only {name} --case {k} ({kind}): {outcome.wrong}", flush=True)
         spent = time.perf_counter() - started
         end = "in the middle of" if stopped else "after"
-        print(f"{spent:6.0f} s  {end} case {min(begin + ROUND, len(cases)) - 1} of {len(seen)} files: {dict(counts)}, {wrong} wrong", flush=True)
+        print(
+            f"{spent:6.0f} s  {end} case {min(begin + ROUND, len(cases)) - 1} of {len(seen)} files: {dict(counts)}, "
+            f"{wrong} wrong",
+            flush=True,
+        )
         if stopped:
             break
     print(f"cases by kind: {dict(kinds)}")

@@ -1,6 +1,7 @@
 """Making meshes and measuring their locality: time against the number of facets.
 
-    python benchmarks/mesh_shapes.py [MESH...]        # a minute; --no-csv. Without files: the real inputs, where they are
+    python benchmarks/mesh_shapes.py [MESH...]
+    # a minute; --no-csv. Without files: the real inputs, where they are
 
 For each mesh, in milliseconds, the fastest of several runs: `Mesh` as it comes (welding, defects, shells, volumes),
 the same as loose triangles the way an STL has them, taken as a surface without a look, read from a pickle; and
@@ -44,8 +45,10 @@ def measured(name: str, vertices: np.ndarray, faces: np.ndarray) -> dict:
     return {
         "mesh": name, "facets": len(faces), "solid": mesh.solid, "shells": mesh.report.shells,
         "mesh_ms": least(lambda: collide.Mesh(vertices, faces)), "soup_ms": least(lambda: collide.Mesh(corners, ids)),
-        "surface_ms": least(lambda: collide.Mesh(vertices, faces, solid=False)), "unpickle_ms": least(lambda: pickle.loads(pickled)),
-        "locality_ms": least(mesh.locality), "sigma": locality.local_stretches[0], "sigma_10": locality.local_stretches[9],
+        "surface_ms": least(lambda: collide.Mesh(vertices, faces, solid=False)),
+        "unpickle_ms": least(lambda: pickle.loads(pickled)),
+        "locality_ms": least(mesh.locality), "sigma": locality.local_stretches[0],
+        "sigma_10": locality.local_stretches[9],
         "Sigma": locality.global_stretch,
     }  # fmt: skip
 
@@ -63,7 +66,10 @@ def main() -> None:
         rows.append(measured(*source))
         if len(rows) == 1:
             print("  ".join(f"{title:>12}" for title in rows[0]))
-        print("  ".join(f"{v:>12,.4g}" if isinstance(v, float) else f"{v!s:>12.12}" for v in rows[-1].values()), flush=True)
+        print(
+            "  ".join(f"{v:>12,.4g}" if isinstance(v, float) else f"{v!s:>12.12}" for v in rows[-1].values()),
+            flush=True,
+        )
     if not args.no_csv:
         with (Path(__file__).parent / "results" / "mesh_shapes.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")

@@ -1,6 +1,7 @@
 """Triangle meshes against coal and FCL: building, booleans, all pairs of facets, distances.
 
-    python benchmarks/meshes.py                       # ten minutes; --meshes teapot bunny, --runs N, --poses N, --no-csv
+    python benchmarks/meshes.py
+    # ten minutes; --meshes teapot bunny, --runs N, --poses N, --no-csv
 
 Meshes are scaled to a box diagonal of 1 and stand in random poses of six classes: far (0.5 apart), gaps of 1e-2 and
 1e-4, shallow (1e-3 into each other), deep (0.1), and inside (the second mesh a tenth as large, in the first one).
@@ -162,8 +163,10 @@ def measured(pair: str, name: str, meshes, trees, X_WAs, X_WBs, runs: int, with_
         count = 1 if question == "build" else len(X_WAs)
         for engine, taken in times.items():
             rows.append({
-                "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes), "poses": "" if question == "build" else name,
-                "question": question, "engine": engine, "runs": len(taken), "median_us": f"{np.median(taken) / count * 1e6:.2f}",
+                "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes),
+                "poses": "" if question == "build" else name,
+                "question": question, "engine": engine, "runs": len(taken),
+                "median_us": f"{np.median(taken) / count * 1e6:.2f}",
                 "least_us": f"{min(taken) / count * 1e6:.2f}", "ratio": f"{np.median(taken) / ours_seconds:.2f}",
                 "disagreements": wrong.get(engine, "") if question == "boolean" else "",
             })  # fmt: skip
@@ -180,28 +183,34 @@ def counted(pair: str, name: str, meshes, trees, X_WAs, X_WBs) -> list[dict]:
         boxes, triangles, exact = ask(*trees, X_WAs, X_WBs).counters.mean(axis=0)
         rows.append({
             "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes), "poses": name, "question": question,
-            "engine": "collide counters", "boxes": f"{boxes:.1f}", "triangles": f"{triangles:.1f}", "exact": f"{exact:.2f}",
+            "engine": "collide counters", "boxes": f"{boxes:.1f}", "triangles": f"{triangles:.1f}",
+            "exact": f"{exact:.2f}",
         })  # fmt: skip
     return rows
 
 
 def as_text(rows: list[dict]) -> str:
     """Ratios to each peer, a line a pair of meshes, question and class."""
-    lines = [f"{'meshes':12} {'question':10} {'poses':9} {'us':>9} {'single':>8} {'OBBRSS':>7} {'OBB':>7} {'fcl':>7}  wrong"]
+    lines = [
+        f"{'meshes':12} {'question':10} {'poses':9} {'us':>9} {'single':>8} {'OBBRSS':>7} {'OBB':>7} {'fcl':>7}  wrong"
+    ]
     keys = dict.fromkeys((r["meshes"], r["question"], r["poses"]) for r in rows if "ratio" in r)
     for key in keys:
         of = {r["engine"]: r for r in rows if (r["meshes"], r["question"], r["poses"]) == key and "ratio" in r}
         wrong = "/".join(str(of[e]["disagreements"]) for e in ("coal OBBRSS", "coal OBB", "fcl"))
         single = of["collide single"]["median_us"] if "collide single" in of else ""
         ratios = " ".join(f"{of[e]['ratio']:>7}" for e in ("coal OBBRSS", "coal OBB", "fcl"))
-        lines.append(f"{key[0]:12} {key[1]:10} {key[2]:9} {of['collide batch']['median_us']:>9} {single:>8} {ratios}  {wrong}")
+        lines.append(
+            f"{key[0]:12} {key[1]:10} {key[2]:9} {of['collide batch']['median_us']:>9} {single:>8} {ratios}  {wrong}"
+        )
     return "\n".join(lines)
 
 
 def write(rows: list[dict]) -> Path:
     """The CSV, with the processor and the versions the times belong to."""
     about = {
-        "cpu": processor(), "cores": str(os.cpu_count()), "system": platform.system(), "python": platform.python_version(),
+        "cpu": processor(), "cores": str(os.cpu_count()), "system": platform.system(),
+        "python": platform.python_version(),
         **{name: version(package) for name, package in PACKAGES.items()},
     }  # fmt: skip
     slug = re.sub(r"[^a-z0-9]+", "-", about["cpu"].lower()).strip("-")

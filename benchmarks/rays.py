@@ -1,10 +1,12 @@
 """Rays against meshes: `collide.raycast` beside embree and trimesh's own rays, and pybullet's batches.
 
-    python benchmarks/rays.py                    # half a minute; needs trimesh and pybullet; embreex where it is installed
+    python benchmarks/rays.py
+    # half a minute; needs trimesh and pybullet; embreex where it is installed
 
-First hits of random rays through meshes of box diagonal 1, from a sphere around them at points near the middle. Engines take
-turns; times are the least of several turns, per ray. embree and pybullet work in single precision or with meshes read
-anew from a file; "facets" and "missed" count rays for which they name another facet, or none, where a facet is hit.
+First hits of random rays through meshes of box diagonal 1, from a sphere around them at points near the middle. Engines
+take turns; times are the least of several turns, per ray. embree and pybullet work in single precision or with meshes
+read anew from a file; "facets" and "missed" count rays for which they name another facet, or none, where a facet is
+hit.
 """
 
 from __future__ import annotations
@@ -61,7 +63,9 @@ def engines(vertices, faces, origins, directions, folder: Path) -> dict:
         plain.export(place)
         client = pybullet.connect(pybullet.DIRECT)
         flag = pybullet.GEOM_FORCE_CONCAVE_TRIMESH
-        shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=str(place), flags=flag, physicsClientId=client)
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_MESH, fileName=str(place), flags=flag, physicsClientId=client
+        )
         pybullet.createMultiBody(0, shape, physicsClientId=client)
         starts, ends = origins.tolist(), (origins + 2 * directions).tolist()
 
@@ -98,13 +102,28 @@ def main() -> int:
         for engine, seconds in best.items():
             theirs = facets[engine]
             others = ours[: len(theirs)]
-            wrong = {"missed": int(((theirs == -1) & (others >= 0)).sum()), "extra": int(((theirs != -1) & (others < 0)).sum())}
+            wrong = {
+                "missed": int(((theirs == -1) & (others >= 0)).sum()),
+                "extra": int(((theirs != -1) & (others < 0)).sum()),
+            }
             if engine != "pybullet":
                 wrong["facets"] = int(((theirs != others) & (theirs >= 0) & (others >= 0)).sum())
             each = seconds / len(theirs) * 1e6
-            rows.append({"mesh": name, "facets": len(faces), "engine": engine, "us_per_ray": f"{each:.2f}", "hit_share": f"{(ours >= 0).mean():.2f}",
-                         **{f"rays_{key}": value for key, value in wrong.items()}})  # fmt: skip
-            print(f"{name:12} {engine:9} {each:8.2f} µs a ray, {each / (best['collide'] / RAYS * 1e6):7.2f} of collide's; {wrong}", flush=True)
+            rows.append(
+                {
+                    "mesh": name,
+                    "facets": len(faces),
+                    "engine": engine,
+                    "us_per_ray": f"{each:.2f}",
+                    "hit_share": f"{(ours >= 0).mean():.2f}",
+                    **{f"rays_{key}": value for key, value in wrong.items()},
+                }
+            )
+            print(
+                f"{name:12} {engine:9} {each:8.2f} µs a ray, {each / (best['collide'] / RAYS * 1e6):7.2f} of "
+                f"collide's; {wrong}",
+                flush=True,
+            )
     place = RESULTS / "rays.csv"
     with open(place, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [*dict.fromkeys(key for row in rows for key in row), "cores"])

@@ -4,7 +4,8 @@
     python benchmarks/startup.py --runs 1 --cold-runs 1 --no-csv
     python benchmarks/startup.py --against ../older/.venv/bin/python      # another installation, in turns with this one
 
-Each case runs in processes of its own. Cold means an empty cache folder: meshes are read, and kernels compiled where they come
+Each case runs in processes of its own. Cold means an empty cache folder: meshes are read, and kernels compiled where
+    they come
 in no library. Warm means a folder that one run has filled. Wall time is taken from outside, the interpreter's own start
 included; peak memory is the process's largest resident set.
 """
@@ -91,7 +92,8 @@ def _wait(process: subprocess.Popen) -> float:
 
 
 def measure(case: Case, runs: int, cold_runs: int, pythons: list[str]) -> dict[tuple[str, str], list[Run]]:
-    """Runs of a case by interpreter and by the state of the cache: "-" where it does not matter, else "cold" and "warm".
+    """Runs of a case by interpreter and by the state of the cache: "-" where it does not matter, else "cold" and
+    "warm".
 
     Interpreters take turns, so that what else the machine does meets all of them.
     """
@@ -116,7 +118,13 @@ def machine() -> dict[str, str]:
     versions = {name: metadata.version(package) for name, package in
                 (("collide", "collide-robotics"), ("numpy", "numpy"))}  # fmt: skip
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return {"cpu": _cpu(), "cores": str(cores), "system": platform.system(), "python": platform.python_version(), **versions}
+    return {
+        "cpu": _cpu(),
+        "cores": str(cores),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        **versions,
+    }
 
 
 def _cpu() -> str:
@@ -145,7 +153,8 @@ def rows(runs: int, cold_runs: int, pythons: list[str], only: str) -> list[dict[
         for (python, state), taken in measure(case, runs, cold_runs, pythons).items():
             seconds = [run_k.seconds for run_k in taken]
             rows.append({
-                "case": case.name, "of": "this" if python == sys.executable else "other", "cache": state, "runs": str(len(taken)),
+                "case": case.name, "of": "this" if python == sys.executable else "other", "cache": state,
+                "runs": str(len(taken)),
                 "median_s": f"{statistics.median(seconds):.3f}", "min_s": f"{min(seconds):.3f}",
                 "max_s": f"{max(seconds):.3f}", "peak_MiB": f"{max(run_k.peak for run_k in taken):.0f}",
             })  # fmt: skip
@@ -156,7 +165,9 @@ def show(table: list[dict[str, str]]) -> None:
     widths = {key: max(len(key), *(len(row[key]) for row in table)) for key in table[0]}
     for line in [{key: key for key in widths}, *table]:
         left_columns = {"case", "of", "cache"}
-        print("  ".join(line[k].ljust(w) if k in left_columns else line[k].rjust(w) for k, w in widths.items()).rstrip())
+        print(
+            "  ".join(line[k].ljust(w) if k in left_columns else line[k].rjust(w) for k, w in widths.items()).rstrip()
+        )
 
 
 def write(table: list[dict[str, str]], about: dict[str, str]) -> Path:
@@ -175,7 +186,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=7, help="runs of each case, of the warm ones too (default: 7)")
     parser.add_argument("--cold-runs", type=int, default=3, help="runs with an empty cache (default: 3)")
-    parser.add_argument("--against", metavar="PYTHON", help="an interpreter that has another version of collide installed")
+    parser.add_argument(
+        "--against", metavar="PYTHON", help="an interpreter that has another version of collide installed"
+    )
     parser.add_argument("--only", default="", help="cases whose names hold this")
     parser.add_argument("--no-csv", action="store_true", help="print the table alone")
     args = parser.parse_args()

@@ -158,7 +158,10 @@ def main() -> None:
             if columns is None:
                 columns = list(row)
                 print("  ".join(f"{c:>14}" for c in columns))
-            print("  ".join(f"{v:>14,.4g}" if not isinstance(v, (str, int)) else f"{v:>14}" for v in row.values()), flush=True)
+            print(
+                "  ".join(f"{v:>14,.4g}" if not isinstance(v, (str, int)) else f"{v:>14}" for v in row.values()),
+                flush=True,
+            )
     print("\n".join(["", *fitted(rows)]))
     if not args.no_csv:
         path = Path(__file__).parent / "results" / "supports.csv"

@@ -4,9 +4,9 @@
 
 Pairs of bodies of n vertices of several kinds, at poses of which about half meet and many nearly touch. Counts are
 exact, so they are fitted: rounds ≤ a + b·(log2 n + log2 m), for the mean and for the largest of all poses. Time is
-taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is compared with
-the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole bodies at once
-(early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
+taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is
+compared with the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole
+bodies at once (early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
 """
 
 from __future__ import annotations
@@ -137,7 +137,8 @@ def measured(kind: str, n: int) -> dict:
     per = 1e6 / POSES
     ladder_p, ladder_q = A._walk.ladder, B._walk.polar.ladder
     return {
-        "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices), "facets_of_r": len(B._walk.polar.starts) - 1,
+        "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices),
+        "facets_of_r": len(B._walk.polar.starts) - 1,
         "depth_p": result.depth_p, "depth_q": result.depth_q, "hits": truth.mean(),
         "rounds_mean": rows["rounds"].mean(), "rounds_most": int(rows["rounds"].max()),
         "tests_mean": rows["tests"].mean(), "tests_most": int(rows["tests"].max()),
@@ -181,7 +182,9 @@ def drawn(rows: list[dict], path: str) -> None:
         rounds.plot(n, [r["rounds_mean"] for r in of], "o--", color=line.get_color())
         times.plot(n, [r["walk_kernel_us"] for r in of], "o-", color=line.get_color(), label=kind)
         times.plot(n, [r["default_us"] for r in of], "o:", color=line.get_color())
-    rounds.set(title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None))
+    rounds.set(
+        title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None)
+    )
     times.set(title="time of a query [µs]: walk, and (dotted) default", xscale="log", yscale="log", xlabel="vertices")
     rounds.legend()
     times.legend()
@@ -207,7 +210,10 @@ def main() -> None:
                 print("  ".join(f"{c:>11.11}" for c in row))
                 warned = True
             rows[kind, n] = row
-            print("  ".join(f"{v:>11,.4g}" if not isinstance(v, (str, int)) else f"{v:>11}" for v in row.values()), flush=True)
+            print(
+                "  ".join(f"{v:>11,.4g}" if not isinstance(v, (str, int)) else f"{v:>11}" for v in row.values()),
+                flush=True,
+            )
             if not args.no_csv:
                 write(path, rows)
     print("\n".join(["", *fitted(list(rows.values()))]))
@@ -222,7 +228,8 @@ def read(path: Path) -> dict[tuple[str, int], dict]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     return {
-        (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()} for row in rows
+        (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()}
+        for row in rows
     }
 
 

@@ -171,7 +171,11 @@ def bodies() -> None:
         axes.scatter(*(primal.points[r.vertex_p] + offset), color=RED, s=25, depthshade=False)
         azimuth = np.degrees(np.arctan2(tangent[1], tangent[0]))
         axes.view_init(elev=8, azim=azimuth)
-        tidy(axes, np.concatenate([body, primal.points[: len(A.points)] + offset]), f"$P_{{{r.level_p}}}$ beyond ρ(z), j = {r.level_q}")
+        tidy(
+            axes,
+            np.concatenate([body, primal.points[: len(A.points)] + offset]),
+            f"$P_{{{r.level_p}}}$ beyond ρ(z), j = {r.level_q}",
+        )
     figure.savefig(FOLDER / "walk_planes.png", dpi=110)
 
 

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from collide import errors as errors
     from collide import results as results
     from collide import transforms as transforms
-    from collide.certificates.certificates import Certificate, CertificateRefused, verify
+    from collide.certificates.certificate import Certificate, CertificateRefused
+    from collide.certificates.make_certificate import certify
+    from collide.certificates.verify import verify
     from collide.contact.contact_query import contacts
     from collide.contact.contact_rows import Contacts
     from collide.errors import (
@@ -66,7 +68,9 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
-    "collide.certificates.certificates": ("Certificate", "CertificateRefused", "verify"),
+    "collide.certificates.certificate": ("Certificate", "CertificateRefused"),
+    "collide.certificates.make_certificate": ("certify",),
+    "collide.certificates.verify": ("verify",),
     "collide.contact.contact_query": ("contacts",),
     "collide.contact.contact_rows": ("Contacts",),
     "collide.surface_queries.contains": ("contains",),
@@ -94,7 +98,7 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
     "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
-    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "collide", "contacts", "contains",
+    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains",
     "distance", "facet_pairs", "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
     "walk",
 ]

@@ -26,7 +26,7 @@ _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
 
 
-def told(value: Any) -> str:
+def describe(value: Any) -> str:
     """A value as an error message shows it: short, numpy's numbers as numbers."""
     with contextlib.suppress(Exception):  # whoever's __repr__ fails is told by type
         return _SHORT.repr(value.item() if isinstance(value, (np.number, np.bool_)) else value)
@@ -53,19 +53,19 @@ def limit(what: str, value: Any, unit: str = " [m]") -> float:
         return value
     read = number(value)
     if read is None or not read >= 0.0 or (math.isinf(read) and value != read):
-        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {told(value)}")
+        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {describe(value)}")
     return read
 
 
-def is_whole(value: Any) -> bool:
+def is_integer(value: Any) -> bool:
     """Whether it is an integer: neither True nor a time span, which to numpy is one."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
 
 
-def whole(what: str, value: Any, least: int) -> int:
+def integer(what: str, value: Any, least: int) -> int:
     """An integer. Raises InvalidArgument."""
-    if not is_whole(value) or value < least:
-        raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {told(value)}")
+    if not is_integer(value) or value < least:
+        raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {describe(value)}")
     return int(value)
 
 
@@ -81,12 +81,12 @@ def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.n
     if found.dtype.kind in _REAL:
         return found.astype(np.float64)
     if found.dtype.kind != "O":
-        raise error(f"{what} must be real numbers {wanted}, got {_KINDS.get(found.dtype.kind, found.dtype)}: {told(value)}")
+        raise error(f"{what} must be real numbers {wanted}, got {_KINDS.get(found.dtype.kind, found.dtype)}: {describe(value)}")
     read = [number(entry) for entry in found.ravel().tolist()]
     if None in read:
         k = read.index(None)
         where = list(map(int, np.unravel_index(k, found.shape))) if found.ndim else ""
-        raise error(f"{what}{where} must be a real number (all of it {wanted}), got {told(found.ravel()[k])}")
+        raise error(f"{what}{where} must be a real number (all of it {wanted}), got {describe(found.ravel()[k])}")
     return np.array(read, dtype=np.float64).reshape(found.shape)
 
 
@@ -98,7 +98,7 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
         return np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         # numpy's own words for rows of different lengths are long, and tell no more
-        raise error(f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {told(value)}") from None
+        raise error(f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {describe(value)}") from None
 
 
 def _is_masked(value: Any) -> bool:

@@ -222,7 +222,9 @@ def _make(args, **limits) -> list:
         state_report = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
         if trajectory is not None:
             tested = report.without(scene, ignore)
-            state_report.trajectory = follow(tested, trajectory, resolution=args.resolution, progress=progress, **limits)
+            state_report.trajectory = follow(
+                tested, trajectory, resolution=args.resolution, progress=progress, **limits
+            )
         made.append(states.Stated(label, scene, state_report))
     return made
 
@@ -324,7 +326,9 @@ def _stress(args) -> int:
         title = f"STRESS  {args.engine}, {args.cases} cases a family, seed {args.seed}; judged in exact arithmetic"
         terminal.show_table(Table(title, columns, rows))
     if not args.quiet:
-        _say(f"{count(table.wrong, 'wrong answer')}, {table.failed} failed, {table.undecided} left open by {args.engine}")
+        _say(
+            f"{count(table.wrong, 'wrong answer')}, {table.failed} failed, {table.undecided} left open by {args.engine}"
+        )
     return YES if args.engine == "collide" and (table.wrong or table.failed) else FREE
 
 

@@ -11,6 +11,7 @@ import math
 import re
 from typing import NoReturn
 
+from collide import __version__
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -32,9 +33,7 @@ class _Parser(argparse.ArgumentParser):
 
 class _Version(argparse.Action):
     def __call__(self, parser, namespace, values, option_string=None):
-        import collide
-
-        print(f"collide {collide.__version__}")
+        print(f"collide {__version__}")
         raise SystemExit(0)
 
 
@@ -207,7 +206,9 @@ def _add_stress(commands) -> None:
 
 def _add_locality(commands) -> None:
     parser = _add(commands, "locality", "how local are these meshes?", _LOCALITY)
-    parser.add_argument("meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too")
+    parser.add_argument(
+        "meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too"
+    )
     parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
     parser.add_argument("--repeated", action="store_true",
                         help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
@@ -282,9 +283,13 @@ def _add_scenes(commands) -> None:
 def _scene_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("scene")
     group.add_argument("scenes", nargs="+", metavar="SCENE", help="a file, or the name of a shipped scene")
-    group.add_argument("--state", action="append", metavar="VALUES",
-                       help="joint values: a state's name, a YAML or JSON file, 0,0.5,... in the order of the joints, "
-                       "or joint=0.5,...; several names or files, separated by commas or given again, are several states")
+    group.add_argument(
+        "--state",
+        action="append",
+        metavar="VALUES",
+        help="joint values: a state's name, a YAML or JSON file, 0,0.5,... in the order of the joints, "
+        "or joint=0.5,...; several names or files, separated by commas or given again, are several states",
+    )
     group.add_argument("--robot", metavar="URDF", help="the robot of a planning scene")
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the URDF)")
     group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),

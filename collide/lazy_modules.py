@@ -1,7 +1,7 @@
 """Modules of kernels that a light module may need later: named where it imports, loaded when first used.
 
-Shapes can be made and certificates verified without any kernel. What a shape computes on request, its hull or the tree over
-its facets, takes kernels, and these are loaded then.
+Shapes can be made and certificates verified without any kernel. What a shape computes on request, its hull or the tree
+over its facets, takes kernels, and these are loaded then.
 """
 
 from __future__ import annotations
@@ -21,5 +21,5 @@ class LazyModule:
 
 
 def lazy_module(name: str) -> Any:
-    """The module, to be imported when an attribute of it is first used. tests/test_imports.py counts it as an import."""
+    """The module, to be imported when an attribute of it is first used. A test counts it as an import."""
     return LazyModule(name)

@@ -16,7 +16,7 @@ log = logging.getLogger("collide")
 
 
 @contextmanager
-def told(what: str, *sizes: int) -> Iterator[None]:
+def log_duration(what: str, *sizes: int) -> Iterator[None]:
     """Say what was made within, and how long it took. what : a format of the sizes, as logging has them."""
     started = time.perf_counter()
     yield

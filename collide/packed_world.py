@@ -29,7 +29,6 @@ class PackedWorld:
         self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
         self._keys = np.sort(np.array([i * len(bodies) + j for i, j in allowed], dtype=np.int64))
         self._shapes = [body.shape for body in bodies]
-        self._ready: dict = {}  # pairs with a mesh, made ready for booleans
         self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
         self._any_meshed = bool(self._meshed.any())
         parts = [bounding_parts_of(shape) for shape in self._shapes]
@@ -114,14 +113,13 @@ class PackedWorld:
         return found
 
     def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
-        from collide.narrowphase.facets.hull_culling import rows_within
-        from collide.narrowphase.facets.mesh_hits import APART, OPEN
-        from collide.narrowphase.facets.single_mesh_call import one_state
+        from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
+        from collide.narrowphase.facets.surface_pairs import APART, OPEN
 
         A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
         if boolean:
             row = np.zeros(1, dtype=PAIR_DTYPE)
-            state = one_state(A, B, X_WA, X_WB, self._ready, a * len(self._shapes) + b)
+            state = pair_states(A, B, X_WA[None], X_WB[None])[0]
             row["hit"], row["how"] = state != APART, UNDECIDED if state == OPEN else EXACT
         else:
             row = rows_within(A, B, X_WA[None], X_WB[None], limit)
@@ -182,7 +180,7 @@ class PackedWorld:
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
-        from collide.narrowphase.facets.hull_culling import rows_within
+        from collide.narrowphase.facets.mesh_pairs import rows_within
 
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
         for b in bodies[meshed].tolist():

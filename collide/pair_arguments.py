@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked
@@ -22,7 +22,7 @@ def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
             counts[name] = len(side)
             single = False
         elif not isinstance(side, Shape):
-            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(side)}")
+            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(side)}")
     wanted = max(counts.values()) if min(counts.values()) else 0
     for name, count in counts.items():
         if count != wanted and (count != 1 or name in "AB"):

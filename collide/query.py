@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.algorithms import named_algorithm
 from collide.batches import answer_batch, length_of
+from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.convex_queries import close
@@ -180,7 +181,7 @@ def distance(
     Raises InvalidPose, InvalidArgument; UnsupportedQuery where the depth has no end (half-space in
     half-space).
     """
-    limit = reading.limit("max_distance", max_distance)
+    limit = checks.limit("max_distance", max_distance)
     answer = named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:
@@ -190,7 +191,7 @@ def distance(
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
             if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]))
+                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
         except (AttributeError, KeyError, TypeError):
             pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
@@ -209,7 +210,7 @@ def distance(
         where = "" if single else f" (pose {k} of the batch)"
         pair = " and ".join(type(shape_at(S, k)).__name__ for S in (A, B))
         raise UnsupportedQuery(f"distance of {pair}{where}: {REFUSED[Method.PLANES, 'distance']}")
-    return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies))
+    return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies), certify)
 
 
 def _immutable(shapes):

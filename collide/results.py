@@ -1,34 +1,43 @@
 """What queries return: structured arrays with documented dtypes, and the names that go with them.
 
-One row is one pair of bodies. The fields, with A the first body and B the second:
+One row of `PAIR_DTYPE` is one pair of bodies A and B; vectors are in the world W, lengths in metres:
 
-=============== ===================================================================================
-a, b            ids of the bodies (0 and 1 for a pair query), a < b
-part_a, part_b  which convex part of each decided (0 where a body is one convex set)
-hit             the closed sets share a point
-certified       the sign is proven and the bracket keeps the promise of `narrowphase/bounds.py`
-beyond          the pair is farther apart than the query's max_distance; `distance` and `lower` are
-                then a proven lower bound ≥ max_distance, and `upper` is infinite
-how             which argument decided, a `How`: an index into `HOW`
-iterations      rounds of GJK (low half) and of EPA (high half), for diagnosis; of unions those of all
-                pairs of parts that were asked
-exact           rounds of the exact stage, 0 where doubles decided
-distance        signed [m]: the gap, or minus the depth
-lower, upper    lower ≤ true signed distance ≤ upper, proven against rounding [m]
-normal          (3,) unit vector nhat_AB_W: moving B by −distance·normal brings the pair to touch
-point_a,point_b (3,) witness points p_WAa, p_WBb [m]: point_b − point_a = distance · normal
-count           how many vertex pairs follow
-vertices_a, _b  (4,) ids of the core vertices that span the deciding feature, pair by pair: apart,
-                the features nearest each other; together, a simplex of A ⊖ B. −1 for curved cores
-=============== ===================================================================================
+=============== ============ ======================================================================================
+distance        float64      signed: the gap, or minus the depth (the length of a translation that separates A and B)
+lower, upper    float64      proven bounds of the true signed distance, rounding included
+normal          float64 (3,) unit vector nhat_AB_W: moving B by −distance·normal brings the pair to touch
+point_a         float64 (3,) witness point p_WAa of A
+point_b         float64 (3,) witness point p_WBb of B
+a, b            int32        ids of the bodies, a < b; 0 and 1 for a pair query
+part_a, part_b  int32        which convex part (or facet, of a mesh) of A and of B is meant; 0 where a body is one convex set
+vertices_a      int32 (4,)   ids of the core vertices of A that span the deciding feature: apart, the features nearest
+                             each other; together, a simplex of A ⊖ B around the origin. −1 for curved cores
+vertices_b      int32 (4,)   of B; pair by pair with vertices_a
+iterations      int32        iterations of GJK (low 16 bits) and of EPA (high 16 bits), for diagnosis; of unions the
+                             sum over all pairs of parts that were asked
+count           int32        how many of the four vertex pairs count
+how             int32        which argument decided: the value of a `How`, an index into `HOW`
+exact           uint8        iterations of the exact stage, 0 where doubles decided
+hit             bool         the closed sets A and B share a point
+certified       bool         the sign is proven, and the bracket keeps the promise of `narrowphase/bounds.py`
+beyond          bool         the pair is farther apart than the query's max_distance
+=============== ============ ======================================================================================
 
-Invariants, asserted in the tests: lower ≤ distance ≤ upper; hit ⇔ distance ≤ 0 where certified;
-|normal| = 1; `flipped(flipped(r))` is r.
+Invariants, asserted in the tests; u is a few units in the last place of the largest coordinate of the two bodies:
+
+    lower ≤ distance ≤ upper
+    hit = (distance ≤ 0)                                   where certified
+    |normal| = 1 ± u;  normal = 0                          for hits of ``distance(signed=False)``
+    point_b − point_a = distance · normal ± u              unless beyond
+    beyond:  max_distance ≤ lower = distance,  upper = ∞
+    flipped(flipped(rows)) = rows                          byte for byte
+    distance(B, A).rows = flipped(distance(A, B).rows)     byte for byte but for a and b, unless (A, X_WA) and (B, X_WB)
+                                                           are the same: then the normal is a fixed one of the two
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
@@ -45,22 +54,22 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Bools = NDArray[np.bool_]
     #: `Single` or `Batch`; Any where a type checker cannot tell which, and values of fields are Any, too.
-    Asked = TypeVar("Asked", default=Any)
-    One = TypeVar("One")
-    Many = TypeVar("Many")
+    Form = TypeVar("Form", default=Any)
+    Scalar = TypeVar("Scalar")
+    Column = TypeVar("Column")
 
-    class Field(Generic[One, Many]):
+    class Field(Generic[Scalar, Column]):
         """A field of a `PairResult` to a type checker: a scalar of a single result, a column of a batch."""
 
         @overload
-        def __get__(self, result: PairResult[Single], owner: object) -> One: ...
+        def __get__(self, result: PairResult[Single], owner: object) -> Scalar: ...
         @overload
-        def __get__(self, result: PairResult[Batch], owner: object) -> Many: ...
+        def __get__(self, result: PairResult[Batch], owner: object) -> Column: ...
         def __get__(self, result: Any, owner: object) -> Any: ...
 else:
     from typing import TypeVar
 
-    Asked = TypeVar("Asked")
+    Form = TypeVar("Form")
 
 
 class How(IntEnum):
@@ -80,10 +89,10 @@ class How(IntEnum):
     EXACT_ARITHMETIC = 5, "integers, where doubles leave the sign open or the last digit of a gap or depth"
 
     def __new__(cls, value: int, meaning: str) -> Self:
-        made = int.__new__(cls, value)
-        made._value_ = value
-        made.meaning = made.__doc__ = meaning
-        return made
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.meaning = member.__doc__ = meaning
+        return member
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", " ")
@@ -92,7 +101,7 @@ class How(IntEnum):
         return format(str(self), spec)
 
 
-#: Names of what `how` tells, by its value.
+#: Words of the arguments that decide, by the value of the field ``how``.
 HOW: tuple[str, ...] = tuple(str(how) for how in How)
 UNDECIDED, PLANE, SIMPLEX, SWEPT, FORMULA, EXACT = range(len(HOW))
 #: Set by a kernel on a pair outside the range of sizes; never in a result.
@@ -115,10 +124,10 @@ FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()
 
 
 def flipped(rows: np.ndarray) -> np.ndarray:
-    """The same results with the bodies' roles exchanged: points swapped, normals negated, exactly."""
+    """Rows of `PAIR_DTYPE` (n,) with A and B exchanged: ids, parts, points and vertices swapped, normals negated, exactly."""
     swapped = rows.copy()
-    for one, other in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("vertices_a", "vertices_b")):
-        swapped[one], swapped[other] = rows[other], rows[one]
+    for of_a, of_b in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("vertices_a", "vertices_b")):
+        swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
     swapped["normal"] = 0.0 - rows["normal"]  # never −0.0
     return swapped
 
@@ -131,14 +140,23 @@ class Batch:
     """``PairResult[Batch]``, to type checkers: fields are arrays with a leading N."""
 
 
-class PairResult(Generic[Asked]):
+#: (A, B, X_WA, X_WB): shapes, or sequences of them, and poses (N, 4, 4) or (1, 4, 4).
+Question = tuple[Any, Any, np.ndarray, np.ndarray]
+
+
+class PairResult(Generic[Form]):
     """Answer of a pair query: the fields of `PAIR_DTYPE` as attributes.
 
-    Scalars and (3,) arrays for single poses, ``how`` a `How`; arrays with a leading N for batches, of which ``r[k]``
-    is one result. ``rows`` is the structured array itself.
+    Parameters
+    ----------
+    rows : (N,) `PAIR_DTYPE`, the structured array itself.
+    is_single : whether the query was about a single pair of poses. Then attributes are scalars and (3,) arrays, and ``how``
+        is a `How`; of batches they are arrays with a leading N, and ``r[k]`` is the result of row k.
+    question : (A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1.
+    certify : what makes certificates of it, `collide.certify`.
     """
 
-    __slots__ = ("_question", "_single", "rows")
+    __slots__ = ("_certify", "is_single", "question", "rows")
 
     if TYPE_CHECKING:
         distance: Field[float, Floats]
@@ -150,10 +168,10 @@ class PairResult(Generic[Asked]):
         hit: Field[bool, Bools]
         certified: Field[bool, Bools]
         beyond: Field[bool, Bools]
-        how: Field[How, Bytes]
+        how: Field[How, Ints]
         iterations: Field[int, Ints]
         exact: Field[int, Bytes]
-        count: Field[int, Bytes]
+        count: Field[int, Ints]
         a: Field[int, Ints]
         b: Field[int, Ints]
         part_a: Field[int, Ints]
@@ -161,47 +179,28 @@ class PairResult(Generic[Asked]):
         vertices_a: Field[Ints, Ints]
         vertices_b: Field[Ints, Ints]
 
-    def __init__(self, rows: np.ndarray, single: bool, question: tuple):
-        self.rows, self._single, self._question = rows, single, question
+    def __init__(self, rows: np.ndarray, is_single: bool, question: Question, certify: Callable):
+        self.rows, self.is_single, self.question, self._certify = rows, is_single, question, certify
 
     @property
     def certificate(self):
-        """Plain data that proves the boolean, worked out when asked for; see `collide.certificates.certificates`.
+        """Plain data that proves the boolean, worked out when asked for: `collide.certify`.
 
-        A tuple of `Certificate`, one for each pair of parts it takes; None where there is none. A
-        list of these for batches. `collide.verify` checks it in Python integers.
+        A tuple of `Certificate`, one for each pair of parts it takes; None where there is none. A list of these for
+        batches. `collide.verify` checks one in Python integers.
         """
-        from collide.certificates.certificates import certificate_of
-
-        asked = (self._asked(k) for k in range(len(self.rows)))
-        found = [certificate_of(A, B, X_WA[0], X_WB[0], row) for (A, B, X_WA, X_WB), row in zip(asked, self.rows)]
-        return found[0] if self._single else found
-
-    def _asked(self, k: int) -> tuple:
-        """(A, B, X_WA, X_WB) of row k, poses (1, 4, 4)."""
-        A, B, X_WA, X_WB = self._question
-        shapes = (S[k] if isinstance(S, Sequence) else S for S in (A, B))
-        poses = (X if len(X) == 1 else X[k : k + 1] for X in (X_WA, X_WB))
-        return (*shapes, *poses)
-
-    @property
-    def question(self) -> tuple:
-        """(A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1."""
-        return self._question
+        return self._certify(*self.question, self)
 
     @overload
     def __getitem__(self, k: int) -> PairResult[Single]: ...
     @overload
     def __getitem__(self, k: slice) -> PairResult[Batch]: ...
     def __getitem__(self, k):
-        """Result k of a batch, or a batch of those in a slice."""
+        """Result k of a batch, or a batch of those in a slice. Raises IndexError, InvalidArgument."""
         if isinstance(k, slice):
-            A, B, X_WA, X_WB = self._question
-            shapes = (S[k] if isinstance(S, Sequence) else S for S in (A, B))
-            poses = (X if len(X) == 1 else X[k] for X in (X_WA, X_WB))
-            return PairResult(self.rows[k], False, (*shapes, *poses))
+            return PairResult(self.rows[k], False, _questions_at(self.question, k), self._certify)
         k = _row_number(k, len(self.rows))
-        return PairResult(self.rows[k : k + 1], True, self._asked(k))
+        return PairResult(self.rows[k : k + 1], True, question_of_row(self.question, k), self._certify)
 
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
@@ -209,7 +208,7 @@ class PairResult(Generic[Asked]):
             if name not in FIELDS:
                 raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
             values = self.rows[name]
-            if not self._single:
+            if not self.is_single:
                 return values
             if name == "how":
                 return How(values[0])
@@ -222,13 +221,27 @@ class PairResult(Generic[Asked]):
         return len(self.rows)
 
     def __repr__(self) -> str:
-        if self._single:
+        if self.is_single:
             row = self.rows[0]
             return (
                 f"PairResult(distance={float(row['distance'])!r}, hit={bool(row['hit'])}, "
                 f"certified={bool(row['certified'])}, how={HOW[row['how']]!r})"
             )
         return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
+
+
+def question_of_row(question: Question, k: int) -> Question:
+    """The question of row k of its results: two shapes, and poses (1, 4, 4)."""
+    A, B, X_WA, X_WB = _questions_at(question, slice(k, k + 1))
+    A, B = (S[0] if isinstance(S, Sequence) else S for S in (A, B))
+    return A, B, X_WA, X_WB
+
+
+def _questions_at(question: Question, rows: slice) -> Question:
+    A, B, X_WA, X_WB = question
+    A, B = (S[rows] if isinstance(S, Sequence) else S for S in (A, B))
+    X_WA, X_WB = (X if len(X) == 1 else X[rows] for X in (X_WA, X_WB))
+    return A, B, X_WA, X_WB
 
 
 def _row_number(k, count: int) -> int:
@@ -243,20 +256,21 @@ def _row_number(k, count: int) -> int:
 class WorldResult:
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
-    Indexing by a field name gives that column; ``names`` resolves the ids; ``pair(k)`` is row k as a
-    `PairResult`, with its certificate.
+    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows; ``rows`` is the
+    structured array (n,) of `PAIR_DTYPE` itself. ``names`` resolves the ids; ``pair(k)`` is row k as a `PairResult`, with
+    its certificate.
     """
 
-    __slots__ = ("_bodies", "rows")
+    __slots__ = ("_bodies", "_certify", "rows")
 
-    def __init__(self, rows: np.ndarray, bodies: dict):
-        self.rows, self._bodies = rows, bodies
+    def __init__(self, rows: np.ndarray, bodies: Mapping, certify: Callable):
+        self.rows, self._bodies, self._certify = rows, bodies, certify
 
     def pair(self, k: int) -> PairResult[Single]:
-        """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate."""
+        """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate. Raises IndexError."""
         row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
-        return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]))
+        return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]), self._certify)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -269,10 +283,10 @@ class WorldResult:
     @overload
     def __getitem__(self, key: Literal["hit", "certified", "beyond"]) -> Bools: ...
     @overload
-    def __getitem__(self, key: Literal["how", "exact", "count"]) -> Bytes: ...
+    def __getitem__(self, key: Literal["exact"]) -> Bytes: ...
     @overload
     def __getitem__(
-        self, key: Literal["a", "b", "part_a", "part_b", "vertices_a", "vertices_b", "iterations"]
+        self, key: Literal["a", "b", "part_a", "part_b", "vertices_a", "vertices_b", "iterations", "count", "how"]
     ) -> Ints: ...
     @overload
     def __getitem__(self, key: int) -> np.void: ...

@@ -16,6 +16,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -25,6 +26,8 @@ from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut,
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
+#: Module and function that read robots from files: found when first needed, since the engine imports no loader.
+_LOADER = ("collide.scenes.loaders.urdf", "load_robot")
 #: Columns of ``q`` by joint type.
 COLUMNS = {
     "revolute": ("",),
@@ -83,25 +86,43 @@ class Robot:
 
     Parameters
     ----------
-    name : of the robot.
-    links : names of the links, in the order of the file.
-    joints : the joints, in the order of the file; together they make one tree.
-    geometry : link name -> list of `LinkShape`; links without collision geometry may be left out.
-    semantic_pairs : (link, link, reason) from an SRDF. None: links next to each other in the tree
-        are taken as never tested.
-    states : named joint values, ``{"ready": {"joint1": 0.0, ...}}``.
-    notes : what the person who loads the robot should know. Joints that cannot follow what they are said to mimic
-        (a joint that does not exist, a circle) become joints of their own, and a note is added for each.
+    name : str
+        Of the robot.
+    links : sequence of str
+        Names of the links, in the order of the file.
+    joints : sequence of Joint
+        In the order of the file; together they make one tree. Joints that cannot follow what they are said to mimic (a
+        joint that does not exist, a cycle) become joints of their own, and a note is added for each.
+    geometry : mapping of str to sequence of LinkShape, optional
+        Link → its collision elements; links without collision geometry may be left out.
+    semantic_pairs : iterable of (link, link, reason), optional
+        From an SRDF. None: links next to each other in the tree are taken as never tested.
+    states : mapping, optional
+        Named joint values [rad or m], ``{"ready": {"joint1": 0.0, ...}}``.
+    notes : iterable of str
+        What the person who loads the robot should know.
+    sources : iterable of str
+        The files read, the robot's own first.
 
     Attributes
     ----------
-    joint_names, dof, lower, upper : the columns of ``q``, their number and their limits (dof,).
-    root : the link without a parent.   base_links : links welded to the root, root included.
-    rigid_clusters : tuples of links welded together by fixed joints, in the order of the links.
-    disabled_pairs : [(link, link, reason)], both with collision geometry, in the order of the links.
-    place : the robot and the file it comes from, for messages.
+    joint_names, dof, lower, upper
+        The columns of ``q``, their number, and their limits (dof,) [rad or m].
+    root
+        The link without a parent.
+    base_links
+        Links welded to the root, root included.
+    rigid_clusters
+        Tuples of links welded together by fixed joints, in the order of the links.
+    disabled_pairs
+        [(link, link, reason)], both with collision geometry, in the order of the links.
+    place
+        The robot and the file it comes from, for messages.
 
-    Raises SceneError naming the link or joint where the joints do not make one tree.
+    Raises
+    ------
+    SceneError
+        Naming the link or joint, where names repeat, geometry has no link, or the joints do not make one tree.
     """
 
     def __init__(
@@ -143,11 +164,26 @@ class Robot:
     def load(cls, path, srdf=None, **options) -> Robot:
         """A robot from a URDF file, with the SRDF beside it or the one given.
 
-        options : ``meshes``, ``package_path``, ``missing_meshes`` as in `collide.scenes.load`.
-        """
-        from collide.scenes.loaders.urdf import load_robot
+        Parameters
+        ----------
+        path : str or Path
+            The URDF file.
+        srdf : str, Path or bool, optional
+            The SRDF file. None looks beside the URDF, False does without.
+        **options
+            ``meshes``, ``package_path`` and ``missing_meshes`` as of `collide.scenes.load`.
 
-        return load_robot(path, srdf=srdf, **options)
+        Returns
+        -------
+        Robot
+            With everything that URDF and SRDF say about collisions.
+
+        Raises
+        ------
+        SceneError
+            Naming file, element and value of what cannot be read.
+        """
+        return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {len(self.links)} links, {self.dof} degrees of freedom)"
@@ -173,19 +209,39 @@ class Robot:
         self.lower, self.upper = np.array(lower), np.array(upper)
 
     def default_configuration(self) -> np.ndarray:
-        """(dof,): 0 for every column, or the limit nearest to 0 where 0 is outside."""
+        """The configuration of zeros, or of the limit nearest to 0 where 0 is outside.
+
+        Returns
+        -------
+        (dof,) float64
+            [rad or m], columns as in ``joint_names``.
+        """
         return np.clip(np.zeros(self.dof), self.lower, self.upper)
 
     def configuration(
         self, values: Mapping[str, float], start: np.ndarray | None = None
     ) -> tuple[np.ndarray, list[str]]:
-        """Joint values by name as a configuration (dof,), and notes about the values given.
+        """Joint values by name as a configuration, and notes about them.
 
-        Columns without a value keep that of ``start``, by default `default_configuration`. Values
-        outside a limit are used and noted; so are values for joints that cannot take one.
+        Parameters
+        ----------
+        values : mapping of str to float
+            Joint, or column of ``joint_names`` → value [rad or m]. Values outside a limit are used and noted; so are
+            values for joints that cannot take one.
+        start : (dof,) float64, optional
+            What columns without a value keep; by default `default_configuration`.
 
-        Raises InvalidArgument for unknown joints (the known ones are listed) and for values that
-        are not finite numbers.
+        Returns
+        -------
+        q : (dof,) float64
+            [rad or m].
+        notes : list of str
+            For the person who gave the values.
+
+        Raises
+        ------
+        InvalidArgument
+            For unknown joints (the known ones are listed) and for values that are not finite numbers.
         """
         q = self.default_configuration() if start is None else np.array(start, dtype=np.float64)
         column = {name: k for k, name in enumerate(self.joint_names)}
@@ -214,7 +270,20 @@ class Robot:
         return q, notes + self.limit_notes(q)
 
     def default_notes(self, names: Iterable[str], q: np.ndarray) -> list[str]:
-        """A note about the columns that were not ``names`` a value and stand in ``q`` by default."""
+        """A note about the columns of a configuration that nobody gave a value.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The columns that were given one.
+        q : (dof,) float64
+            The configuration [rad or m].
+
+        Returns
+        -------
+        list of str
+            One note, or none.
+        """
         names = set(names)
         unset = [(name, value) for name, value in zip(self.joint_names, q) if name not in names]
         if not unset:
@@ -223,12 +292,36 @@ class Robot:
         return [f"robot {self.name}: no value given for {listed}: 0 taken, or the limit nearest to 0"]
 
     def joint_value(self, name: str, q: np.ndarray) -> float:
-        """The value of a joint that moves along one coordinate, mimicking ones included."""
+        """The value of a joint that moves along one coordinate, mimicking ones included.
+
+        Parameters
+        ----------
+        name : str
+            Of the joint.
+        q : (dof,) float64
+            The configuration [rad or m].
+
+        Returns
+        -------
+        float
+            [rad or m].
+        """
         driver, multiplier, offset = self._drivers[name]
         return multiplier * float(q[self._columns[driver]]) + offset
 
     def limit_notes(self, q: np.ndarray) -> list[str]:
-        """One note for each joint outside its limits in the configuration (dof,)."""
+        """Notes about joints outside their limits.
+
+        Parameters
+        ----------
+        q : (dof,) float64
+            The configuration [rad or m].
+
+        Returns
+        -------
+        list of str
+            One a joint.
+        """
         notes = []
         for joint in self.joints:
             if joint.type not in ("revolute", "prismatic"):
@@ -246,16 +339,29 @@ class Robot:
     # --- kinematics ------------------------------------------------------------------------------
 
     def link_poses(self, q, X_WR=None) -> np.ndarray:
-        """Forward kinematics: (N, links, 4, 4) poses X_WL of all links, in the order of ``links``.
+        """Forward kinematics: the poses of all links.
 
-        q : (dof,) or (N, dof), columns as in ``joint_names``; a single row gives N = 1.
-        X_WR : (4, 4) pose of the root link in the world, by default the identity.
+        Every row is computed alone, by the same additions and multiplications: one row gives the same bits as that row
+        in a batch.
 
-        Every row is computed alone, by the same additions and multiplications: one row gives the
-        same bits as that row in a batch.
+        Parameters
+        ----------
+        q : (dof,) or (N, dof) array_like, float64
+            Configurations [rad or m], columns as in ``joint_names``; a single one gives N = 1.
+        X_WR : (4, 4) float64, optional
+            Pose of the root link R in the world W, by default the identity.
 
-        Raises InvalidArgument for configurations of another shape or not finite, and InvalidPose, naming file, link and
-        joint, where a link leaves the numbers that poses may have.
+        Returns
+        -------
+        (N, links, 4, 4) float64
+            Poses X_WL, links in the order of ``links``. O(N · joints).
+
+        Raises
+        ------
+        InvalidArgument
+            For configurations of another shape, or not finite.
+        InvalidPose
+            Naming file, link and joint, where a link leaves the range of coordinates that poses may have.
         """
         q = self._as_configurations(q)
         X_WLs = np.empty((len(q), len(self.links), 4, 4))
@@ -278,7 +384,8 @@ class Robot:
         value = f" = {self.joint_value(joint.name, q[row]):g}" if joint.name in self._drivers else ""
         follows = f", which follows {cut(joint.mimic.joint)}," if joint.mimic is not None else ""
         raise InvalidPose(
-            f'{self.place}: link "{cut(joint.child)}" stands at {at}: coordinates must be finite and within {LARGEST:g}; '
+            f'{self.place}: link "{cut(joint.child)}" stands at {at}: coordinates must be finite and within '
+            f'{LARGEST:g}; '
             f'look at the origin of joint "{cut(joint.name)}"{follows} and at its value{value}'
         )
 
@@ -286,7 +393,9 @@ class Robot:
         try:
             array = np.asarray(q, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            raise InvalidArgument(f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}") from None
+            raise InvalidArgument(
+                f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}"
+            ) from None
         if array.ndim not in (1, 2) or array.shape[-1] != self.dof:
             raise InvalidArgument(
                 f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
@@ -317,6 +426,7 @@ class Robot:
 
     @property
     def disabled_pairs(self) -> list[tuple[str, str, str]]:
+        """[(link, link, reason)] of pairs never tested, both with collision geometry, in the order of the links."""
         pairs: dict[tuple[str, str], str] = {}
         for a, b, reason in self.semantic_pairs if self.semantic_pairs is not None else self._adjacent_pairs():
             self._note_pair(pairs, a, b, reason)
@@ -350,7 +460,18 @@ class Robot:
             pairs.setdefault(key, reason)
 
     def renamed(self, prefix: str) -> Robot:
-        """The same robot with ``prefix`` before the name of every link and joint."""
+        """The same robot with a prefix before the name of every link and joint.
+
+        Parameters
+        ----------
+        prefix : str
+            For example ``"left_"``; the empty text gives the robot itself.
+
+        Returns
+        -------
+        Robot
+            A new one; shapes are shared.
+        """
         if not prefix:
             return self
         return Robot(
@@ -381,7 +502,9 @@ def _indices(kind: str, names: Sequence[str]) -> dict[str, int]:
     index: dict[str, int] = {}
     for k, name in enumerate(names):
         if name in index:
-            raise SceneError(f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"')
+            raise SceneError(
+                f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"'
+            )
         index[name] = k
     return index
 
@@ -419,7 +542,8 @@ def _tree(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Join
     for joint in joints:
         if joint.child in above:
             raise SceneError(
-                f'link "{cut(joint.child)}" has two parents: it is also the child of joint "{cut(above[joint.child].name)}"',
+                f'link "{cut(joint.child)}" has two parents: it is also the child of joint '
+                f'"{cut(above[joint.child].name)}"',
                 element=f'joint "{cut(joint.name)}"',
             )
         above[joint.child] = joint
@@ -476,7 +600,9 @@ def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
         if joint.name not in single:
             broken[joint.name] = f"a {joint.type} joint has no single value that could follow another"
         elif joint.mimic.joint not in single:
-            broken[joint.name] = f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
+            broken[joint.name] = (
+                f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
+            )
     ended: set[str] = set()  # joints whose chain was followed to its end
     for name in single:
         chain: dict[str, int] = {}
@@ -487,13 +613,18 @@ def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
             here = mimic.joint if mimic is not None and here not in broken else None
         if here in chain:
             circle = list(chain)[chain[here] :]
-            broken.update({member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle})
+            broken.update(
+                {member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle}
+            )
         ended.update(chain)
     return broken
 
 
 def _about_broken(name: str, why: str) -> str:
-    return f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest to it unless a value is given'
+    return (
+        f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest '
+        'to it unless a value is given'
+    )
 
 
 def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
@@ -511,7 +642,10 @@ def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, floa
             driver, multiplier, offset = drivers[mimic.joint]
             composed = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
             if not all(map(math.isfinite, composed)):
-                what = f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its offset {composed[1]:g}'
+                what = (
+                    f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its '
+                    f'offset {composed[1]:g}'
+                )
                 raise SceneError(f"{what}: both must be finite", element=f'joint "{cut(here)}" mimic')
             drivers[here] = (driver, *composed)
     return drivers

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS
@@ -30,9 +30,9 @@ Pair = tuple[Shape, Shape, np.ndarray, np.ndarray]
 
 def checked_margin(name: str, value) -> float:
     """A margin [m] as given: 0, or of a size that a body may have. Raises InvalidArgument."""
-    margin = reading.limit(name, value)
+    margin = checks.limit(name, value)
     if margin and not SMALLEST <= margin <= LARGEST:
-        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}")
+        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.describe(value)}")
     return margin
 
 

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from typing import Any
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 
 #: As many threads as anybody may ask for: more than one can start are never started.
@@ -26,7 +26,7 @@ _GAIN = 1.3
 
 def check_threads(threads) -> int:
     """A number of threads, as an integer. Raises InvalidArgument."""
-    number = reading.whole("threads", threads, 1)
+    number = checks.integer("threads", threads, 1)
     if number > _MOST:
         raise InvalidArgument(f"threads must be an integer from 1 to {_MOST}; more than there are processors cannot help")
     return number

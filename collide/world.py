@@ -8,22 +8,21 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import argument_checks as reading
-from collide import log as journal
+from collide import argument_checks as checks
 from collide.broadphase.filters import CULLED, count_skipped
+from collide.certificates.make_certificate import certify
+from collide.contact.contact_query import check_margin, check_most, contact_rows
+from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
+from collide.log import log_duration
 from collide.packed_world import PackedWorld
 from collide.results import HOW, UNDECIDED, WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
-
-if TYPE_CHECKING:
-    from collide.contact.contact_rows import WorldContacts
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
@@ -93,12 +92,12 @@ class World:
         group, mask : bit sets of up to 32 bits.
         """
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {reading.told(shape)}")
+            raise InvalidArgument(f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {checks.describe(shape)}")
         X_WB = _one_pose(np.eye(4) if X_WB is None else X_WB, "World.add: X_WB")
         identity = self._next
         name = f"body {identity}" if name is None else name
         if not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {reading.told(name)}")
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.describe(name)}")
         if name in self._ids:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._ids[name]})')
         body = Body(identity, name, shape, X_WB, _flag("static", static), _bits("group", group), _bits("mask", mask))
@@ -139,7 +138,7 @@ class World:
         reason : a few words; `stats` counts skipped pairs under it.
         """
         if b is None:
-            self._allow_matrix(reading.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument), reason)
+            self._allow_matrix(checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument), reason)
             return
         i, j = self._id(a), self._id(b)
         if i == j:
@@ -165,10 +164,10 @@ class World:
                 return self._ids[body]
             known = ", ".join(sorted(self._ids)[:12]) or "none"
             raise UnknownBody(f'no body is named "{body}"; there are: {known}{", …" if len(self._ids) > 12 else ""}')
-        if not reading.is_whole(body):
-            raise UnknownBody(f"a body is named by its id or its name, got {reading.told(body)}")
+        if not checks.is_integer(body):
+            raise UnknownBody(f"a body is named by its id or its name, got {checks.describe(body)}")
         if body not in self._bodies:
-            raise UnknownBody(f"no body has id {reading.told(body)}; it may have been removed")
+            raise UnknownBody(f"no body has id {checks.describe(body)}; it may have been removed")
         return int(body)
 
     def __len__(self) -> int:
@@ -211,7 +210,7 @@ class World:
     def collisions(self) -> WorldResult:
         """Every hitting pair with its depth, sorted by (a, b)."""
         rows = self._ask(0.0)
-        return WorldResult(rows[rows["hit"]], dict(self._bodies))
+        return WorldResult(rows[rows["hit"]], dict(self._bodies), certify)
 
     def distances(self, max_distance: float = math.inf) -> WorldResult:
         """Every tested pair at most ``max_distance`` [m] apart, hits included, sorted by (a, b).
@@ -219,9 +218,9 @@ class World:
         None is left out that is not proven farther apart: ``lower ≤ max_distance`` of all of them.
         Two half-spaces that meet have distance −inf.
         """
-        limit = reading.limit("World.distances: max_distance", max_distance)
+        limit = checks.limit("World.distances: max_distance", max_distance)
         rows = self._ask(limit)
-        return WorldResult(rows[_within(rows, limit)], dict(self._bodies))
+        return WorldResult(rows[_within(rows, limit)], dict(self._bodies), certify)
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8) -> WorldContacts:
         """Contacts of every tested pair within ``margin`` [m], sorted by (a, b): one row a contact.
@@ -229,9 +228,6 @@ class World:
         margin, max_contacts, and what a row says and promises: as in `collide.contacts`. `stats` stays as it is.
         Raises UnsupportedQuery, naming the bodies, where that does.
         """
-        from collide.contact.contact_query import check_margin, check_most, contact_rows
-        from collide.contact.contact_rows import WorldContacts, no_rows
-
         margin, most = check_margin("World.contacts", margin), check_most("World.contacts", max_contacts)
         bodies = list(self._bodies.values())
         found = []
@@ -250,7 +246,7 @@ class World:
 
         Such are some shapes against a mesh. Allow these pairs, and the rest of the World is answered.
         """
-        limit = reading.limit("World.unanswerable: max_distance", max_distance)
+        limit = checks.limit("World.unanswerable: max_distance", max_distance)
         packed, ids = self._pack(), list(self._bodies)
         return [(ids[a], ids[b], why) for a, b, why in packed.refused(packed.candidates(limit), limit)]
 
@@ -260,15 +256,15 @@ class World:
         Field a is −1 for the outside shape, b the body; normals point from the shape to the body.
         Filters do not apply, and `stats` stays that of the last query of the whole World.
         """
-        limit = reading.limit("World.query: max_distance", max_distance)
+        limit = checks.limit("World.query: max_distance", max_distance)
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.query: shape must be a shape, got {reading.told(shape)}")
+            raise InvalidArgument(f"World.query: shape must be a shape, got {checks.describe(shape)}")
         X_WS = _one_pose(X_WS, "World.query: X_WS")
         rows = self._pack().against(shape, X_WS, limit)
         rows = rows[_within(rows, limit)]
         rows["b"] = self._pack().ids[rows["b"]]
         rows["a"] = -1
-        return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)})
+        return WorldResult(rows, {**self._bodies, -1: Body(-1, "query", shape, X_WS, False, 0, 0)}, certify)
 
     @property
     def allowed(self) -> dict[tuple[int, int], str]:
@@ -307,7 +303,7 @@ class World:
         if self._packed is None:
             position = {identity: k for k, identity in enumerate(self._bodies)}
             allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
-            with journal.told("tables and box-tree of a World of %d bodies made", len(self._bodies)):
+            with log_duration("tables and box-tree of a World of %d bodies made", len(self._bodies)):
                 self._packed = PackedWorld(list(self._bodies.values()), allowed)
         elif self._moved:
             moved = sorted(self._moved)
@@ -366,12 +362,12 @@ def _read_only(X: np.ndarray) -> np.ndarray:
 def _flag(field: str, value) -> bool:
     if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"World.add: {field} must be True or False, got {reading.told(value)}")
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.describe(value)}")
 
 
 def _bits(field: str, value) -> int:
-    if not reading.is_whole(value) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {reading.told(value)}")
+    if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.describe(value)}")
     return int(value)
 
 

@@ -35,4 +35,6 @@ print("after the move:  ", f"{collide.distance(crate, ball, X_WA, freed).distanc
 lower, upper = collide.Box((1, 1, 1)), collide.Box((0.5, 0.5, 0.5))
 for height in (0.75, np.nextafter(0.75, 1)):
     r = collide.distance(lower, upper, np.eye(4), collide.pose((0, 0, height)))
-    print(f"\nbox at {float(height)!r}: hit {r.hit}, distance {r.distance:.1e}, certified {r.certified}, by {HOW[r.how]}")
+    print(
+        f"\nbox at {float(height)!r}: hit {r.hit}, distance {r.distance:.1e}, certified {r.certified}, by {HOW[r.how]}"
+    )

@@ -24,7 +24,9 @@ assert alone.distance == r.distance[1] and (alone.normal == r.normal[1]).all()
 # Beyond max_distance only a proven lower bound is worked out, which is cheaper: a planner that keeps
 # 2 cm of clearance need not know how much farther the rest is.
 near = collide.distance(finger, bottle, X_WAs, X_WB, max_distance=0.02)
-print(f"\nbeyond 2 cm: {near.beyond.sum()} of {len(near)} poses, each proven at least", near.lower[near.beyond].min(), "m")
+print(
+    f"\nbeyond 2 cm: {near.beyond.sum()} of {len(near)} poses, each proven at least", near.lower[near.beyond].min(), "m"
+)
 
 # Booleans alone are the cheapest question.
 print("hits:", collide.collide(finger, bottle, X_WAs, X_WB))

@@ -26,7 +26,10 @@ jaws = collide.Compound([(collide.Box((0.02, 0.04, 0.06)), collide.pose((side * 
 bar = collide.Box((0.100002, 0.3, 0.02))
 grip = collide.contacts(jaws, bar, np.eye(4), np.eye(4))
 for patch in grip.patches:
-    print(f"jaw {patch['part_a']} pushes along {np.round(patch['normal'], 3) + 0.0}, {int((grip.patch == patch['patch']).sum())} points")
+    print(
+        f"jaw {patch['part_a']} pushes along {np.round(patch['normal'], 3) + 0.0}, "
+        f"{int((grip.patch == patch['patch']).sum())} points"
+    )
 
 # In a world: every pair that is tested, with the ids of the bodies.
 world = collide.World()

@@ -1,4 +1,4 @@
-"""Mesh files in scenes: as they are, not as hulls. A pin in a notch is free, and an open mesh says which facets leave it open."""
+"""Mesh files in scenes as they are, not as hulls: a pin in a notch is free, an open mesh says where it is open."""
 
 import json
 import tempfile

@@ -1,4 +1,4 @@
-"""Security margins, what decided by name, contacts of many pairs in one call, and poses as other libraries write them."""
+"""Security margins, the deciding argument, contacts of a batch, and poses as other libraries write them."""
 
 import logging
 
@@ -29,4 +29,7 @@ print(f"contacts of pair 0: {len(c[0])}, contacts of pair 1: {len(c[1])}")
 
 # Quaternions in either order and of any length; and whatever has as_matrix(), as scipy's Rotation does.
 rotation = collide.pose((1, 2, 3), quat_xyzw=(0, 0, 1, 1))
-print("a pose by (R, t) is that of the matrix:", collide.collide(shelf, box, (rotation[:3, :3], rotation[:3, 3]), rotation) is True)
+print(
+    "a pose by (R, t) is that of the matrix:",
+    collide.collide(shelf, box, (rotation[:3, :3], rotation[:3, 3]), rotation) is True,
+)

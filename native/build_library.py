@@ -28,8 +28,9 @@ NATIVE = ROOT / "native"
 BUILD = ROOT / "build" / "kernels"
 #: Modules of C in libcollide.
 C_SOURCES = [
-    "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c", "capi_mesh.c",
-    "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c", "capi_shapes.c", "capi_spread.c", "capi_status.c",
+    "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c",
+    "capi_mesh.c", "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c",
+    "capi_shapes.c", "capi_spread.c", "capi_status.c",
     "capi_surface.c", "capi_tree.c", "capi_whole.c",
 ]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
@@ -43,16 +44,21 @@ def _asked(name: str) -> bool:
 def why_not() -> str:
     """Why no library can be made here; empty where one can. Raises SystemExit where one was required."""
     if sysconfig.get_config_var("Py_GIL_DISABLED"):
-        raise SystemExit("collide: free-threaded builds of Python are not supported; use a build with the lock (python3.14, not 3.14t)")
+        raise SystemExit(
+            "collide: free-threaded builds of Python are not supported; "
+            "use a build with the lock (python3.14, not 3.14t)"
+        )
     reason = "COLLIDE_NO_LIBRARY is set" if _asked("COLLIDE_NO_LIBRARY") else _cannot_link()
     if reason and _asked("COLLIDE_REQUIRE_COMPILED"):
         raise SystemExit(
-            f"collide: kernels cannot be built: {reason}\nCOLLIDE_REQUIRE_COMPILED is set, so this is an error. Install a C compiler: "
+            f"collide: kernels cannot be built: {reason}\nCOLLIDE_REQUIRE_COMPILED is set, so this is an error. "
+            "Install a C compiler: "
             "apt install gcc, dnf install gcc, xcode-select --install, or the Build Tools of Visual Studio"
         )
     if reason:
         _say_loudly(
-            f"*** collide: NO COMPILED KERNELS: {reason}. The package will need numba, and compile kernels at their first call "
+            f"*** collide: NO COMPILED KERNELS: {reason}. The package will need numba, and compile kernels at their "
+            "first call "
             "(half a minute). Install a C compiler, then collide-robotics again; `collide doctor` tells. ***"
         )
     return reason
@@ -75,7 +81,10 @@ def _cannot_link() -> str:
             compiler.link_shared_object(objects, str(Path(folder) / "probe.so"))
         except Exception as error:  # noqa: BLE001 - whatever a compiler's absence looks like here
             tool = (getattr(compiler, "compiler_so", None) or ["the C compiler"])[0]
-            return f"no C compiler or linker ({tool}: {str(error).splitlines()[0] if str(error) else type(error).__name__})"
+            return (
+                f"no C compiler or linker ({tool}: "
+                f"{str(error).splitlines()[0] if str(error) else type(error).__name__})"
+            )
         finally:
             os.dup2(quiet[1], 2)
             for handle in quiet:
@@ -116,11 +125,20 @@ class BuildLibrary(build_ext):
 
     def get_outputs(self) -> list[str]:
         place = Path(self.build_lib) / "collide"
-        made = (*place.glob("lib/**/*"), *place.glob("include/*"), place / "kernels" / "built.py", *place.glob("kernels/_glue*"))
+        made = (
+            *place.glob("lib/**/*"),
+            *place.glob("include/*"),
+            place / "kernels" / "built.py",
+            *place.glob("kernels/_glue*"),
+        )
         return [str(file) for file in made if file.is_file()]
 
     def get_source_files(self) -> list[str]:
-        return [file.relative_to(ROOT).as_posix() for file in sorted(NATIVE.rglob("*")) if file.suffix in (".py", ".c", ".h", ".in")]
+        return [
+            file.relative_to(ROOT).as_posix()
+            for file in sorted(NATIVE.rglob("*"))
+            if file.suffix in (".py", ".c", ".h", ".in")
+        ]
 
     def _write_interface(self, place: Path) -> None:
         """What C programs need beside the library: the header, and the file that pkg-config reads."""
@@ -134,7 +152,11 @@ class BuildLibrary(build_ext):
     def _compiled(self, names: list[str], generated: Path) -> list[str]:
         import numpy
 
-        flags = ["/O2"] if WINDOWS else ["-O2", "-g0", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
+        flags = (
+            ["/O2"]
+            if WINDOWS
+            else ["-O2", "-g0", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
+        )
         include = [str(generated), str(NATIVE), numpy.get_include(), sysconfig.get_path("include")]
         sources = [str(NATIVE / name) for name in names]
         return self.compiler.compile(sources, output_dir=self.build_temp, include_dirs=include, extra_postargs=flags)
@@ -151,7 +173,11 @@ class BuildLibrary(build_ext):
             return
         compiler = self.compiler.compiler_so[0]
         if MACOS:
-            kind = ["-bundle", "-undefined", "dynamic_lookup"] if calls_python else ["-dynamiclib", "-install_name", f"@rpath/{LIBRARY}"]
+            kind = (
+                ["-bundle", "-undefined", "dynamic_lookup"]
+                if calls_python
+                else ["-dynamiclib", "-install_name", f"@rpath/{LIBRARY}"]
+            )
             self.spawn([compiler, *kind, "-o", str(out), *objects])
         else:
             kind = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{LIBRARY}"]
@@ -163,7 +189,14 @@ def _compiled_kernels() -> dict:
     import json
 
     levels = os.environ.get("COLLIDE_LEVELS", "").split()
-    command = [sys.executable, str(NATIVE / "compile_kernels.py"), "--out", str(BUILD), "--json", *(["--levels", *levels] if levels else [])]
+    command = [
+        sys.executable,
+        str(NATIVE / "compile_kernels.py"),
+        "--out",
+        str(BUILD),
+        "--json",
+        *(["--levels", *levels] if levels else []),
+    ]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
     if done.returncode:
         raise SystemExit("collide: kernels could not be compiled: see above")
@@ -192,7 +225,8 @@ def _write_about(place: Path, files: list[Path], made: dict) -> None:
     known = {file.relative_to(place).as_posix(): (file.stat().st_size, zlib.crc32(file.read_bytes())) for file in files}
     (place / "kernels" / "built.py").write_text(
         '"""What the library of this installation was made from. Written by the build."""\n\n'
-        f"#: Checksum of the kernels' sources (`sources.fingerprint`), and which files they are.\nSOURCES = {made['sources']}\n"
+        "#: Checksum of the kernels' sources (`sources.fingerprint`), and which files they are.\nSOURCES = "
+        f"{made['sources']}\n"
         f"SOURCE_FILES = {made['source_files']!r}\n"
         f"#: Levels of processors.\nLEVELS = {tuple(made['objects'])!r}\n"
         f"#: Numba and LLVM, as they were.\nCOMPILER = {made['versions']!r}\n"

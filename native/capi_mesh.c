@@ -44,18 +44,14 @@ static struct filled fill(const struct collide_kernels *kernels, struct arena *a
     return made;
 }
 
-/* Largest coordinates, and balls around the centre: of the root's box, and of the facets. */
+/* Largest coordinates, and a ball around the root's box. */
 static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t many)
 {
     float box[6];
-    double squares = 0.0;
     int64_t k;
     int axis;
     for (k = 0; k < 3 * many; k++) {
         const double *p = made->triangles + 3 * k;
-        double x = p[0] - mesh->numbers[0], y = p[1] - mesh->numbers[1], z = p[2] - mesh->numbers[2];
-        double square = x * x + y * y + z * z;
-        if (square > squares) squares = square;
         for (axis = 0; axis < 3; axis++)
             if (fabs(p[axis]) > mesh->numbers[CORNER + axis]) mesh->numbers[CORNER + axis] = fabs(p[axis]);
     }
@@ -63,10 +59,6 @@ static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *m
     mesh->numbers[BALL] = ldexp(root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
                                                 fabs((double)box[2]) + (double)box[5]),
                                 (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
-    memcpy(mesh->ball, mesh->numbers, 3 * sizeof *mesh->ball);
-    mesh->ball[3] = sqrt(squares) * (1 + 1e-12);
-    mesh->reach = sqrt(mesh->numbers[CORNER] * mesh->numbers[CORNER] + mesh->numbers[CORNER + 1] * mesh->numbers[CORNER + 1] +
-                       mesh->numbers[CORNER + 2] * mesh->numbers[CORNER + 2]) + mesh->radius;
 }
 
 static void digest(collide_mesh *mesh, const struct filled *made, int64_t many)

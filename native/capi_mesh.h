@@ -10,8 +10,7 @@ struct collide_mesh {
     int64_t tree[9];           /* the tree's header */
     double numbers[7];         /* the tree's numbers */
     unsigned char content[16]; /* digest of the facets */
-    double ball[4];            /* centre and reach */
-    double radius, reach;      /* reach : from the frame's origin */
+    double radius;
     double *points;
     int64_t n_points, depth;
     int solid, given; /* given : as facets, not as a convex shape */

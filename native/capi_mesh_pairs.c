@@ -1,37 +1,28 @@
-/* Two bodies of facets at a pair of poses: `PreparedPair` of collide/narrowphase/facets/single_mesh_call.py. What that leaves to numpy is said to be
-   unsupported. */
+/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/body_pairs.py. What kernels leave to Python is
+   said to be unsupported. */
 #include "capi_mesh.h"
 
 #include <string.h>
 
-/* Header of the kernels (collide/narrowphase/facets/single_surface.py). */
+/* Header of the kernels (collide/narrowphase/facets/surface_pairs.py). */
 enum {
-    TREE_A, TREE_B, ALIKE, EXCHANGED, WALK_AT, INSIDE_AT, SOLID_A, SOLID_B, POINTS_A, POINTS_B, MANY_A, MANY_B, BALLS_AT, KEYS_AT,
-    MARKS_AT, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, DECIDE, SWEPT, DISTANCES_AT, ROOM_AT, HEAP_AT, N_HEAP,
-    MESH_HEADER
+    TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B, SAME_TREE, SAME_BODY, EXCHANGED,
+    SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, HEAP_AT, N_HEAP,
+    SCRATCH_AT, MESH_HEADER
 };
-/* A result and its marks (collide/narrowphase/facets/surface_distance.py). */
-enum { R_DISTANCE, R_LOWER, R_UPPER, R_POINT_A, R_POINT_B = 6, R_NORMAL = 9, RESULT = 12 };
-enum { FACET_A, FACET_B, MEETS, BOXES, TRIANGLES, EXACT_DECISIONS, MARKS };
-/* More points than this are left to a batch; bodies with radii are looked for this much farther. */
+/* More points than this are left to a batch. */
 enum { MOST_POINTS = 64 };
-static const double FARTHER = 1 + 1e-9;
-/* Facets nearer than this share of the pair's size tell its direction badly; gaps are promised in brackets no wider than that. */
-static const double NEAR = 5.960464477539063e-08, PROMISE = 1.1368683772161603e-13;
 
 /* Room of a workspace for meshes (collide_workspace.mesh). */
 struct mesh_room {
     int64_t header[MESH_HEADER];
-    double balls[8], room[2 + RESULT];
-    int64_t keys[128], marks[8];
-    double found[RESULT + MARKS];
 };
 
 size_t mesh_room_bytes(const int64_t *m)
 {
-    if (m[M_MESH_HEADER] != MESH_HEADER || m[M_RESULT] != RESULT || m[M_MARKS] != MARKS) return 0;
+    if (m[M_MESH_HEADER] != MESH_HEADER) return 0;
     return sizeof(struct mesh_room) + 8 * (size_t)(2 * STACK_OF_MESHES + 32 + 2 * HEAP_OF_MESHES) +
-           8 * (size_t)(m[M_MESH_DOUBLES] + m[M_MESH_INTEGERS]);
+           8 * (size_t)(m[M_MESH_DOUBLES] + m[M_MESH_INTEGERS] + m[M_MESH_SCRATCH]);
 }
 
 #define CODE(space, name) code_at(&(space)->kernels->name)
@@ -48,20 +39,17 @@ void furnish_meshes(collide_workspace *space, void *place, const int64_t *m)
     struct mesh_room *room = place;
     int64_t *header = room->header;
     space->mesh = room;
-    header[WALK_AT] = CODE(space, walk_surfaces);
-    header[INSIDE_AT] = CODE(space, points_inside);
-    header[DECIDE] = CODE(space, decide_exactly);
-    header[DISTANCES_AT] = CODE(space, near_surfaces);
-    header[BALLS_AT] = address_of(room->balls);
-    header[KEYS_AT] = address_of(room->keys);
-    header[MARKS_AT] = address_of(room->marks);
-    header[ROOM_AT] = address_of(room->room);
+    header[SURFACES_CODE] = CODE(space, walk_surfaces);
+    header[POINTS_CODE] = CODE(space, points_inside);
+    header[EXACT_CODE] = CODE(space, decide_exactly);
+    header[DISTANCES_CODE] = CODE(space, near_surfaces);
     header[N_STACK] = STACK_OF_MESHES;
     header[N_HEAP] = HEAP_OF_MESHES;
     header[STACK_AT] = address_of(room + 1);
     header[HEAP_AT] = header[STACK_AT] + 8 * (2 * STACK_OF_MESHES + 32);
     header[MESH_DOUBLES_AT] = header[HEAP_AT] + 8 * 2 * HEAP_OF_MESHES;
     header[MESH_INTEGERS_AT] = header[MESH_DOUBLES_AT] + 8 * m[M_MESH_DOUBLES];
+    header[SCRATCH_AT] = header[MESH_INTEGERS_AT] + 8 * m[M_MESH_INTEGERS];
 }
 
 /* Whether B comes before A: by facets, by radius, then surfaces before solids. */
@@ -73,26 +61,25 @@ static int is_exchanged(const collide_mesh *A, const collide_mesh *B)
     return B->solid < A->solid;
 }
 
-/* Prepare the kernels for a pair, in order. */
-static void take_meshes(struct mesh_room *room, const collide_mesh *one, const collide_mesh *other, int exchanged)
+/* Prepare the kernels for a pair: the bodies in the order of their contents. */
+static void take_meshes(struct mesh_room *room, const collide_mesh *A, const collide_mesh *B)
 {
     int64_t *header = room->header;
-    double radius = one->radius + other->radius;
+    int exchanged = is_exchanged(A, B);
+    const collide_mesh *one = exchanged ? B : A, *two = exchanged ? A : B;
     header[TREE_A] = address_of(one->tree);
-    header[TREE_B] = address_of(other->tree);
-    header[ALIKE] = memcmp(one->content, other->content, sizeof one->content) == 0;
-    header[EXCHANGED] = exchanged;
+    header[TREE_B] = address_of(two->tree);
     header[SOLID_A] = one->solid;
-    header[SOLID_B] = other->solid;
+    header[SOLID_B] = two->solid;
     header[POINTS_A] = address_of(one->points);
-    header[POINTS_B] = address_of(other->points);
-    header[MANY_A] = one->n_points;
-    header[MANY_B] = other->n_points;
-    header[SWEPT] = radius > 0.0;
-    memcpy(room->balls, one->ball, sizeof one->ball);
-    memcpy(room->balls + 4, other->ball, sizeof other->ball);
-    room->room[0] = radius;
-    room->room[1] = radius * FARTHER;
+    header[POINTS_B] = address_of(two->points);
+    header[N_POINTS_A] = one->n_points;
+    header[N_POINTS_B] = two->n_points;
+    memcpy(header + RADIUS_A, &one->radius, sizeof(double));
+    memcpy(header + RADIUS_B, &two->radius, sizeof(double));
+    header[SAME_TREE] = memcmp(one->content, two->content, sizeof one->content) == 0;
+    header[SAME_BODY] = header[SAME_TREE] && one->radius == two->radius && one->solid == two->solid;
+    header[EXCHANGED] = exchanged;
 }
 
 /* Why a kernel left a pair to Python: matrices that are no poses, or something that C does not do. */
@@ -120,13 +107,11 @@ collide_status collide_mesh_collide(collide_workspace *workspace, const collide_
     collide_status status;
     rounding given;
     int64_t said;
-    int exchanged;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
     *hit = 0;
     if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
-    exchanged = is_exchanged(A, B);
-    take_meshes(workspace->mesh, exchanged ? B : A, exchanged ? A : B, exchanged);
+    take_meshes(workspace->mesh, A, B);
     said = workspace->kernels->meet_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB));
     if (said < 0) status = why(workspace, X_WA, X_WB, flags);
     round_as_before(given);
@@ -134,76 +119,19 @@ collide_status collide_mesh_collide(collide_workspace *workspace, const collide_
     return status;
 }
 
-static double larger(double a, double b) { return b > a ? b : a; }
-
-/* The row of a gap, of bodies in the order of their contents; 0 where Python's batches know better. */
-static int write_gap(const struct mesh_room *room, const collide_mesh *one, const collide_mesh *other, double away,
-                     collide_pair *row)
-{
-    const double *r = room->found;
-    double radius = one->radius + other->radius, size = (one->reach + other->reach) + away;
-    int64_t marks[MARKS];
-    int k, narrow;
-    memcpy(marks, r + RESULT, sizeof marks);
-    if (marks[FACET_A] < 0 || !(r[R_LOWER] > radius || radius == 0.0) || r[R_DISTANCE] <= NEAR * size) return 0;
-    if (r[R_NORMAL] == 0.0 && r[R_NORMAL + 1] == 0.0 && r[R_NORMAL + 2] == 0.0) return 0;
-    row->lower = larger(radius != 0.0 ? nextafter(r[R_LOWER] - radius, -INFINITE) : r[R_LOWER], 0.0);
-    row->upper = larger(radius != 0.0 ? nextafter(r[R_UPPER] - radius, INFINITE) : r[R_UPPER], 0.0);
-    row->distance = larger(r[R_DISTANCE] - radius, row->lower);
-    if (row->upper < row->distance) row->distance = row->upper;
-    if (row->distance == 0.0) row->distance = row->upper;
-    for (k = 0; k < 3; k++) {
-        row->normal[k] = r[R_NORMAL + k] + 0.0;
-        row->point_a[k] = r[R_POINT_A + k] + one->radius * r[R_NORMAL + k];
-        row->point_b[k] = r[R_POINT_B + k] + -other->radius * r[R_NORMAL + k];
-    }
-    for (k = 0; k < 4; k++) row->vertices_a[k] = row->vertices_b[k] = -1;
-    narrow = row->upper <= row->lower + PROMISE * size;
-    row->b = 1;
-    row->part_a = (int32_t)marks[FACET_A];
-    row->part_b = (int32_t)marks[FACET_B];
-    row->how = COLLIDE_HOW_CLOSED_FORM;
-    row->exact = (uint8_t)(marks[EXACT_DECISIONS] < 255 ? marks[EXACT_DECISIONS] : 255);
-    row->certified = narrow && (row->lower > 0.0 || radius == 0.0);
-    return 1;
-}
-
-static void exchange(collide_pair *row)
-{
-    int32_t part = row->part_a;
-    int k;
-    row->part_a = row->part_b;
-    row->part_b = part;
-    for (k = 0; k < 3; k++) {
-        double point = row->point_a[k];
-        row->point_a[k] = row->point_b[k];
-        row->point_b[k] = point;
-        row->normal[k] = 0.0 - row->normal[k] + 0.0;
-    }
-}
-
 collide_status collide_mesh_distance(collide_workspace *workspace, const collide_mesh *A, const collide_mesh *B,
                                      const double X_WA[16], const double X_WB[16], unsigned flags, collide_pair *pair)
 {
-    const collide_mesh *one, *other;
     collide_status status;
     rounding given;
-    int exchanged;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
     memset(pair, 0, sizeof *pair);
     if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
-    exchanged = is_exchanged(A, B);
-    one = exchanged ? B : A;
-    other = exchanged ? A : B;
-    take_meshes(workspace->mesh, one, other, exchanged);
-    if (workspace->kernels->near_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB),
-                                        address_of(workspace->mesh->found), 1) < 0)
+    take_meshes(workspace->mesh, A, B);
+    if (workspace->kernels->gap_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB), address_of(pair), 1) < 0) {
+        memset(pair, 0, sizeof *pair);
         status = why(workspace, X_WA, X_WB, flags);
-    else {
-        double x = X_WB[3] - X_WA[3], y = X_WB[7] - X_WA[7], z = X_WB[11] - X_WA[11];
-        if (!write_gap(workspace->mesh, one, other, sqrt(x * x + y * y + z * z), pair)) status = COLLIDE_UNSUPPORTED;
-        else if (exchanged) exchange(pair);
     }
     round_as_before(given);
     return status;

@@ -1,4 +1,4 @@
-/* What doubles leave open goes to the exact stage: as `_finish` of collide/narrowphase/convex_queries.py. */
+/* What doubles leave open goes to the exact stage: as `settle_rows` of collide/narrowphase/exact/exact_stage.py, then `settle_by_other_searches`. */
 #include "capi_internal.h"
 
 #include <string.h>
@@ -54,7 +54,7 @@ static void settle_by_other_searches(collide_workspace *space, const struct ques
 }
 
 /* Overlaps that the exact stage has settled without a depth are measured by all planes. */
-static void deepen(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
+static void find_depths(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
 {
     uint8_t shallow[BLOCK];
     size_t k;
@@ -64,7 +64,7 @@ static void deepen(collide_workspace *space, const struct question *asked, colli
         any = any || shallow[k];
     }
     if (!any) return;
-    space->kernels->deepen_pairs(
+    space->kernels->exact_depth(
         space->header[INTS_AT], space->header[NUMBERS_AT], space->header[POSES_AT], space->header[SHAPE_OF_AT],
         space->header[PAIRS_AT], address_of(shallow), (int64_t)n, asked->limit, address_of(rows), 0, 0, space->digits_at);
 }
@@ -82,12 +82,12 @@ collide_status settle_rows(collide_workspace *space, const struct question *aske
             return COLLIDE_OUT_OF_RANGE;
         }
     if (open_rows(rows, n, space->left) == 0) return COLLIDE_OK;
-    if (kernels->decide_pairs(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
+    if (kernels->settle_hulls(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
                               (int64_t)n, (uint8_t)asked->boolean, (uint8_t)depths, asked->limit, address_of(rows), 0, 0,
                               space->requests_at, space->digits_at) > 0)
-        kernels->decide_planes(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
+        kernels->settle_halfspaces(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
                                (int64_t)n, (uint8_t)asked->boolean, asked->limit, address_of(rows), 0, 0, space->digits_at);
-    if (depths) deepen(space, asked, rows, n);
+    if (depths) find_depths(space, asked, rows, n);
     status = settle_half_spaces(space, asked, rows, n);
     if (status == COLLIDE_OK) settle_by_other_searches(space, asked, rows, n);
     return status;

@@ -1,11 +1,13 @@
-"""Compile all kernels, ahead of time: object files of all entries for each level of processors, and C text that names them.
+"""Compile all kernels ahead of time: object files of the entries per processor level, and C text that names them.
 
     python native/compile_kernels.py --out build/kernels
     python native/compile_kernels.py --out build/kernels --levels v3          # one level only, for a try
     python native/compile_kernels.py --out /tmp/arm --triple aarch64-unknown-linux-gnu
 
-Needs numba and llvmlite, no C compiler. The front end runs once, for all levels; its result is kept in the folder, under the
-checksum of what it was made from, and so are the object files: a second call does nothing. The same sources and versions
+Needs numba and llvmlite, no C compiler. The front end runs once, for all levels; its result is kept in the folder,
+under the
+checksum of what it was made from, and so are the object files: a second call does nothing. The same sources and
+    versions
 give the same bytes.
 """
 
@@ -176,7 +178,9 @@ def told(what: str):
 
     def tell(label: str) -> None:
         if sys.stderr.isatty():
-            print(f"\r\x1b[2Kcollide: {label} ({time.perf_counter() - begun:.0f} s)", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r\x1b[2Kcollide: {label} ({time.perf_counter() - begun:.0f} s)", end="", file=sys.stderr, flush=True
+            )
 
     yield tell
     end = "\r\x1b[2K" if sys.stderr.isatty() else ""
@@ -194,7 +198,17 @@ def main() -> None:
     made = compile_kernels(given.out, given.triple, tuple(given.levels), given.jobs)
     if given.json:
         paths = {level: str(place) for level, place in made.objects.items()}
-        print(json.dumps({"objects": paths, "entries": made.entries, "versions": made.versions, "sources": made.sources, "source_files": made.source_files}))
+        print(
+            json.dumps(
+                {
+                    "objects": paths,
+                    "entries": made.entries,
+                    "versions": made.versions,
+                    "sources": made.sources,
+                    "source_files": made.source_files,
+                }
+            )
+        )
         return
     for level, place in made.objects.items():
         print(f"{level}: {place}, {place.stat().st_size / 1e6:.2f} MB, {platform.machine()}")

@@ -1,4 +1,4 @@
-"""C text for the entries: the table of kernels, and a Python function for each. Made from their names and signatures."""
+"""C text for the entries, made from their names and signatures: the table of kernels, a Python function for each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ import zlib
 #: Numba's types, as C has them in kernels, and how a Python object becomes one.
 C_TYPES = {"int64": "int64_t", "float64": "double", "boolean": "uint8_t", "void": "void"}
 _FROM_PYTHON = {"int64": "integer_of", "float64": "double_of", "boolean": "truth_of"}
-_TO_PYTHON = {"int64": "PyLong_FromLongLong(said)", "float64": "PyFloat_FromDouble(said)", "boolean": "PyBool_FromLong(said)"}
+_TO_PYTHON = {
+    "int64": "PyLong_FromLongLong(said)",
+    "float64": "PyFloat_FromDouble(said)",
+    "boolean": "PyBool_FromLong(said)",
+}
 
 
 def _parsed(signature: str) -> tuple[str, list[str]]:
@@ -53,7 +57,9 @@ def python_functions(entries) -> str:
         if result != "void":
             lines.append(f"    {C_TYPES[result]} said;")
         lines += [f'    if (n != {len(arguments)}) return wrong_count("{name}", {len(arguments)}, n);']
-        lines += [f"    if ({_FROM_PYTHON[kind]}(given[{k}], &a{k}) < 0) return NULL;" for k, kind in enumerate(arguments)]
+        lines += [
+            f"    if ({_FROM_PYTHON[kind]}(given[{k}], &a{k}) < 0) return NULL;" for k, kind in enumerate(arguments)
+        ]
         call = f"kernels->{name}({', '.join(f'a{k}' for k in range(len(arguments)))});"
         call = call if result == "void" else f"said = {call}"
         lines.append(f"    Py_BEGIN_ALLOW_THREADS {call} Py_END_ALLOW_THREADS" if nogil else f"    {call}")
@@ -64,5 +70,7 @@ def python_functions(entries) -> str:
     text.append("#define SINGLES " + " ".join(f"{macros[count]}({name})" for name, count in singles))
     text.append("#define SINGLE_METHODS " + " ".join(f"SINGLE_METHOD({name})" for name, _ in singles))
     text.append("#define ENTRIES \\")
-    text += [f'    {{"{name}", (PyCFunction)(void (*)(void))py_{name}, METH_FASTCALL, NULL}}, \\' for name, _, _ in entries]
+    text += [
+        f'    {{"{name}", (PyCFunction)(void (*)(void))py_{name}, METH_FASTCALL, NULL}}, \\' for name, _, _ in entries
+    ]
     return "\n".join(text) + "\n\n"

@@ -21,7 +21,9 @@ import numpy as np
 
 from collide.errors import SceneError
 from collide.scenes.description import Scene, SceneBody
+from collide.scenes.loaders import scene_yaml
 from collide.scenes.loaders.fields import did_you_mean
+from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 from collide.shapes import (
     Box,
     Capsule,
@@ -38,21 +40,40 @@ from collide.transforms import pose
 
 
 def generate(name: str, seed: int = 0, **size) -> Scene:
-    """A generated scene.
+    """A generated scene: the same name, seed and size give the same scene.
 
-    name : one of `names`.   seed : a whole number ≥ 0.   size : the generator's own arguments.
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    seed : int
+        ≥ 0.
+    **size
+        The generator's own arguments, for example ``n`` of "stack".
 
-    Raises SceneError for an unknown name or argument, listing the known ones.
+    Returns
+    -------
+    Scene
+        Its ``sources`` say how it was made.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, seed or argument, listing the known ones.
     """
     if name not in _GENERATORS:
-        raise SceneError(f"no generated scene is called {name!r}{did_you_mean(name, _GENERATORS)}; there are {', '.join(names())}")
+        raise SceneError(
+            f"no generated scene is called {name!r}{did_you_mean(name, _GENERATORS)}; there are {', '.join(names())}"
+        )
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
         raise SceneError(f"seed must be a whole number ≥ 0, got {seed!r}")
     make = _GENERATORS[name]
     known = [argument for argument in inspect.signature(make).parameters if argument != "rng"]
     for argument in size:
         if argument not in known:
-            raise SceneError(f"{name} has no argument {argument!r}{did_you_mean(argument, known)}; it has {', '.join(known)}")
+            raise SceneError(
+                f"{name} has no argument {argument!r}{did_you_mean(argument, known)}; it has {', '.join(known)}"
+            )
     scene = make(np.random.default_rng(seed), **size)
     scene.sources = [f"generate({', '.join([repr(name), f'seed={seed}', *(f'{k}={v!r}' for k, v in size.items())])})"]
     return scene
@@ -88,7 +109,9 @@ def _clutter(rng: np.random.Generator, n: int = 100, density: float = 0.2, stati
         kind = list(_RANDOM_SHAPES)[int(rng.integers(len(_RANDOM_SHAPES)))]
         X = pose(rng.uniform(-edge / 2, edge / 2, 3), quat_wxyz=rng.standard_normal(4))
         still = bool(rng.random() < static)
-        scene.add(SceneBody(f"{kind}_{k}", _RANDOM_SHAPES[kind](rng, float(reach)), X, static=still, source=f"clutter: {k}"))
+        scene.add(
+            SceneBody(f"{kind}_{k}", _RANDOM_SHAPES[kind](rng, float(reach)), X, static=still, source=f"clutter: {k}")
+        )
     return scene
 
 
@@ -138,7 +161,11 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
         raise SceneError(f"jitter must lie within [0, 1], got {jitter!r}")
     size, pitch = np.array([0.25, 0.125, 0.125]), 0.275
     scene = Scene("stack")
-    scene.add(SceneBody("ground", Box((pitch * (wide + 2), 1.0, 0.25)), pose((0, 0, -0.125)), static=True, source="stack: ground"))
+    scene.add(
+        SceneBody(
+            "ground", Box((pitch * (wide + 2), 1.0, 0.25)), pose((0, 0, -0.125)), static=True, source="stack: ground"
+        )
+    )
     for layer in range(layers):
         for k in range(wide):
             shift, angle = rng.uniform(-jitter, jitter, 2)
@@ -153,8 +180,6 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
 
 def _workcell(rng: np.random.Generator, parts: int = 16) -> Scene:
     """An arm of seven joints and a gripper over a bench with a fixture and scattered parts."""
-    from collide.scenes.loaders import scene_yaml
-
     return scene_yaml.build(workcell_document(rng, _count("parts", parts, 0)), "workcell")
 
 
@@ -169,7 +194,9 @@ def workcell_document(rng: np.random.Generator, parts: int = 16) -> dict[str, An
         _item("bench", {"box": {"size": [2 * half, 2 * half, 0.05]}}, [0, 0, -0.025], static=True),
         _item("fence", {"box": {"size": [2 * half, 0.02, 0.9]}}, [0, -0.34, 0.45], static=True),
         _item("post", {"box": {"size": [0.05, 0.05, 0.26]}}, [0.539, 0.142, 0.13], static=True),
-        _item("hook", {"capsule": {"radius": 0.01, "length": 0.3}}, [0.17, 0.10, 0.68], rpy_deg=[0, 90, 17], static=True),
+        _item(
+            "hook", {"capsule": {"radius": 0.01, "length": 0.3}}, [0.17, 0.10, 0.68], rpy_deg=[0, 90, 17], static=True
+        ),
     ]
     taken = [(0.0, 0.0, 0.2), (0.54, 0.14, 0.06)]
     for k in range(parts):
@@ -245,7 +272,11 @@ def _part_hpolytope(rng):
     """A block with one edge cut off."""
     x, y, z = _mm(rng, 0.03, 0.06), _mm(rng, 0.03, 0.06), _mm(rng, 0.04, 0.08)
     normals = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [1, 0, 1]]
-    return {"hpolytope": {"normals": normals, "offsets": [x, x, y, y, z, 0, round(x + z - 0.02, 3)]}}, 0.0, math.hypot(x, y)
+    return (
+        {"hpolytope": {"normals": normals, "offsets": [x, x, y, y, z, 0, round(x + z - 0.02, 3)]}},
+        0.0,
+        math.hypot(x, y),
+    )
 
 
 #: kind -> rng -> (shape, height of its frame above the bench, radius of its footprint)
@@ -274,7 +305,9 @@ def _arm() -> dict[str, Any]:
 
     ring = [(1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7), (-1, 0), (-0.7, -0.7), (0, -1), (0.7, -0.7)]
     roll = [[round(r * x, 4), round(r * y, 4), z] for r, z in ((0.045, 0.0), (0.035, 0.09)) for x, y in ring]
-    palm = [[sx * w, sy * d, z] for w, d, z in ((0.02, 0.04, 0.0), (0.025, 0.065, 0.05)) for sx in (-1, 1) for sy in (-1, 1)]
+    palm = [
+        [sx * w, sy * d, z] for w, d, z in ((0.02, 0.04, 0.0), (0.025, 0.065, 0.05)) for sx in (-1, 1) for sy in (-1, 1)
+    ]
     finger = {"box": {"size": [0.02, 0.015, 0.07]}}
     slide = {"type": "prismatic", "parent": "palm", "origin": {"xyz": [0, 0, 0.05]}, "limits": [0.0, 0.05]}
     return {
@@ -298,21 +331,44 @@ def _arm() -> dict[str, Any]:
             revolute("wrist_pitch", "roll", "wrist", [0, 0, 0.1], [0, 1, 0], 2.2),
             revolute("wrist_roll", "wrist", "palm", [0, 0, 0.09], [0, 0, 1], 3.0),
             {"name": "left_slide", **slide, "child": "left_finger", "axis": [0, 1, 0]},
-            {"name": "right_slide", **slide, "child": "right_finger", "axis": [0, -1, 0], "mimic": {"joint": "left_slide"}},
+            {
+                "name": "right_slide",
+                **slide,
+                "child": "right_finger",
+                "axis": [0, -1, 0],
+                "mimic": {"joint": "left_slide"},
+            },
         ],
         "allow": [
-            *([a, b, "adjacent links"] for a, b in (
-                ("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "roll"),
-                ("roll", "wrist"), ("wrist", "palm"), ("palm", "left_finger"), ("palm", "right_finger"),
-            )),
-            ["forearm", "wrist", "always close"], ["roll", "palm", "always close"],
+            *(
+                [a, b, "adjacent links"]
+                for a, b in (
+                    ("base", "turret"),
+                    ("turret", "upper_arm"),
+                    ("upper_arm", "forearm"),
+                    ("forearm", "roll"),
+                    ("roll", "wrist"),
+                    ("wrist", "palm"),
+                    ("palm", "left_finger"),
+                    ("palm", "right_finger"),
+                )
+            ),
+            ["forearm", "wrist", "always close"],
+            ["roll", "palm", "always close"],
             ["left_finger", "right_finger", "close on each other"],
         ],
         "states": {
-            "home": dict.fromkeys(("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_roll", "left_slide"), 0.0),
+            "home": dict.fromkeys(
+                ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_roll", "left_slide"), 0.0
+            ),
             "reach": {
-                "yaw": 0.3, "shoulder": 0.5, "elbow": 1.4, "forearm_roll": 0.0, "wrist_pitch": 1.2416,
-                "wrist_roll": 0.0, "left_slide": 0.02,
+                "yaw": 0.3,
+                "shoulder": 0.5,
+                "elbow": 1.4,
+                "forearm_roll": 0.0,
+                "wrist_pitch": 1.2416,
+                "wrist_roll": 0.0,
+                "left_slide": 0.02,
             },
         },
     }
@@ -329,24 +385,18 @@ def _harpsicordia(
     stretch : local stretch σ ≥ 6.   spread : global stretch Σ at most; n where None.   gap : the upper one is
     lifted by it [m]; 0 touches, less than 0 crosses.
     """
-    from collide.scenes.worst_cases import harpsicordia
-
     upper, lower, meetings = harpsicordia(n, stretch, spread)
     return _across_the_saddle(rng, "harpsicordia", upper, lower, meetings, gap)
 
 
 def _accordions(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
     """Two accordions each of whose strings meets every one of the other. gap : as above [m]."""
-    from collide.scenes.worst_cases import accordion, below
-
     mesh = accordion(strings)
     return _across_the_saddle(rng, "accordions", mesh, below(mesh), strings**2, gap)
 
 
 def _chazelle(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
     """Two of Chazelle's polyhedra each of whose ridges meets every one of the other. gap : as above [m]."""
-    from collide.scenes.worst_cases import below, chazelle
-
     mesh = chazelle(strings)
     return _across_the_saddle(rng, "chazelle", mesh, below(mesh), strings**2, gap)
 

@@ -51,7 +51,7 @@ def harpsicordion(strings: int, stretch: float = 10.0) -> Mesh:
 
 
 def accordion(strings: int) -> Mesh:
-    """An accordion, above the saddle: ``strings`` of length 1 within x = ±1/4; σ is 3.5 to 7 times their number, Σ 4.47."""
+    """An accordion above the saddle: ``strings`` of length 1 within x = ±1/4; σ is 3.5 to 7 times their number."""
     strings = _whole("strings", strings)
     return Mesh(*_folds([1.0] * (strings + 1), 2.0 ** -(1 + (strings - 1).bit_length())), solid=True)
 
@@ -108,7 +108,9 @@ def harpsicordia(n: int, stretch: float = 10.0, spread: float | None = None) -> 
     ratio, spread = _ratio(stretch), n if spread is None else spread
     least = _TEMPLATE_STRETCH * ratio
     if isinstance(spread, bool) or not isinstance(spread, (int, float)) or not least <= spread <= 1e18:
-        raise SceneError(f"spread must lie within [{least:.4g}, 1e18] for strings of stretch {stretch:g}, got {spread!r}")
+        raise SceneError(
+            f"spread must lie within [{least:.4g}, 1e18] for strings of stretch {stretch:g}, got {spread!r}"
+        )
     strings = min(int(math.log(spread / _TEMPLATE_STRETCH) / math.log(ratio)), (n - 3) // 7)
     upper = harpsicordion(strings, stretch)
     copies = max(1, n // len(upper.vertices))

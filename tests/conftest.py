@@ -1,5 +1,5 @@
-"""Oracles and families are importable by name from any test, for tests are no package; tests whose kernels are their own
-are skipped where kernels come from the library."""
+"""Oracles and families are importable by name from any test, for tests are no package; tests that need kernels of another
+kind than this process has are skipped."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from pathlib import Path
 import pytest
 
 from collide.kernels import library
-from collide.kernels.mode import COMPILED, MODE, WHY
+from collide.kernels.mode import COMPILED, JUST_IN_TIME, MODE, WHY
 
 HERE = Path(__file__).resolve().parent
 #: Every module below this folder that is no test. They have one name each, for all their folders are on the path.
 HELPERS = sorted(file for file in HERE.glob("*/**/*.py") if not file.name.startswith("test_"))
 sys.path += sorted({str(file.parent) for file in HELPERS})
 
-OWN_KERNELS = "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"
+#: Marks of tests, the mode of kernels in which each is skipped, and how to run it then.
+SKIPPED = {
+    "own_kernels": (COMPILED, "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"),
+    "plain_kernels": (JUST_IN_TIME, "calls kernels as plain Python: NUMBA_DISABLE_JIT=1 python -m pytest -m plain_kernels"),
+}
 
 
 def pytest_report_header() -> str:
@@ -24,8 +28,10 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The library has the package's kernels and no others: see collide/kernels/mode.py."""
-    if MODE == COMPILED:
-        for item in items:
-            if item.get_closest_marker("own_kernels"):
-                item.add_marker(pytest.mark.skip(reason=OWN_KERNELS))
+    """The library has the package's entries and no others, and what only kernels call stays Python beside it: see
+    collide/kernels/mode.py. Compiled just in time, it cannot be called."""
+    for name, (mode, reason) in SKIPPED.items():
+        if mode == MODE:
+            for item in items:
+                if item.get_closest_marker(name):
+                    item.add_marker(pytest.mark.skip(reason=reason))

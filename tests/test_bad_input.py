@@ -510,9 +510,9 @@ def test_numbers_are_read_while_another_thread_imports_numpys_masks(monkeypatch)
     import sys
     import types
 
-    from collide import argument_checks as reading
+    from collide import argument_checks as checks
 
     monkeypatch.setitem(sys.modules, "numpy.ma", types.ModuleType("numpy.ma"))
-    assert reading.number(0.5) == 0.5
+    assert checks.number(0.5) == 0.5
     assert collide.Box((1, 2, 3)).size.tolist() == [1.0, 2.0, 3.0]
     assert collide.pose((1, 2, 3))[:3, 3].tolist() == [1.0, 2.0, 3.0]

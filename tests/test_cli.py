@@ -39,6 +39,7 @@ def fake_scene(*rows):
         distances=lambda max_distance: WorldResult(
             answers[answers["hit"] | (answers["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
+            collide.certify,
         ),
         stats=stats, names=dict(names),
     )

@@ -133,7 +133,10 @@ def _not_parted(A: Cells, B: Cells, pairs: list[tuple[int, int]], within: float)
     for axis in _guesses(A, B, remaining):
         lengths = np.sqrt((axis**2).sum(axis=1))
         axis = axis / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        p, q = ((body.placed[body.faces[ids]] * axis[:, None]).sum(axis=2) for body, ids in ((A, remaining[:, 0]), (B, remaining[:, 1])))
+        p, q = (
+            (body.placed[body.faces[ids]] * axis[:, None]).sum(axis=2)
+            for body, ids in ((A, remaining[:, 0]), (B, remaining[:, 1]))
+        )
         apart = np.maximum(q.min(axis=1) - p.max(axis=1), p.min(axis=1) - q.max(axis=1))
         open_ &= ~((apart > slack) & (lengths > 0.0))
     remaining = remaining[open_]
@@ -170,7 +173,12 @@ def _near_cells(A: Cells, B: Cells, within: float) -> Iterator[tuple[int, int]]:
         if _between(_around(A, some), _around(B, others)) > within:
             continue
         if max(len(some), len(others)) <= _LEAF:
-            yield from ((i, j) for i in some.tolist() for j in others.tolist() if _between(A.boxes[i].tolist(), B.boxes[j].tolist()) <= within)
+            yield from (
+                (i, j)
+                for i in some.tolist()
+                for j in others.tolist()
+                if _between(A.boxes[i].tolist(), B.boxes[j].tolist()) <= within
+            )
         elif len(some) >= len(others):
             todo += [(half, others) for half in _split(A, some)]
         else:

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from collide.adapters.peers import exact, exact_meshes
 from collide.adapters.peers.protocol import PairwisePeer, Reply
 from collide.adapters.peers.question import Body, convex_parts, corners
 from collide.errors import UnsupportedQuery
@@ -30,7 +31,11 @@ class ExactPeer(PairwisePeer):
     name = "exact"
 
     def refuses(self, part: Shape) -> str | None:
-        return None if isinstance(part, Mesh) or corners(part) else f"not judged: {type(part).__name__} has no exact form here"
+        return (
+            None
+            if isinstance(part, Mesh) or corners(part)
+            else f"not judged: {type(part).__name__} has no exact form here"
+        )
 
     def build(self, part: Shape) -> tuple | Mesh:
         if isinstance(part, Mesh):
@@ -41,7 +46,7 @@ class ExactPeer(PairwisePeer):
         return corner_points
 
     def parts(self, body: Body) -> Iterator[tuple]:
-        """The corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
+        """Corners of a compound's parts in its own frame, no pose rounded; meshes where a rounded pose puts them."""
         if not isinstance(body.shape, Compound) or _has(body, Mesh):
             yield from super().parts(body)
             return
@@ -53,8 +58,6 @@ class ExactPeer(PairwisePeer):
             yield (_moved(points, poses), radius), body.X_WB
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:
-        from collide.adapters.peers import exact
-
         if isinstance(A, Mesh) or isinstance(B, Mesh):
             return _with_mesh(A, X_WA, B, X_WB)
         (P, radius_a), (Q, radius_b) = A, B
@@ -65,8 +68,6 @@ class ExactPeer(PairwisePeer):
 
 
 def _with_mesh(A, X_WA, B, X_WB) -> Reply:
-    from collide.adapters.peers import exact_meshes
-
     if math.prod(len(body.faces) if isinstance(body, Mesh) else 1 for body in (A, B)) > MAX_PAIRS:
         raise UnsupportedQuery("not judged: so many facets would take exact arithmetic in Python too long")
     a, b = (

@@ -101,7 +101,9 @@ def _collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
         return {"shapeType": kind, "radius": part.radius, "height": part.length}, part.radius + part.length
     if isinstance(part, Mesh):
         if len(part.vertices) > _MAX_VERTICES or 3 * len(part.faces) > _MAX_INDICES:
-            raise UnsupportedQuery(f"pybullet takes meshes of {_MAX_VERTICES} vertices and {_MAX_INDICES} indices at most")
+            raise UnsupportedQuery(
+                f"pybullet takes meshes of {_MAX_VERTICES} vertices and {_MAX_INDICES} indices at most"
+            )
         return {
             "shapeType": pybullet.GEOM_MESH, "vertices": part.vertices.tolist(), "indices": part.faces.ravel().tolist(),
             "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,

@@ -76,7 +76,9 @@ def gap_along(case: Case | MeshCase, normal) -> Decimal | None:
     nearest = min(exact.dot(n, p) for p in B) * Fraction(2) ** e_b
     farthest = max(exact.dot(n, p) for p in A) * Fraction(2) ** e_a
     length = _GUARD.sqrt(_decimal(exact.dot(n, n)))
-    return _GUARD.divide(_decimal(nearest - farthest), length) - _decimal(Fraction(case.radius_a) + Fraction(case.radius_b))
+    return _GUARD.divide(_decimal(nearest - farthest), length) - _decimal(
+        Fraction(case.radius_a) + Fraction(case.radius_b)
+    )
 
 
 def _size(case: Case) -> float:

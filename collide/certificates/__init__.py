@@ -1,1 +1,1 @@
-"""Certificates: plain data that prove a boolean, made here and checked in Python integers."""
+"""Certificates: plain data that prove a boolean, made and checked in Python integers. No kernel is imported."""

@@ -16,7 +16,7 @@ from collide.contact.contact_points import Points, points_along
 from collide.contact.internal_edges import FLAT, Links, aligned, local_minima, snapped
 from collide.contact.shallow_overlaps import CLEAR, WayApart, translation_that_parts, ways_apart
 from collide.errors import UnsupportedQuery
-from collide.narrowphase.facets.mesh_hits import core_hits
+from collide.narrowphase.facets.body_pairs import core_hits
 
 #: A pair belongs to a patch where the normal of one of its facets is this near to the patch's, as a cosine.
 _ALONG = 0.8

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.batches import answer_batch, length_of
 from collide.contact.contact_rows import Contacts, no_rows
 from collide.contact.convex_contacts import convex_contacts
@@ -135,15 +135,15 @@ def _reach(shape: Shape) -> float:
 
 def check_margin(name: str, value) -> float:
     """A margin [m]."""
-    number = reading.number(value)
+    number = checks.number(value)
     if number is None or not 0.0 <= number <= _LARGEST_MARGIN:
-        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {reading.told(value)}")
+        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {checks.describe(value)}")
     return number
 
 
 def check_most(name: str, value) -> int:
     """How many contacts a patch may have."""
-    return reading.whole(f"{name}: max_contacts", value, 1)
+    return checks.integer(f"{name}: max_contacts", value, 1)
 
 
 def is_answered(shape: Shape) -> bool:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from collide.batches import answer_batch
-from collide.certificates.certificates import certificate_from
+from collide.certificates.make_certificate import certificate_from_pairs, certify
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
@@ -67,7 +67,7 @@ class Walks:
         own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
         corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
         pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
-        return certificate_from(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
+        return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
         return f"Walks(<{len(self)} poses>, hits={int(self.hit.sum())}, walked={int(self.walked.sum())})"
@@ -133,7 +133,7 @@ def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> Pa
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
     close(rows, depths=signed)
-    return PairResult(rows, single, (A, B, X_WA, X_WB))
+    return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
 
 
 def _with_default(A, B, X_WA, X_WB, check_poses: bool):

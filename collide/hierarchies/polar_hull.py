@@ -22,8 +22,8 @@ from collide.hierarchies.symbolic_perturbation import exact_side, rank_of
 from collide.hierarchies.true_facets import Cloud, cloud_at, named_in, true_facets
 from collide.hull.exact_hull import Hull, convex_hull
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
-from collide.numerics.error_free import two_sum
-from collide.numerics.orientation import pair_product, pair_sum
+from collide.numerics import double_double as dd
+from collide.numerics.error_free import DD, two_sum
 
 #: The most a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
 _MOST_DRAWN = 2.0**-10
@@ -218,8 +218,7 @@ def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_a
         for axis in range(3):
             n, n_low, n_size = (x, x_low, x_size) if axis == 0 else ((y, y_low, y_size) if axis == 1 else (z, z_low, z_size))
             w, w_low = two_sum(points[a + axis], -origin[axis])
-            p, p_low = pair_product(n, n_low, w, w_low)
-            d, d_low = pair_sum(d, d_low, p, p_low)
+            d, d_low = dd.sloppy_add(DD(d, d_low), dd.unnormalized_mul(DD(n, n_low), DD(w, w_low)))
             d_size += n_size * abs(w)
         largest = max(abs(x), abs(y), abs(z))
         # Pairs: an error of 2⁻⁹⁶ times the terms' magnitudes is far more than theirs (see `orientation`).
@@ -253,16 +252,16 @@ def normal_part(points, a, b, c, i, j):
     uj, uj_low = two_sum(points[b + j], -points[a + j])
     vi, vi_low = two_sum(points[c + i], -points[a + i])
     vj, vj_low = two_sum(points[c + j], -points[a + j])
-    p, p_low = pair_product(ui, ui_low, vj, vj_low)
-    q, q_low = pair_product(uj, uj_low, vi, vi_low)
-    high, low = pair_sum(p, p_low, -q, -q_low)
-    return high, low, abs(p) + abs(q)
+    p = dd.unnormalized_mul(DD(ui, ui_low), DD(vj, vj_low))
+    q = dd.unnormalized_mul(DD(uj, uj_low), DD(vi, vi_low))
+    high, low = dd.sloppy_add(p, dd.neg(q))
+    return high, low, abs(p.high) + abs(q.high)
 
 
 @kernel
 def quotient(n, n_low, d, d_low):
     """n / d for pairs of doubles, rounded, to 2⁻⁵³ and a little."""
     q = n / d
-    product, low = pair_product(q, 0.0, d, d_low)
-    rest, _ = pair_sum(n, n_low, -product, -low)
-    return q + rest / d
+    product = dd.unnormalized_mul(DD(q, 0.0), DD(d, d_low))
+    remainder = dd.sloppy_add(DD(n, n_low), dd.neg(product))
+    return q + remainder.high / d

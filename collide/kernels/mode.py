@@ -45,6 +45,6 @@ WITH_NUMBA = MODE == JUST_IN_TIME
 PLAIN_PYTHON = MODE == PYTHON
 
 
-def told() -> str:
+def describe_mode() -> str:
     """The mode in words: ``library, v4``."""
     return f"library, {library.level}" if MODE == COMPILED else MODE

@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.extents import extent_of
+from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.facets.facet_convex import Posed
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import IDENTITY, Shape
-from collide.support.extents import extent_of
 
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
@@ -38,7 +38,7 @@ class Part(NamedTuple):
     turn: float
     shift: float
 
-    def at(self, X_WB: np.ndarray, about: np.ndarray) -> Posed:
+    def at(self, X_WB: np.ndarray, about: np.ndarray) -> PosesWithSlop:
         """Its poses in the world, for poses (n, 4, 4) of the union.
 
         about : (n,) how far from it half-spaces are looked at [m].
@@ -47,7 +47,7 @@ class Part(NamedTuple):
         reach = np.full(len(X_WB), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
         X, slop = moved_pose(X_WB, self.X, reach)
         stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
-        return Posed(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
+        return PosesWithSlop(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
 
     @property
     def bound(self) -> PackedConvex:

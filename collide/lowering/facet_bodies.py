@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.packed_convex import HALFSPACE, POINTS
@@ -21,9 +21,6 @@ from collide.mesh.bvh import REACH, MeshTree
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-
-#: Gaps above so many units of the smaller body's boxes may be more than these, in floats, can tell.
-_FAR = 1e20
 
 
 class Body(NamedTuple):
@@ -47,6 +44,25 @@ class Body(NamedTuple):
     def key(self) -> tuple:
         """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
         return self.tree.content, self.radius, self.solid
+
+
+class PosesWithSlop(NamedTuple):
+    """Poses of one body.
+
+    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from where they put it [m].
+    """
+
+    X: np.ndarray
+    slop: np.ndarray
+
+    def of(self, some) -> PosesWithSlop:
+        """Those of the given numbers, or where a mask says so."""
+        return PosesWithSlop(self.X[some], self.slop[some])
+
+
+def as_given(X: np.ndarray) -> PosesWithSlop:
+    """Poses that are exact as they were given."""
+    return PosesWithSlop(X, np.zeros(len(X)))
 
 
 def is_halfspace(shape: Shape) -> bool:
@@ -78,7 +94,7 @@ def facet_body(shape, caller: str) -> Body:
     Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
+        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}")
     name = type(shape).__name__
     if is_halfspace(shape):
         raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
@@ -100,11 +116,6 @@ def hull_of(body: Body) -> Shape:
     if not body.hull:
         body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
     return body.hull[0]
-
-
-def farthest_told(A: Body, B: Body) -> float:
-    """The largest gap [m] that box-trees tell: their boxes are floats, in units of the smaller body's size."""
-    return _FAR * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
 
 
 def reach_of(body: Body) -> float:

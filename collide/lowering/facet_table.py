@@ -12,9 +12,8 @@ from collide.kernels import address_of
 from collide.lowering.packed_convex import BLOCK, POINTS, PackedConvex, pack_points
 from collide.lowering.prepared_structures import coarse_address
 from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH
+from collide.numerics.lowest_bits import lowest_exponents
 
-#: Exponent of the lowest bit of coordinates that are all 0, as in `packing.lowest_exponent`.
-_NO_BITS = 2000
 _FACET = pack_points(np.zeros((1, 3)))
 
 
@@ -31,7 +30,7 @@ class FacetTable:
         first = address_of(self.coordinates)
         self.ints[:k] = POINTS, 3, BLOCK, 0, 0, 0, 0, 0
         self.ints[:k, ADDRESS] = first + self.coordinates.strides[0] * np.arange(k)
-        self.ints[:k, LOWEST] = _lowest_exponents(corners.reshape(k, 9))
+        self.ints[:k, LOWEST] = lowest_exponents(corners.reshape(k, 9))
         self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
         coarse = coarse_address(packed)
         self.ints[k] = (
@@ -45,11 +44,3 @@ class FacetTable:
 
     def plant(self, rows: np.ndarray) -> None:
         """Shapes asked about here are scanned: none is large enough for a support tree."""
-
-
-def _lowest_exponents(values: np.ndarray) -> np.ndarray:
-    """(k,) `packing.lowest_exponent` of rows (k, 9)."""
-    fraction, exponent = np.frexp(values)
-    mantissa = (fraction * 2.0**53).astype(np.int64)
-    lowest = exponent - 53 + np.frexp((mantissa & -mantissa).astype(float))[1] - 1
-    return np.where(values != 0.0, lowest, _NO_BITS).min(axis=1)

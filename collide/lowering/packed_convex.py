@@ -12,11 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-#: Kinds of core. POINTS is the hull of points; the others are the sets of their names.
-POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE = range(5)
+from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
+from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
+
+__all__ = [
+    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack_curved",
+    "pack_halfspace", "pack_points",
+]  # fmt: skip
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
+
 
 class PreparedStructures:
     """What `prepared_structures.py` makes of the points when a query first needs it; shared by all copies of a packed set.
@@ -92,7 +98,7 @@ def _packed(kind, radius, reach, slop, params, points, coordinates, with_tree=Fa
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
-    lowest = lowest_exponent(points)
+    lowest = int(lowest_exponents(points.ravel())) if len(points) else NO_BITS
     return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, PreparedStructures(with_tree), lowest, digest.digest())
 
 
@@ -106,15 +112,6 @@ def on_cache_lines(*shape: int) -> np.ndarray:
     room = np.empty(size + BLOCK - 1)
     first = -(room.ctypes.data // room.itemsize) % BLOCK
     return room[first : first + size].reshape(shape)
-
-
-def lowest_exponent(values: np.ndarray) -> int:
-    """Exponent of the lowest set bit among doubles; 2000 where all are 0."""
-    fraction, exponent = np.frexp(values[values != 0.0])
-    if not len(fraction):
-        return 2000
-    mantissa = (fraction * 2.0**53).astype(np.int64)
-    return int((exponent - 53 + np.frexp((mantissa & -mantissa).astype(float))[1] - 1).min())
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

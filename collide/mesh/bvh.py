@@ -14,10 +14,12 @@ import hashlib
 import math
 import os
 import threading
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
+from collide.numerics.vec3 import Vec3
 
 #: Boxes of a node, and its words: six floats a box and a link.
 WIDTH = 8
@@ -166,15 +168,64 @@ def _depth(parents: np.ndarray, below: np.ndarray, n: int) -> int:
     return depth
 
 
+class TreeView(NamedTuple):
+    """A tree as kernels see it.
+
+    header, numbers : as the constants above lay them out.
+    boxes, links : the words of the nodes, as floats and as integers.
+    triangles : nine doubles a facet, in the order of the leaves.   ids : the facets' numbers.
+    """
+
+    header: np.ndarray
+    numbers: np.ndarray
+    boxes: np.ndarray
+    links: np.ndarray
+    triangles: np.ndarray
+    ids: np.ndarray
+
+
+class Box(NamedTuple):
+    """A box along the axes of its tree: centre and half lengths, in the tree's units, from the tree's centre."""
+
+    centre: Vec3
+    half: Vec3
+
+
 @kernel(inline=True)
 def open_tree(header_at):
-    """(header, numbers, boxes, links, triangles, facet numbers) of the tree whose header stands at an address."""
+    """The tree whose header stands at an address."""
     header = view_i64(header_at, INTS)
-    return (
+    return TreeView(
         header, view_f64(header[NUMBERS_AT], NUMBERS), view_f32(header[NODES_AT], NODE * header[N_NODES]),
         view_i32(header[NODES_AT], NODE * header[N_NODES]), view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS]),
         view_i32(header[IDS_AT], header[N_FACETS]),
     )  # fmt: skip
+
+
+@kernel(inline=True)
+def float_column_at(values, at):
+    """A vector whose components stand WIDTH floats apart: of a box, or of the normal of a slab."""
+    return Vec3(float(values[at]), float(values[at + WIDTH]), float(values[at + 2 * WIDTH]))
+
+
+@kernel(inline=True)
+def box_at(boxes, ref):
+    """The box behind a reference, which is the number of its node times 8 plus its slot."""
+    at = NODE * (ref >> 3) + (ref & 7)
+    return Box(float_column_at(boxes, at), float_column_at(boxes, at + 3 * WIDTH))
+
+
+@kernel(inline=True)
+def box_size(boxes, ref):
+    """Sum of the half lengths of the box behind a reference."""
+    half = float_column_at(boxes, NODE * (ref >> 3) + (ref & 7) + 3 * WIDTH)
+    return half.x + half.y + half.z
+
+
+@kernel(inline=True)
+def link_of(links, ref):
+    """What is behind the box of a reference: a node (≥ 0) or a leaf (< 0)."""
+    return int(links[NODE * (ref >> 3) + 6 * WIDTH + (ref & 7)])
 
 
 @kernel

@@ -14,10 +14,10 @@ from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
 from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT
-from collide.narrowphase.exact.settle_hulls import WORKSPACE
-from collide.narrowphase.facets import single_surface as single
+from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
+from collide.narrowphase.facets import surface_pairs as pairs
 from collide.narrowphase.facets import winding_numbers as inside
 from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
 from collide.narrowphase.pose_batches import BLOCK, HEADER
@@ -37,7 +37,7 @@ _MEASURES = (
     FACET, PLANE, STATE, STACK,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
-    single.HEADER, _MESH_DOUBLES, MESH_INTEGERS, distances.RESULT, distances.MARKS,
+    pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH,
 )  # fmt: skip
 
 

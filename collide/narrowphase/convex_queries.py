@@ -12,11 +12,9 @@ from collide.kernels import PLAIN_PYTHON, address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
-from collide.narrowphase.exact.depth_requests import ROWS_TOGETHER
-from collide.narrowphase.exact.exact_depth import deepen_pairs
-from collide.narrowphase.exact.opposite_halfspaces import settle
-from collide.narrowphase.exact.settle_halfspaces import decide_planes
-from collide.narrowphase.exact.settle_hulls import WORKSPACE, decide_pairs
+from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
+from collide.narrowphase.exact.exact_stage import settle_rows
+from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finalize_rows import close_rows
 from collide.narrowphase.pose_batches import (
@@ -28,7 +26,7 @@ from collide.narrowphase.pose_batches import (
     answer_poses,
 )
 from collide.narrowphase.single_call import collide_single, distance_single
-from collide.results import EXACT, PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
 
 #: Set by tests: no pair of hulls is settled in doubles, whatever they have proven.
@@ -58,7 +56,7 @@ def run_pairs(
     depths = depths and not boolean
     done = 0
     while done < len(pairs):
-        last = len(pairs) if boolean else done + ROWS_TOGETHER
+        last = len(pairs) if boolean else done + ROWS_PER_BATCH
         todo, out = pairs[done:last], rows[done:last]
         answered = answer_pairs(
             *tables, address_of(todo), len(todo), boolean, depths, stop_at_hit, limit, address_of(out),
@@ -94,20 +92,10 @@ def _finish(
     if distrust_doubles:
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
-        tables = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
-        terms = address_of(poses.terms), len(poses.terms)
-        digits = address_of(_of_thread.space.digits)
-        planes = decide_pairs(
-            *tables, len(rows), boolean, depths, limit, address_of(rows), *terms,
-            _of_thread.space.addresses[1] + 8 * REQUESTS_AT, digits,
+        settle_rows(
+            rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit, digits=_of_thread.space.digits,
+            requests_at=_of_thread.space.addresses[1] + 8 * REQUESTS_AT,
         )  # fmt: skip
-        if planes:
-            decide_planes(*tables, len(rows), boolean, limit, address_of(rows), *terms, digits)
-        if depths and not boolean:
-            shallow = (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]
-            if shallow.any():
-                deepen_pairs(*tables, address_of(shallow), len(rows), limit, address_of(rows), *terms, digits)
-        settle(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
         if not distrust_doubles:
             shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
             settle_by_other_searches(

@@ -11,11 +11,9 @@ from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_bodies import Question, answer_convex, prepare_convex
 from collide.narrowphase.convex_queries import single_calls_are_safe
 from collide.narrowphase.dispatch import TABLE, Method, method_of
-from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows
-from collide.narrowphase.facets.single_mesh_call import single_pair
+from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows, single_pair
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.shapes.shape import Shape
-from collide.transforms import as_poses
 
 
 class Answer(NamedTuple):
@@ -32,13 +30,10 @@ class Answer(NamedTuple):
 
 
 def _answer_meshes(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    X_WA = as_poses(X_WA, "X_WA", check=question.check)
-    X_WB = as_poses(X_WB, "X_WB", check=question.check)
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (len(out), 4, 4))) for X in (X_WA, X_WB))
     if question.boolean:
-        out[:] = pair_hits(A, B, X_WA, X_WB)
+        out[:] = pair_hits(A, B, X_WA, X_WB, check=question.check)
     else:
-        out[:] = pair_rows(A, B, X_WA, X_WB, limit=question.limit, depths=question.depths)
+        pair_rows(A, B, X_WA, X_WB, limit=question.limit, depths=question.depths, check=question.check, out=out)
     return True
 
 

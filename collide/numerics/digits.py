@@ -1,13 +1,13 @@
-"""Integers of any length inside kernels: runs of signed digits in an int64 workspace.
+"""Integers of any length in kernels: runs of signed digits in an int64 workspace.
 
-A number is n digits in base 2²⁶ standing one after another, lowest first: value = Σ d_k 2^(26 k),
-times a power of two its user keeps track of. Digits may leave their range while terms are summed
-(there is room for 2¹⁰ products of two of them in 63 bits) and are carried back by `carry`, after
-which all but the highest lie in [0, 2²⁶) and the sign is that of the number's highest digit.
+A number is n consecutive digits in base 2²⁶, lowest first: value = Σ d_k 2^(26 k), times a power of two
+(its *grid*, an exponent in units of BITS) that its user keeps track of. Digits may leave their range while terms
+are summed (2¹⁰ products of two of them fit in 63 bits); `carry` brings them back, after which all but the highest
+lie in [0, 2²⁶) and the number's sign is that of its highest digit.
 
-Polynomials of doubles are exact this way, since a double is an integer times a power of two.
-Expansions of doubles (Priest, Shewchuk) were not chosen: a coordinate of a posed vertex already
-takes seven components, and a determinant of such coordinates thousands.
+Polynomials of doubles are exact this way, since a double is an integer times a power of two. Expansions of doubles
+(Priest, Shewchuk) would take seven components for a coordinate of a posed vertex, and thousands for a determinant
+of such coordinates.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel
-from collide.numerics.error_free import two_sum
+from collide.numerics.double_double import ScaledDD
+from collide.numerics.error_free import DD, two_sum
 
 #: Bits of a digit.
 BITS = 26
@@ -91,17 +92,17 @@ def add_number(digits, out, a, n, sign):
 def carry(digits, at, n):
     """Bring digits into range; returns the sign of the number: −1, 0 or 1."""
     over = 0
-    some = 0
+    lower_digits = 0
     for k in range(at, at + n - 1):
         value = digits[k] + over
         over = value >> BITS
         digits[k] = value & _MASK
-        some |= digits[k]
+        lower_digits |= digits[k]
     digits[at + n - 1] += over
     highest = digits[at + n - 1]
     if highest < 0:
         return -1
-    return 1 if (highest > 0 or some != 0) else 0
+    return 1 if (highest > 0 or lower_digits != 0) else 0
 
 
 @kernel
@@ -109,7 +110,7 @@ def as_double(digits, at, n):
     """(x, e): the carried number is x·2^e, x rounded to nearest, so a power of two changes e alone.
 
     From the top into 61 bits. The leading −1 of a negative number and the full digits behind it cancel
-    exactly; what is left over below only says that it is there.
+    exactly; of lower digits only the last bit says whether there are any.
     """
     value = 0
     k = n - 1
@@ -133,16 +134,30 @@ def as_double(digits, at, n):
 
 @kernel
 def as_double_double(digits, at, n):
-    """(x, low, e): the carried number is (x + low)·2^e to a relative 2⁻⁸⁰.
+    """The carried number as a `ScaledDD`, to a relative 2⁻⁸⁰.
 
     From the top, without rounding, until 80 bits of it are there; 26 more at most fit in 106.
     """
-    value = 0.0
+    high = 0.0
     low = 0.0
     k = n - 1
-    while k >= 0 and abs(value) < 1.2e24:  # 2⁸⁰
-        value, e = two_sum(value * 67108864.0, low * 67108864.0)
-        value, low = two_sum(value, float(digits[at + k]))
-        value, low = two_sum(value, low + e)
+    while k >= 0 and abs(high) < 1.2e24:  # 2⁸⁰
+        high, error = two_sum(high * 67108864.0, low * 67108864.0)  # 2²⁶
+        high, low = two_sum(high, float(digits[at + k]))
+        high, low = two_sum(high, low + error)
         k -= 1
-    return value, low, BITS * (k + 1)
+    return ScaledDD(DD(high, low), BITS * (k + 1))
+
+
+@kernel
+def negate(digits, at, n):
+    """The carried number becomes its negative, carried."""
+    for k in range(at, at + n):
+        digits[k] = -digits[k]
+    carry(digits, at, n)
+
+
+@kernel
+def copy(digits, out, a, n):
+    for k in range(n):
+        digits[out + k] = digits[a + k]

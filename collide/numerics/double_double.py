@@ -1,122 +1,287 @@
-"""Numbers of 106 bits: the sum of two doubles, the second at most half a unit in the last place of the first.
+"""Double-doubles: numbers of 106 bits, the sum of two doubles, the second at most half an ulp of the first.
 
 T. J. Dekker 1971; the algorithms and their error bounds after Joldes, Muller and Popescu, "Tight and rigorous
 error bounds for basic building blocks of double-word arithmetic" (ACM TOMS 44, 2017). With u = 2⁻⁵³ a sum, a
-product, a quotient or a root is good to a relative 16 u² = 2⁻¹⁰², barring overflow and underflow: what goes in
+product, a quotient or a root is good to a relative 16 u² = 2⁻¹⁰², barring overflow and underflow: operands
 should lie between 2⁻⁴⁰⁰ and 2⁴⁰⁰, or be 0.
 
-A number is passed as two doubles, or as two `Lanes` for eight numbers at once, and returned as a pair.
+Operands are `DD`s of doubles, or of `Lanes` for eight numbers at once. Names are read with the module's:
+``dd.add``, ``dd.inner``.
 """
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from collide.kernels import kernel
 from collide.kernels.lanes import root_of, select
-from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.error_free import DD, two_product, two_sum
+from collide.numerics.vec3 import Vec3
 
 #: Relative error of an operation of this file.
 ROUNDING = 2.0**-102
+#: A little more than half an ulp, relatively: adding or taking off as much rounds to the neighbouring double.
 _TO_NEIGHBOUR = 2.0**-53 * (1.0 + 2.0**-52)
+#: Doubles of a stored `DDVec3`.
+STRIDE = 6
 
 
 @kernel(inline=True)
-def quick_sum(a, b):
-    """(s, e) as `two_sum`, for |a| ≥ |b|."""
+def quick_two_sum(a, b):
+    """`two_sum` for |a| ≥ |b|."""
     total = a + b
-    return total, b - (total - a)
+    return DD(total, b - (total - a))
 
 
 @kernel(inline=True)
-def add(a, a_low, b, b_low):
+def add(a, b):
     """a + b, to a relative 3u²."""
-    s, e = two_sum(a, b)
-    t, f = two_sum(a_low, b_low)
-    s, e = quick_sum(s, e + t)
-    return quick_sum(s, e + f)
+    s = two_sum(a.high, b.high)
+    t = two_sum(a.low, b.low)
+    s = quick_two_sum(s.high, s.low + t.high)
+    return quick_two_sum(s.high, s.low + t.low)
 
 
 @kernel(inline=True)
-def subtract(a, a_low, b, b_low):
+def sloppy_add(a, b):
+    """a + b, off by 4u² of |a| + |b|: two thirds of the work of `add`."""
+    s = two_sum(a.high, b.high)
+    return quick_two_sum(s.high, s.low + (a.low + b.low))
+
+
+@kernel(inline=True)
+def neg(a):
+    return DD(-a.high, -a.low)
+
+
+@kernel(inline=True)
+def sub(a, b):
     """a − b, to a relative 3u²."""
-    return add(a, a_low, -b, -b_low)
+    return add(a, neg(b))
 
 
 @kernel(inline=True)
-def multiply(a, a_low, b, b_low):
+def mul(a, b):
     """a·b, to a relative 8u²."""
-    product, error = two_product(a, b)
-    return quick_sum(product, error + (a * b_low + a_low * b))
+    product = unnormalized_mul(a, b)
+    return quick_two_sum(product.high, product.low)
 
 
 @kernel(inline=True)
-def divide(a, a_low, b, b_low):
-    """a / b, to a relative 16u²: the quotient of the leading parts, and that of what it leaves."""
-    q = a / b
-    product, error = multiply(q, 0.0, b, b_low)
-    rest, rest_low = add(a, a_low, -product, -error)
-    return quick_sum(q, (rest + rest_low) / b)
+def unnormalized_mul(a, b):
+    """`mul` whose low part may be a few ulps of the high one."""
+    product = two_product(a.high, b.high)
+    return DD(product.high, product.low + (a.high * b.low + a.low * b.high))
 
 
 @kernel(inline=True)
-def square_root(a, a_low):
+def div(a, b):
+    """a / b, to a relative 16u²: the quotient of the leading parts, and that of the remainder."""
+    q = a.high / b.high
+    remainder = sub(a, mul(DD(q, 0.0), b))
+    return quick_two_sum(q, (remainder.high + remainder.low) / b.high)
+
+
+@kernel(inline=True)
+def sqrt(a):
     """√a for a ≥ 0, to a relative 8u²: one step of Newton from the root of the leading part."""
-    positive = a > 0.0
-    root = root_of(select(positive, a, 1.0))
-    square, error = two_product(root, root)
-    rest = ((a - square) - error) + a_low
-    root, rest = quick_sum(root, rest / (2.0 * root))
-    return select(positive, root, 0.0), select(positive, rest, 0.0)
+    positive = a.high > 0.0
+    root = root_of(select(positive, a.high, 1.0))
+    square = two_product(root, root)
+    remainder = ((a.high - square.high) - square.low) + a.low
+    root, low = quick_two_sum(root, remainder / (2.0 * root))
+    return DD(select(positive, root, 0.0), select(positive, low, 0.0))
 
 
 @kernel(inline=True)
-def cross(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
+def scale(factor, a):
+    """A power of two times a."""
+    return DD(a.high * factor, a.low * factor)
+
+
+@kernel(inline=True)
+def dd_select(condition, a, b):
+    """`select` of both parts."""
+    return DD(select(condition, a.high, b.high), select(condition, a.low, b.low))
+
+
+@kernel(inline=True)
+def less(a, b):
+    return a.high < b.high or (a.high == b.high and a.low < b.low)
+
+
+class Bracket(NamedTuple):
+    """Doubles around a number: lower ≤ nearest ≤ upper, as close to each other as doubles allow."""
+
+    lower: float
+    nearest: float
+    upper: float
+
+
+@kernel(inline=True)
+def bracket(a, error):
+    """The `Bracket` of all numbers within ``error`` of a."""
+    s, e = two_sum(a.high, a.low - error)
+    lower = select(e >= 0.0, s, s - abs(s) * _TO_NEIGHBOUR)
+    s, e = two_sum(a.high, a.low + error)
+    upper = select(e <= 0.0, s, s + abs(s) * _TO_NEIGHBOUR)
+    return Bracket(lower, a.high + a.low, upper)
+
+
+# --- beyond the range of doubles ------------------------------------------------------------------
+
+
+class ScaledDD(NamedTuple):
+    """value · 2^exponent."""
+
+    value: DD
+    exponent: int
+
+
+@kernel
+def ldexp(x, exponent):
+    """x·2^exponent, with exponents far out of range brought to where they still give 0 or infinity."""
+    return math.ldexp(x, int(min(max(exponent, -5000), 5000)))
+
+
+@kernel
+def ldexp_dd(a, exponent):
+    return DD(ldexp(a.high, exponent), ldexp(a.low, exponent))
+
+
+@kernel
+def unscaled(a):
+    """A `ScaledDD` as a double-double, rounded to 0 or infinity where it is out of range."""
+    return ldexp_dd(a.value, a.exponent)
+
+
+@kernel
+def scaled_sqrt(a):
+    """√a of a `ScaledDD`: a power of four is taken out first, so that nothing tiny vanishes."""
+    odd = a.exponent & 1
+    return ScaledDD(sqrt(ldexp_dd(a.value, odd)), (a.exponent - odd) // 2)
+
+
+@kernel
+def normalized(a):
+    """A double-double as a `ScaledDD` of size ½ to 1."""
+    exponent = math.frexp(a.high)[1]
+    return ScaledDD(ldexp_dd(a, -exponent), exponent)
+
+
+@kernel
+def scaled_div(a, b):
+    return ScaledDD(div(a.value, b.value), a.exponent - b.exponent)
+
+
+# --- vectors --------------------------------------------------------------------------------------
+
+
+class DDVec3(NamedTuple):
+    """A vector of three double-doubles."""
+
+    x: DD
+    y: DD
+    z: DD
+
+
+@kernel(inline=True)
+def vec3_at(values, at):
+    """Three double-doubles stored as six consecutive doubles, or Lanes: high and low part of x, then of y, then of z."""
+    return DDVec3(
+        DD(values[at], values[at + 1]), DD(values[at + 2], values[at + 3]), DD(values[at + 4], values[at + 5])
+    )
+
+
+@kernel(inline=True)
+def put_vec3(values, at, a):
+    values[at] = a.x.high
+    values[at + 1] = a.x.low
+    values[at + 2] = a.y.high
+    values[at + 3] = a.y.low
+    values[at + 4] = a.z.high
+    values[at + 5] = a.z.low
+
+
+@kernel(inline=True)
+def exact_vec3(a):
+    """A `Vec3` of doubles as it is."""
+    return DDVec3(DD(a.x, 0.0), DD(a.y, 0.0), DD(a.z, 0.0))
+
+
+@kernel(inline=True)
+def leading(a):
+    """The `Vec3` of leading parts."""
+    return Vec3(a.x.high, a.y.high, a.z.high)
+
+
+@kernel(inline=True)
+def difference(a, b):
+    """a − b of two `Vec3` of doubles, exactly."""
+    return DDVec3(two_sum(a.x, -b.x), two_sum(a.y, -b.y), two_sum(a.z, -b.z))
+
+
+@kernel(inline=True)
+def neg_vec3(a):
+    return DDVec3(neg(a.x), neg(a.y), neg(a.z))
+
+
+@kernel(inline=True)
+def scale_vec3(factor, a):
+    """A power of two, or ±1, times a."""
+    return DDVec3(scale(factor, a.x), scale(factor, a.y), scale(factor, a.z))
+
+
+@kernel(inline=True)
+def sub_vec3(a, b):
+    """a − b, each component to a relative 3u²."""
+    return DDVec3(sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z))
+
+
+@kernel(inline=True)
+def select_vec3(condition, a, b):
+    return DDVec3(dd_select(condition, a.x, b.x), dd_select(condition, a.y, b.y), dd_select(condition, a.z, b.z))
+
+
+@kernel(inline=True)
+def cross(a, b):
     """a × b, each component to 2⁻¹⁰¹·(|products|)."""
-    x, x_low = _determinant(ay, ay_low, az, az_low, by, by_low, bz, bz_low)
-    y, y_low = _determinant(az, az_low, ax, ax_low, bz, bz_low, bx, bx_low)
-    z, z_low = _determinant(ax, ax_low, ay, ay_low, bx, bx_low, by, by_low)
-    return x, x_low, y, y_low, z, z_low
+    return DDVec3(_determinant(a.y, a.z, b.y, b.z), _determinant(a.z, a.x, b.z, b.x), _determinant(a.x, a.y, b.x, b.y))
 
 
 @kernel(inline=True)
-def _determinant(a, a_low, b, b_low, c, c_low, d, d_low):
+def _determinant(a, b, c, d):
     """a·d − b·c, to 13u²·(|a·d| + |b·c|): lower parts are at most 4u of that, and rounded in three sums."""
-    p, e = two_product(a, d)
-    q, f = two_product(b, c)
-    s, g = two_sum(p, -q)
-    return two_sum(s, g + ((e + (a * d_low + a_low * d)) - (f + (b * c_low + b_low * c))))
+    p = two_product(a.high, d.high)
+    q = two_product(b.high, c.high)
+    s, e = two_sum(p.high, -q.high)
+    lower = (p.low + (a.high * d.low + a.low * d.high)) - (q.low + (b.high * c.low + b.low * c.high))
+    return two_sum(s, e + lower)
 
 
 @kernel(inline=True)
-def product_of_vectors(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
+def inner(a, b):
     """a·b, to 2⁻¹⁰¹·Σ|products|."""
-    total, rest = loose_product(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low)
-    return two_sum(total, rest)
+    total = unnormalized_inner(a, b)
+    return two_sum(total.high, total.low)
 
 
 @kernel(inline=True)
-def loose_product(ax, ax_low, ay, ay_low, az, az_low, bx, bx_low, by, by_low, bz, bz_low):
+def unnormalized_inner(a, b):
     """a·b as two doubles, the second of which may be larger than the first, to 25u²·Σ|products|.
 
     Errors of products and sums, and lower parts, are at most 5u·Σ|products| together; sums of them round by 24u².
     """
-    total, e = two_product(ax, bx)
-    term, f = two_product(ay, by)
-    total, g = two_sum(total, term)
-    rest = (e + f) + g
-    term, f = two_product(az, bz)
-    total, g = two_sum(total, term)
-    low = (ax * bx_low + ax_low * bx) + (ay * by_low + ay_low * by) + (az * bz_low + az_low * bz)
-    return total, rest + ((f + g) + low)
-
-
-@kernel(inline=True)
-def bracket(a, a_low, error):
-    """(lower, nearest, upper): doubles around every number within ``error`` of a; as close as doubles allow.
-
-    Adding or taking off a little more than half a unit in the last place rounds to the neighbour.
-    """
-    s, e = two_sum(a, a_low - error)
-    lower = select(e >= 0.0, s, s - abs(s) * _TO_NEIGHBOUR)
-    s, e = two_sum(a, a_low + error)
-    upper = select(e <= 0.0, s, s + abs(s) * _TO_NEIGHBOUR)
-    return lower, a + a_low, upper
+    x = two_product(a.x.high, b.x.high)
+    y = two_product(a.y.high, b.y.high)
+    z = two_product(a.z.high, b.z.high)
+    total, first_error = two_sum(x.high, y.high)
+    error = (x.low + y.low) + first_error
+    total, second_error = two_sum(total, z.high)
+    low = (
+        (a.x.high * b.x.low + a.x.low * b.x.high)
+        + (a.y.high * b.y.low + a.y.low * b.y.high)
+        + (a.z.high * b.z.low + a.z.low * b.z.high)
+    )
+    return DD(total, error + ((z.low + second_error) + low))

@@ -1,4 +1,4 @@
-"""Sums and products of doubles with the error they make, which is a double too.
+"""Error-free transformations: sums and products of doubles with their rounding error, which is a double too.
 
 D. E. Knuth's sum and T. J. Dekker's product ("A floating-point technique for extending the available
 precision", 1971): what exact signs and double-doubles are built from. Compiled, the error of a product is one
@@ -7,15 +7,24 @@ fused instruction instead of Dekker's sixteen.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from collide.kernels import WITH_NUMBA, kernel
+
+
+class DD(NamedTuple):
+    """A double-double: the unevaluated sum of two doubles, or of two `Lanes`, |low| at most half an ulp of high."""
+
+    high: float
+    low: float
 
 
 @kernel(inline=True)
 def two_sum(a, b):
-    """(s, e): s = a + b rounded, s + e = a + b exactly (Knuth)."""
+    """a + b exactly, as the rounded sum and its error (Knuth)."""
     total = a + b
-    other = total - a
-    return total, (a - (total - other)) + (b - other)
+    b_rounded = total - a
+    return DD(total, (a - (total - b_rounded)) + (b - b_rounded))
 
 
 @kernel
@@ -28,7 +37,7 @@ def dekker_product(a, b):
     wide = 134217729.0 * b
     b_high = wide - (wide - b)
     b_low = b - b_high
-    return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+    return DD(product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low))
 
 
 if not WITH_NUMBA:
@@ -38,6 +47,6 @@ else:
 
     @kernel(inline=True)
     def two_product(a, b):
-        """(p, e): p = a·b rounded, p + e = a·b exactly unless it underflows."""
+        """a·b exactly unless it underflows, as the rounded product and its error."""
         product = a * b
-        return product, product_error(a, b, product)
+        return DD(product, product_error(a, b, product))

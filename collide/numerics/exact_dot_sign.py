@@ -9,9 +9,12 @@ shows. Ties are common, since directions are often facet normals: this stage has
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
+from collide.numerics.double_double import difference
 from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.vec3 import Vec3
 
 #: Each term goes through four roundings of relative size 2⁻⁵³: a difference, a product, two sums. Seven cover
 #: those of the bound itself, too, and the last summand products below the smallest normal double.
@@ -24,11 +27,11 @@ _SMALLEST_PRODUCT = 2.0**-900
 
 
 @kernel
-def product_and_bound(ax, ay, az, bx, by, bz, gx, gy, gz):
+def product_and_bound(a, b, g):
     """(value, bound): (a − b)·g in doubles, and a bound of its error. Not finite where that overflows."""
-    x = (ax - bx) * gx
-    y = (ay - by) * gy
-    z = (az - bz) * gz
+    x = (a.x - b.x) * g.x
+    y = (a.y - b.y) * g.y
+    z = (a.z - b.z) * g.z
     return x + y + z, (abs(x) + abs(y) + abs(z)) * _ROUNDING + _TINY
 
 
@@ -72,41 +75,41 @@ def _sign_of_long_sum(a, b, c, d, e, f, g, h, i, j, k, m):
 
 
 @kernel
-def exact_sign(ax, ay, az, bx, by, bz, gx, gy, gz):
-    """Sign of (a − b)·g. The direction must lie in the range that `layout.exact_range` tells."""
-    dx, ex = two_sum(ax, -bx)
-    dy, ey = two_sum(ay, -by)
-    dz, ez = two_sum(az, -bz)
-    x, x_low = two_product(dx, gx)
-    y, y_low = two_product(dy, gy)
-    z, z_low = two_product(dz, gz)
-    if ex == 0.0 and ey == 0.0 and ez == 0.0:
-        return _sign_of_sum(x, y, z, x_low, y_low, z_low)
-    u, u_low = two_product(ex, gx)
-    v, v_low = two_product(ey, gy)
-    w, w_low = two_product(ez, gz)
-    return _sign_of_long_sum(x, y, z, x_low, y_low, z_low, u, v, w, u_low, v_low, w_low)
+def exact_sign(a, b, g):
+    """Sign of (a − b)·g. The direction must lie in the range of `support_tree.exact_range`."""
+    d = difference(a, b)
+    x = two_product(d.x.high, g.x)
+    y = two_product(d.y.high, g.y)
+    z = two_product(d.z.high, g.z)
+    if d.x.low == 0.0 and d.y.low == 0.0 and d.z.low == 0.0:
+        return _sign_of_sum(x.high, y.high, z.high, x.low, y.low, z.low)
+    u = two_product(d.x.low, g.x)
+    v = two_product(d.y.low, g.y)
+    w = two_product(d.z.low, g.z)
+    return _sign_of_long_sum(
+        x.high, y.high, z.high, x.low, y.low, z.low, u.high, v.high, w.high, u.low, v.low, w.low
+    )
 
 
 @kernel
-def exact_sign_of_pairs(ax, ax_low, ay, ay_low, az, az_low, gx, gx_low, gy, gy_low, gz, gz_low, terms):
-    """(certain, sign) of a·g, for two vectors of double-doubles. Not certain where products are too small to be exact.
+def exact_sign_of_dot(a, g, terms):
+    """(certain, sign) of a·g, for two `DDVec3`. Not certain where products are too small to be exact.
 
-    terms : PRODUCT_TERMS doubles to work in.
+    terms : workspace of PRODUCT_TERMS doubles.
     """
-    certain = _set_products(ax, ax_low, gx, gx_low, terms, 0)
-    certain = _set_products(ay, ay_low, gy, gy_low, terms, 8) and certain
-    certain = _set_products(az, az_low, gz, gz_low, terms, 16) and certain
+    certain = _put_products(a.x, g.x, terms, 0)
+    certain = _put_products(a.y, g.y, terms, 8) and certain
+    certain = _put_products(a.z, g.z, terms, 16) and certain
     return certain, sign_of_terms(terms, PRODUCT_TERMS) if certain else 0
 
 
 @kernel
-def _set_products(a, a_low, g, g_low, terms, at):
+def _put_products(a, g, terms, at):
     """Put the eight doubles whose sum is a·g at ``at``; whether it is that exactly."""
     certain = True
     for k in range(4):
-        p = a if k < 2 else a_low
-        q = g if k % 2 == 0 else g_low
+        p = a.high if k < 2 else a.low
+        q = g.high if k % 2 == 0 else g.low
         terms[at + 2 * k], terms[at + 2 * k + 1] = two_product(p, q)
         certain = certain and (p == 0.0 or q == 0.0 or abs(terms[at + 2 * k]) > _SMALLEST_PRODUCT)
     return certain
@@ -126,19 +129,29 @@ def sign_of_terms(terms, n):
         terms[n - 1] = total
 
 
+class ScaledDirection(NamedTuple):
+    """exact : whether `exact_sign` is exact for g."""
+
+    exact: bool
+    g: Vec3
+
+
 @kernel
-def scaled_into_range(least, most, target, gx, gy, gz):
-    """(certain, gx, gy, gz): the direction times a power of two, and whether `exact_sign` is exact for it."""
-    x = abs(gx)
-    y = abs(gy)
-    z = abs(gz)
+def scaled_into_range(least, largest_allowed, target, g):
+    """The direction times a power of two, so that its components lie in [least, largest_allowed] where they can.
+
+    target : exponent that the largest component gets.
+    """
+    x = abs(g.x)
+    y = abs(g.y)
+    z = abs(g.z)
     largest = max(x, y, z)
     smallest = min(x if x > 0.0 else largest, y if y > 0.0 else largest, z if z > 0.0 else largest)
     if not (x < math.inf and y < math.inf and z < math.inf):
-        return False, gx, gy, gz
-    if largest == 0.0 or (smallest >= least and largest <= most):
-        return True, gx, gy, gz
+        return ScaledDirection(False, g)
+    if largest == 0.0 or (smallest >= least and largest <= largest_allowed):
+        return ScaledDirection(True, g)
     shift = int(target) - math.frexp(largest)[1]
     # Smaller components may be lost on the way down: then they are below range, too.
-    certain = math.ldexp(smallest, shift) >= least
-    return certain, math.ldexp(gx, shift), math.ldexp(gy, shift), math.ldexp(gz, shift)
+    exact = math.ldexp(smallest, shift) >= least
+    return ScaledDirection(exact, Vec3(math.ldexp(g.x, shift), math.ldexp(g.y, shift), math.ldexp(g.z, shift)))

@@ -7,6 +7,7 @@ can be written as integers times one power of two: nothing is rounded.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import TypeVar
 
@@ -32,15 +33,19 @@ def integers(values) -> tuple[list[int], int]:
 
 def placed(X: np.ndarray, points: np.ndarray) -> tuple[list[Point], int]:
     """(points (k, 3) placed by the pose X as integers, exponent of their grid), entries taken as exact numbers."""
+    own, own_at = integers(points)
+    return moved(X, zip(own[0::3], own[1::3], own[2::3]), own_at)
+
+
+def moved(X: np.ndarray, points: Iterable[Point], own_at: int) -> tuple[list[Point], int]:
+    """The same of points that are integers times 2^own_at."""
     turn, turn_at = integers(X[:3, :3])
     shift, shift_at = integers(X[:3, 3])
-    own, own_at = integers(points)
     low = min(turn_at + own_at, shift_at)
     up, over = turn_at + own_at - low, shift_at - low
     t = [s << over for s in shift]
     result = []
-    for k in range(0, len(own), 3):
-        x, y, z = own[k : k + 3]
+    for x, y, z in points:
         result.append(tuple(((turn[i] * x + turn[i + 1] * y + turn[i + 2] * z) << up) + t[i // 3] for i in (0, 3, 6)))
     return result, low  # type: ignore[return-value]
 

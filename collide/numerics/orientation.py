@@ -1,14 +1,14 @@
-"""On which side of a plane a point lies, decided exactly for any finite doubles.
+"""The orientation predicate: on which side of a plane a point lies, exactly for any finite doubles.
 
-Four stages, each asked only where the one before cannot tell: plain doubles with an error bound;
-pairs of doubles with an error bound 2⁵¹ times smaller; expansions (Priest; Shewchuk, "Adaptive
+Four stages, each evaluated only where the one before leaves the sign open: plain doubles with an error bound;
+double-doubles with an error bound 2⁵¹ times smaller; expansions (Priest; Shewchuk, "Adaptive
 precision floating-point arithmetic and fast robust geometric predicates", 1997), which are exact
 while nothing underflows; integers of many digits (`numerics/digits.py`), which always are.
 
-A cloud is given twice: ``points``, scaled by a power of two so that the largest coordinate lies in
-[1/2, 1), and ``originals``, as they came. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
+A point cloud comes twice: ``points``, scaled by a power of two so that the largest coordinate lies in
+[1/2, 1), and ``originals``, unscaled. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
 scaling, so the last stage reads the originals. ``work`` begins with two numbers about the cloud
-(`survey`), the rest is room for sums:
+(`survey`), the rest is workspace for sums:
 
 * threshold: 0, or the magnitude below which a nonzero original keeps its test from the expansions;
 * quantum: where all scaled coordinates are multiples of 2^-k, k ≤ 33, a determinant is a multiple
@@ -23,8 +23,9 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel
-from collide.numerics.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit
-from collide.numerics.error_free import two_product, two_sum
+from collide.numerics import double_double as dd
+from collide.numerics.digits import BITS, add_double, add_product, carry, clear, grid_of, lowest_bit
+from collide.numerics.error_free import DD, two_product, two_sum
 
 #: Doubles in ``work``: two numbers, nine differences in two parts, a minor (≤ 16) and a determinant (≤ 192).
 WORK = 256
@@ -35,19 +36,19 @@ _TOTAL = 40
 DIGITS = 14 * 84
 #: Expansions multiply three coordinates with lowest bits ≥ 2⁻³³³: 2⁻⁹⁹⁹ does not underflow.
 _SMALLEST_BIT = 280
-#: A finer lattice's quantum lies below what pairs of doubles can tell from 0. Adding and taking away
+#: A finer lattice's quantum lies below what double-doubles can tell from 0. Adding and taking away
 #: 1.5·2⁵² rounds a number of so few bits to an integer.
-_MOST_BITS = 33
+_MAX_LATTICE_BITS = 33
 _ROUNDER = 6755399441055744.0
 
 #: Doubles: a term of the determinant is the product of three rounded differences (3 u), rounded as
 #: it is multiplied (2 u), subtracted (1 u) and added (2 u): (1 + u)⁸ − 1 times the sum of the terms'
 #: magnitudes, which itself is known to (1 + u)⁸. Twice that is more than enough.
 _DOUBLE_ERROR = 2.0**-49
-#: Pairs: differences are exact. A product of pairs leaves out the product of the tails and rounds
-#: three times at the size of a tail, below 6 u²; a sum of pairs rounds two tails' sums, below 4 u² of the
+#: Double-doubles: differences are exact. A product leaves out the product of the tails and rounds
+#: three times at the size of a tail, below 6 u²; a sum rounds two tails' sums, below 4 u² of the
 #: magnitudes. Two products and three sums deep: 24 u². The rest covers the bound's own rounding.
-_PAIR_ERROR = 2.0**-100
+_DD_ERROR = 2.0**-100
 #: What underflow adds, in the scaling and in products of numbers below 4, is far below this.
 UNDERFLOW = 2.0**-1000
 
@@ -71,11 +72,11 @@ def survey(originals, points, count, work):
         x = originals[k] * factor0 * factor1
         points[k] = x
         wide = wide or 0.0 < abs(originals[k]) < threshold
-        while bits <= _MOST_BITS and (x * steps + _ROUNDER) - _ROUNDER != x * steps:
+        while bits <= _MAX_LATTICE_BITS and (x * steps + _ROUNDER) - _ROUNDER != x * steps:
             bits += 1
             steps *= 2.0
     work[0] = threshold if wide else 0.0
-    work[1] = math.ldexp(1.0, -3 * bits) if bits <= _MOST_BITS and not wide else 0.0
+    work[1] = math.ldexp(1.0, -3 * bits) if bits <= _MAX_LATTICE_BITS and not wide else 0.0
     return exponent
 
 
@@ -90,9 +91,9 @@ def orientation(points, originals, work, digits, a, b, c, d, axis):
     margins, shrink with that distance. A cloud that crowds together in one place needs this.
     """
     if axis < 0:
-        near_a = apart(points, a, d)
-        near_b = apart(points, b, d)
-        near_c = apart(points, c, d)
+        near_a = distance1(points, a, d)
+        near_b = distance1(points, b, d)
+        near_c = distance1(points, c, d)
         if near_b < near_a and near_b <= near_c:
             a, b, c = b, c, a
         elif near_c < near_a:
@@ -109,8 +110,8 @@ def orientation(points, originals, work, digits, a, b, c, d, axis):
     # From here on nothing underflows: a sum of terms 0 is truly 0.
     if size == 0.0:
         return 0
-    value = pair_determinant(work)
-    margin = _PAIR_ERROR * size
+    value = dd_determinant(work)
+    margin = _DD_ERROR * size
     if abs(value) > margin:
         return 1 if value > 0.0 else -1
     if abs(value) + margin < work[1]:
@@ -119,7 +120,8 @@ def orientation(points, originals, work, digits, a, b, c, d, axis):
 
 
 @kernel
-def apart(points, a, b):
+def distance1(points, a, b):
+    """Sum of the coordinates' differences of two points."""
     total = 0.0
     for k in range(3):
         total += abs(points[3 * a + k] - points[3 * b + k])
@@ -128,7 +130,7 @@ def apart(points, a, b):
 
 @kernel(inline=True)
 def one_of_four(k, a, b, c, d):
-    """Number k of four. A loop over a tuple asks whether it is left, and would raise."""
+    """Number k of four: kernels cannot index a tuple by a variable."""
     if k == 0:
         return a
     if k == 1:
@@ -177,35 +179,24 @@ def double_determinant(work):
     return value, size
 
 
-@kernel
-def pair_product(a, a_low, b, b_low):
-    product, error = two_product(a, b)
-    return product, error + (a * b_low + a_low * b)
+@kernel(inline=True)
+def _dd_at(work, k):
+    return DD(work[k], work[k + 1])
 
 
 @kernel
-def pair_sum(a, a_low, b, b_low):
-    total, error = two_sum(a, b)
-    error += a_low + b_low
-    high = total + error
-    return high, error - (high - total)
-
-
-@kernel
-def pair_determinant(work):
-    """The determinant of the differences summed in pairs of doubles, to 24 u² of its terms' magnitudes."""
-    high = 0.0
-    low = 0.0
+def dd_determinant(work):
+    """The determinant of the differences, rounded from double-doubles good to 24 u² of its terms' magnitudes."""
+    total = DD(0.0, 0.0)
     for k in range(3):
         i = _DIFFERENCES + 2 * ((k + 1) % 3)
         j = _DIFFERENCES + 2 * ((k + 2) % 3)
         w = _DIFFERENCES + 12 + 2 * k
-        p, p_low = pair_product(work[i], work[i + 1], work[j + 6], work[j + 7])
-        q, q_low = pair_product(work[j], work[j + 1], work[i + 6], work[i + 7])
-        p, p_low = pair_sum(p, p_low, -q, -q_low)
-        p, p_low = pair_product(p, p_low, work[w], work[w + 1])
-        high, low = pair_sum(high, low, p, p_low)
-    return high
+        p = dd.unnormalized_mul(_dd_at(work, i), _dd_at(work, j + 6))
+        q = dd.unnormalized_mul(_dd_at(work, j), _dd_at(work, i + 6))
+        minor = dd.sloppy_add(p, dd.neg(q))
+        total = dd.sloppy_add(total, dd.unnormalized_mul(minor, _dd_at(work, w)))
+    return total.high
 
 
 @kernel
@@ -271,12 +262,10 @@ def by_digits(originals, digits, a, b, c, d, axis):
     n = (highest - BITS * grid) // BITS + 2
     minor = 9 * n
     total = 11 * n
-    for k in range(total, total + 3 * n):
-        digits[k] = 0
+    clear(digits, total, 3 * n)
     for cell in range(9):
         at = cell * n
-        for k in range(at, at + n):
-            digits[k] = 0
+        clear(digits, at, n)
         if cell >= 6 and axis >= 0:
             digits[at] = 1 if cell == 6 + axis else 0
         else:
@@ -290,8 +279,7 @@ def by_digits(originals, digits, a, b, c, d, axis):
     for k in range(3):
         i = ((k + 1) % 3) * n
         j = ((k + 2) % 3) * n
-        for t in range(minor, total):
-            digits[t] = 0
+        clear(digits, minor, 2 * n)
         add_product(digits, minor, i, n, j + 3 * n, n, 1)
         add_product(digits, minor, j, n, i + 3 * n, n, -1)
         carry(digits, minor, 2 * n)

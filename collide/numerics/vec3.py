@@ -6,6 +6,7 @@ A Vec3 costs nothing in machine code: its three doubles are registers.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
@@ -45,6 +46,26 @@ def scale(factor, a):
 @kernel(inline=True)
 def neg(a):
     return Vec3(-a.x, -a.y, -a.z)
+
+
+@kernel(inline=True)
+def norm(a):
+    """|a|. Squares of components below 2⁻⁵³⁷ vanish, above 2⁵¹¹ they overflow."""
+    return math.sqrt(a.x * a.x + a.y * a.y + a.z * a.z)
+
+
+@kernel(inline=True)
+def norm1(a):
+    """Sum of magnitudes of the components: what rounding errors of a dot product are measured by."""
+    return abs(a.x) + abs(a.y) + abs(a.z)
+
+
+@kernel(inline=True)
+def component(a, axis):
+    """Component 0, 1 or 2: kernels cannot index a tuple by a variable."""
+    if axis == 0:
+        return a.x
+    return a.y if axis == 1 else a.z
 
 
 @kernel(inline=True)
@@ -101,3 +122,16 @@ def rotate_back(R, at, a):
         R[at + 1] * a.x + R[at + 4] * a.y + R[at + 7] * a.z,
         R[at + 2] * a.x + R[at + 5] * a.y + R[at + 8] * a.z,
     )
+
+
+@kernel
+def unit_orthogonal(a):
+    """A unit vector orthogonal to a ≠ 0, made from its two largest coordinates."""
+    if abs(a.x) <= abs(a.y) and abs(a.x) <= abs(a.z):
+        length = math.sqrt(a.y * a.y + a.z * a.z)
+        return Vec3(0.0, -a.z / length, a.y / length)
+    if abs(a.y) <= abs(a.z):
+        length = math.sqrt(a.x * a.x + a.z * a.z)
+        return Vec3(a.z / length, 0.0, -a.x / length)
+    length = math.sqrt(a.x * a.x + a.y * a.y)
+    return Vec3(-a.y / length, a.x / length, 0.0)

@@ -101,7 +101,9 @@ def check(report: Report, label: str, *, touching_counts: bool, known: Baseline 
     made = Check(label, report.scene["name"], report.bodies, report.verdict(), against_baseline=known is not None)
     made.unanswered = [*report.unanswered, *(report.trajectory or {}).get("unanswered", [])]
     if report.trajectory is not None:
-        made.summary = f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
+        made.summary = (
+            f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
+        )
     unmatched = dict(known.of(label)) if known is not None else {}
     for finding in _pairs(report):
         counts = finding.what == COLLISION or (finding.what == TOUCHING and touching_counts)

@@ -49,7 +49,7 @@ def roundings(size_a, size_b):
 
 
 def is_touching(lower, upper, rounding):
-    """Whether a bracket [lower, upper] says no more than that two bodies touch within rounding; numbers or arrays [m]."""
+    """Whether a bracket [lower, upper] says only that two bodies touch within rounding; numbers or arrays [m]."""
     return ((lower < 0.0) & (upper > 0.0)) | (np.maximum(-lower, upper) <= rounding)
 
 

@@ -136,5 +136,12 @@ def _blame(dispute: dict) -> str:
     if dispute["not_judged"]:
         return "not judged"
     names = ", ".join(dispute["wrong"]) or "none"
-    remarks = [word for word, so in (("touching", dispute["touching"]), ("by bracket", dispute["judged_by"] == "the proven bracket")) if so]
+    remarks = [
+        word
+        for word, so in (
+            ("touching", dispute["touching"]),
+            ("by bracket", dispute["judged_by"] == "the proven bracket"),
+        )
+        if so
+    ]
     return f"{names} ({', '.join(remarks)})" if remarks else names

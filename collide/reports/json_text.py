@@ -1,4 +1,4 @@
-"""JSON as text, a piece at a time: a report of millions of pairs is never held as one text, nor as one tree of dicts."""
+"""JSON as text, a piece at a time: a report of millions of pairs is never held as one text or tree of dicts."""
 
 from __future__ import annotations
 

@@ -34,11 +34,19 @@ def _suite(check: Check) -> Iterator[str]:
     )
     for body in check.bodies:
         inside = [
-            *(f"<failure message={_attribute(_message(body, findings))} type={_attribute(findings[0].what)}>"
-              f"{_text(_lines(body, findings))}</failure>" for findings in [failing.get(body)] if findings),
+            *(
+                f"<failure message={_attribute(_message(body, findings))} type={_attribute(findings[0].what)}>"
+                f"{_text(_lines(body, findings))}</failure>"
+                for findings in [failing.get(body)]
+                if findings
+            ),
             *(f'<error message={_attribute(why)} type="not answered"/>' for why in unanswered.get(body, [])[:1]),
-            *(f"<system-out>{_text(_lines(body, findings))}</system-out>" for findings in [reported.get(body)] if findings),
-        ]  # fmt: skip
+            *(
+                f"<system-out>{_text(_lines(body, findings))}</system-out>"
+                for findings in [reported.get(body)]
+                if findings
+            ),
+        ]
         case = f"    <testcase classname={name} name={_attribute(body)}"
         yield f"{case}>\n      " + "\n      ".join(inside) + "\n    </testcase>\n" if inside else f"{case}/>\n"
     yield f"    <system-out>{_text(check.verdict())}</system-out>\n  </testsuite>\n"

@@ -22,7 +22,7 @@ _ABOUT = [
     "depth: at most so many levels in a graded box-tree of a connected mesh, ⌈log2 nΣ⌉.",
 ]
 _TREES = [
-    "nodes of the graded tree: at most 2F - 1. level: of its octree; at most log2(W/l) + 3, W its width, l the shortest edge.",
+    "nodes of the graded tree: at most 2F - 1. level: of its octree, at most log2(W/l) + 3 (W width, l shortest edge).",
     "outliers: facets that fit into no child of their node.",
 ]
 
@@ -46,7 +46,8 @@ def _mesh_dict(item: Measured) -> dict:
     limits, counts = locality.histogram()
     return {
         "name": item.name, "path": item.path, "vertices": locality.vertices, "distinct": locality.distinct,
-        "in_use": locality.in_use, "facets": locality.facets, "shortest_edge": locality.shortest, "longest_edge": locality.longest,
+        "in_use": locality.in_use, "facets": locality.facets, "shortest_edge": locality.shortest,
+        "longest_edge": locality.longest,
         "global_stretch": locality.global_stretch, "local_stretch": locality.local_stretches.tolist(),
         "worst_vertex": locality.worst.tolist(), "mean": locality.means.tolist(),
         "quantiles": {str(share): row.tolist() for share, row in zip(_SHARES, locality.quantiles(_SHARES))},
@@ -71,21 +72,39 @@ def tables(measured: list[Measured]) -> list[Table]:
 
 def _trees(measured: list[Measured]) -> Table:
     columns = [
-        Column("mesh", "name"), Column("facets"), Column("nodes", optional=2), Column("depth"), Column("graded nodes", optional=1),
+        Column("mesh", "name"), Column("facets"), Column("nodes", optional=2), Column("depth"),
+        Column("graded nodes", optional=1),
         Column("at most", optional=1), Column("graded depth"), Column("level"), Column("at most"), Column("outliers"),
         Column("at one node", optional=2),
     ]  # fmt: skip
     rows = []
     for item in measured:
         t = item.trees
-        counts = (t.facets, t.nodes, t.depth, t.graded_size, t.node_bound, t.graded_depth, t.graded_level, t.level_bound)
+        counts = (
+            t.facets,
+            t.nodes,
+            t.depth,
+            t.graded_size,
+            t.node_bound,
+            t.graded_depth,
+            t.graded_level,
+            t.level_bound,
+        )
         rows.append([item.name, *map(str, counts), f"{100 * t.outlier_share:.1f} %", str(t.max_outliers)])
-    return Table("TREES  the one that queries walk, eight boxes a node; the graded box-tree of the paper", columns, rows, notes=_TREES)
+    return Table(
+        "TREES  the one that queries walk, eight boxes a node; the graded box-tree of the paper",
+        columns,
+        rows,
+        notes=_TREES,
+    )
 
 
 def _distribution(measured: list[Measured]) -> Table:
     columns = [Column("mesh", "name"), Column("order", "label"), Column("mean")]
-    columns += [Column(f"{100 * share:g} %") for share in _SHARES] + [Column("largest"), Column("at vertex", optional=1)]
+    columns += [Column(f"{100 * share:g} %") for share in _SHARES] + [
+        Column("largest"),
+        Column("at vertex", optional=1),
+    ]
     rows = []
     for item in measured:
         quantiles = item.locality.quantiles(_SHARES)
@@ -140,5 +159,7 @@ def _draw(panel, item: Measured) -> None:
     panel.set_yscale("symlog", linthresh=1.0)
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel("vertices")
-    panel.set_title(f"{item.name}: {item.locality.distinct} vertices, Σ = {_figure(item.locality.global_stretch)}", fontsize=10)
+    panel.set_title(
+        f"{item.name}: {item.locality.distinct} vertices, Σ = {_figure(item.locality.global_stretch)}", fontsize=10
+    )
     panel.legend(fontsize=8)

@@ -25,7 +25,8 @@ def of_scene(scene) -> list[dict]:
     """A row for every mesh of every body, in the order of the bodies: plain data for `Report.meshes`."""
     return [
         {
-            "body": body.name, "solid": mesh.solid, "facets": len(mesh.faces), "what": describe(mesh), "source": body.source,
+            "body": body.name, "solid": mesh.solid, "facets": len(mesh.faces), "what": describe(mesh),
+            "source": body.source,
         }
         for body in scene.bodies
         for mesh in meshes_of(body.shape)

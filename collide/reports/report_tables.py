@@ -50,7 +50,9 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
 
 def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: bool, proofs: bool) -> Table:
     """A class of pairs; ``measure`` says what its number is: depth, distance or within."""
-    folds, more = pairs.folded(MAX_PAIRS_OF_BODY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
+    folds, more = (
+        pairs.folded(MAX_PAIRS_OF_BODY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
+    )
     listed = [fold.pair for fold in folds]
     unit, on_a = coordinates([pair.point_a for pair in listed])
     columns = [
@@ -140,7 +142,8 @@ def _bracket(pair: Pair) -> float:
 def _line_table(report: Report, everything: bool, proofs: bool) -> Table:
     """What a person should know of, a line each; what has a table of its own is left out."""
     lines = [] if everything else [
-        ("touching", _touching_line(report)), ("meshes", _mesh_line(report)), ("stand-ins", _approximation_line(report)),
+        ("touching", _touching_line(report)), ("meshes", _mesh_line(report)),
+        ("stand-ins", _approximation_line(report)),
     ]  # fmt: skip
     lines += [] if proofs else [("never tested", _skip_line(report))]
     lines += [] if everything else [("notes", _note_line(report))]
@@ -181,7 +184,10 @@ def _approximation_line(report: Report) -> str:
     if not entries:
         return ""
     named = [f"{entry['body']} ({entry['what']})" for entry in entries[:2]]
-    return f"{_MARK.strip()} {count(len(entries), 'body', 'bodies')}, answers hold for these: {_and_more(named, len(entries) > 2)}"
+    return (
+        f"{_MARK.strip()} {count(len(entries), 'body', 'bodies')}, answers hold for these: "
+        f"{_and_more(named, len(entries) > 2)}"
+    )
 
 
 def _skip_line(report: Report) -> str:

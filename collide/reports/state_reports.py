@@ -81,7 +81,8 @@ def _page(report: Report, *, everything: bool, proofs: bool, width: int, whole_n
 def _how_sampled(trajectory: dict) -> str:
     notes = f"; {count(len(trajectory['notes']), 'note')}: {trajectory['notes'][0]}" if trajectory["notes"] else ""
     return (
-        f"{count(trajectory['samples'], 'sample')} through {count(trajectory['waypoints'], 'waypoint')}, no joint moving more than "
+        f"{count(trajectory['samples'], 'sample')} through {count(trajectory['waypoints'], 'waypoint')}, no joint "
+        "moving more than "
         f"{trajectory['resolution']:g} rad or m between two of them: by sampling, not certified in between{notes}"
     )
 
@@ -91,7 +92,8 @@ def _trajectory_tables(trajectory: dict, limit: int | None) -> list[Table]:
         _motion_table("COLLIDING ALONG THE PATH  in the order they begin", trajectory["colliding"], "depth", limit),
         _motion_table("NEAR ALONG THE PATH  nearest first", trajectory["near"], "distance", limit),
         Table(
-            "NOT ANSWERED ALONG THE PATH", [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
+            "NOT ANSWERED ALONG THE PATH",
+            [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
             [[entry["a"], entry["b"], entry["why"]] for entry in trajectory["unanswered"]],
         ),
     ]  # fmt: skip
@@ -101,9 +103,16 @@ def _trajectory_tables(trajectory: dict, limit: int | None) -> list[Table]:
 def _motion_table(title: str, pairs: list[dict], measure: str, limit: int | None) -> Table:
     listed = pairs[:limit]
     sizes = [abs(pair["distance"]) if pair["distance"] is not None else float("inf") for pair in listed]
-    columns = [Column("body A", "name"), Column("body B", "name"), Column(measure), Column("at"), Column("samples", optional=1)]
+    columns = [
+        Column("body A", "name"),
+        Column("body B", "name"),
+        Column(measure),
+        Column("at"),
+        Column("samples", optional=1),
+    ]
     cells = zip(
-        [pair["a"] for pair in listed], [pair["b"] for pair in listed], lengths(sizes), [place(pair["at"]) for pair in listed],
+        [pair["a"] for pair in listed], [pair["b"] for pair in listed], lengths(sizes),
+        [place(pair["at"]) for pair in listed],
         [str(pair["samples"]) for pair in listed],
     )  # fmt: skip
     rows = [list(row) for row in cells]

@@ -14,6 +14,7 @@ import numpy as np
 
 from collide.errors import InvalidArgument, SceneError, UnsupportedQuery
 from collide.reports import classes
+from collide.reports.number_format import brief_length, count
 from collide.reports.progress import silent
 
 #: Largest change of a joint [rad] or [m] between two samples, unless another is asked for.
@@ -52,7 +53,8 @@ def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
     steps = np.max([np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) for q in corners.values()], axis=0)
     if not steps.sum() / resolution <= MAX_SAMPLES:
         raise InvalidArgument(
-            f"resolution: the path is {steps.sum():g} rad or m long, more than {MAX_SAMPLES} samples of {resolution:g}: "
+            f"resolution: the path is {steps.sum():g} rad or m long, more than {MAX_SAMPLES} samples of "
+            f"{resolution:g}: "
             "give a larger one (--resolution)"
         )
     counts = np.maximum(1, np.ceil(steps / resolution)).astype(int)
@@ -237,12 +239,15 @@ class _Watch:
     def _listed(self, name: str) -> list[dict]:
         """Pairs that are in this class at worst: collisions in the order they begin, others the nearest first."""
         worse = [self.worst[worse_class] for worse_class in classes.NAMES[: classes.NAMES.index(name)]]
-        events = [event for pair, event in self.worst[name].items() if not any(pair in worse_class for worse_class in worse)]
+        events = [
+            event for pair, event in self.worst[name].items() if not any(pair in worse_class for worse_class in worse)
+        ]
         by_start = name in (classes.COLLIDING, classes.SHALLOW)
         ordered = sorted(events, key=lambda event: (event["first"] if by_start else 0.0, event["event"]["order"]))
         return [
-            {**self._entry(event["event"]), "from": self._place(event["first"]), "samples": event["samples"]} for event in ordered
-        ]  # fmt: skip
+            {**self._entry(event["event"]), "from": self._place(event["first"]), "samples": event["samples"]}
+            for event in ordered
+        ]
 
     def _entry(self, event: dict) -> dict:
         row, k = event["row"], event["sample"]
@@ -274,8 +279,6 @@ def _finite(value) -> float | None:
 
 def verdict(trajectory: dict) -> str:
     """A trajectory in one line."""
-    from collide.reports.number_format import brief_length, count
-
     if not trajectory["moving"]:
         return f"the trajectory moves no body: {count(trajectory['samples'], 'sample')} at one place"
     first, least = trajectory["first_collision"], trajectory["least"]

@@ -12,13 +12,24 @@ from collide.transforms import as_poses
 class Compound(Shape):
     """The union of shapes, each at its own pose.
 
-    items : sequence of ``(shape, X_CS)``: a shape S and its (4, 4) pose in the compound's frame C.
-        Compounds may be nested, and meshes among the shapes.
+    Parameters
+    ----------
+    items : sequence of (Shape, X_CS)
+        A shape S and its (4, 4) pose in the compound's frame C, each. Compounds may be nested, and meshes be among
+        them.
 
-    Nested poses are multiplied out in float64; the rounding is accounted for in every bracket.
+    Raises
+    ------
+    InvalidShape
+        Where items are no pairs that begin with a shape, or there are none.
+    InvalidPose
+        Where a pose is not one (4, 4) rigid transform.
 
-    Against a convex shape or another compound, queries ask only pairs of parts that come near: a compound costs about as
-    much as its parts asked one by one where it has two, and less the more it has.
+    Notes
+    -----
+    Nested poses are multiplied out in float64, and every bracket accounts for the rounding. Against a convex shape or
+    another compound only pairs of parts that come near are tested: a compound costs about as much as its parts one by
+    one where it has two, and less the more it has.
     """
 
     __slots__ = ("items",)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import log as journal
 from collide.errors import InvalidShape
 from collide.lazy_modules import lazy_module
+from collide.log import log_duration
 from collide.shapes.shape import Shape, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
@@ -27,15 +27,29 @@ if not TYPE_CHECKING:
 class ConvexHull(Shape):
     """Exactly the convex hull of the points given, swept by a ball.
 
-    points : (n, 3) in any order [m]: a solid, a flat or a straight set, one point; points that
-        are doubled, collinear, coplanar or inside are fine and change nothing.
-    faces : (m, 3) vertex ids, optional: checked for shape and range, and by `validate` for being the
-        hull's surface. The set does not depend on them.
-    radius : of the ball swept over the hull [m], ≥ 0.
+    Parameters
+    ----------
+    points : (n, 3) array_like, float64
+        In any order, in the frame of the shape [m]: a solid, a flat or a straight set, one point. Points that are
+        doubled, collinear, coplanar or inside change nothing.
+    faces : (m, 3) array_like of int, optional
+        Rows of ``points``. The set does not depend on them: they are checked for shape and range here, and by
+        `validate` for being the surface of the hull.
+    radius : float
+        Of the ball swept over the hull [m], ≥ 0.
 
-    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support
-    tree, which answers in logarithmic time: made when a query first needs it (4 to 6 µs a point) and kept with the shape.
-    Files and pickles hold the points alone: proofs rest on the tree, so it is made from them and never believed.
+    Raises
+    ------
+    InvalidShape
+        Where points are missing, not finite or out of range, faces name points that are not there, or the radius is
+        negative.
+
+    Notes
+    -----
+    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support tree, which
+    finds the extreme vertex in O(log n); it is built when a query first needs it (4 to 6 µs a point) and kept with the
+    shape. Files and pickles hold the points alone: proofs rest on the tree, so it is built from them and never
+    believed.
     """
 
     __slots__ = ("_hull", "faces", "points", "radius")
@@ -65,10 +79,13 @@ class ConvexHull(Shape):
 
     @property
     def hull(self) -> Hull:
-        """The surface, exactly: ``dimension`` (3 solid … 0 point), ``vertices`` and ``facets`` by rows of
-        ``points``, facets counter-clockwise from outside. Worked out when first asked for, O(n log n)."""
+        """The surface, exactly, computed when first needed in O(n log n).
+
+        ``dimension`` (3 solid, 2 flat, 1 straight, 0 a point), ``vertices`` and ``facets`` by rows of ``points``,
+        facets counter-clockwise seen from outside.
+        """
         if not hasattr(self, "_hull"):
-            with journal.told("convex hull of %d points made", len(self.points)):
+            with log_duration("convex hull of %d points made", len(self.points)):
                 hull = exact_hull.convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False
@@ -76,9 +93,14 @@ class ConvexHull(Shape):
         return self._hull
 
     def validate(self) -> None:
-        """Check exactly that `hull` and the faces given are the surface of the hull of all points.
+        """Check exactly that `hull`, and the faces given, are the surface of the hull of all points.
 
-        Raises InvalidShape with the defect and where it is. For tests and for data of doubtful origin.
+        For tests, and for data of doubtful origin.
+
+        Raises
+        ------
+        InvalidShape
+            With the defect and where it is.
         """
         given = self.hull._replace(facets=self.faces) if self.faces is not None else None
         for what, surface in (("hull", self.hull), ("faces", given)):
@@ -93,7 +115,13 @@ class ConvexHull(Shape):
                 raise InvalidShape(f"ConvexHull: {what}: {error}") from None
 
     def save(self, path) -> None:
-        """Write points, faces and radius to an ``.npz`` file."""
+        """Write points, faces and radius to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is overwritten.
+        """
         arrays = {"points": self.points, "radius": np.array(self.radius)}
         if self.faces is not None:
             arrays["faces"] = self.faces
@@ -101,7 +129,23 @@ class ConvexHull(Shape):
 
     @classmethod
     def load(cls, path) -> ConvexHull:
-        """A hull from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
+        """A hull from a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        ConvexHull
+            Equal to the one that was saved.
+
+        Raises
+        ------
+        InvalidShape
+            Where the file is another one, or damaged.
+        """
         arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
         try:
             return cls(arrays["points"], faces=arrays.get("faces"), radius=float(arrays["radius"]))
@@ -111,8 +155,12 @@ class ConvexHull(Shape):
     def without_repeats(self) -> ConvexHull:
         """The same set with every point once, in the order of first appearance.
 
-        Files repeat vertices (an STL names each about six times); a support query is a scan.
-        Faces are dropped, since they name the old ids.
+        Files repeat vertices (an STL names each about six times), and a support query of a small hull is a scan.
+
+        Returns
+        -------
+        ConvexHull
+            Without faces, which would name the old ids; this hull itself where no point repeats.
         """
         distinct, first = np.unique(self.points + 0.0, axis=0, return_index=True)
         if len(distinct) == len(self.points):
@@ -122,4 +170,8 @@ class ConvexHull(Shape):
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
-_FILE_FIELDS = {"points": Field("f8", (None, 3)), "faces": Field("i8", (None, 3), needed=False), "radius": Field("f8", ())}
+_FILE_FIELDS = {
+    "points": Field("f8", (None, 3)),
+    "faces": Field("i8", (None, 3), needed=False),
+    "radius": Field("f8", ()),
+}

@@ -16,16 +16,29 @@ if TYPE_CHECKING:
 
 
 class HPolytope(Shape):
-    """{x : normals @ x ≤ offsets}, bounded and not empty.
+    """The polytope {x : normals @ x ≤ offsets}, bounded and not empty.
 
-    normals : (m, 3), each of any length but zero.   offsets : (m,).
-    bounded : must be True in this version; unbounded corridors are a coming row of the plan.
+    Parameters
+    ----------
+    normals : (m, 3) array_like, float64
+        Outward normals, each of any length but zero, in the frame of the shape.
+    offsets : (m,) array_like, float64
+        In the units of normals·x: metres, where normals have length 1.
+    bounded : bool
+        Must be True: unbounded polyhedra are not supported yet.
 
-    The vertices are found exactly (double description in integers) when the shape is made, then
-    rounded once to float64; ``vertices`` holds them and every bracket counts that rounding in.
-    Complexity: about O(m · v²) integer operations for v vertices; meant for m up to a few hundred.
+    Raises
+    ------
+    InvalidShape
+        Where the set is empty or unbounded, which is decided exactly, or numbers are out of range.
+    UnsupportedQuery
+        For ``bounded=False``.
 
-    Raises InvalidShape where the set is empty or unbounded, exactly decided.
+    Notes
+    -----
+    The vertices are found exactly, by double description in integers (Motzkin, Raiffa, Thompson and Thrall 1953), and
+    rounded once to float64; ``vertices`` (v, 3) holds them, and every bracket counts that rounding in. About O(m v²)
+    integer operations: meant for m up to a few hundred.
     """
 
     __slots__ = ("bounded", "normals", "offsets", "slop", "vertices")

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from collide import argument_checks as reading
-from collide import log as journal
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.lazy_modules import lazy_module
+from collide.log import log_duration
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
 from collide.shapes.shape import Shape, facet_ids, positive, rows
@@ -45,22 +45,34 @@ if not TYPE_CHECKING:
 class Mesh(Shape):
     """Triangles: a solid, or a surface.
 
-    vertices : (n, 3) [m]; equal ones are welded, so that an STL's loose triangles close. Some may be unused. Or, with no
-        faces, an object that has ``vertices`` and ``faces``, as a trimesh.Trimesh does.
-    faces : (m, 3) vertex ids, counter-clockwise seen from outside.
-    solid : None takes a mesh that closes as a solid and any other as a surface; ``mesh.solid`` says which, and
-        ``mesh.report`` why. True insists: a mesh without an inside is refused, with its defects and facet
-        numbers. False takes the surface alone.
+    Parameters
+    ----------
+    vertices : (n, 3) array_like, float64, or an object with ``vertices`` and ``faces``
+        [m], in the frame of the shape. Equal ones are welded, so that the loose triangles of an STL close; some may be
+        unused. With no ``faces``, an object such as a trimesh.Trimesh.
+    faces : (m, 3) array_like of int
+        Rows of ``vertices``, counter-clockwise seen from outside.
+    solid : bool, optional
+        None takes a mesh that closes as a solid and any other as a surface: ``mesh.solid`` says which, ``mesh.report``
+        why. True insists: a mesh without an inside is refused, with its defects and facet numbers. False takes the
+        surface alone.
 
-    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a
-    part that runs the other way round within another is a cavity. A **surface** is its facets. Facets need
-    not be manifold for that: every edge must be run along as often one way as the other. That the facets of
-    a solid do not cross each other is not looked at here.
+    Raises
+    ------
+    InvalidShape
+        For anything but finite vertices and at least one row of ids in range; with ``solid=True`` also where the mesh
+        has no inside.
 
-    Ids in results are rows of ``faces``, as given. Looking at a mesh takes about 0.3 µs a facet; its box-tree
-    (`tree`) is made when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and
-    the choice of ``solid``; what proofs rest on is worked out anew from them.
-    Raises InvalidShape for anything but finite vertices and at least one row of ids in range.
+    Notes
+    -----
+    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a part that
+    runs the other way round within another is a cavity. A **surface** is its facets. Facets need not be manifold for
+    that: every edge must be run along as often one way as the other. Whether the facets of a solid cross each other is
+    not checked here (`collide.self_collisions`).
+
+    Ids in results are rows of ``faces``, as given. Surveying a mesh takes about 0.3 µs a facet; its box-tree (`tree`)
+    is built when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and the
+    choice of ``solid``; what proofs rest on is computed anew from them.
     """
 
     __slots__ = ("_copied", "_hull", "_survey", "_tree", "faces", "scale", "solid", "vertices")
@@ -99,7 +111,7 @@ class Mesh(Shape):
 
     @classmethod
     def _known(cls, vertices, faces, solid: bool) -> Mesh:
-        """A mesh that was looked at before, as prepared input tells: it is looked at again when a query first needs it."""
+        """A mesh whose ``solid`` a cache knows: it is surveyed again when a query first needs that."""
         made = cls(vertices, faces, solid=False)
         made._store(solid=bool(solid))
         return made
@@ -112,7 +124,7 @@ class Mesh(Shape):
     def tree(self) -> MeshTree:
         """The box-tree that queries walk: made when first asked for. A scaled copy's is its base's, boxes scaled."""
         if not hasattr(self, "_tree"):
-            with journal.told("box-tree of a mesh of %d facets made", len(self.faces)):
+            with log_duration("box-tree of a mesh of %d facets made", len(self.faces)):
                 if self._copied is None:
                     self._store(_tree=build_bvh.build_mesh_tree(self.vertices, self.faces))
                 else:
@@ -124,7 +136,7 @@ class Mesh(Shape):
         """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
         if not hasattr(self, "_hull"):
             used = self.vertices[np.unique(self.faces)]
-            with journal.told("convex hull around a mesh of %d facets made", len(self.faces)):
+            with log_duration("convex hull around a mesh of %d facets made", len(self.faces)):
                 if len(used) > _MANY:
                     used = used[exact_hull.convex_hull(used).vertices]
                 self._store(_hull=ConvexHull(used))
@@ -141,7 +153,7 @@ class Mesh(Shape):
         if self._copied is not None:
             return self._copied.survey
         if not hasattr(self, "_survey"):
-            with journal.told("surface of a mesh of %d facets looked at", len(self.faces)):
+            with log_duration("surface of a mesh of %d facets looked at", len(self.faces)):
                 survey = mesh_survey.survey_surface(self.vertices, self.faces)
             spoilt = self.solid and _what_spoils(len(self.vertices), survey)
             if spoilt:
@@ -158,10 +170,25 @@ class Mesh(Shape):
         return report._replace(volume=report.volume * self.scale**3)
 
     def scaled(self, factor: float) -> Mesh:
-        """The mesh with every coordinate times ``factor`` > 0, rounded once; its search tree is shared.
+        """The mesh with every coordinate times a factor, rounded once; its search tree is shared.
 
-        The copy's ``base`` is the mesh that is copied and ``scale`` the factor; factors of copies of
-        copies are multiplied first. What is solid stays so.
+        The copy's ``base`` is the mesh that is copied and ``scale`` the factor; factors of copies of copies are
+        multiplied first. What is solid stays so.
+
+        Parameters
+        ----------
+        factor : float
+            > 0, without a unit.
+
+        Returns
+        -------
+        Mesh
+            The scaled copy; ``base`` itself where the product of the factors is 1.
+
+        Raises
+        ------
+        InvalidShape
+            Where the factor is no positive finite number, or coordinates leave the supported range.
         """
         factor = positive("Mesh.scaled", "factor", factor) * self.scale
         if factor == 1.0:
@@ -173,23 +200,59 @@ class Mesh(Shape):
         return made
 
     def locality(self, *, repeated: bool = False, progress=None) -> Locality:
-        """How local the mesh is: Σ and σ_1 … σ_10 with their distributions; see `collide.mesh.locality`.
+        """How local the mesh is: Erickson's global stretch Σ and local stretches σ_1 … σ_10, with their distributions.
 
-        repeated : count equal vertices one by one.   progress : called with a label, gives a context manager.
-        O(n log n), a second for 437,645 vertices. Scaling changes nothing but rounding.
+        Parameters
+        ----------
+        repeated : bool
+            Count vertices with equal coordinates one by one, as Table 1 of the paper does.
+        progress : callable, optional
+            Called with a label, gives a context manager; for long work.
+
+        Returns
+        -------
+        Locality
+            See `collide.mesh.locality`. Scaling changes nothing but rounding.
+
+        Notes
+        -----
+        O(n log n), a second for 437,645 vertices. J. Erickson, "Local polyhedra and geometric graphs", Computational
+        Geometry 31 (2005), sections 2.1 and 8.
         """
         options = {} if progress is None else {"progress": progress}
         return local_stretch.locality(self.vertices, self.faces, repeated=repeated, **options)
 
     def save(self, path) -> None:
-        """Write the mesh to an ``.npz`` file."""
+        """Write vertices, faces, ``solid`` and ``scale`` to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is overwritten.
+        """
         arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
         arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
         write_arrays("Mesh", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path) -> Mesh:
-        """A mesh from a file that `save` wrote. Raises InvalidShape where the file is another one, or damaged."""
+        """A mesh from a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Mesh
+            Equal to the one that was saved.
+
+        Raises
+        ------
+        InvalidShape
+            Where the file is another one, or damaged, or says solid of a mesh that has no inside.
+        """
         arrays = read_arrays("Mesh", path, _FILE_FORMAT, _FILE_FIELDS, "mesh_")
         try:
             return cls._from_fields(arrays["vertices"], arrays["faces"], arrays["solid"], float(arrays["scale"]))
@@ -203,7 +266,8 @@ _MANY = 512
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1
 _FILE_FIELDS = {
-    "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()), "scale": Field("f8", ()),
+    "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()),
+    "scale": Field("f8", ()),
 }  # fmt: skip
 
 
@@ -225,7 +289,8 @@ def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
         return mesh.vertices, mesh.faces
     except AttributeError:
         raise InvalidShape(
-            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and no faces"
+            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and "
+            "no faces"
         ) from None
 
 
@@ -234,14 +299,15 @@ def _check_vertices(vertices) -> np.ndarray:
     largest = float(np.abs(vertices).max())
     if 0.0 < largest < SMALLEST:
         raise InvalidShape(
-            f"Mesh: vertices: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: scale the scene"
+            f"Mesh: vertices: the largest coordinate is {largest!r}; it must be 0 or at least {SMALLEST:g}: scale the "
+            "scene"
         )
     return vertices
 
 
 def _check_faces(faces, n: int) -> np.ndarray:
     """(m, 3) int32 ids, read-only, m ≥ 1."""
-    array = reading.plain_array("Mesh: faces", faces, "(m, 3)", InvalidShape)
+    array = checks.plain_array("Mesh: faces", faces, "(m, 3)", InvalidShape)
     if array.size == 0:
         raise InvalidShape(f"Mesh: no facets: faces has shape {array.shape}; at least one row of three ids is needed")
     return facet_ids("Mesh", array, n, np.int32, "vertices 0 … {last}")

@@ -54,10 +54,11 @@ class MeshReport(NamedTuple):
     defects: tuple[Defect, ...]
 
     def __str__(self) -> str:
+        shells = f"{self.shells} shell{'s' * (self.shells != 1)}"
         lines = [
             f"{'solid' if self.solid else 'surface'}: {self.why}",
             f"{self.facets} facets, {self.edges} edges, {self.used} distinct vertices in use of {self.vertices}",
-            f"{self.shells} shell{'s' * (self.shells != 1)}, Euler characteristic {self.euler}, volume {self.volume:.6g} m³",
+            f"{shells}, Euler characteristic {self.euler}, volume {self.volume:.6g} m³",
         ]
         return "\n".join([*lines, *(f"- {defect}" for defect in self.defects)])
 
@@ -76,7 +77,12 @@ def find_defects(survey: Survey) -> tuple[Defect, ...]:
 
     nothing = bool(len(survey.signs)) and not (survey.signs > 0).any()
     kinds = [
-        (meet.DOUBLED, not survey.closed, "duplicate facets", "the same corners as an earlier facet, the same way round"),
+        (
+            meet.DOUBLED,
+            not survey.closed,
+            "duplicate facets",
+            "the same corners as an earlier facet, the same way round",
+        ),
         (meet.OPEN, True, "open edges", "an edge has no other facet"),
         (meet.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
         (meet.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),

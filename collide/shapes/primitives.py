@@ -18,9 +18,17 @@ if TYPE_CHECKING:
 
 
 class Sphere(Shape):
-    """A ball around the origin.
+    """A ball around the origin of its frame.
 
-    radius : [m], > 0. A Euclidean ball in the world, whatever the pose's rounding.
+    Parameters
+    ----------
+    radius : float
+        [m], > 0. The ball is Euclidean in the world, whatever the rounding of the pose's rotation.
+
+    Raises
+    ------
+    InvalidShape
+        Where the radius is not a finite number within [1e-50, 1e50] m.
     """
 
     __slots__ = ("radius",)
@@ -32,9 +40,19 @@ class Sphere(Shape):
 
 
 class Box(Shape):
-    """A box centred at the origin, its faces across the axes.
+    """A box centred at the origin of its frame, its edges along the axes.
 
-    size : (3,) full edge lengths [m], each > 0; or three numbers: ``Box(1, 2, 3)`` is ``Box((1, 2, 3))``.
+    Parameters
+    ----------
+    size : (3,) array_like, or float
+        Full edge lengths along x, y, z [m], each > 0. ``Box(1, 2, 3)`` is ``Box((1, 2, 3))``.
+    y, z : float, optional
+        The other two lengths [m], where ``size`` is the first of three numbers.
+
+    Raises
+    ------
+    InvalidShape
+        Where a length is not a positive finite number, or two lengths are given.
     """
 
     __slots__ = ("size",)
@@ -54,9 +72,21 @@ def _one_length(shape: str, length, height):
 
 
 class Capsule(Shape):
-    """All points within ``radius`` of a segment along z, centred at the origin.
+    """All points within a radius of a segment along z, centred at the origin of its frame.
 
-    radius : [m], > 0.   length : of the segment, without the caps [m], ≥ 0; ``height=`` is another name for it.
+    Parameters
+    ----------
+    radius : float
+        Of the sweeping ball [m], > 0.
+    length : float
+        Of the segment, without the caps [m], ≥ 0; 0 is a sphere.
+    height : float
+        Another name for ``length`` [m]; exactly one of them is given.
+
+    Raises
+    ------
+    InvalidShape
+        Where a number is out of range, or neither or both of ``length`` and ``height`` are given.
     """
 
     __slots__ = ("radius", "length")
@@ -72,9 +102,21 @@ class Capsule(Shape):
 
 
 class Cylinder(Shape):
-    """A solid cylinder along z, centred at the origin.
+    """A solid cylinder along z, centred at the origin of its frame.
 
-    radius : [m], > 0.   length : full length [m], > 0; ``height=`` is another name for it.
+    Parameters
+    ----------
+    radius : float
+        [m], > 0.
+    length : float
+        Full length along z [m], > 0.
+    height : float
+        Another name for ``length`` [m]; exactly one of them is given.
+
+    Raises
+    ------
+    InvalidShape
+        Where a number is out of range, or neither or both of ``length`` and ``height`` are given.
     """
 
     __slots__ = ("radius", "length")
@@ -90,9 +132,21 @@ class Cylinder(Shape):
 
 
 class Cone(Shape):
-    """A solid cone along z: apex at +z·length/2, base of ``radius`` at −z·length/2.
+    """A solid cone along z: its apex at +z·length/2, its base at −z·length/2.
 
-    radius : of the base [m], > 0.   length : from base to apex [m], > 0; ``height=`` is another name for it.
+    Parameters
+    ----------
+    radius : float
+        Of the base [m], > 0.
+    length : float
+        From base to apex [m], > 0.
+    height : float
+        Another name for ``length`` [m]; exactly one of them is given.
+
+    Raises
+    ------
+    InvalidShape
+        Where a number is out of range, or neither or both of ``length`` and ``height`` are given.
     """
 
     __slots__ = ("radius", "length")
@@ -106,9 +160,19 @@ class Cone(Shape):
 
 
 class Ellipsoid(Shape):
-    """{x : Σ (x_k / radii_k)² ≤ 1}.
+    """The ellipsoid {x : Σ (x_k / radii_k)² ≤ 1}.
 
-    radii : (3,) semi-axes along x, y, z [m], each > 0; or three numbers: ``Ellipsoid(1, 2, 3)``.
+    Parameters
+    ----------
+    radii : (3,) array_like, or float
+        Semi-axes along x, y, z [m], each > 0. ``Ellipsoid(1, 2, 3)`` is ``Ellipsoid((1, 2, 3))``.
+    y, z : float, optional
+        The other two semi-axes [m], where ``radii`` is the first of three numbers.
+
+    Raises
+    ------
+    InvalidShape
+        Where a semi-axis is not a positive finite number, or two are given.
     """
 
     __slots__ = ("radii",)
@@ -120,10 +184,19 @@ class Ellipsoid(Shape):
 
 
 class Halfspace(Shape):
-    """{x : normal·x ≤ offset}: everything behind a plane, without end.
+    """The half-space {x : normal·x ≤ offset}: everything behind a plane, unbounded.
 
-    normal : (3,) pointing out of the solid; any length but zero, kept as given.
-    offset : in the same units as normal·x (metres, where the normal has length 1).
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Points out of the solid, in the frame of the shape. Any length within [1e-6, 1e6], kept as given.
+    offset : float
+        In the units of normal·x: metres, where the normal has length 1.
+
+    Raises
+    ------
+    InvalidShape
+        Where the normal has no direction, or a number is not finite.
     """
 
     __slots__ = ("normal", "offset")

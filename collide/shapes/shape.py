@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.transforms import LARGEST, SMALLEST
 
@@ -18,7 +18,10 @@ class Shape:
     Subclasses name their constructor arguments in ``_fields`` and store each under its name.
     """
 
-    __slots__ = ("__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk")
+    __slots__ = (
+        "__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology",
+        "_union", "_walk",
+    )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple
@@ -34,7 +37,7 @@ class Shape:
     _topology: Any
     #: Its parts, as unions with meshes ask about them (`lowering/composite_parts.py`).
     _union: Any
-    #: Its parts in the rows that kernels of compounds read (`lowering/compound_table.py`).
+    #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
     _laid_out: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
@@ -108,23 +111,26 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
     if zero and number == 0.0:
         return 0.0
     if not number > 0:
-        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {checks.describe(value)}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {reading.told(value)}; scale the scene"
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.describe(value)}; scale the "
+            "scene"
         )
     return number
 
 
 def scalar(shape: str, field: str, value: Any) -> float:
     """A finite real number."""
-    number = reading.number(value)
+    number = checks.number(value)
     if number is None:
-        raise InvalidShape(f"{shape}: {field} must be a number, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be a number, got {checks.describe(value)}")
     if not math.isfinite(number):
-        raise InvalidShape(f"{shape}: {field} must be finite, got {reading.told(value)}")
+        raise InvalidShape(f"{shape}: {field} must be finite, got {checks.describe(value)}")
     if abs(number) > LARGEST:
-        raise InvalidShape(f"{shape}: {field} must not exceed {LARGEST:g}, got {reading.told(value)}; scale the scene")
+        raise InvalidShape(
+            f"{shape}: {field} must not exceed {LARGEST:g}, got {checks.describe(value)}; scale the scene"
+        )
     return number
 
 
@@ -141,7 +147,7 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
 def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
     shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
-    array = np.array(reading.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
+    array = np.array(checks.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
     if array.shape[0] == 0:
@@ -158,7 +164,7 @@ def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
 
 def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.ndarray:
     """(m, 3) ids of corners 0 … n − 1, as a read-only copy. corners : what the ids count, for messages."""
-    array = reading.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
+    array = checks.plain_array(f"{shape}: faces", value, "(m, 3)", InvalidShape)
     if array.ndim != 2 or array.shape[1] != 3:
         cut = "; cut polygons into triangles" if array.ndim == 2 and array.shape[1] > 3 else ""
         raise InvalidShape(f"{shape}: faces must have shape (m, 3), got {array.shape}{cut}")

@@ -1,9 +1,11 @@
-"""Shapes in ``.npz`` files: the arrays that define them, by name, the version of their format, and a digest of everything.
+"""Shapes in ``.npz`` files: the arrays that define them, by name, the version of their format, and a digest of
+everything.
 
-A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are worked
-out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The digest
-tells damage; it is no signature. Before any array is read its header is held against what the format has, and its length
-against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
+A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are
+    worked
+out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The
+digest tells damage; it is no signature. Before any array is read its header is held against what the format has, and
+its length against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 
 if TYPE_CHECKING:
@@ -24,8 +26,8 @@ if TYPE_CHECKING:
 
 
 class Field(NamedTuple):
-    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether it
-    must be there."""
+    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether
+    it must be there."""
 
     type: str
     shape: tuple[int | None, ...]
@@ -43,7 +45,8 @@ def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) ->
         with Path(path).open("wb") as file:
             np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
     except (OSError, TypeError, ValueError) as error:
-        raise InvalidShape(f"{who}.save: {reading.told(path)}: {getattr(error, 'strerror', None) or error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidShape(f"{who}.save: {checks.describe(path)}: {reason}") from None
 
 
 def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped: str) -> dict[str, np.ndarray]:
@@ -55,7 +58,7 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     """
     import zipfile  # here, and below: a start of the library need not load it
 
-    named = f"{who}.load: {reading.told(path) if not isinstance(path, (str, Path)) else path}"
+    named = f"{who}.load: {checks.describe(path) if not isinstance(path, (str, Path)) else path}"
     other = f"{named} is of another format; save the shape again"
     try:
         if Path(path).exists() and not Path(path).is_file():

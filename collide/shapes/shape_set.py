@@ -6,18 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidShape
 from collide.shapes.shape import Shape
 
 
 class ShapeSet:
-    """Shapes laid out once, however often they are asked about.
+    """Shapes laid out once, however often queries ask about them.
 
         library = collide.ShapeSet(shapes)
         collide.collide(library[i], library[j], X_WA, X_WB)     # i, j: (N,) numbers of shapes
 
-    shapes : a sequence of shapes. Picking by an integer gives the shape, by an integer array a `Picked`.
+    Parameters
+    ----------
+    shapes : sequence of Shape
+        At least one. Indexing by an integer gives the shape, by an integer array (N,) or a slice a `Picked`, a sequence
+        that queries accept as N shapes.
+
+    Raises
+    ------
+    InvalidShape
+        Where ``shapes`` is empty or holds what is no shape.
     """
 
     #: What the engine makes of the shapes, once asked for (`lowering/shape_set_tables.py`).
@@ -38,18 +47,20 @@ class ShapeSet:
         return len(self.shapes)
 
     def __getitem__(self, rows):
-        if reading.is_whole(rows):
+        if checks.is_integer(rows):
             if not -len(self) <= rows < len(self):
                 raise IndexError(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {rows}")
             return self.shapes[rows]
         rows = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
-        numbers = reading.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
+        numbers = checks.plain_array("ShapeSet: numbers", rows, "(N,)", InvalidArgument)
         if numbers.size == 0 and numbers.ndim == 1:
             numbers = numbers.astype(np.int64)
         if numbers.ndim != 1 or numbers.dtype.kind not in "iu":
             raise InvalidArgument(f"ShapeSet: pick by integers (N,), got {numbers.dtype} {numbers.shape}")
         if len(numbers) and not (0 <= numbers.min() and numbers.max() < len(self)):
-            raise InvalidArgument(f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}")
+            raise InvalidArgument(
+                f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}"
+            )
         return Picked(self, numbers.astype(np.int64))
 
 

@@ -53,18 +53,32 @@ class Tessellation(tuple):
 
 
 def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | None = None) -> Tessellation:
-    """A shape as triangles in its own frame: (vertices (V, 3) float64, faces (F, 3) int64), outward oriented.
+    """A shape as triangles in its own frame, outward oriented, inside the shape.
 
-    tolerance : no point of the shape is farther than this [m] from the solid that the triangles bound; by default a
-        hundredth of each shape's largest radius. ``deviation`` of the result says what was reached.
-    size : edge length [m] of the square that stands for a `Halfspace`, which has no end: around the point of its
-        plane nearest the origin, facing out of the solid, open.
+    Parameters
+    ----------
+    shape : Shape
+        Convex shapes give a closed surface. A `ConvexHull` without an inside gives both sides of a flat polygon, or no
+        triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part, parts overlapping.
+    tolerance : float, optional
+        No point of the shape is farther than this [m] from the solid that the triangles bound; by default a hundredth
+        of each shape's largest radius.
+    size : float, optional
+        Edge length [m] of the square that stands for a `Halfspace`, which is unbounded: around the point of its plane
+        nearest the origin, facing out of the solid, open.
 
-    Convex shapes give a closed surface. A `ConvexHull` without an inside gives both sides of a flat polygon, or no
-    triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part, parts overlapping.
+    Returns
+    -------
+    Tessellation
+        A tuple ``(vertices, faces)``: (V, 3) float64 [m] and (F, 3) int64; its ``deviation`` [m] says what tolerance
+        was reached.
 
-    Raises InvalidArgument for a tolerance or size that is not above 0, and where a shape would take more than
-    `MOST_VERTICES` vertices; UnsupportedQuery for a half-space without ``size``.
+    Raises
+    ------
+    InvalidArgument
+        For a tolerance or size that is not above 0, and where a shape would take more than 2,000,000 vertices.
+    UnsupportedQuery
+        For a half-space without ``size``.
     """
     if not isinstance(shape, Shape):
         raise InvalidArgument(f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")

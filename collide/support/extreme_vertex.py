@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.numerics.exact_dot_sign import exact_sign, product_and_bound, scaled_into_range
+from collide.numerics.vec3 import Vec3
 from collide.support.support_tree import (
     AT_POINTS,
     AT_RANGE,
@@ -55,7 +56,8 @@ def climb(tree_at, vertex, gx, gy, gz, counters):
     ring = view_i32(header[AT_RING], header[LINKS])
     coordinates = view_f64(header[AT_POINTS], 3 * header[POINTS])
     limits = view_f64(header[AT_RANGE], 3)
-    certain, gx, gy, gz = scaled_into_range(limits[0], limits[1], limits[2], gx, gy, gz)
+    certain, g = scaled_into_range(limits[0], limits[1], limits[2], Vec3(gx, gy, gz))
+    gx, gy, gz = g
     if not certain or starts[vertex + 1] == starts[vertex]:
         return -1 - vertex
     if gx == 0.0 and gy == 0.0 and gz == 0.0:
@@ -95,10 +97,10 @@ def _best_of(coordinates, ring, begin, degree, first, end, vertex, gx, gy, gz, c
         x = coordinates[3 * neighbour]
         y = coordinates[3 * neighbour + 1]
         z = coordinates[3 * neighbour + 2]
-        value, bound = product_and_bound(x, y, z, wx, wy, wz, gx, gy, gz)
+        value, bound = product_and_bound(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
         sign = 1 if value > bound else -1
         if not (value < -bound or value > bound):
-            sign = exact_sign(x, y, z, wx, wy, wz, gx, gy, gz)
+            sign = exact_sign(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
             if len(counters) > 0:
                 counters[EXACT_SIGNS] += 1
         if sign != 0:
@@ -125,7 +127,7 @@ def _across_plateau(coordinates, starts, n, vertex, gx, gy, gz, counters):
             x = coordinates[3 * other]
             y = coordinates[3 * other + 1]
             z = coordinates[3 * other + 2]
-            sign = exact_sign(x, y, z, wx, wy, wz, gx, gy, gz)
+            sign = exact_sign(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
             if len(counters) > 0:
                 counters[EXACT_SIGNS] += 1
             if sign != 0:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import log as journal
+from collide.log import log_duration
 
 if TYPE_CHECKING:
     from collide.support.support_tree import SupportTree
@@ -31,7 +31,7 @@ class PlantedTree:
         if self._tree is None and not self._hopeless:
             with _growing():
                 if self._tree is None and not self._hopeless:
-                    with journal.told("support tree of a hull of %d points made", len(self._points)):
+                    with log_duration("support tree of a hull of %d points made", len(self._points)):
                         self._tree = _grown(self._points)
                     self._hopeless = self._tree is None
         return self._tree

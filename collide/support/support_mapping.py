@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel, view_f64, view_i64
-from collide.lowering.packed_convex import CYLINDER, ELLIPSOID, POINTS
 from collide.support.block_scan import farthest
 from collide.support.coarse_points import COARSE
 from collide.support.extreme_vertex import settle_vertex
+from collide.support.shape_kinds import CYLINDER, ELLIPSOID, POINTS
 from collide.support.support_tree_query import extreme_vertex_listed
 
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from collide.kernels import address_of
-from collide.lowering.packed_convex import lowest_exponent
+from collide.numerics.lowest_bits import lowest_exponents
 
 #: Header entries: how many of what, then addresses.
 (POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,
@@ -130,7 +130,7 @@ def exact_range(points: np.ndarray) -> np.ndarray:
     Products of a component with differences of coordinates, and the rounding errors of these products,
     are then doubles. Other directions are first scaled so that their largest component is near target.
     """
-    lowest = lowest_exponent(points)
+    lowest = int(lowest_exponents(points.ravel()))
     highest = int(np.frexp(np.abs(points).max())[1])
     least = max(-1020, -1020 - lowest)
     most = min(900, 960 - highest)

@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
@@ -52,7 +52,7 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {reading.told(shape)}")
+        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}")
     points, one = vectors("contains", "points_W", points_W)
     beyond = np.abs(points).max(axis=1) > LARGEST
     if beyond.any():

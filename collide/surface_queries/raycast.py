@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as reading
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import Body, facet_body
 from collide.narrowphase.facets import ray_surface as rays
@@ -103,7 +103,7 @@ def raycast(
     UnsupportedQuery for shapes without facets.
     """
     body = facet_body(shape, "raycast")
-    limit = reading.limit("raycast: max_distance", max_distance, "")
+    limit = checks.limit("raycast: max_distance", max_distance, "")
     X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, limit, check_poses)
     n = len(given)
     hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], given, not all_hits)
@@ -130,7 +130,7 @@ def _nothing(n: int) -> RayHits:
 
 def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
     """((n, 3) finite float64, whether a single one was given)."""
-    array = reading.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
+    array = checks.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {array.shape}")
     rows = np.ascontiguousarray(array.reshape(-1, 3))

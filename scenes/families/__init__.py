@@ -45,7 +45,9 @@ _FAMILIES: dict[str, Callable[..., Case]] = {
 STANDARD: tuple[str, ...] = tuple(_FAMILIES)
 
 _FAMILIES |= {
-    family.__name__: family for module in (touching, scales, thin, rounded, swept_hulls, lattices) for family in module.MORE_FAMILIES
+    family.__name__: family
+    for module in (touching, scales, thin, rounded, swept_hulls, lattices)
+    for family in module.MORE_FAMILIES
 }
 #: Of pairs of meshes; their cases are `MeshCase`.
 _MESHES: dict[str, Callable[..., MeshCase]] = {family.__name__: family for family in mesh_cases.FAMILIES}

@@ -1,4 +1,4 @@
-"""Pairs of triangle meshes that collision libraries get wrong: coplanar grids, equal poses, insides, facets without area.
+"""Triangle meshes that collision libraries get wrong: coplanar grids, equal poses, insides, facets without area.
 
 A case is plain numbers, as those of hulls are (`case.py`), with facets. Where a family promises contact, it is exact:
 coordinates and poses are multiples of powers of two.
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.scenes.families.ingredients import EXACT_ROTATIONS, rotation
+from collide.shapes import Mesh
 
 
 class Surface(NamedTuple):
@@ -38,8 +39,6 @@ class MeshCase(NamedTuple):
 
     def shapes(self) -> tuple:
         """(A, B, X_WA, X_WB) as `collide.distance` takes them."""
-        from collide.shapes import Mesh
-
         A, B = (Mesh(s.vertices, s.faces, solid=s.solid) for s in (self.a, self.b))
         return A, B, self.a.X, self.b.X
 
@@ -53,7 +52,9 @@ class MeshCase(NamedTuple):
 
     def snippet(self) -> str:
         """Python that asks collide this question again: the generator's call."""
-        call = ", ".join([repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)])
+        call = ", ".join(
+            [repr(self.family), str(self.index + 1), str(self.seed), *(f"{k}={v!r}" for k, v in self.size)]
+        )
         return (
             "import collide\nfrom collide.scenes.families import generate\n\n"
             f"A, B, X_WA, X_WB = generate({call})[-1].shapes()\n"
@@ -98,7 +99,9 @@ def mesh_gaps(rng, index: int) -> MeshCase:
     """Two solids whose nearest facets are 1e-9 of their size apart, or overlap by it."""
     (v, f), (w, g) = _blob(rng, 6), _blob(rng, 6)
     step = float(rng.choice([1.0, -1.0])) * 1e-9
-    return _turned(rng, (v, f, True), (w, g, True), np.array([0.0, 0.0, v[:, 2].max() - w[:, 2].min() + step]), exact=True)
+    return _turned(
+        rng, (v, f, True), (w, g, True), np.array([0.0, 0.0, v[:, 2].max() - w[:, 2].min() + step]), exact=True
+    )
 
 
 def mesh_soups(rng, index: int) -> MeshCase:
@@ -108,7 +111,9 @@ def mesh_soups(rng, index: int) -> MeshCase:
         n = int(rng.integers(4, 12))
         vertices = rng.integers(-3, 4, (n, 3)) * 0.25
         faces = rng.integers(0, n, (n, 3))
-        sides.append((vertices, np.concatenate([faces, faces[: n // 3, ::-1], np.repeat(faces[:2, :1], 3, axis=1)]), False))
+        sides.append(
+            (vertices, np.concatenate([faces, faces[: n // 3, ::-1], np.repeat(faces[:2, :1], 3, axis=1)]), False)
+        )
     return _turned(rng, sides[0], sides[1], rng.integers(-4, 5, 3) * 0.25, exact=index % 3 > 0)
 
 
@@ -153,13 +158,22 @@ def _grid(n: int, side: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _box(half) -> tuple[np.ndarray, np.ndarray]:
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-    faces = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+    faces = [
+        (0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5),
+        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+    ]  # fmt: skip
     return corners, np.array(faces)
 
 
 def _ring() -> tuple[np.ndarray, np.ndarray]:
     """A square ring around the z axis: a tube of four sides."""
-    vertices = np.array([(r * x, r * y, z) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)) for r, z in ((0.25, -0.125), (0.5, -0.125), (0.5, 0.125), (0.25, 0.125))])  # fmt: skip
+    vertices = np.array(
+        [
+            (r * x, r * y, z)
+            for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+            for r, z in ((0.25, -0.125), (0.5, -0.125), (0.5, 0.125), (0.25, 0.125))
+        ]
+    )
     faces = []
     for i in range(4):
         for k in range(4):
@@ -174,8 +188,13 @@ def _blob(rng, n: int) -> tuple[np.ndarray, np.ndarray]:
     theta, phi = np.pi * (np.arange(n - 1) + 1) / n, 2 * np.pi * np.arange(n) / n
     radius = 0.5 * rng.uniform(0.6, 1.0, (n - 1, n))
     ring = np.stack(
-        [radius * np.sin(theta)[:, None] * np.cos(phi), radius * np.sin(theta)[:, None] * np.sin(phi), radius * np.cos(theta)[:, None] + 0 * phi], axis=-1
-    )  # fmt: skip
+        [
+            radius * np.sin(theta)[:, None] * np.cos(phi),
+            radius * np.sin(theta)[:, None] * np.sin(phi),
+            radius * np.cos(theta)[:, None] + 0 * phi,
+        ],
+        axis=-1,
+    )
     vertices = np.concatenate([ring.reshape(-1, 3), [(0, 0, 0.55), (0, 0, -0.55)]])
     north, south, j = len(vertices) - 2, len(vertices) - 1, np.arange(n)
     k = (j + 1) % n

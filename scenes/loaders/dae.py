@@ -1,4 +1,4 @@
-"""COLLADA: looked at here, then read by pycollada, which takes NaN for 0, ids below 0, and units that are none, without a word."""
+"""COLLADA: checked here, then read by pycollada, which takes NaN for 0, negative ids and bad units without a word."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ def check(content: bytes, path: Path) -> list[str]:
 
 
 def _at(path: Path, element: ET.Element, what: str, inside: str = "") -> NoReturn:
-    name = "".join(f' {key}="{cut(element.get(key) or "")}"' for key in ("id", "name", "material") if element.get(key))[:100]
+    name = "".join(f' {key}="{cut(element.get(key) or "")}"' for key in ("id", "name", "material") if element.get(key))[
+        :100
+    ]
     raise SceneError(what, path=path, element=f"<{element.tag}{name}>{inside}")
 
 
@@ -53,7 +55,12 @@ def _check_unit(root: ET.Element, path: Path) -> None:
         metre = math.nan
     if not 0.0 < metre < math.inf:
         unit_text = brief(unit.get("meter"))
-        _at(path, unit, f"meter must be a finite number above 0, got {unit_text}: it says how many metres the unit has; 1 is a metre")
+        _at(
+            path,
+            unit,
+            f"meter must be a finite number above 0, got {unit_text}: it says how many metres the unit has; 1 is a "
+            "metre",
+        )
 
 
 # --- meshes ---------------------------------------------------------------------------------------
@@ -103,7 +110,12 @@ def _check_primitive(primitive: ET.Element, by_id: dict, path: Path) -> None:
             outside = (corners < 0) | (corners >= positions)
             if outside.any():
                 k = int(np.argmax(outside))
-                _at(path, primitive, f"corner {k} is vertex {int(corners[k])}, but there are 0 ... {positions - 1}", " <p>")
+                _at(
+                    path,
+                    primitive,
+                    f"corner {k} is vertex {int(corners[k])}, but there are 0 ... {positions - 1}",
+                    " <p>",
+                )
     _check_counts(primitive, [len(index) for index in ids], stride, path)
 
 
@@ -115,20 +127,40 @@ def _check_counts(primitive: ET.Element, lengths: list[int], stride: int, path: 
     elif primitive.tag == "polylist":
         corners = _numbers(primitive.find("vcount"), int, path)
         if (corners < 0).any() or (count is not None and len(corners) != count):
-            _at(path, primitive, f"says count {count}, but <vcount> holds {len(corners)} numbers, the least {corners.min() if len(corners) else 0}")
+            _at(
+                path,
+                primitive,
+                f"says count {count}, but <vcount> holds {len(corners)} numbers, the least "
+                f"{corners.min() if len(corners) else 0}",
+            )
         declared = int(corners.sum()) * stride
     elif count is not None and len(lengths) != count:
         _at(path, primitive, f"says count {count}, but has {len(lengths)} of <p>: it was cut short or is damaged")
     if declared is not None and sum(lengths) != declared:
-        _at(path, primitive, f"says {declared} numbers, {stride} a corner, but <p> holds {sum(lengths)}: it was cut short or is damaged")
+        _at(
+            path,
+            primitive,
+            f"says {declared} numbers, {stride} a corner, but <p> holds {sum(lengths)}: it was cut short or is damaged",
+        )
     if any(length % stride for length in lengths):
-        _at(path, primitive, f"has {stride} numbers a corner, but a <p> of {next(n for n in lengths if n % stride)} numbers")
+        _at(
+            path,
+            primitive,
+            f"has {stride} numbers a corner, but a <p> of {next(n for n in lengths if n % stride)} numbers",
+        )
 
 
 def _positions(vertex: ET.Element, by_id: dict, path: Path) -> int:
     """How many positions a VERTEX input names; they must be finite, and as many as their counts say."""
     vertices = _named(vertex, "source", by_id, path)
-    place = next((semantic_input for semantic_input in vertices.findall("input") if semantic_input.get("semantic") == "POSITION"), None)
+    place = next(
+        (
+            semantic_input
+            for semantic_input in vertices.findall("input")
+            if semantic_input.get("semantic") == "POSITION"
+        ),
+        None,
+    )
     if place is None:
         _at(path, vertices, 'has no <input semantic="POSITION">')
     source = _named(place, "source", by_id, path)
@@ -163,12 +195,17 @@ def _named(element: ET.Element, key: str, by_id: dict, path: Path) -> ET.Element
 
 
 def _check_nodes(root: ET.Element, by_id: dict, path: Path) -> None:
-    """How deep nodes stand in one another, and how many there are with what they repeat: pycollada and trimesh recurse."""
+    """Limit the depth of nodes, and their number with repeats: pycollada and trimesh recurse."""
     sizes: dict[ET.Element, int] = {}  # of nodes that were looked at: how many they are with what stands in them
 
     def inner(node: ET.Element) -> list[ET.Element]:
-        repeated = [by_id.get((instance.get("url") or "").removeprefix("#")) for instance in node.findall("instance_node")]
-        return [*node.findall("node"), *(instance for instance in repeated if instance is not None and instance.tag == "node")]
+        repeated = [
+            by_id.get((instance.get("url") or "").removeprefix("#")) for instance in node.findall("instance_node")
+        ]
+        return [
+            *node.findall("node"),
+            *(instance for instance in repeated if instance is not None and instance.tag == "node"),
+        ]
 
     for start in root.iter("node"):
         waiting: list[ET.Element] = [start]

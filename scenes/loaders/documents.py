@@ -126,12 +126,15 @@ def _check_events(events, path: Path) -> None:
     for event in events:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in sizes and any(anchor == event.anchor for anchor, _ in opened):
-                raise SceneError(f"{_place(event.start_mark)}the alias *{event.anchor} stands inside what it repeats", path=path)
+                raise SceneError(
+                    f"{_place(event.start_mark)}the alias *{event.anchor} stands inside what it repeats", path=path
+                )
             again = sizes.get(event.anchor, 1)  # an alias of nothing is refused when the file is read
             nodes, repeated = nodes + again, repeated + again
             if repeated > MAX_REPEATED:
                 raise SceneError(
-                    f"{_place(event.start_mark)}aliases repeat more than {MAX_REPEATED:,} nodes: write the file without them",
+                    f"{_place(event.start_mark)}aliases repeat more than {MAX_REPEATED:,} nodes: write the file "
+                    "without them",
                     path=path,
                 )
         elif isinstance(event, yaml.CollectionStartEvent):
@@ -178,7 +181,10 @@ def _yaml_loader():
                 return super().construct_object(node, deep)
             except (ValueError, OverflowError, TypeError, KeyError, AttributeError, IndexError):
                 kind = node.tag.rsplit(":", 1)[-1]
-                problem = f"{brief(node.value) if isinstance(node, yaml.ScalarNode) else 'what stands here'} cannot be read as {kind}"
+                problem = (
+                    f"{brief(node.value) if isinstance(node, yaml.ScalarNode) else 'what stands here'} cannot "
+                    f"be read as {kind}"
+                )
                 raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None
 
     # No two ways to read the same digits: a megabyte of them must not be tried in every way.

@@ -32,7 +32,8 @@ MAX_PLACED = 50_000_000
 
 _PIECE = 2**20
 _KINDS = (
-    (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"), (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
 )  # fmt: skip
 
 

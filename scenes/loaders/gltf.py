@@ -1,4 +1,4 @@
-"""glTF and GLB: looked at here, then read by trimesh, which takes negative indices, sparse and packed data without a word."""
+"""glTF and GLB: checked here, then read by trimesh, which takes negative indices and packed data without a word."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ class Source(NamedTuple):
 
 
 def source(content: bytes, suffix: str, path: Path) -> Source:
-    """The parts of a glTF or GLB. Raises SceneError for lengths that are not those of the file, and files outside its folder."""
+    """Check a glTF or GLB, and list its notes.
+
+    Raises SceneError for lengths that are not those of the file, and for files outside its folder.
+    """
     text, chunk = (content, None) if suffix == ".gltf" else _chunks(content, path)
     header = read_json(text, path, "glTF: its text is not JSON")
     buffers = header.get("buffers", []) if isinstance(header, dict) else None
@@ -56,13 +59,20 @@ def _chunks(content: bytes, path: Path) -> tuple[bytes, bytes | None]:
     if version != 2:
         refuse(path, f"is GLB of version {version}; read is version 2")
     if length != len(content):
-        refuse(path, f"says that it has {length} bytes, but it has {len(content)}: it was cut short or is damaged; export it again")
+        refuse(
+            path,
+            f"says that it has {length} bytes, but it has {len(content)}: it was cut short or is damaged; export it "
+            "again",
+        )
     text = chunk = None
     at = 12
     while at + 8 <= len(content):
         size, kind = np.frombuffer(content[at : at + 8], "<u4").tolist()
         if at + 8 + size > len(content):
-            refuse(path, f"a part of it says that it has {size} bytes, but {len(content) - at - 8} follow: the file is damaged")
+            refuse(
+                path,
+                f"a part of it says that it has {size} bytes, but {len(content) - at - 8} follow: the file is damaged",
+            )
         if kind == _JSON and text is None:
             text = content[at + 8 : at + 8 + size]
         elif kind == _BIN and chunk is None:
@@ -95,7 +105,9 @@ def check(source: Source, path: Path) -> list[str]:
     except (TypeError, AttributeError, KeyError, ValueError, OverflowError) as error:
         if isinstance(error, SceneError):
             raise
-        raise SceneError(f"is not glTF: an entry is missing or of another type ({brief(str(error))})", path=path) from None
+        raise SceneError(
+            f"is not glTF: an entry is missing or of another type ({brief(str(error))})", path=path
+        ) from None
 
 
 class _Check:
@@ -108,7 +120,8 @@ class _Check:
         for k, view in enumerate(self._list("bufferViews")):
             where = f"bufferViews[{k}]"
             size = self._entry("buffers", view.get("buffer"), f"{where}.buffer").get("byteLength")
-            start, length = self._count(view.get("byteOffset", 0), f"{where}.byteOffset"), self._count(view.get("byteLength"), f"{where}.byteLength")
+            start = self._count(view.get("byteOffset", 0), f"{where}.byteOffset")
+            length = self._count(view.get("byteLength"), f"{where}.byteLength")
             if start + length > self._count(size, "buffers.byteLength"):
                 _at(self.path, where, f"ends at byte {start + length}, but its buffer has {size}")
         for k, mesh in enumerate(self._list("meshes")):
@@ -140,7 +153,11 @@ class _Check:
     def _primitive(self, primitive: dict, where: str) -> None:
         packed = [name for name in primitive.get("extensions") or {} if name in _PACKED[:2]]
         if packed:
-            _at(self.path, where, f"its vertices are packed ({packed[0]}), which is not read: export it without compression")
+            _at(
+                self.path,
+                where,
+                f"its vertices are packed ({packed[0]}), which is not read: export it without compression",
+            )
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_POINTS, _TRIANGLES, _STRIP):
             kind = "a fan of triangles" if mode == _FAN else "lines"
@@ -151,22 +168,40 @@ class _Check:
         if "indices" in primitive:
             corners = self._accessor(primitive["indices"], f"{where}.indices", "SCALAR")["count"]
         if mode == _TRIANGLES and corners % 3:
-            _at(self.path, where, f"is made of triangles, but has {corners} corners, not three each: was the file cut short?")
+            _at(
+                self.path,
+                where,
+                f"is made of triangles, but has {corners} corners, not three each: was the file cut short?",
+            )
 
     def _accessor(self, index: Any, where: str, kind: str) -> dict:
         accessor = self._entry("accessors", index, where)
-        count, component = self._count(accessor.get("count"), f"accessors[{index}].count"), accessor.get("componentType")
+        count, component = (
+            self._count(accessor.get("count"), f"accessors[{index}].count"),
+            accessor.get("componentType"),
+        )
         if not isinstance(component, int) or component not in _COMPONENTS or accessor.get("type") != kind:
-            _at(self.path, f"accessors[{index}]", f"holds {brief(accessor.get('type'))} of type {brief(component)}, which {where} cannot be")
+            _at(
+                self.path,
+                f"accessors[{index}]",
+                f"holds {brief(accessor.get('type'))} of type {brief(component)}, which {where} cannot be",
+            )
         if kind == "SCALAR" and component not in (5121, 5123, 5125):
             _at(self.path, f"accessors[{index}]", f"indices must be whole numbers without a sign, got type {component}")
         if "sparse" in accessor or "bufferView" not in accessor or accessor.get("normalized"):
-            why = "sparse" if "sparse" in accessor else "normalized" if accessor.get("normalized") else "kept by an extension"
-            _at(self.path, f"accessors[{index}]", f"its numbers are {why}, which is not read: export the mesh with plain numbers")
+            why = "normalized" if accessor.get("normalized") else "kept by an extension"
+            why = "sparse" if "sparse" in accessor else why
+            _at(
+                self.path,
+                f"accessors[{index}]",
+                f"its numbers are {why}, which is not read: export the mesh with plain numbers",
+            )
         view = self._entry("bufferViews", accessor["bufferView"], f"accessors[{index}].bufferView")
         row = _WIDTHS[kind] * np.dtype(_COMPONENTS[component]).itemsize
         stride = self._count(view.get("byteStride", row), f"bufferViews[{accessor['bufferView']}].byteStride")
-        end = self._count(accessor.get("byteOffset", 0), f"accessors[{index}].byteOffset") + (stride * (count - 1) + row if count else 0)
+        end = self._count(accessor.get("byteOffset", 0), f"accessors[{index}].byteOffset") + (
+            stride * (count - 1) + row if count else 0
+        )
         if end > view["byteLength"] or (stride < row and count > 1):
             what = f"has {count} entries, {end} bytes, but its bufferView has {view['byteLength']}"
             _at(self.path, f"accessors[{index}]", f"{what}: it was cut short or is damaged")
@@ -179,7 +214,11 @@ class _Check:
             for child in node.get("children", []):
                 self._entry("nodes", child, f"nodes[{k}].children")
                 if child in parents:
-                    _at(self.path, f"nodes[{k}].children", f"node {child} is a child of node {parents[child]} too: nodes are trees")
+                    _at(
+                        self.path,
+                        f"nodes[{k}].children",
+                        f"node {child} is a child of node {parents[child]} too: nodes are trees",
+                    )
                 parents[child] = k
             if "mesh" in node:
                 self._entry("meshes", node["mesh"], f"nodes[{k}].mesh")
@@ -204,6 +243,9 @@ class _Check:
 
 def _finite(values: Any, count: int) -> bool:
     return (
-        isinstance(values, list) and len(values) == count
-        and all(isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) for value in values)
-    )  # fmt: skip
+        isinstance(values, list)
+        and len(values) == count
+        and all(
+            isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) for value in values
+        )
+    )

@@ -60,7 +60,9 @@ def load_planning_scene(
     start = {**states.get("scene", {}), **states.get("start", {})}
     scene.place_robot(robot, X_WR, start, name=robot.name, allowed=())
     # MoveIt's goal constrains the planned joints; the others stay as at the start.
-    scene.states.update({name: {**states.get("scene", {}), **states.get("start", {}), **joints} for name, joints in states.items()})
+    scene.states.update(
+        {name: {**states.get("scene", {}), **states.get("start", {}), **joints} for name, joints in states.items()}
+    )
     frames = _Frames(fields, scene, robot)
     _add_objects(fields, scene, frames, meshes)
     _add_attached(fields, scene, robot, meshes)
@@ -111,13 +113,17 @@ def _read_states(fields: Fields, robot: Robot, scene: Scene) -> tuple[dict[str, 
     states: dict[str, dict[str, float]] = {}
     X_WR = np.eye(4)
     if isinstance(fields.get("robot_state"), dict):
-        states["scene"], X_WR = _robot_state(Fields(fields.get("robot_state"), fields.path, "robot_state"), robot, scene, X_WR)
+        states["scene"], X_WR = _robot_state(
+            Fields(fields.get("robot_state"), fields.path, "robot_state"), robot, scene, X_WR
+        )
     request = _request_file(Path(str(fields.path)))
     if request is not None:
         scene.sources.append(str(request))
         asked = Fields(read_document(request), request)
         if isinstance(asked.get("start_state"), dict):
-            states["start"], X_WR = _robot_state(Fields(asked.get("start_state"), request, "start_state"), robot, scene, X_WR)
+            states["start"], X_WR = _robot_state(
+                Fields(asked.get("start_state"), request, "start_state"), robot, scene, X_WR
+            )
         for k, (goal, place) in enumerate(asked.items("goal_constraints")):
             values = _goal(Fields(goal, request, place))
             if values:
@@ -136,9 +142,13 @@ def _robot_state(state: Fields, robot: Robot, scene: Scene, X_WR: np.ndarray) ->
     known = {joint.name for joint in robot.joints} | set(robot.joint_names)
     strangers = [joint for joint in values if joint not in known]
     if strangers and len(strangers) == len(values):
-        state.fail(f"none of the joints {listing(strangers)} is known; robot {robot.name} has {listing(robot.joint_names)}")
+        state.fail(
+            f"none of the joints {listing(strangers)} is known; robot {robot.name} has {listing(robot.joint_names)}"
+        )
     if strangers:
-        scene.notes.append(f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {listing(strangers)}")
+        scene.notes.append(
+            f"{Path(str(state.path)).name}: joints that robot {robot.name} does not have: {listing(strangers)}"
+        )
     multi = state.get("multi_dof_joint_state")
     if isinstance(multi, dict) and multi.get("joint_names"):
         transforms = Fields(multi, state.path, state.place("multi_dof_joint_state")).items("transforms")
@@ -207,7 +217,9 @@ class _Frames:
         frame = str(header.get("frame_id") or "") if isinstance(header, dict) else ""
         frame = frame.lstrip("/")
         if frame not in self.known:
-            fields.fail(f"unknown frame {brief(frame)}; known are {listing(filter(None, self.known))}", "header.frame_id")
+            fields.fail(
+                f"unknown frame {brief(frame)}; known are {listing(filter(None, self.known))}", "header.frame_id"
+            )
         return self.known[frame]
 
 
@@ -222,11 +234,14 @@ def _add_objects(fields: Fields, scene: Scene, frames: _Frames, meshes: str) -> 
         thing.named(name)
         if thing.get("operation", 0) in (1, "REMOVE", "remove"):
             continue
-        X_WO = frames.pose(thing) @ (_pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4))
+        X_WO = frames.pose(thing) @ (
+            _pose(thing.sub("pose", ("position", "orientation"))) if thing.get("pose") else np.eye(4)
+        )
         shape, X_OS, approximation = object_shape(thing, meshes)
         scene.add(
             SceneBody(
-                name, shape, _in_world(X_WO @ X_OS, thing), static=True, source=f"{fields.path}: {thing.element}", approximation=approximation
+                name, shape, _in_world(X_WO @ X_OS, thing), static=True, source=f"{fields.path}: {thing.element}",
+                approximation=approximation
             )
         )
 
@@ -257,7 +272,11 @@ def object_shape(thing: Fields, meshes: str = "mesh") -> tuple[Shape, np.ndarray
                 shape, approximation = make(Fields(entry, thing.path, place))
             except InvalidShape as error:
                 raise InvalidShape(placed(error, thing.path, place)) from None
-            X = _pose(Fields(places[k][0], thing.path, f"{thing.element}.{poses}[{k}]")) if k < len(places) else np.eye(4)
+            X = (
+                _pose(Fields(places[k][0], thing.path, f"{thing.element}.{poses}[{k}]"))
+                if k < len(places)
+                else np.eye(4)
+            )
             items.append((shape, X))
             about += [approximation] if approximation else []
     if not items:
@@ -271,7 +290,10 @@ def _primitive(fields: Fields) -> tuple[Shape, str | None]:
     kind = fields.get("type")
     name = _TYPES.get(kind) if isinstance(kind, int) else str(kind).lower()
     if name not in _DIMENSIONS:
-        fields.fail(f"unknown primitive {brief(kind)}{did_you_mean(kind, _DIMENSIONS)}; known are {', '.join(_DIMENSIONS)}", "type")
+        fields.fail(
+            f"unknown primitive {brief(kind)}{did_you_mean(kind, _DIMENSIONS)}; known are {', '.join(_DIMENSIONS)}",
+            "type",
+        )
     size = fields.numbers("dimensions", (_DIMENSIONS[name],))
     if name == "box":
         return Box(size), None
@@ -283,7 +305,12 @@ def _primitive(fields: Fields) -> tuple[Shape, str | None]:
 def _inline_mesh(fields: Fields, meshes: str) -> tuple[Shape, str | None]:
     vertices = fields.get("vertices")
     if isinstance(vertices, list) and vertices and isinstance(vertices[0], dict):
-        points = np.array([_vector(Fields({"p": v}, fields.path, f"{fields.element}.vertices[{k}]"), "p", "xyz") for k, v in enumerate(vertices)])
+        points = np.array(
+            [
+                _vector(Fields({"p": v}, fields.path, f"{fields.element}.vertices[{k}]"), "p", "xyz")
+                for k, v in enumerate(vertices)
+            ]
+        )
     else:
         points = fields.numbers("vertices", (None, 3))
     try:
@@ -293,7 +320,7 @@ def _inline_mesh(fields: Fields, meshes: str) -> tuple[Shape, str | None]:
 
 
 def _triangles(fields: Fields) -> np.ndarray:
-    """(m, 3) ids; each triangle is a list of three, or a shape_msgs/MeshTriangle. None at all means a cloud of points."""
+    """(m, 3) ids; each triangle is a list of three or a shape_msgs/MeshTriangle. No triangles: a cloud of points."""
     indices = fields.get("triangles")
     if not indices:
         return np.zeros((0, 3), dtype=np.int64)
@@ -344,7 +371,9 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
     names = [body.name for body in scene.bodies]
     pairs: dict[tuple[str, str], str] = {}
     disabled_pairs = robot.disabled_pairs
-    matrix = fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
+    matrix = (
+        fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
+    )
     if matrix is not None and matrix.get("entry_names"):
         pairs.update({pair: ALLOWED for pair in _matrix_pairs(matrix, names)})
         named = {*matrix.words("entry_names"), *matrix.words("default_entry_names")}
@@ -369,7 +398,9 @@ def _matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
     entries = matrix.words("entry_names")
     rows: list[Any] = [row.get("enabled") if isinstance(row, dict) else row for row, _ in matrix.items("entry_values")]
     if len(rows) != len(entries) or any(not isinstance(row, list) or len(row) != len(entries) for row in rows):
-        matrix.fail(f"must hold {len(entries)} rows of {len(entries)} values, one for each of entry_names", "entry_values")
+        matrix.fail(
+            f"must hold {len(entries)} rows of {len(entries)} values, one for each of entry_names", "entry_values"
+        )
     default_names = matrix.words("default_entry_names")
     default_values = [value for value, _ in matrix.items("default_entry_values")]
     if len(default_names) != len(default_values):
@@ -394,7 +425,9 @@ def _note_what_is_ignored(fields: Fields, scene: Scene) -> None:
     octomap = world.get("octomap") if isinstance(world, dict) else None
     cells = octomap.get("octomap") if isinstance(octomap, dict) else None
     if isinstance(cells, dict) and cells.get("data"):
-        scene.notes.append(f"{Path(str(fields.path)).name}: the octomap is not read; what it marks as occupied is NOT checked")
+        scene.notes.append(
+            f"{Path(str(fields.path)).name}: the octomap is not read; what it marks as occupied is NOT checked"
+        )
     for key, neutral in (("link_padding", 0), ("link_scale", 1)):
         for entry, _ in fields.items(key):
             value = entry.get("padding" if key == "link_padding" else "scale") if isinstance(entry, dict) else None

@@ -1,7 +1,7 @@
 """Wavefront OBJ: the vertices and polygons of its objects; materials, groups, normals and curves are not looked at.
 
-Read here because ids are counted from 1, negative ones back from where they stand, and an id of 0 or of a vertex that is
-not there must be told with its line.
+Read here because ids are counted from 1, negative ones back from where they stand, and an id of 0 or of a vertex that
+is not there must be told with its line.
 """
 
 from __future__ import annotations

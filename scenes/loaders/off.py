@@ -36,15 +36,20 @@ def read(content: bytes, path: Path) -> Read:
     rest = lines[0][1][kind.end() :].strip()  # the counts may stand beside the word
     lines = [(lines[0][0], rest), *lines[1:]] if rest else lines[1:]
     if not lines or len(lines[0][1].split()) < 2:
-        refuse(path, f"the counts of vertices and faces must stand after OFF, got {quoted(lines[0][1]) if lines else 'nothing'}")
+        refuse(
+            path,
+            f"the counts of vertices and faces must stand after OFF, got {quoted(lines[0][1]) if lines else 'nothing'}",
+        )
     n, m = (whole(word, "a count", path, lines[0][0]) for word in lines[0][1].split()[:2])
     if n < 0 or m < 0:
         refuse(path, f"says {n} vertices and {m} faces: counts must be 0 or more", lines[0][0])
     if len(lines) - 1 != n + m:
         refuse(
-            path, f"says {n} vertices and {m} faces, {n + m} lines, but {len(lines) - 1} follow: it was cut short or is damaged",
+            path,
+            f"says {n} vertices and {m} faces, {n + m} lines, but {len(lines) - 1} follow: it was cut short or is "
+            "damaged",
             lines[0][0],
-        )  # fmt: skip
+        )
     return _table(lines[1 : n + 1], lines[n + 1 :], path)
 
 
@@ -73,4 +78,6 @@ def _table(vertex_lines: list[tuple[int, bytes]], face_lines: list[tuple[int, by
         numbers.append(number)
     corners, sizes = wholes(ids, "a vertex of a face", path, numbers, counts), np.array(counts, dtype=np.int64)
     check_ids(corners, sizes, len(vertices), 0, numbers, path)
-    return Read([Part(path.name, vertices, fans(corners, sizes) if counts else NO_FACES)], degenerate_notes(degenerate_lines))
+    return Read(
+        [Part(path.name, vertices, fans(corners, sizes) if counts else NO_FACES)], degenerate_notes(degenerate_lines)
+    )

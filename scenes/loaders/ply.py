@@ -23,8 +23,9 @@ from collide.scenes.loaders.polygons import (
 )
 
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
     "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
@@ -45,7 +46,8 @@ class _Element(NamedTuple):
     properties: list[_Property]
 
 
-#: Of one element: property -> its column, or the values of its lists in one row and their lengths; and the line of each row.
+#: Of one element: property -> its column, or the values of its lists in one row and their lengths; and the line of each
+#: row.
 _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 
@@ -70,7 +72,10 @@ def read(content: bytes, path: Path) -> Read:
     check_ids(corners, counts, len(vertices), 0, body.lines, path)
     if len(degenerate):
         corners, counts = corners[np.repeat(counts >= 3, counts)], counts[counts >= 3]
-    return Read([Part(path.name, vertices, fans(corners, counts) if len(counts) else NO_FACES)], degenerate_notes(degenerate.tolist(), "face"))
+    return Read(
+        [Part(path.name, vertices, fans(corners, counts) if len(counts) else NO_FACES)],
+        degenerate_notes(degenerate.tolist(), "face"),
+    )
 
 
 def _vertices(columns: dict[str, _Columns], path: Path) -> np.ndarray:
@@ -91,7 +96,12 @@ def _header(content: bytes, path: Path) -> tuple[str, list[_Element], int]:
     """Byte order (empty: text), elements, and where the data begin."""
     end = re.search(rb"^[ \t]*end_header[ \t]*(\r\n|\n|\r)", content[: 2**20], re.MULTILINE)
     if not content.startswith(b"ply") or end is None:
-        refuse(path, "is no PLY: it must begin with ply and have a line end_header" if end else "its header has no line end_header: is it cut short?")
+        refuse(
+            path,
+            "is no PLY: it must begin with ply and have a line end_header"
+            if end
+            else "its header has no line end_header: is it cut short?",
+        )
     form: str | None = None
     elements: list[_Element] = []
     for number, line in enumerate(content[: end.start()].splitlines(), 1):
@@ -140,7 +150,8 @@ class _Text:
         if len(rows) < element.rows:
             refuse(
                 self._path,
-                f"declares {element.rows} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; export it again",
+                f"declares {element.rows} of {element.name}, but holds {len(rows)}: it was cut short or is damaged; "
+                "export it again",
             )
         self._at += element.rows
         if element.name == "face":
@@ -158,7 +169,9 @@ class _Text:
         for prop in element.properties:
             if table is None or at >= width:
                 return None
-            if prop.length and (table[at] % 1 or not 0 <= table[at] < width - at or (table[at::width] != table[at]).any()):
+            if prop.length and (
+                table[at] % 1 or not 0 <= table[at] < width - at or (table[at::width] != table[at]).any()
+            ):
                 return None
             count, at = (int(table[at]), at + 1) if prop.length else (1, at)
             values = table.reshape(-1, width)[:, at : at + count].ravel()
@@ -178,15 +191,26 @@ class _Text:
             for k, prop in enumerate(element.properties):
                 count, shift = 1, 0
                 if prop.length:
-                    count, shift = whole(self._word(line, words, at, prop), f"the length of {prop.name}", self._path, line), 1
+                    count, shift = (
+                        whole(self._word(line, words, at, prop), f"the length of {prop.name}", self._path, line),
+                        1,
+                    )
                 lists = words[at + shift : at + shift + count] if count >= 0 else []
                 if len(lists) != count:
-                    refuse(self._path, f"{prop.name} has {count} numbers, got {len(lists)}: {quoted(b' '.join(words))}", line)
+                    refuse(
+                        self._path,
+                        f"{prop.name} has {count} numbers, got {len(lists)}: {quoted(b' '.join(words))}",
+                        line,
+                    )
                 values[k] += lists
                 counts[k].append(count)
                 at += shift + count
             if at != len(words):
-                refuse(self._path, f"a row of {element.name} has {at} numbers, got {len(words)}: {quoted(b' '.join(words))}", line)
+                refuse(
+                    self._path,
+                    f"a row of {element.name} has {at} numbers, got {len(words)}: {quoted(b' '.join(words))}",
+                    line,
+                )
         columns: _Columns = {}
         for k, prop in enumerate(element.properties):
             column = self._column(values[k], prop, lines, counts[k])
@@ -212,7 +236,9 @@ class _Text:
         if self._at < len(self._rows):
             line, words = self._rows[self._at]
             more = len(self._rows) - self._at
-            refuse(self._path, f"{more} more lines than its header declares, the first is {quoted(b' '.join(words))}", line)
+            refuse(
+                self._path, f"{more} more lines than its header declares, the first is {quoted(b' '.join(words))}", line
+            )
 
 
 def _as(values: np.ndarray, prop: _Property) -> np.ndarray:
@@ -237,7 +263,10 @@ class _Binary:
     def element(self, element: _Element) -> _Columns:
         if not element.rows or not element.properties:
             none = np.zeros(0)
-            return {prop.name: (none.astype(np.int64), none.astype(np.int64)) if prop.length else none for prop in element.properties}
+            return {
+                prop.name: (none.astype(np.int64), none.astype(np.int64)) if prop.length else none
+                for prop in element.properties
+            }
         return self._equal_rows(element) or self._row_by_row(element)
 
     def _equal_rows(self, element: _Element) -> _Columns | None:
@@ -246,7 +275,10 @@ class _Binary:
         for k, prop in enumerate(element.properties):
             if prop.length:
                 count = int(self._take(prop.length, 1, at, element, 0)[0])
-                fields += [(f"n{k}", self._endian + prop.length), (f"v{k}", self._endian + prop.kind, (self._sane(count, prop),))]
+                fields += [
+                    (f"n{k}", self._endian + prop.length),
+                    (f"v{k}", self._endian + prop.kind, (self._sane(count, prop),)),
+                ]
                 at += np.dtype(prop.length).itemsize + count * np.dtype(prop.kind).itemsize
             else:
                 fields.append((f"v{k}", self._endian + prop.kind))
@@ -262,7 +294,9 @@ class _Binary:
                 return None
         self._at += layout.itemsize * element.rows
         return {
-            prop.name: (_native(rows[f"v{k}"]).ravel(), rows[f"n{k}"].astype(np.int64)) if prop.length else _native(rows[f"v{k}"])
+            prop.name: (_native(rows[f"v{k}"]).ravel(), rows[f"n{k}"].astype(np.int64))
+            if prop.length
+            else _native(rows[f"v{k}"])
             for k, prop in enumerate(element.properties)
         }
 
@@ -286,7 +320,11 @@ class _Binary:
 
     def _sane(self, count: int, prop: _Property) -> int:
         if not 0 <= count <= len(self._content):
-            refuse(self._path, f"a list of {prop.name} has the length {count}: the file is damaged, or declares other types than it holds")
+            refuse(
+                self._path,
+                f"a list of {prop.name} has the length {count}: the file is damaged, or declares other types than it "
+                "holds",
+            )
         return count
 
     def _take(self, kind: str, count: int, at: int, element: _Element, row: int) -> np.ndarray:
@@ -297,13 +335,18 @@ class _Binary:
     def _cut_short(self, element: _Element, holds: int) -> NoReturn:
         refuse(
             self._path,
-            f"declares {element.rows} of {element.name}, but holds {holds}: it was cut short or is damaged; export it again",
+            f"declares {element.rows} of {element.name}, but holds {holds}: it was cut short or is damaged; export it "
+            "again",
         )
 
     def end(self) -> None:
         remaining = self._content[self._at :]
         if remaining.strip(b"\0\r\n \t"):
-            refuse(self._path, f"has {len(remaining)} bytes more than its header declares: the counts are wrong, or the file is damaged")
+            refuse(
+                self._path,
+                f"has {len(remaining)} bytes more than its header declares: the counts are wrong, or the file is "
+                "damaged",
+            )
 
 
 def _native(values: np.ndarray) -> np.ndarray:

@@ -101,7 +101,9 @@ def fans(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.stack([corners[first], corners[first + k + 1], corners[first + k + 2]], axis=1)
 
 
-def check_ids(corners: np.ndarray, counts: np.ndarray, vertices: int, first: int, lines: Sequence[int] | None, path: Path) -> None:
+def check_ids(
+    corners: np.ndarray, counts: np.ndarray, vertices: int, first: int, lines: Sequence[int] | None, path: Path
+) -> None:
     """Refuse polygons with a corner that is no vertex, by line or by number.
 
     corners : from 0.   first : what the file calls the first vertex, for the message.

@@ -34,7 +34,11 @@ def find(filename: str, beside: Path, package_path: Iterable = (), *, element: s
     elif scheme in ("", "file"):
         candidates = _plain_candidates(rest, beside, package_path)
     else:
-        raise SceneError(f'"{cut(filename)}": files are not fetched over {cut(scheme)}; download it first', path=beside, element=element)
+        raise SceneError(
+            f'"{cut(filename)}": files are not fetched over {cut(scheme)}; download it first',
+            path=beside,
+            element=element,
+        )
     searched: dict[str, None] = {}
     for candidate in candidates:
         if is_file(candidate):

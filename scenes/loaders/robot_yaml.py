@@ -42,7 +42,9 @@ def inline_robot(entry: Fields, metres: float, mesh: Callable) -> Robot:
             sources=[str(fields.path)],
         )
     except SceneError as error:
-        raise SceneError(error.what, path=fields.path, element=": ".join(filter(None, (fields.element, error.element)))) from None
+        raise SceneError(
+            error.what, path=fields.path, element=": ".join(filter(None, (fields.element, error.element)))
+        ) from None
     if fields.get("states") is not None:
         robot.states = _states(fields, robot)
     return robot
@@ -55,7 +57,11 @@ def _collision(link: Fields, metres: float, mesh: Callable, notes: list[str]) ->
         if "shape" not in element:
             element.fail("'shape' is missing")
         described = read_shape(element.data["shape"], link.path, element.place("shape"), metres, mesh)
-        shapes.append(LinkShape(described.shape, read_pose(element, "pose", metres), described.approximation, f"{link.path}: {place}"))
+        shapes.append(
+            LinkShape(
+                described.shape, read_pose(element, "pose", metres), described.approximation, f"{link.path}: {place}"
+            )
+        )
         notes += described.notes
     return shapes
 
@@ -86,10 +92,14 @@ def _pairs(fields: Fields, links: list[str]) -> list[tuple[str, str, str]]:
     pairs, known = [], set(links)
     for entry, place in fields.items("allow"):
         if not isinstance(entry, list) or len(entry) not in (2, 3) or not all(isinstance(word, str) for word in entry):
-            raise SceneError(f"must be [link, link] or [link, link, reason], got {brief(entry)}", path=fields.path, element=place)
+            raise SceneError(
+                f"must be [link, link] or [link, link, reason], got {brief(entry)}", path=fields.path, element=place
+            )
         for link in entry[:2]:
             if link not in known:
-                raise SceneError(f"unknown link {brief(link)}{did_you_mean(link, links)}", path=fields.path, element=place)
+                raise SceneError(
+                    f"unknown link {brief(link)}{did_you_mean(link, links)}", path=fields.path, element=place
+                )
         pairs.append((entry[0], entry[1], entry[2] if len(entry) == 3 else "allowed by the robot"))
     return pairs
 
@@ -102,8 +112,10 @@ def _states(fields: Fields, robot: Robot) -> dict[str, dict[str, float]]:
         for joint in values:
             if joint not in known:
                 raise SceneError(
-                    f"unknown joint {brief(joint)}{did_you_mean(joint, robot.joint_names)}; it has {listing(robot.joint_names)}",
-                    path=fields.path, element=place,
+                    f"unknown joint {brief(joint)}{did_you_mean(joint, robot.joint_names)}; it has "
+                    f"{listing(robot.joint_names)}",
+                    path=fields.path,
+                    element=place,
                 )
         states[str(name)] = values
     return states

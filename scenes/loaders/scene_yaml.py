@@ -33,7 +33,7 @@ _BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
 
 @dataclass
 class _Included:
-    """How many files a scene has included so far, and how many characters they have: files that include many multiply."""
+    """How many files a scene has included so far, and their characters: files that include many multiply."""
 
     files: int = 0
     characters: int = 0
@@ -91,7 +91,9 @@ def _build_into(building: _Building, data: Any) -> None:
     scene = building.scene
     scene.sources.append(str(building.path))
     if building.metres != 1.0:
-        scene.notes.append(f"{building.path.name}: lengths are in {document.get('units')}; they were turned into metres")
+        scene.notes.append(
+            f"{building.path.name}: lengths are in {document.get('units')}; they were turned into metres"
+        )
     for entry, place in document.items("include"):
         _include(building, entry, place)
     for entry, place in document.items("robots"):
@@ -115,9 +117,15 @@ def _include(building: _Building, entry: Any, place: str) -> None:
         raise SceneError(f"files include each other in a circle: {names}", path=building.path, element=place)
     text, so_far = read_text(file), building.included
     so_far.files, so_far.characters = so_far.files + 1, so_far.characters + len(text)
-    for number, limit, of_what in ((so_far.files, MAX_INCLUDED, "files"), (so_far.characters, LARGEST_TEXT, "characters")):
+    for number, limit, of_what in (
+        (so_far.files, MAX_INCLUDED, "files"),
+        (so_far.characters, LARGEST_TEXT, "characters"),
+    ):
         if number > limit:
-            what = f"with this the scene includes more than {limit:,} {of_what}, repeats counted: put their bodies in one file"
+            what = (
+                f"with this the scene includes more than {limit:,} {of_what}, repeats counted: put their bodies "
+                "in one file"
+            )
             raise SceneError(what, path=building.path, element=place)
     _build_into(replace(building, path=file, metres=1.0, open_files=chain), parse_document(text, file))
 
@@ -170,7 +178,11 @@ def _robot_state(entry: Fields, robot: Robot) -> dict[str, float]:
         return {}
     if isinstance(state, str):
         if state not in robot.states:
-            entry.fail(f"unknown state {brief(state)}{did_you_mean(state, robot.states)}; known are {listing(robot.states) or 'none'}", "state")
+            entry.fail(
+                f"unknown state {brief(state)}{did_you_mean(state, robot.states)}; known are "
+                f"{listing(robot.states) or 'none'}",
+                "state",
+            )
         return dict(robot.states[state])
     prefix = _prefix(entry)
     known = set(robot.joint_names) | {joint.name for joint in robot.joints}
@@ -179,7 +191,8 @@ def _robot_state(entry: Fields, robot: Robot) -> dict[str, float]:
         full = joint if joint in known else prefix + joint
         if full not in known:
             entry.fail(
-                f"unknown joint {brief(joint)}{did_you_mean(joint, known)}; robot {robot.name} has {listing(robot.joint_names)}",
+                f"unknown joint {brief(joint)}{did_you_mean(joint, known)}; robot {robot.name} has "
+                f"{listing(robot.joint_names)}",
                 "state",
             )
         values[full] = value
@@ -194,7 +207,9 @@ def _add_body(building: _Building, entry: Fields) -> None:
     entry.named(name)
     if "shape" not in entry:
         entry.fail("'shape' is missing")
-    described = shape_yaml.read_shape(entry.data["shape"], entry.path, entry.place("shape"), building.metres, building.mesh)
+    described = shape_yaml.read_shape(
+        entry.data["shape"], entry.path, entry.place("shape"), building.metres, building.mesh
+    )
     building.scene.add(
         SceneBody(
             name, described.shape, read_pose(entry, "pose", building.metres), static=entry.flag("static", False),
@@ -207,7 +222,9 @@ def _add_body(building: _Building, entry: Fields) -> None:
 
 def _allowed_pair(document: Fields, entry: Any, place: str, names: Mapping[str, None]) -> tuple[str, str, str]:
     if not isinstance(entry, list) or len(entry) not in (2, 3) or not all(isinstance(word, str) for word in entry):
-        raise SceneError(f"must be [body, body] or [body, body, reason], got {brief(entry)}", path=document.path, element=place)
+        raise SceneError(
+            f"must be [body, body] or [body, body, reason], got {brief(entry)}", path=document.path, element=place
+        )
     for name in entry[:2]:
         if name not in names:
             raise SceneError(
@@ -215,7 +232,9 @@ def _allowed_pair(document: Fields, entry: Any, place: str, names: Mapping[str, 
                 path=document.path, element=place,
             )
     if entry[0] == entry[1]:
-        raise SceneError(f"a body is never tested against itself, got {brief(entry)}", path=document.path, element=place)
+        raise SceneError(
+            f"a body is never tested against itself, got {brief(entry)}", path=document.path, element=place
+        )
     return entry[0], entry[1], entry[2] if len(entry) == 3 else "allowed by the scene"
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, brief
+from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
+from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 from collide.shapes import (
     Box,
     Capsule,
@@ -57,7 +59,11 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
     if unknown or len(kinds.data) != 1:
-        complaint = f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}" if unknown else f"needs one shape, got {brief(data)}"
+        complaint = (
+            f"unknown shape {brief(unknown[0])}{did_you_mean(unknown[0], KINDS)}"
+            if unknown
+            else f"needs one shape, got {brief(data)}"
+        )
         kinds.fail(f"{complaint}; known shapes are {', '.join(KINDS)}")
     kind = next(iter(kinds.data))
     try:
@@ -117,9 +123,6 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
-    from collide.scenes.loaders import mesh_file as mesh_loader
-    from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
-
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
     file = mesh(fields.text("file"), fields.place("file"), taken)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from collide.errors import SceneError, cut, listing
+from collide.scenes.loaders.xml_text import parse_xml
 
 
 @dataclass
@@ -26,8 +27,6 @@ def read_srdf(path: Path, links: list[str], joints: list[str]) -> Semantics:
 
     Entries about links or joints the robot does not have are left out and noted.
     """
-    from collide.scenes.loaders.urdf import parse_xml
-
     semantics = Semantics()
     root = parse_xml(path, semantics.notes)
     if root.tag != "robot":
@@ -61,12 +60,18 @@ def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> N
             label, text = joint.get("name", ""), joint.get("value", "")
             words = text.split()
             if label not in known or len(words) != 1:
-                semantics.notes.append(f'state "{cut(name)}": joint "{cut(label)}" with value "{cut(text)}" was left out')
+                semantics.notes.append(
+                    f'state "{cut(name)}": joint "{cut(label)}" with value "{cut(text)}" was left out'
+                )
                 continue
             try:
                 value = float(words[0])
             except ValueError:
                 value = math.nan
             if not math.isfinite(value):
-                raise SceneError(f'the value must be a finite number, got "{cut(text)}"', path=path, element=f'state "{cut(name)}" joint "{cut(label)}"')
+                raise SceneError(
+                    f'the value must be a finite number, got "{cut(text)}"',
+                    path=path,
+                    element=f'state "{cut(name)}" joint "{cut(label)}"',
+                )
             values[label] = value

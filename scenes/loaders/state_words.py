@@ -74,7 +74,8 @@ def _in_order(scene: Scene, values: list[float]) -> dict[str, float]:
     joints = [joint for placement in scene.placements.values() for joint in placement.robot.joint_names]
     if len(values) != len(joints):
         raise SceneError(
-            f"{len(values)} joint value{'s' * (len(values) != 1)} given, its robots have {len(joints)} joints: {', '.join(joints) or 'none'}; "
+            f"{len(values)} joint value{'s' * (len(values) != 1)} given, its robots have {len(joints)} joints: "
+            f"{', '.join(joints) or 'none'}; "
             "joint=value,... names some of them",
             path=f"scene {scene.name}",
         )

@@ -33,7 +33,10 @@ def state_of(data: Any, path: object, element: str = "") -> dict[str, float]:
     names, positions_key = fields.words(names_key), "positions" if "positions" in fields else "position"
     positions = fields.get(positions_key)
     if not isinstance(positions, list) or len(positions) != len(names):
-        fields.fail(f"must hold one value for each of the {len(names)} joints in {names_key}, got {brief(positions)}", positions_key)
+        fields.fail(
+            f"must hold one value for each of the {len(names)} joints in {names_key}, got {brief(positions)}",
+            positions_key,
+        )
     values: dict[str, float] = {}
     for k, (joint, value) in enumerate(zip(names, positions)):
         if joint in values:

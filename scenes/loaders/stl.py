@@ -13,13 +13,14 @@ _HEADER = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 #: What may follow a keyword of ASCII STL.
 _NEXT = {
-    b"solid": (b"facet", b"endsolid"), b"facet": (b"outer",), b"outer": (b"vertex",), b"vertex": (b"vertex", b"endloop"),
+    b"solid": (b"facet", b"endsolid"), b"facet": (b"outer",), b"outer": (b"vertex",),
+    b"vertex": (b"vertex", b"endloop"),
     b"endloop": (b"endfacet",), b"endfacet": (b"facet", b"endsolid"), b"endsolid": (b"solid",),
 }  # fmt: skip
 
 
 def read(content: bytes, path: Path) -> Read:
-    """The facets of an STL; SceneError where the count in its header, or the order of its lines, is not that of its facets."""
+    """The facets of an STL; SceneError where its header's count or its lines' order contradicts them."""
     declared = int(np.frombuffer(content[80:84], "<u4")[0]) if len(content) >= _HEADER else None
     if declared is not None and len(content) == _HEADER + declared * _FACET.itemsize:
         corners = np.frombuffer(content, _FACET, offset=_HEADER)["corners"]
@@ -27,14 +28,21 @@ def read(content: bytes, path: Path) -> Read:
             k = int(np.argmax(~np.isfinite(corners).all(axis=(1, 2))))
             refuse(path, f"facet {k} is {corners[k].tolist()}: coordinates must be finite")
         return Read([_part(path.name, corners.reshape(-1, 3).astype(np.float64))], [])
-    if re.match(rb"(\xef\xbb\xbf)?\s*solid\b", content[:200], re.IGNORECASE) and b"\0" not in content[_HEADER : _HEADER + 400]:
+    if (
+        re.match(rb"(\xef\xbb\xbf)?\s*solid\b", content[:200], re.IGNORECASE)
+        and b"\0" not in content[_HEADER : _HEADER + 400]
+    ):
         return _ascii(content, path)
     if declared is None:
-        refuse(path, f"is no STL: it has {len(content)} bytes, a binary one has 84 and more, an ASCII one begins with solid")
+        refuse(
+            path,
+            f"is no STL: it has {len(content)} bytes, a binary one has 84 and more, an ASCII one begins with solid",
+        )
     holds = (len(content) - _HEADER) / _FACET.itemsize
     refuse(
         path,
-        f"its header says {declared} facets, but the file holds {holds:.10g}: it was cut short or is damaged (or is no STL); "
+        f"its header says {declared} facets, but the file holds {holds:.10g}: it was cut short or is damaged (or is no "
+        "STL); "
         "export it again",
     )
 
@@ -54,7 +62,11 @@ def _ascii(content: bytes, path: Path) -> Read:
             continue
         keyword = words[0].lower()
         if keyword not in _NEXT[before]:
-            refuse(path, f"{' or '.join(word.decode() for word in _NEXT[before])} must stand here, got {quoted(line)}", number)
+            refuse(
+                path,
+                f"{' or '.join(word.decode() for word in _NEXT[before])} must stand here, got {quoted(line)}",
+                number,
+            )
         if keyword == b"vertex":
             if len(words) != 4:
                 refuse(path, f"a vertex has three coordinates, got {quoted(line)}", number)

@@ -41,7 +41,8 @@ def read_trajectory(path) -> Trajectory:
 
     Accepted: CSV with a header of joint names; YAML or JSON holding a list of ``{joint: value}``, a mapping of
     joints to lists of values, or ``joint_names`` beside ``points`` with ``positions``, as ROS and MoveIt print a
-    JointTrajectory, also under ``joint_trajectory`` or ``trajectory``. Times, where there are any: a column ``time``, or
+    JointTrajectory, also under ``joint_trajectory`` or ``trajectory``. Times, where there are any: a column ``time``,
+        or
     ``time_from_start``.
 
     Raises SceneError naming file, row or element, and value.
@@ -55,7 +56,9 @@ def read_trajectory(path) -> Trajectory:
         return Trajectory(str(path), rows)
     for k, (before, after) in enumerate(pairwise(times)):
         if after < before:
-            raise SceneError(f"times must rise, got {after:g} s after {before:g} s", path=path, element=f"waypoint {k + 1}")
+            raise SceneError(
+                f"times must rise, got {after:g} s after {before:g} s", path=path, element=f"waypoint {k + 1}"
+            )
     return Trajectory(str(path), rows, times)
 
 
@@ -74,7 +77,9 @@ def _read_csv(path: Path) -> list[dict[str, float]]:
     rows = []
     for k, cells in enumerate(body):
         if len(cells) != len(header):
-            raise SceneError(f"has {len(cells)} values, the header {len(header)} columns", path=path, element=f"row {k + 1}")
+            raise SceneError(
+                f"has {len(cells)} values, the header {len(header)} columns", path=path, element=f"row {k + 1}"
+            )
         values = {name: _number(cell, path, f'row {k + 1} "{name}"') for name, cell in zip(header, cells)}
         rows.append(_timed(values))
     return rows
@@ -103,7 +108,10 @@ def _rows(data: Any, path: Path, element: str) -> list[dict[str, float]]:
     fields = Fields(data, path, element)
     several = fields.get("multi_dof_joint_trajectory")
     if isinstance(several, Mapping) and several.get("points"):
-        fields.fail("joints of several degrees of freedom are not read: give their values by column", "multi_dof_joint_trajectory")
+        fields.fail(
+            "joints of several degrees of freedom are not read: give their values by column",
+            "multi_dof_joint_trajectory",
+        )
     for key in ("trajectory", "joint_trajectory", "waypoints"):
         if key in fields:
             return _rows(data[key], path, fields.place(key))
@@ -142,7 +150,9 @@ def _seconds(fields: Fields, key: str) -> float:
     if not isinstance(value, Mapping):
         return fields.checked_number(value, key)
     parts = Fields(value, fields.path, fields.place(key))
-    whole, rest = (next((n for n in names if n in parts), names[0]) for names in (("secs", "sec"), ("nsecs", "nanosec")))
+    whole, rest = (
+        next((n for n in names if n in parts), names[0]) for names in (("secs", "sec"), ("nsecs", "nanosec"))
+    )
     return parts.number(whole, 0.0) + 1e-9 * parts.number(rest, 0.0)
 
 

@@ -22,7 +22,12 @@ from collide.scenes.loaders.files import MAX_PLACED, read_mesh_bytes
 from collide.scenes.loaders.polygons import Part, Read
 from collide.shapes.mesh import Mesh
 
-_READERS: dict[str, Callable[[bytes, Path], Read]] = {".stl": stl.read, ".obj": obj.read, ".ply": ply.read, ".off": off.read}
+_READERS: dict[str, Callable[[bytes, Path], Read]] = {
+    ".stl": stl.read,
+    ".obj": obj.read,
+    ".ply": ply.read,
+    ".off": off.read,
+}
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb", ".gltf", ".off")
 
 
@@ -41,7 +46,7 @@ class MeshBytes(NamedTuple):
 
 
 def open_mesh(path: Path) -> MeshBytes:
-    """The bytes of a mesh file, which may be packed (``.ply.gz``). Raises SceneError for what is no mesh file, or too large."""
+    """The bytes of a mesh file, unpacked (``.ply.gz``); SceneError where it is no file, or too large."""
     inner = Path(path.stem).suffix.lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
     if inner not in SUFFIXES:
         raise SceneError(f"unknown mesh format {cut(inner)!r}; known are {', '.join(SUFFIXES)}", path=path)
@@ -50,8 +55,9 @@ def open_mesh(path: Path) -> MeshBytes:
 
 
 def read_triangles(path: Path) -> tuple[list[tuple[str, np.ndarray, np.ndarray]], list[str]]:
-    """The meshes of a file by name, (n, 3) vertices in metres in the file's world frame and (m, 3) facets each, and notes.
+    """The meshes of a file and notes about it: (name, vertices (n, 3), facets (m, 3)) each.
 
+    Vertices are in metres in the file's world frame.
     path : of a format in `SUFFIXES`, which may be packed (``.ply.gz``). Point clouds have no facets.
     Raises SceneError for what cannot be read, MissingExtra without the library that reads it.
     """
@@ -105,7 +111,9 @@ def _by_trimesh(opened: MeshBytes) -> Read:
         )
         edges = loaded.graph.to_edgelist()
     except ModuleNotFoundError as error:
-        raise MissingExtra(error.name or "a mesh library", extra="robots", purpose=f"read the mesh {path.name}") from None
+        raise MissingExtra(
+            error.name or "a mesh library", extra="robots", purpose=f"read the mesh {path.name}"
+        ) from None
     except Exception as error:  # noqa: BLE001 - the readers of two formats raise what they like
         raise SceneError(f"is not a mesh that can be read: {_one_line(error)}", path=path) from None
     placed = sum(len(getattr(loaded.geometry.get(about.get("geometry")), "faces", ())) for _, _, about in edges)
@@ -116,8 +124,13 @@ def _by_trimesh(opened: MeshBytes) -> Read:
         notes = [f"the file says its unit is {metre:g} m; it was scaled to metres", *notes]
     # by name: the graph keeps no order
     placed_meshes = sorted(_placed(edges, str(loaded.graph.base_frame)), key=lambda item: item[0])
-    shapes = {name: item for name, item in loaded.geometry.items() if isinstance(item, (trimesh.Trimesh, trimesh.PointCloud))}
-    return Read([_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in placed_meshes if geometry in shapes], notes)
+    shapes = {
+        name: item for name, item in loaded.geometry.items() if isinstance(item, (trimesh.Trimesh, trimesh.PointCloud))
+    }
+    return Read(
+        [_part(name, shapes[geometry], X_WG, metre) for name, geometry, X_WG in placed_meshes if geometry in shapes],
+        notes,
+    )
 
 
 def _placed(edges: list, base: str) -> list[tuple[str, str, np.ndarray]]:
@@ -158,7 +171,15 @@ def _metres(units) -> float:
     """Metres in a unit as trimesh names it: "meters", "0.0254 * meters", "millimeters", None."""
     words = str(units or "meters").replace("*", " ").split()
     factor = float(words[0]) if len(words) == 2 else 1.0
-    named = {"meters": 1.0, "m": 1.0, "millimeters": 1e-3, "mm": 1e-3, "centimeters": 1e-2, "cm": 1e-2, "inches": 0.0254}
+    named = {
+        "meters": 1.0,
+        "m": 1.0,
+        "millimeters": 1e-3,
+        "mm": 1e-3,
+        "centimeters": 1e-2,
+        "cm": 1e-2,
+        "inches": 0.0254,
+    }
     return factor * named.get(words[-1], 1.0) if math.isfinite(factor) else 1.0
 
 

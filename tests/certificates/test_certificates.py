@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import collide
-from collide.certificates.certificates import Certificate
+from collide.certificates.certificate import Certificate
 from collide.scenes.families import generate, names
 
 LARGE = {"spheres_big", "cyl1000", "bipyramids", "repeats"}

@@ -11,7 +11,7 @@ from mesh_families import grid_case, random_case, random_pose, right_angle_pose
 from mesh_shapes import block_ring, box, bumpy_sphere
 
 import collide
-from collide.certificates.certificates import Certificate, CertificateRefused
+from collide.certificates.certificate import Certificate, CertificateRefused
 
 EYE = np.eye(4)
 

@@ -418,7 +418,7 @@ def sign(x):
 
 rng = random.Random(4)
 work, digits, seen = np.zeros(O.WORK), np.zeros(O.DIGITS, dtype=np.int64), {}
-for name in ("by_expansions", "by_digits", "pair_determinant", "double_determinant"):
+for name in ("by_expansions", "by_digits", "dd_determinant", "double_determinant"):
     def counted(*args, name=name, known=getattr(O, name)):
         seen[name] = seen.get(name, 0) + 1
         return known(*args)
@@ -462,7 +462,7 @@ for _ in range(1500):
         assert got == sign(n[axis]), (originals.tolist(), axis)
     got = O.by_digits(originals.ravel(), digits, 0, 1, 2, 3, -1)
     assert got == truth, originals.tolist()
-assert min(seen[name] for name in ("by_expansions", "pair_determinant")) > 200, seen
+assert min(seen[name] for name in ("by_expansions", "dd_determinant")) > 200, seen
 
 clouds = pickle.load(sys.stdin.buffer)
 pickle.dump([tuple(convex_hull(points)) for points in clouds], sys.stdout.buffer)

@@ -50,4 +50,8 @@ def why_no_library() -> str:
         return "this installation was built without compiled kernels"
     from collide.kernels import sources
 
-    return "" if sources.fingerprint(built.SOURCE_FILES) == built.SOURCES else "kernels were edited since the library was built: build it again"
+    try:
+        fits = sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
+    except FileNotFoundError:  # a source has moved since
+        fits = False
+    return "" if fits else "kernels were edited since the library was built: build it again"

@@ -13,9 +13,11 @@ import pytest
 import collide
 from collide.kernels import address_of, entry, kernel, view_f64
 from collide.kernels.lanes import LANES, any_of, root_of, select, transpose_eight, view_lanes
+from collide.narrowphase.gap import gap_layout as at
 from collide.narrowphase.gap import precise_pair as fine
-from collide.narrowphase.gap import refine_gap as gap
-from collide.numerics import double_double
+from collide.narrowphase.gap.refine_gap import refine_gaps
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD
 from collide.numerics.error_free import dekker_product, two_product, two_sum
 
 #: Numbers that go into one round of all operations, and that come out.
@@ -52,16 +54,16 @@ def _everything(x, y):
     y[17] = select((a == b) | (c != d), a, c)
     y[18] = select(~(a < 0.0), a, -a)
     y[19] = select(0.0 < a, 2.0, d)
-    y[20], y[21] = double_double.add(a, b, c, d)
-    y[22], y[23] = double_double.subtract(a, b, c, d)
-    y[24], y[25] = double_double.multiply(a, b, c, d)
-    y[26], y[27] = double_double.divide(a, b, c, d)
-    y[28], y[29] = double_double.square_root(a, b)
-    y[30], y[31], y[32] = double_double.bracket(a, b, abs(c))
-    y[33], y[34], y[35], y[36], y[37], y[38] = double_double.cross(
-        a, b, c, d, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11]
-    )
-    y[39], y[40] = double_double.product_of_vectors(a, b, c, d, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
+    y[20], y[21] = dd.add(DD(a, b), DD(c, d))
+    y[22], y[23] = dd.sub(DD(a, b), DD(c, d))
+    y[24], y[25] = dd.mul(DD(a, b), DD(c, d))
+    y[26], y[27] = dd.div(DD(a, b), DD(c, d))
+    y[28], y[29] = dd.sqrt(DD(a, b))
+    y[30], y[31], y[32] = dd.bracket(DD(a, b), abs(c))
+    u = dd.vec3_at(x, 0)
+    v = dd.vec3_at(x, dd.STRIDE)
+    dd.put_vec3(y, 33, dd.cross(u, v))
+    y[39], y[40] = dd.inner(u, v)
     y[41], y[42] = dekker_product(a, b)
     y[43] = fine.larger(a, b)
     y[44] = fine.smaller(a, b)
@@ -180,21 +182,21 @@ def test_without_compilation_the_bits_are_the_same():
 
 
 @entry("void(int64, int64, int64, int64)")
-def _polish(room_at, out_at, n, parts):
-    """One room of questions; out: the feature, its direction, the answer."""
-    direction_at = out_at + 8 * LANES * gap.FEATURE
-    gap.polish_gaps(
-        view_lanes(room_at, gap.QUESTION), n, parts, False, view_lanes(out_at, gap.FEATURE),
-        view_lanes(direction_at, fine.FINE), view_lanes(direction_at + 8 * LANES * fine.FINE, gap.ANSWER),
+def _refine(question_at, out_at, n, parts):
+    """A lane block of questions; out: the feature, its direction, the answer."""
+    direction_at = out_at + 8 * LANES * at.FEATURE
+    refine_gaps(
+        view_lanes(question_at, at.QUESTION), n, parts, False, view_lanes(out_at, at.FEATURE),
+        view_lanes(direction_at, dd.STRIDE), view_lanes(direction_at + 8 * LANES * dd.STRIDE, at.ANSWER),
     )  # fmt: skip
 
 
 @entry("void(int64, int64, int64, int64)")
-def _polish_one(room_at, out_at, n, parts):
-    direction_at = out_at + 8 * gap.FEATURE
-    gap.polish_gaps(
-        view_f64(room_at, gap.QUESTION), n, parts, False, view_f64(out_at, gap.FEATURE),
-        view_f64(direction_at, fine.FINE), view_f64(direction_at + 8 * fine.FINE, gap.ANSWER),
+def _refine_one(question_at, out_at, n, parts):
+    direction_at = out_at + 8 * at.FEATURE
+    refine_gaps(
+        view_f64(question_at, at.QUESTION), n, parts, False, view_f64(out_at, at.FEATURE),
+        view_f64(direction_at, dd.STRIDE), view_f64(direction_at + 8 * dd.STRIDE, at.ANSWER),
     )  # fmt: skip
 
 
@@ -204,22 +206,22 @@ def _polish_one(room_at, out_at, n, parts):
 def test_gaps_eight_at_a_time_are_those_one_by_one(n, parts):
     """The same source, compiled for doubles; questions are random, or have an edge that is nothing or a direction too."""
     rng = np.random.default_rng(100 * n + parts)
-    room = rng.normal(size=(gap.QUESTION, LANES))
-    room[gap.POSE_B + 9] += 8.0
-    room[gap.SCALE] = 2.0**-4
-    room[[gap.SLOP, gap.ERROR]] = 0.0
-    room[gap.PARALLELOGRAM] = rng.integers(0, 2, LANES)
+    block = rng.normal(size=(at.QUESTION, LANES))
+    block[at.POSE_B + 9] += 8.0
+    block[at.SCALE] = 2.0**-4
+    block[[at.SLOP, at.ERROR]] = 0.0
+    block[at.PARALLELOGRAM] = rng.integers(0, 2, LANES)
     for edge in range(2):
         for part in range(2):
-            room[gap.EDGES + gap.EDGE * edge + gap.PART * part + gap.OF_A] = (1 - part) if parts == 2 else rng.integers(0, 2, LANES)
-    room[gap.EDGES : gap.EDGES + 3, 5] = room[gap.EDGES + 3 : gap.EDGES + 6, 5]
-    room[gap.POSE_A : gap.POSE_B + 12, 6] = room[gap.CORNER_A : gap.CORNER_B + 3, 6] = 0.0
-    size = gap.FEATURE + fine.FINE + gap.ANSWER
+            block[at.EDGES + at.EDGE * edge + at.PART * part + at.OF_A] = (1 - part) if parts == 2 else rng.integers(0, 2, LANES)
+    block[at.EDGES : at.EDGES + 3, 5] = block[at.EDGES + 3 : at.EDGES + 6, 5]
+    block[at.POSE_A : at.POSE_B + 12, 6] = block[at.CORNER_A : at.CORNER_B + 3, 6] = 0.0
+    size = at.FEATURE + dd.STRIDE + at.ANSWER
     eight = np.zeros((size, LANES))
-    _polish(address_of(room), address_of(eight), n, parts)
+    _refine(address_of(block), address_of(eight), n, parts)
     for lane in range(LANES):
-        question, one = np.ascontiguousarray(room[:, lane]), np.zeros(size)
-        _polish_one(address_of(question), address_of(one), n, parts)
+        question, one = np.ascontiguousarray(block[:, lane]), np.zeros(size)
+        _refine_one(address_of(question), address_of(one), n, parts)
         assert np.array_equal(_bits(one), _bits(eight[:, lane])), (lane, question.tolist())
 
 

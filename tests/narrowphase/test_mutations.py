@@ -28,10 +28,14 @@ print(table.wrong + table.failed, table.undecided)
 MUTATIONS = {
     "none": ("bounds.py", "", ""),
     "error bound a hundredth": ("bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.64 * 2.0**-53"),
-    "a sign swapped": ("exact/directions.py", "    if side < 0:\n        for axis", "    if side > 0:\n        for axis"),
-    "the exact stage skipped": ("decide.py", "if marks[HOW] != UNDECIDED:", "if True:"),
-    "the plane stage inverted": ("exact_plane.py", "return TOUCHING if sign <= 0", "return TOUCHING if sign < 0"),
-    "an error of a sum dropped": ("fine.py", "rest += e + f", "rest += e"),
+    "a sign swapped": (
+        "exact/exact_directions.py", "    if side < 0:\n        reverse", "    if side > 0:\n        reverse",
+    ),
+    "the exact stage skipped": ("exact/settle_hulls.py", "if view_u8(row_at, ROW)[HOW] != UNDECIDED:", "if True:"),
+    "the exact half-space inverted": (
+        "exact/exact_halfspace.py", "return PlaneContact(TOUCHING if sign <= 0", "return PlaneContact(TOUCHING if sign < 0",
+    ),
+    "an error of a sum dropped": ("gap/precise_pair.py", "rest += x.low + error", "rest += x.low"),
 }
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from collide.kernels import address_of, entry, view_f64
-from collide.numerics import double_double
-from collide.numerics.error_free import dekker_product, two_product, two_sum
+from collide.numerics import double_double as dd
+from collide.numerics.error_free import DD, dekker_product, two_product, two_sum
 from collide.support.block_scan import (
     count_level,
     count_level_one_by_one,
@@ -31,11 +31,13 @@ def _operate(numbers_at, results_at, n):
         a_low = numbers[4 * k + 1]
         b = numbers[4 * k + 2]
         b_low = numbers[4 * k + 3]
-        out[14 * k], out[14 * k + 1] = double_double.add(a, a_low, b, b_low)
-        out[14 * k + 2], out[14 * k + 3] = double_double.subtract(a, a_low, b, b_low)
-        out[14 * k + 4], out[14 * k + 5] = double_double.multiply(a, a_low, b, b_low)
-        out[14 * k + 6], out[14 * k + 7] = double_double.divide(a, a_low, b, b_low)
-        out[14 * k + 8], out[14 * k + 9] = double_double.square_root(abs(a), a_low if a > 0.0 else -a_low)
+        x = DD(a, a_low)
+        y = DD(b, b_low)
+        out[14 * k], out[14 * k + 1] = dd.add(x, y)
+        out[14 * k + 2], out[14 * k + 3] = dd.sub(x, y)
+        out[14 * k + 4], out[14 * k + 5] = dd.mul(x, y)
+        out[14 * k + 6], out[14 * k + 7] = dd.div(x, y)
+        out[14 * k + 8], out[14 * k + 9] = dd.sqrt(x if a > 0.0 else dd.neg(x))
         out[14 * k + 10], out[14 * k + 11] = two_product(a, b)
         out[14 * k + 12], out[14 * k + 13] = dekker_product(a, b)
 
@@ -60,8 +62,8 @@ def test_operations_keep_their_bounds():
         a, b = Fraction(ah) + Fraction(al), Fraction(bh) + Fraction(bl)
         found = [Fraction(row[k]) + Fraction(row[k + 1]) for k in range(0, 14, 2)]
         for value, exact in zip(found, (a + b, a - b, a * b, a / b)):
-            assert abs(value - exact) <= abs(exact) * Fraction(double_double.ROUNDING), (ah, al, bh, bl)
-        assert abs(found[4] ** 2 - abs(a)) <= abs(a) * Fraction(2 * double_double.ROUNDING)
+            assert abs(value - exact) <= abs(exact) * Fraction(dd.ROUNDING), (ah, al, bh, bl)
+        assert abs(found[4] ** 2 - abs(a)) <= abs(a) * Fraction(2 * dd.ROUNDING)
         assert found[5] == found[6] == Fraction(ah) * Fraction(bh) and row[10] == row[12]
         cancelled += abs(a + b) < abs(a) * Fraction(2.0**-40)
     assert cancelled > n // 8
@@ -70,7 +72,7 @@ def test_operations_keep_their_bounds():
 @entry("void(float64, float64, float64, int64)")
 def _bracket(a, a_low, error, out_at):
     out = view_f64(out_at, 3)
-    out[0], out[1], out[2] = double_double.bracket(a, a_low, error)
+    out[0], out[1], out[2] = dd.bracket(DD(a, a_low), error)
 
 
 def test_brackets_are_outward_and_tight():

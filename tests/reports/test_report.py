@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import collide
 from collide.errors import InvalidArgument
 from collide.reports import number_format as units
 from collide.reports import report, tables, terminal
@@ -70,6 +71,7 @@ def make_scene(rows=ROWS, names=NAMES):
         distances=lambda max_distance: WorldResult(
             stacked[stacked["hit"] | (stacked["distance"] <= max_distance)],
             {k: SimpleNamespace(name=name) for k, name in names.items()},
+            collide.certify,
         ),
         stats=stats,
         names=dict(names),

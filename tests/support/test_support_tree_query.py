@@ -10,6 +10,7 @@ from hull_families import HULLS, directions_for, farthest_of, hull_of, integers,
 
 from collide.kernels import address_of, entry, view_f64
 from collide.numerics.exact_dot_sign import exact_sign
+from collide.numerics.vec3 import vec3_at
 from collide.support.build_support_tree import build_support_tree
 from collide.support.extreme_vertex import settle_vertex
 from collide.support.support_tree_query import extreme_vertex, extreme_vertices
@@ -131,10 +132,7 @@ def _signs(rows_at, n, out_at):
     rows = view_f64(rows_at, 9 * n)
     out = view_f64(out_at, n)
     for i in range(n):
-        k = 9 * i
-        out[i] = exact_sign(
-            rows[k], rows[k + 1], rows[k + 2], rows[k + 3], rows[k + 4], rows[k + 5], rows[k + 6], rows[k + 7], rows[k + 8]
-        )
+        out[i] = exact_sign(vec3_at(rows, 9 * i), vec3_at(rows, 9 * i + 3), vec3_at(rows, 9 * i + 6))
 
 
 signs = entry("void(int64, int64, int64)")(_signs)

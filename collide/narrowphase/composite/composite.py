@@ -15,13 +15,13 @@ from collide.lowering.compound_table import BALL_IN_WORLD, LaidOut, UnionTable
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_queries as run
 from collide.narrowphase.composite.composite_poses import (
-    ASKED,
     BAD_POSE,
     BLOCK,
-    DONE,
     HEADER,
     LIST,
-    LISTED,
+    N_ANSWERED,
+    N_DONE,
+    N_LISTED,
     SLOTS,
     answer_unions,
 )
@@ -33,7 +33,7 @@ from collide.results import PAIR_DTYPE
 # --- workspaces ---------------------------------------------------------------------------------
 
 #: How far things have come to begin with.
-_AT_THE_START = (0,) * (HEADER - DONE)
+_AT_THE_START = (0,) * (HEADER - N_DONE)
 #: Rows of parts of a block of poses, unless one pose takes more.
 _ROOM = 4096
 
@@ -111,9 +111,9 @@ def run_unions(
             run.distrust_doubles, address_of(out),
         )  # fmt: skip
         if not said or said == BAD_POSE:
-            of_thread.asked += int(header[ASKED])
+            of_thread.asked += int(header[N_ANSWERED])
             return not said
-        listed = int(header[LISTED])
+        listed = int(header[N_LISTED])
         run.settle_open(
             space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean, limit=limit,
             depths=depths and not boolean,

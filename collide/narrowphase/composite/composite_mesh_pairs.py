@@ -12,14 +12,14 @@ import math
 import numpy as np
 
 from collide.lowering.enclosures import enclosure_of
-from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace
+from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, has_facets, is_halfspace
 from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_bodies import convex_rows
-from collide.narrowphase.facets.facet_convex import Posed
-from collide.narrowphase.facets.facet_queries import FARTHER, all_hits, first_hits, surface_distances
+from collide.narrowphase.facets.body_pairs import body_rows, core_hits
+from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, decide
-from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN, core_hits
-from collide.narrowphase.facets.mesh_rows import PROMISE, facet_rows_of, hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_rows import hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN, PROMISE
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
@@ -29,7 +29,7 @@ _DETERMINANT, _COORDINATE = 2.0**-46, 2.0**-48
 _MOST_PAIRS = 4096
 
 
-def part_states(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed) -> np.ndarray:
+def part_states(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> np.ndarray:
     """(n,) APART, HIT or OPEN, for a mesh and another single body."""
     slop = X_WA.slop + X_WB.slop
     states = np.full(len(slop), OPEN)
@@ -48,13 +48,13 @@ def part_states(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed) -> np.ndarray:
     return states
 
 
-def _curved_states(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:
+def _curved_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     if not has_facets(A):
         A, B, PA, PB = B, A, PB, PA
     return decide(body_of(A), enclosure_of(B), PA, PB).state
 
 
-def part_rows(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed, limit: float) -> np.ndarray:
+def part_rows(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop, limit: float) -> np.ndarray:
     """Rows of a mesh and another single body, without depths, but against half-spaces; where open, how is "undecided".
 
     A bracket is widened by how far rounding may have moved the parts.
@@ -78,7 +78,7 @@ def part_rows(A: Shape, B: Shape, X_WA: Posed, X_WB: Posed, limit: float) -> np.
     return rows
 
 
-def _plane_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
+def _plane_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit: float) -> np.ndarray:
     rows = convex_rows(hull_shape(A), hull_shape(B), PA.X, PB.X)
     rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1
     _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
@@ -88,7 +88,7 @@ def _plane_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.nd
     return rows
 
 
-def _size(A: Shape, B: Shape, PA: Posed, PB: Posed) -> np.ndarray:
+def _size(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     """(n,) of pairs of parts, as `narrowphase/bounds.py` has it."""
     size = np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
     for shape in (A, B):
@@ -108,9 +108,9 @@ def _widen(rows: np.ndarray, size: np.ndarray, slop: np.ndarray, limit: float) -
     rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], np.inf
 
 
-def _loose_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.ndarray:
+def _loose_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit: float) -> np.ndarray:
     states = loose_states(body_of(A), body_of(B), PA, PB)
-    rows = facet_rows_of(A, B, PA.X, PB.X)
+    rows = body_rows(body_of(A), body_of(B), PA.X, PB.X, limit=math.inf, depths=False)
     hit = rows["hit"].copy()
     _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
     apart = states == APART
@@ -124,7 +124,7 @@ def _loose_rows(A: Shape, B: Shape, PA: Posed, PB: Posed, limit: float) -> np.nd
     return rows
 
 
-def loose_states(A: Body, B: Body, PA: Posed, PB: Posed) -> np.ndarray:
+def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     """(n,) states of two bodies of facets whose poses are known to within their slops."""
     slop, radius = PA.slop + PB.slop, A.radius + B.radius
     states = np.full(len(slop), OPEN)

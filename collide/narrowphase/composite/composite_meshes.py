@@ -15,16 +15,10 @@ from collide.lowering.composite_parts import UnionParts, union_of
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
-from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN
-from collide.narrowphase.facets.mesh_rows import rows_in_order
-from collide.narrowphase.facets.separating_translation import Parting, shortened
-from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
+from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
+from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
+from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
-
-
-def union_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool for poses (n, 4, 4): whether two shapes, one at least a union, share a point; True where open."""
-    return union_states(A, B, X_WA, X_WB) != APART
 
 
 def union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
@@ -81,7 +75,22 @@ def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
 
 def union_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
     """Rows (PAIR_DTYPE) for poses (n, 4, 4) of two shapes, one at least a union; limit, depths as in `distance`."""
-    return rows_in_order(_rows, union_of(A), union_of(B), X_WA, X_WB, limit, depths)
+    return _rows_in_order(union_of(A), union_of(B), X_WA, X_WB, limit, depths)
+
+
+def _rows_in_order(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+    """Rows worked out on the same numbers for swapped questions: unions in the order of their contents, equal ones by poses."""
+    if B.key < A.key:
+        return flipped(_rows_in_order(B, A, X_WB, X_WA, limit, depths))
+    rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    swap = np.zeros(len(X_WA), dtype=bool)
+    if A.key == B.key:
+        swap[:] = [X.tolist() > Y.tolist() for X, Y in zip(X_WA[:, :3], X_WB[:, :3])]
+    if swap.any():
+        rows[swap] = flipped(_rows(B, A, X_WB[swap], X_WA[swap], limit, depths))
+    if not swap.all():
+        rows[~swap] = _rows(A, B, X_WA[~swap], X_WB[~swap], limit, depths)
+    return rows
 
 
 def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
@@ -181,18 +190,18 @@ def _overlap(A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting:
     out[0] = row
 
 
-def _way_out(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> Parting:
+def _way_out(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
     """A translation of B that parts the unions, proven."""
     axes = np.concatenate([np.eye(3), X_WA[:3, :3].T, X_WB[:3, :3].T])
     axes /= np.sqrt(np.square(axes).sum(axis=1))[:, None]
     told = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
     directions = np.concatenate([told, axes, -axes])
-    best: Parting | None = None
+    best: SeparatingTranslation | None = None
     for n in directions:
         (a, error_a), (b, error_b) = A.extent(X_WA, n), B.extent(X_WB, -n)
         depth, bound = max(a + b, 0.0), max(a + b + error_a + error_b, 0.0)
         if best is None or bound < best.bound:
-            best = Parting(depth, bound, n)
+            best = SeparatingTranslation(depth, bound, n)
     assert best is not None
     if best.bound == 0.0:
         return best

@@ -9,8 +9,9 @@ the proven lower bound that each overlapping pair of parts must come apart.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
-from collide.kernels import entry, kernel, view_f64, view_i32, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import (
     COUNT,
@@ -41,223 +42,235 @@ from collide.narrowphase.rows import (
     POINT_B,
     ROW,
     UPPER,
+    view_row,
 )
+from collide.numerics.vec3 import Vec3, add, dot, neg, norm1, put_vec3, rotate_back, scale, sub, vec3_at
 from collide.support.support_mapping import support
 
-#: Normals of overlapping parts that are tried as the way out of a union, deepest first.
-NORMALS_TRIED = 8
+#: Normals of overlapping parts that are tried for a separating translation, deepest first.
+MAX_NORMALS = 8
 
-# What is known of a pair of bodies while its rows come in: which row is nearest, ends of the bracket, the least lower end
-# of a row that is not certified, rounds, whether a row is a hit, the upper end after the first row, and the deepest overlaps.
-_LEAST, _NEAREST, _LOWER, _UPPER, _UNPROVEN, _GJK, _EPA, _HIT, _FIRST_UPPER, _OVERLAPS, _DEEPEST = range(11)
-# Of an overlap: its distance, which row it is, its parts, its normal and both points.
-_DEPTH, _PLACE, _OF_A, _OF_B, _VECTORS = range(5)
+# Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
+# ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, the upper end of the
+# first row, the number of overlaps kept, and the deepest of them.
+(
+    _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _FIRST_UPPER, _N_OVERLAPS, _DEEPEST,
+) = range(11)  # fmt: skip
+# Of an overlap: its distance, the number of its row, its parts, its normal and both points.
+_DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
 _OVERLAP = _VECTORS + 9
-SCORE = _DEEPEST + NORMALS_TRIED * _OVERLAP
+SCORE = _DEEPEST + MAX_NORMALS * _OVERLAP
+
+
+class PosedParts(NamedTuple):
+    """Views of a `ShapeTable`'s integers and numbers, of poses of parts, and of which shape each part is."""
+
+    ints: Any
+    numbers: Any
+    poses: Any
+    shape_of: Any
+
+
+class BodySize(NamedTuple):
+    """Size of a body seen from a point of the world [m], how far its points may be off besides, whether it is curved."""
+
+    size: float
+    slop: float
+    curved: bool
+
+
+# --- scores ---------------------------------------------------------------------------------------
 
 
 @kernel(inline=True)
 def begin_score(score, at):
+    for k in range(_DEEPEST):
+        score[at + k] = 0.0
     score[at + _LEAST] = math.inf
     score[at + _NEAREST] = -1.0
     score[at + _LOWER] = math.inf
     score[at + _UPPER] = math.inf
-    score[at + _UNPROVEN] = math.inf
-    score[at + _GJK] = 0.0
-    score[at + _EPA] = 0.0
-    score[at + _HIT] = 0.0
+    score[at + _UNCERTIFIED] = math.inf
     score[at + _FIRST_UPPER] = math.inf
-    score[at + _OVERLAPS] = 0.0
 
 
 @kernel(inline=True)
 def first_upper_of(score, at):
-    """What the distance of the bodies is at most, by the row that came first."""
+    """An upper bound of the bodies' distance, by the row that came first."""
     return score[at + _FIRST_UPPER]
 
 
 @kernel(inline=True)
 def copy_row(row_at, out_at):
-    given = view_i64(row_at, ROW // 8)
+    row = view_i64(row_at, ROW // 8)
     out = view_i64(out_at, ROW // 8)
     for k in range(ROW // 8):
-        out[k] = given[k]
+        out[k] = row[k]
 
 
 @kernel
-def add_row(score, at, row_at, place, out_at):
-    """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of the first place."""
-    row = view_f64(row_at, 12)
-    rounds = view_i32(row_at, ROW // 4)[ITERATIONS]
-    marks = view_u8(row_at, ROW)
+def add_row(score, at, row_at, number, out_at):
+    """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of least number."""
+    row, words, marks = view_row(row_at)
     distance = row[DISTANCE]
     lower = row[LOWER]
     upper = row[UPPER]
     nearest = score[at + _NEAREST]
-    if nearest < 0.0 or distance < score[at + _LEAST] or (distance == score[at + _LEAST] and place < nearest):
+    if nearest < 0.0 or distance < score[at + _LEAST] or (distance == score[at + _LEAST] and number < nearest):
         score[at + _LEAST] = distance
-        score[at + _NEAREST] = float(place)
+        score[at + _NEAREST] = float(number)
         copy_row(row_at, out_at)
     if nearest < 0.0:
         score[at + _FIRST_UPPER] = upper
     score[at + _LOWER] = min(score[at + _LOWER], lower)
     score[at + _UPPER] = min(score[at + _UPPER], upper)
     if marks[CERTIFIED] == 0:
-        score[at + _UNPROVEN] = min(score[at + _UNPROVEN], lower)
+        score[at + _UNCERTIFIED] = min(score[at + _UNCERTIFIED], lower)
     if marks[HIT] != 0:
         score[at + _HIT] = 1.0
+    rounds = words[ITERATIONS]
     score[at + _GJK] += float(rounds & 0xFFFF)
     score[at + _EPA] += float(rounds >> 16)
     if upper < 0.0:
-        _add_overlap(score, at, row_at, place)
+        _add_overlap(score, at, row_at, number)
 
 
 @kernel
-def _add_overlap(score, at, row_at, place):
-    """Keep an overlap among the deepest, in their order."""
-    row = view_f64(row_at, 12)
-    words = view_i32(row_at, ROW // 4)
-    depth = row[DISTANCE]
-    kept = int(score[at + _OVERLAPS])
+def _add_overlap(score, at, row_at, number):
+    """Insert an overlap among the deepest, in their order."""
+    row, words, _ = view_row(row_at)
+    distance = row[DISTANCE]
+    n = int(score[at + _N_OVERLAPS])
     first = at + _DEEPEST
-    behind = 0
-    while behind < kept:
-        other = first + _OVERLAP * behind
-        if depth < score[other + _DEPTH] or (depth == score[other + _DEPTH] and place < score[other + _PLACE]):
+    place = 0
+    while place < n:
+        overlap = first + _OVERLAP * place
+        same = distance == score[overlap + _DISTANCE]
+        if distance < score[overlap + _DISTANCE] or (same and number < score[overlap + _NUMBER]):
             break
-        behind += 1
-    if behind == NORMALS_TRIED:
+        place += 1
+    if place == MAX_NORMALS:
         return
-    kept = min(kept + 1, NORMALS_TRIED)
-    for k in range(kept - 1, behind, -1):
-        for j in range(_OVERLAP):
-            score[first + _OVERLAP * k + j] = score[first + _OVERLAP * (k - 1) + j]
-    to = first + _OVERLAP * behind
-    score[to + _DEPTH] = depth
-    score[to + _PLACE] = float(place)
-    score[to + _OF_A] = float(words[PART_A])
-    score[to + _OF_B] = float(words[PART_B])
+    n = min(n + 1, MAX_NORMALS)
+    for k in range(_OVERLAP * n - 1, _OVERLAP * (place + 1) - 1, -1):
+        score[first + k] = score[first + k - _OVERLAP]
+    overlap = first + _OVERLAP * place
+    score[overlap + _DISTANCE] = distance
+    score[overlap + _NUMBER] = float(number)
+    score[overlap + _OF_A] = float(words[PART_A])
+    score[overlap + _OF_B] = float(words[PART_B])
     for k in range(9):
-        score[to + _VECTORS + k] = row[NORMAL + k]
-    score[at + _OVERLAPS] = float(kept)
+        score[overlap + _VECTORS + k] = row[NORMAL + k]
+    score[at + _N_OVERLAPS] = float(n)
 
 
 @kernel
 def close_score(score, at, out_at):
     """The nearest row, its bracket widened to hold for the bodies; whether they overlap for certain."""
-    row = view_f64(out_at, 12)
-    marks = view_u8(out_at, ROW)
+    row, words, marks = view_row(out_at)
     row[LOWER] = score[at + _LOWER]
     row[UPPER] = score[at + _UPPER]
     marks[HIT] = 1 if score[at + _HIT] != 0.0 else 0
     # Every row that may be the nearest is certified.
-    marks[CERTIFIED] = 1 if score[at + _UNPROVEN] == math.inf or score[at + _UNPROVEN] > score[at + _UPPER] else 0
-    gjk = min(int(score[at + _GJK]), 0xFFFF)
-    epa = min(int(score[at + _EPA]), 0x7FFF)
-    view_i32(out_at, ROW // 4)[ITERATIONS] = gjk | (epa << 16)
+    all_certified = score[at + _UNCERTIFIED] == math.inf or score[at + _UNCERTIFIED] > score[at + _UPPER]
+    marks[CERTIFIED] = 1 if all_certified else 0
+    words[ITERATIONS] = min(int(score[at + _GJK]), 0xFFFF) | (min(int(score[at + _EPA]), 0x7FFF) << 16)
     return score[at + _UPPER] < 0.0
 
 
+# --- overlaps -------------------------------------------------------------------------------------
+
+
 @kernel
-def find_way_out(score, at, out_at, ints, numbers, poses, shape_of, first_a, parts_a, first_b, parts_b):
+def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
     """Replace distance, lower, normal and points by the best translation that separates both bodies.
 
-    first, parts : each body's rows of ``poses`` and ``shape_of``.
+    parts : `PosedParts`.   first, n : each body's parts there.
 
-    Against one half-space the deepest part already tells it: there is one way out for all.
+    Against one half-space the row of the deepest part is the answer: there is one translation for all.
     """
-    if _is_halfspace(ints, shape_of, first_a, parts_a) or _is_halfspace(ints, shape_of, first_b, parts_b):
+    if _is_halfspace(parts, first_a, n_a) or _is_halfspace(parts, first_b, n_b):
         return
-    row = view_f64(out_at, 12)
-    words = view_i32(out_at, ROW // 4)
-    marks = view_u8(out_at, ROW)
+    row, words, marks = view_row(out_at)
     # Seen from between the bodies, whichever is A: where in the world the pair stands is no part of its size.
-    p = POSE * first_a + 9
-    q = POSE * first_b + 9
-    ox = 0.5 * poses[p] + 0.5 * poses[q]
-    oy = 0.5 * poses[p + 1] + 0.5 * poses[q + 1]
-    oz = 0.5 * poses[p + 2] + 0.5 * poses[q + 2]
-    size_a, slop_a, curved_a = _size_of(ints, numbers, poses, shape_of, first_a, parts_a, ox, oy, oz)
-    size_b, slop_b, curved_b = _size_of(ints, numbers, poses, shape_of, first_b, parts_b, ox, oy, oz)
-    size = size_a + size_b
-    error = ERROR * size + (slop_a + slop_b)
+    p_a = vec3_at(parts.poses, POSE * first_a + 9)
+    p_b = vec3_at(parts.poses, POSE * first_b + 9)
+    origin = add(scale(0.5, p_a), scale(0.5, p_b))
+    size_a = _size_of(parts, first_a, n_a, origin)
+    size_b = _size_of(parts, first_b, n_b, origin)
+    size = size_a.size + size_b.size
+    error = ERROR * size + (size_a.slop + size_b.slop)
     best = math.inf
     upper = row[UPPER]
-    for k in range(int(score[at + _OVERLAPS])):
-        tried = at + _DEEPEST + _OVERLAP * k
-        nx = score[tried + _VECTORS]
-        ny = score[tried + _VECTORS + 1]
-        nz = score[tried + _VECTORS + 2]
-        depth = _extent(ints, numbers, poses, shape_of, first_a, parts_a, ox, oy, oz, nx, ny, nz)
-        depth += _extent(ints, numbers, poses, shape_of, first_b, parts_b, ox, oy, oz, -nx, -ny, -nz)
+    for k in range(int(score[at + _N_OVERLAPS])):
+        overlap = at + _DEEPEST + _OVERLAP * k
+        n = vec3_at(score, overlap + _VECTORS)
+        depth = _extent(parts, first_a, n_a, origin, n) + _extent(parts, first_b, n_b, origin, neg(n))
         if depth + error < best:
             best = depth + error
             for j in range(9):
-                row[NORMAL + j] = score[tried + _VECTORS + j]
-            words[PART_A] = int(score[tried + _OF_A])
-            words[PART_B] = int(score[tried + _OF_B])
+                row[NORMAL + j] = score[overlap + _VECTORS + j]
+            words[PART_A] = int(score[overlap + _OF_A])
+            words[PART_B] = int(score[overlap + _OF_B])
             row[DISTANCE] = min(-depth, upper)
             row[LOWER] = -depth - error
     if best == math.inf:
         row[DISTANCE] = -math.inf
         row[LOWER] = -math.inf
     else:
-        # The points of the deepest parts fit that normal's own depth: keep their middle.
-        for j in range(3):
-            middle = 0.5 * (row[POINT_A + j] + row[POINT_B + j])
-            half = 0.5 * row[DISTANCE] * row[NORMAL + j]
-            row[POINT_A + j] = middle - half
-            row[POINT_B + j] = middle + half
-    promised = (PROMISE_CURVED if curved_a or curved_b else PROMISE_STORED) * size
+        # The points of the deepest parts fit that normal's own depth: their middle stays.
+        middle = scale(0.5, add(vec3_at(row, POINT_A), vec3_at(row, POINT_B)))
+        half = scale(0.5 * row[DISTANCE], vec3_at(row, NORMAL))
+        put_vec3(row, POINT_A, sub(middle, half))
+        put_vec3(row, POINT_B, add(middle, half))
+    promised = (PROMISE_CURVED if size_a.curved or size_b.curved else PROMISE_STORED) * size
     if not upper - row[LOWER] <= promised:
         marks[CERTIFIED] = 0
 
 
 @kernel(inline=True)
-def _is_halfspace(ints, shape_of, first, parts):
-    return parts == 1 and ints[INTS * shape_of[first] + KIND] == HALFSPACE
+def _is_halfspace(parts, first, n):
+    return n == 1 and parts.ints[INTS * parts.shape_of[first] + KIND] == HALFSPACE
 
 
 @kernel
-def _size_of(ints, numbers, poses, shape_of, first, parts, ox, oy, oz):
-    """(size of a body seen from a point o of the world, how far its points may be off besides, whether a part is no polytope)."""
+def _size_of(parts, first, n, origin):
+    """The `BodySize` of n parts, seen from a point of the world."""
     size = 0.0
     slop = 0.0
     pose_slop = 0.0
     curved = False
-    for part in range(first, first + parts):
+    for part in range(first, first + n):
         p = POSE * part
-        at = NUMBERS * shape_of[part]
-        away = abs(poses[p + 9] - ox) + abs(poses[p + 10] - oy) + abs(poses[p + 11] - oz)
-        size = max(size, 2 * numbers[at + REACH] + numbers[at + RADIUS] + away)
-        slop = max(slop, numbers[at + SLOP])
-        pose_slop = max(pose_slop, poses[p + POSE_SLOP])
-        curved = curved or ints[INTS * shape_of[part] + KIND] != POINTS
-    return size, slop + pose_slop, curved
+        shape = parts.shape_of[part]
+        at = NUMBERS * shape
+        away = norm1(sub(vec3_at(parts.poses, p + 9), origin))
+        size = max(size, 2 * parts.numbers[at + REACH] + parts.numbers[at + RADIUS] + away)
+        slop = max(slop, parts.numbers[at + SLOP])
+        pose_slop = max(pose_slop, parts.poses[p + POSE_SLOP])
+        curved = curved or parts.ints[INTS * shape + KIND] != POINTS
+    return BodySize(size, slop + pose_slop, curved)
 
 
 @kernel
-def _extent(ints, numbers, poses, shape_of, first, parts, ox, oy, oz, nx, ny, nz):
-    """How far a body reaches along n from a point o of the world."""
+def _extent(parts, first, n_parts, origin, n):
+    """How far a body reaches along n from a point of the world [m]."""
+    ints, numbers, poses = parts.ints, parts.numbers, parts.poses
     farthest = -math.inf
-    for part in range(first, first + parts):
-        shape = shape_of[part]
+    for part in range(first, first + n_parts):
+        shape = parts.shape_of[part]
         kind = ints[INTS * shape + KIND]
         if kind == HALFSPACE:
             return math.inf  # bounded in one direction only, which a rounded normal never is
         p = POSE * part
-        gx = poses[p] * nx + poses[p + 3] * ny + poses[p + 6] * nz
-        gy = poses[p + 1] * nx + poses[p + 4] * ny + poses[p + 7] * nz
-        gz = poses[p + 2] * nx + poses[p + 5] * ny + poses[p + 8] * nz
+        g = rotate_back(poses, p, n)
         at, length = coordinates_of(ints, shape)
-        params = NUMBERS * shape + PARAMS
         _, x, y, z, _ = support(
-            kind, view_f64(at, length), ints[INTS * shape + COUNT], ints[INTS * shape + PADDED], numbers, params,
-            ints[INTS * shape + TREE], 0, -1, gx, gy, gz,
+            kind, view_f64(at, length), ints[INTS * shape + COUNT], ints[INTS * shape + PADDED], numbers,
+            NUMBERS * shape + PARAMS, ints[INTS * shape + TREE], 0, -1, g.x, g.y, g.z,
         )  # fmt: skip
-        core = x * gx + y * gy + z * gz
-        shift = (poses[p + 9] - ox) * nx + (poses[p + 10] - oy) * ny + (poses[p + 11] - oz) * nz
-        farthest = max(farthest, core + shift + numbers[NUMBERS * shape + RADIUS])
+        shift = dot(sub(vec3_at(poses, p + 9), origin), n)
+        farthest = max(farthest, dot(Vec3(x, y, z), g) + shift + numbers[NUMBERS * shape + RADIUS])
     return farthest
 
 
@@ -274,21 +287,21 @@ def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at,
     for k in range(n):
         out = out_at + ROW * k
         begin_score(score, 0)
-        for place in range(starts[k], starts[k + 1]):
-            add_row(score, 0, rows_at + ROW * place, place, out)
+        for number in range(starts[k], starts[k + 1]):
+            add_row(score, 0, rows_at + ROW * number, number, out)
         first_a = spans[4 * k]
-        parts_a = spans[4 * k + 1]
+        n_a = spans[4 * k + 1]
         first_b = spans[4 * k + 2]
-        parts_b = spans[4 * k + 3]
-        if close_score(score, 0, out) and parts_a * parts_b > 1:
-            last = max(first_a + parts_a, first_b + parts_b)
+        n_b = spans[4 * k + 3]
+        if close_score(score, 0, out) and n_a * n_b > 1:
+            last = max(first_a + n_a, first_b + n_b)
             shape_of = view_i64(shape_of_at, last)
-            shapes = 0
-            for part in range(parts_a + parts_b):
-                own = first_a + part if part < parts_a else first_b + part - parts_a
-                shapes = max(shapes, shape_of[own] + 1)
-            find_way_out(
-                score, 0, out, view_i64(ints_at, INTS * shapes), view_f64(numbers_at, NUMBERS * shapes),
-                view_f64(poses_at, POSE * last), shape_of, first_a, parts_a, first_b, parts_b,
+            n_shapes = 0
+            for part in range(n_a + n_b):
+                n_shapes = max(n_shapes, shape_of[first_a + part if part < n_a else first_b + part - n_a] + 1)
+            parts = PosedParts(
+                view_i64(ints_at, INTS * n_shapes), view_f64(numbers_at, NUMBERS * n_shapes),
+                view_f64(poses_at, POSE * last), shape_of,
             )  # fmt: skip
+            separate_bodies(score, 0, out, parts, first_a, n_a, first_b, n_b)
     return 0

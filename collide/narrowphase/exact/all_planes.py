@@ -11,282 +11,281 @@ Doubles leave out nearly all, double-doubles nearly all of the rest; integers me
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64
 from collide.narrowphase.epa.origin_foot import nearest_of_triangle
-from collide.narrowphase.exact.exact_directions import scaled_by, set_normal, side_of
+from collide.narrowphase.exact.exact_directions import direction_length, height_along, reverse_direction, set_normal
 from collide.narrowphase.exact.exact_supports import support_pair
-from collide.narrowphase.exact.exact_workspace import (
-    LONGEST,
-    direction_at,
-    exact_pose,
-    load_poses,
-    scale_of,
-    scratch_at,
-    set_point,
-)
+from collide.narrowphase.exact.exact_workspace import exact_pair, fits, load_poses, set_point
 from collide.narrowphase.gap.precise_pair import (
-    FINE,
     HEIGHT_ERROR,
-    LARGEST_FINE,
-    SMALLEST_FINE,
+    LOW_PARTS_OF_PAIR,
     fine_edge,
     fine_height,
     fine_length,
     fine_point,
-    write_low_parts,
+    is_refinable,
+    put_low_parts,
+    unit_scale,
 )
-from collide.narrowphase.gap.precise_pair import scale_of as power_of_two
-from collide.numerics.digits import BITS, add_product, as_double_double, carry, clear
-from collide.numerics.double_double import add, cross, divide, square_root
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD, STRIDE
+from collide.numerics.vec3 import (
+    Vec3,
+    column_at,
+    cross,
+    dot,
+    neg,
+    norm,
+    norm1,
+    put_vec3,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
 
 #: Most vertices of both bodies, and most planes: some ten milliseconds.
-MOST_VERTICES, MOST_PLANES = 64, 60_000
+MAX_VERTICES, MAX_PLANES = 64, 60_000
 #: Most planes that double-doubles may leave.
-_KEPT = 256
-#: Of a plane kept: its three points (6 vertex ids), a bound of the extent.
+_MAX_CANDIDATES = 256
+#: Of a candidate: three points of its plane (6 vertex ids), a lower bound of the extent.
 _PLANE = 7
-#: Most points of a facet that are looked at for the nearest one.
-_CORNERS = 64
-# Doubles of workspace: points of A and of B, a direction, low parts of poses, planes.
-_DIRECTION = FINE * (MOST_VERTICES + 1)
-_LOW = _DIRECTION + FINE
-_PLANES = _LOW + 24
-ROOM = _PLANES + _PLANE * _KEPT
+#: Most points of a facet that are looked at for the nearest one, and doubles of each: the point, its vertex pair.
+_MAX_CORNERS, _CORNER = 64, 5
+# Doubles of workspace: points of A and of B, a direction, low parts of poses, candidates.
+_DIRECTION = STRIDE * (MAX_VERTICES + 1)
+_LOW = _DIRECTION + STRIDE
+_PLANES = _LOW + LOW_PARTS_OF_PAIR
+DOUBLES = _PLANES + _PLANE * _MAX_CANDIDATES
 #: What rounding does to a normal, in doubles and in double-doubles, in units of |e||f| and of |e| + |f|.
-_IN_DOUBLES, _FINELY = 2.0**-49, 2.0**-96
+_DOUBLE_ERROR, _DD_ERROR = 2.0**-49, 2.0**-96
 #: Extents are told apart to this, relatively, four roundings of doubles doubled; integers do the rest.
 _ROUNDED = 2.0**-50
 
 
+class PlaneDepth(NamedTuple):
+    """The depth of cores that share a point [m], however small, and the unit vector outwards of A ⊖ B; if proven."""
+
+    proven: bool
+    depth: DD
+    nhat: Vec3
+
+
+class PlaneSearch(NamedTuple):
+    """Where candidates come from and go to.
+
+    fine : points of A, then of B, scaled to size 1, as double-doubles.   direction : a workspace.   planes : candidates.
+    """
+
+    fine: Any
+    direction: Any
+    planes: Any
+    n_a: int
+    n_b: int
+
+
+class Candidates(NamedTuple):
+    """How many planes may decide so far, −1 where there are too many, and the least extent so far, scaled."""
+
+    n: int
+    extent: float
+
+
 @kernel
 def planes_of(n_a, n_b):
-    """How many planes there are to look at."""
+    """How many planes there are."""
     pairs = (n_a * (n_a - 1) // 2) * (n_b * (n_b - 1) // 2)
     return pairs + n_a * (n_a - 1) * (n_a - 2) // 6 + n_b * (n_b - 1) * (n_b - 2) // 6
 
 
 @kernel
-def depth_by_all_planes(
-    pair, terms, terms_at, digits, room_at, ids, lowest_a, lowest_b, reach_a, reach_b, size, error
-):  # fmt: skip
-    """The depth of cores that share a point, however small, and the direction of it.
+def depth_by_all_planes(ordered, terms, terms_at, digits, doubles_at, ids):
+    """The `PlaneDepth` of an `OrderedPair`.
 
-    room_at : ROOM doubles of workspace.   ids : out, the vertex pairs of three points around the nearest one.
+    doubles_at : DOUBLES doubles of workspace.   ids : out, the vertex pairs of three points around the nearest one.
     Other arguments as in `touch_exactly`.
-
-    Returns (proven, depth, low part, nx, ny, nz): the last three the unit vector outwards of A ⊖ B.
     """
-    n_a = pair.A.n
-    n_b = pair.B.n
-    if n_a + n_b > MOST_VERTICES or planes_of(n_a, n_b) > MOST_PLANES or not (SMALLEST_FINE < size < LARGEST_FINE):
-        return False, 0.0, 0.0, 0.0, 0.0, 1.0
-    pose_a = exact_pose(pair.poses, pair.A.pose_at, terms)
-    pose_b = exact_pose(pair.poses, pair.B.pose_at, terms)
-    scale = scale_of(pose_a, pose_b, lowest_a, lowest_b, reach_a, reach_b, 0.0, 0.0, size)
-    if scale[0] > LONGEST:
-        return False, 0.0, 0.0, 0.0, 0.0, 1.0
-    kept = _nearest_planes(pair, terms_at, room_at, n_a, n_b, size)
-    if kept == 0:
-        return False, 0.0, 0.0, 0.0, 0.0, 1.0
-    load_poses(digits, scale, pose_a, pose_b)
-    planes = view_f64(room_at + 8 * _PLANES, _PLANE * _KEPT)
-    depth = math.inf
-    depth_low = 0.0
-    nx = 0.0
-    ny = 0.0
-    nz = 1.0
-    for k in range(kept):
+    pair = ordered.pair
+    unproven = PlaneDepth(False, DD(0.0, 0.0), Vec3(0.0, 0.0, 1.0))
+    n_a, n_b = pair.A.n, pair.B.n
+    if n_a + n_b > MAX_VERTICES or planes_of(n_a, n_b) > MAX_PLANES or not is_refinable(ordered.size):
+        return unproven
+    exact = exact_pair(ordered, terms, digits, 0.0, 0.0)
+    if not fits(exact):
+        return unproven
+    n_planes = _find_candidates(ordered, terms_at, doubles_at)
+    if n_planes == 0:
+        return unproven
+    load_poses(exact)
+    planes = view_f64(doubles_at + 8 * _PLANES, _PLANE * _MAX_CANDIDATES)
+    best = PlaneDepth(False, DD(math.inf, 0.0), Vec3(0.0, 0.0, 1.0))
+    for k in range(n_planes):
         at = _PLANE * k
         for point in range(3):
-            set_point(digits, scale, pair, point, int(planes[at + 2 * point]), int(planes[at + 2 * point + 1]))
-        extent, extent_low, x, y, z = _extent(digits, scale, pair, error)
-        if extent < depth or (extent == depth and extent_low < depth_low):
-            depth = extent
-            depth_low = extent_low
-            nx = x
-            ny = y
-            nz = z
-    if depth == math.inf:
-        return False, 0.0, 0.0, 0.0, 0.0, 1.0
-    _find_corners(pair, room_at, ids, nx, ny, nz, depth, error)
-    return True, depth, depth_low, nx, ny, nz
+            set_point(exact, point, int(planes[at + 2 * point]), int(planes[at + 2 * point + 1]))
+        found = _extent(exact)
+        if dd.less(found.depth, best.depth):
+            best = found
+    if not best.proven:
+        return unproven
+    _find_corners(exact, doubles_at, ids, best)
+    return best
 
 
 @kernel
-def _extent(digits, scale, pair, error):
-    """(extent, low, nx, ny, nz): the least of both extents of A ⊖ B across points 0 … 2, and its direction; infinite
-    where these lie in line."""
-    d = scale[0]
-    n, _ = set_normal(digits, d)
-    square = scratch_at(d, 0)
-    clear(digits, square, 2 * n)
-    for axis in range(3):
-        add_product(digits, square, direction_at(d, axis), n, direction_at(d, axis), n, 1)
-    if carry(digits, square, 2 * n) == 0:
-        return math.inf, 0.0, 0.0, 0.0, 0.0
-    value, value_low, exponent = as_double_double(digits, square, 2 * n)
-    odd = exponent & 1
-    length, length_low = square_root(scaled_by(value, odd), scaled_by(value_low, odd))
-    half = (exponent - odd) // 2
-    best = math.inf
-    best_low = 0.0
-    bx = 0.0
-    by = 0.0
-    bz = 0.0
+def _extent(exact):
+    """The lesser of both extents of A ⊖ B across points 0 … 2; infinite, unproven, where these lie in line."""
+    best = PlaneDepth(False, DD(math.inf, 0.0), Vec3(0.0, 0.0, 0.0))
+    n, _ = set_normal(exact)
+    length = direction_length(exact, n)
+    if length.value.high == 0.0:
+        return best
     for _ in range(2):
-        for axis in range(3):
-            at = direction_at(d, axis)
-            for k in range(n):
-                digits[at + k] = -digits[at + k]
-            carry(digits, at, n)
+        reverse_direction(exact, n)
         # The last vertex against the direction is the first one along its opposite.
-        i, j, vx, vy, vz = support_pair(digits, scale, pair, n, error)
-        set_point(digits, scale, pair, 3, i, j)
-        side_of(digits, d, n, 3)
-        value, value_low, exponent = as_double_double(digits, scratch_at(d, 0), n + d)
-        extent, low = divide(-value, -value_low, length, length_low)
-        shift = exponent - half + BITS * scale[1]
-        extent = scaled_by(extent, shift)
-        low = scaled_by(low, shift)
-        if extent < best or (extent == best and low < best_low):
-            best = extent
-            best_low = low
-            bx = -vx
-            by = -vy
-            bz = -vz
-    return best, best_low, bx, by, bz
+        i, j, v = support_pair(exact, n)
+        set_point(exact, 3, i, j)
+        extent = dd.neg(height_along(exact, n, length, 3))
+        if dd.less(extent, best.depth):
+            best = PlaneDepth(True, extent, neg(v))
+    return best
+
+
+# --- candidates -----------------------------------------------------------------------------------
 
 
 @kernel
-def _nearest_planes(pair, terms_at, room_at, n_a, n_b, size):
-    """Number of the planes that may decide, written into the room; 0 where there are too many of them."""
-    fine = view_f64(room_at, FINE * (MOST_VERTICES + 1))
-    planes = view_f64(room_at + 8 * _PLANES, _PLANE * _KEPT)
-    low_at = room_at + 8 * _LOW
-    low = view_f64(low_at, write_low_parts(pair, terms_at, low_at))
-    scale = power_of_two(size)
+def _find_candidates(ordered, terms_at, doubles_at):
+    """Number of the planes that may decide, written into the workspace; 0 where there are too many of them."""
+    pair = ordered.pair
+    n_a, n_b = pair.A.n, pair.B.n
+    low_at = doubles_at + 8 * _LOW
+    low = view_f64(low_at, put_low_parts(pair, terms_at, low_at))
+    search = PlaneSearch(
+        view_f64(doubles_at, STRIDE * (MAX_VERTICES + 1)), view_f64(doubles_at + 8 * _DIRECTION, STRIDE),
+        view_f64(doubles_at + 8 * _PLANES, _PLANE * _MAX_CANDIDATES), n_a, n_b,
+    )  # fmt: skip
+    unit = unit_scale(ordered.size)
     for i in range(n_a):
-        fine_point(pair, low, fine, i, i, 0, scale)
+        fine_point(pair, low, search.fine, i, i, 0, unit)
     for j in range(n_b):
-        fine_point(pair, low, fine, n_a + j, 0, j, scale)
-    best = math.inf
-    kept = 0
-    for body in range(3):
-        # Three vertices of A, three of B, or two of each; ``first`` and ``last`` bound the numbers of their points.
-        first = n_a if body == 1 else 0
+        fine_point(pair, low, search.fine, n_a + j, 0, j, unit)
+    candidates = Candidates(0, math.inf)
+    for body in range(2):  # three vertices of A, or of B
+        first = 0 if body == 0 else n_a
         last = n_a if body == 0 else n_a + n_b
-        for p in range(first, last if body < 2 else n_a):
-            for q in range(p + 1, last if body < 2 else n_a):
-                for r in range(q + 1 if body < 2 else n_a, last):
-                    if body < 2:
-                        kept, best = _weigh(fine, room_at, planes, n_a, n_b, p, q, p, r, kept, best)
-                    else:
-                        for s in range(r + 1, last):
-                            kept, best = _weigh(fine, room_at, planes, n_a, n_b, p, q, r, s, kept, best)
-                            if kept < 0:
-                                return 0
-                    if kept < 0:
+        for p in range(first, last):
+            for q in range(p + 1, last):
+                for r in range(q + 1, last):
+                    candidates = _consider(search, p, q, p, r, candidates)
+                    if candidates.n < 0:
                         return 0
-    return _pruned(planes, kept, best)
+    for p in range(n_a):  # an edge of A, and one of B
+        for q in range(p + 1, n_a):
+            for r in range(n_a, n_a + n_b):
+                for s in range(r + 1, n_a + n_b):
+                    candidates = _consider(search, p, q, r, s, candidates)
+                    if candidates.n < 0:
+                        return 0
+    return _prune(search.planes, candidates.n, candidates.extent)
+
+
+@kernel(inline=True)
+def _point(fine, k):
+    return dd.leading(dd.vec3_at(fine, STRIDE * k))
 
 
 @kernel
-def _weigh(fine, room_at, planes, n_a, n_b, p, q, r, s, kept, best):
-    """Keep the plane along the edges from p to q and from r to s if it may decide; (kept, least extent so far).
-
-    Kept becomes −1 where there is no room.
-    """
-    ex = fine[FINE * q] - fine[FINE * p]
-    ey = fine[FINE * q + 2] - fine[FINE * p + 2]
-    ez = fine[FINE * q + 4] - fine[FINE * p + 4]
-    fx = fine[FINE * s] - fine[FINE * r]
-    fy = fine[FINE * s + 2] - fine[FINE * r + 2]
-    fz = fine[FINE * s + 4] - fine[FINE * r + 4]
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    high_a = -math.inf
-    low_a = math.inf
-    for i in range(n_a):
-        height = nx * fine[FINE * i] + ny * fine[FINE * i + 2] + nz * fine[FINE * i + 4]
-        high_a = max(high_a, height)
-        low_a = min(low_a, height)
-    high_b = -math.inf
-    low_b = math.inf
-    for j in range(n_a, n_a + n_b):
-        height = nx * fine[FINE * j] + ny * fine[FINE * j + 2] + nz * fine[FINE * j + 4]
-        high_b = max(high_b, height)
-        low_b = min(low_b, height)
-    base = nx * fine[0] + ny * fine[2] + nz * fine[4]
+def _consider(search, p, q, r, s, candidates):
+    """The candidates with the plane along the edges from p to q and from r to s, if it may decide."""
+    fine, n_a, n_b = search.fine, search.n_a, search.n_b
+    e = sub(_point(fine, q), _point(fine, p))
+    f = sub(_point(fine, s), _point(fine, r))
+    n = cross(e, f)
+    high_a, low_a = _span_of_heights(fine, 0, n_a, n)
+    high_b, low_b = _span_of_heights(fine, n_a, n_a + n_b, n)
+    base = dot(n, _point(fine, 0))
     # Points are at most 1 in size, so are heights in units of the normal; edges are off by roundings of points.
-    unsure = 8.0 * _IN_DOUBLES * (e * f + e + f)
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if min(high_a + high_b - base, base - low_a - low_b) - unsure > best * length:
-        return kept, best
-    return _weigh_finely(fine, room_at, planes, n_a, n_b, p, q, r, s, kept, best)
+    error = 8.0 * _DOUBLE_ERROR * (norm1(e) * norm1(f) + norm1(e) + norm1(f))
+    if min(high_a + high_b - base, base - low_a - low_b) - error > candidates.extent * norm(n):
+        return candidates
+    return _consider_finely(search, p, q, r, s, candidates)
+
+
+@kernel(inline=True)
+def _span_of_heights(fine, first, last, n):
+    """(greatest, least) height of points along n."""
+    high = -math.inf
+    low = math.inf
+    for k in range(first, last):
+        height = dot(n, _point(fine, k))
+        high = max(high, height)
+        low = min(low, height)
+    return high, low
 
 
 @kernel
-def _weigh_finely(fine, room_at, planes, n_a, n_b, p, q, r, s, kept, best):
-    """`_weigh` in double-doubles."""
-    direction = view_f64(room_at + 8 * _DIRECTION, FINE)
-    ex, ex_low, ey, ey_low, ez, ez_low = fine_edge(fine, q, p)
-    fx, fx_low, fy, fy_low, fz, fz_low = fine_edge(fine, s, r)
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    (
-        direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-    ) = cross(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low)  # fmt: skip
-    length, _ = fine_length(direction)
-    unsure = 8.0 * (_FINELY * e * f + 4.0 * HEIGHT_ERROR * (e + f))
+def _consider_finely(search, p, q, r, s, candidates):
+    """`_consider` in double-doubles."""
+    e = fine_edge(search.fine, q, p)
+    f = fine_edge(search.fine, s, r)
+    e_size = norm1(dd.leading(e))
+    f_size = norm1(dd.leading(f))
+    dd.put_vec3(search.direction, 0, dd.cross(e, f))
+    length = fine_length(search.direction).high
+    error = 8.0 * (_DD_ERROR * e_size * f_size + 4.0 * HEIGHT_ERROR * (e_size + f_size))
+    n, best = candidates
     extent = 0.0
     if length > 0.0:
-        extent = max(min(_extent_above(fine, n_a, n_b, direction, 1.0), _extent_above(fine, n_a, n_b, direction, -1.0)), 0.0)
-        extent /= length
+        extent = max(min(_extent_above(search, 1.0), _extent_above(search, -1.0)), 0.0) / length
         best = min(best, extent * (1.0 + _ROUNDED) + 8.0 * HEIGHT_ERROR)
-        extent = extent * (1.0 - _ROUNDED) - unsure / length - 8.0 * HEIGHT_ERROR
+        extent = extent * (1.0 - _ROUNDED) - error / length - 8.0 * HEIGHT_ERROR
     if extent > best:
-        return kept, best
-    if kept == _KEPT:
-        kept = _pruned(planes, kept, best)
-        if kept == _KEPT:
-            return -1, best
-    at = _PLANE * kept
-    # Points of A ⊖ B: the corner of both edges, and where either leads from it.
-    if r >= n_a and p < n_a:
-        _set_ids(planes, at, p, r - n_a, q, r - n_a, p, s - n_a)
-    elif p < n_a:
-        _set_ids(planes, at, p, 0, q, 0, s, 0)
-    else:
-        _set_ids(planes, at, 0, p - n_a, 0, q - n_a, 0, s - n_a)
-    planes[at + 6] = extent
-    return kept + 1, best
+        return Candidates(n, best)
+    if n == _MAX_CANDIDATES:
+        n = _prune(search.planes, n, best)
+        if n == _MAX_CANDIDATES:
+            return Candidates(-1, best)
+    _put_plane(search, n, p, q, r, s, extent)
+    return Candidates(n + 1, best)
 
 
 @kernel
-def _extent_above(fine, n_a, n_b, direction, sign):
-    """The greatest height of A ⊖ B along a direction (sign 1) or its opposite (−1), rounded once."""
+def _extent_above(search, sign):
+    """The greatest height of A ⊖ B along the direction (sign 1) or its opposite (−1), rounded once."""
     # Point 0 stands among those of A and those of B, and once too often.
-    total, total_low = fine_height(fine, 0, direction)
-    total = -sign * total
-    total_low = -sign * total_low
+    total = dd.scale(-sign, fine_height(search.fine, 0, search.direction))
     for body in range(2):
-        high = -math.inf
-        high_low = 0.0
-        for k in range(n_a if body == 1 else 0, n_a + n_b if body == 1 else n_a):
-            height, height_low = fine_height(fine, k, direction)
-            if sign * height > high or (sign * height == high and sign * height_low > high_low):
-                high = sign * height
-                high_low = sign * height_low
-        total, total_low = add(total, total_low, high, high_low)
-    return total
+        highest = DD(-math.inf, 0.0)
+        first = search.n_a if body == 1 else 0
+        last = search.n_a + search.n_b if body == 1 else search.n_a
+        for k in range(first, last):
+            height = dd.scale(sign, fine_height(search.fine, k, search.direction))
+            if dd.less(highest, height):
+                highest = height
+        total = dd.add(total, highest)
+    return total.high
 
 
 @kernel
-def _set_ids(planes, at, i, j, i_first, j_first, i_second, j_second):
+def _put_plane(search, k, p, q, r, s, extent):
+    """Candidate k by points of A ⊖ B: the corner of both edges, and where either leads from it."""
+    at = _PLANE * k
+    n_a = search.n_a
+    if r >= n_a and p < n_a:
+        _put_ids(search.planes, at, p, r - n_a, q, r - n_a, p, s - n_a)
+    elif p < n_a:
+        _put_ids(search.planes, at, p, 0, q, 0, s, 0)
+    else:
+        _put_ids(search.planes, at, 0, p - n_a, 0, q - n_a, 0, s - n_a)
+    search.planes[at + 6] = extent
+
+
+@kernel
+def _put_ids(planes, at, i, j, i_first, j_first, i_second, j_second):
     planes[at] = i
     planes[at + 1] = j
     planes[at + 2] = i_first
@@ -296,71 +295,67 @@ def _set_ids(planes, at, i, j, i_first, j_first, i_second, j_second):
 
 
 @kernel
-def _pruned(planes, kept, best):
-    """Drop planes that cannot decide any more; how many are left."""
-    left = 0
-    for k in range(kept):
-        if planes[_PLANE * k + 6] <= best:
+def _prune(planes, n, extent):
+    """Drop candidates whose extent is greater; how many remain."""
+    remaining = 0
+    for k in range(n):
+        if planes[_PLANE * k + 6] <= extent:
             for j in range(_PLANE):
-                planes[_PLANE * left + j] = planes[_PLANE * k + j]
-            left += 1
-    return left
+                planes[_PLANE * remaining + j] = planes[_PLANE * k + j]
+            remaining += 1
+    return remaining
+
+
+# --- the facet ------------------------------------------------------------------------------------
 
 
 @kernel
-def _find_corners(pair, room_at, ids, nx, ny, nz, depth, error):
-    """The vertex pairs of three points of the facet across n, around the foot of the origin.
+def _find_corners(exact, doubles_at, ids, found):
+    """The vertex pairs of three points of the facet across the direction of a `PlaneDepth`, around the foot of the origin.
 
     Any three of its corners may not do; the triangle that comes nearest does, or an edge, or a corner.
     """
-    corners = view_f64(room_at, 5 * _CORNERS)
-    count = _facet(pair, corners, nx, ny, nz, depth, error)
+    corners = view_f64(doubles_at, _CORNER * _MAX_CORNERS)
+    n_corners = _list_corners(exact, corners, found)
     best = math.inf
-    for i in range(count):
+    for i in range(n_corners):
         for j in range(i + 1):
             for k in range(j + 1):
-                away, _, _, _ = nearest_of_triangle(corners, 5 * i, 5 * j, 5 * k, 0.0, 0.0, 0.0)
-                if away < best:
-                    best = away
+                a, b, c = vec3_at(corners, _CORNER * i), vec3_at(corners, _CORNER * j), vec3_at(corners, _CORNER * k)
+                distance = nearest_of_triangle(a, b, c, Vec3(0.0, 0.0, 0.0)).distance
+                if distance < best:
+                    best = distance
                     for corner in range(3):
-                        at = 5 * (i if corner == 0 else j if corner == 1 else k)
+                        at = _CORNER * (i if corner == 0 else j if corner == 1 else k)
                         ids[2 * corner] = int(corners[at + 3])
                         ids[2 * corner + 1] = int(corners[at + 4])
 
 
 @kernel
-def _facet(pair, corners, nx, ny, nz, depth, error):
+def _list_corners(exact, corners, found):
     """Points of A ⊖ B that are level with the farthest along n, less the foot, with their vertices; their number."""
-    A, B, poses, t = pair.A, pair.B, pair.poses, pair.t
-    p, q = A.pose_at, B.pose_at
-    ax = poses[p] * nx + poses[p + 3] * ny + poses[p + 6] * nz
-    ay = poses[p + 1] * nx + poses[p + 4] * ny + poses[p + 7] * nz
-    az = poses[p + 2] * nx + poses[p + 5] * ny + poses[p + 8] * nz
-    bx = poses[q] * nx + poses[q + 3] * ny + poses[q + 6] * nz
-    by = poses[q + 1] * nx + poses[q + 4] * ny + poses[q + 7] * nz
-    bz = poses[q + 2] * nx + poses[q + 5] * ny + poses[q + 8] * nz
+    A, B, poses = exact.pair.A, exact.pair.B, exact.pair.poses
+    along_a = rotate_back(poses, A.pose_at, found.nhat)
+    along_b = rotate_back(poses, B.pose_at, found.nhat)
+    foot = scale(found.depth.high, found.nhat)
     high = -math.inf
     for i in range(A.n):
-        high = max(high, ax * A.coords[i] + ay * A.coords[A.padded + i] + az * A.coords[2 * A.padded + i])
+        high = max(high, dot(along_a, column_at(A.coords, A.padded, i)))
     low = math.inf
     for j in range(B.n):
-        low = min(low, bx * B.coords[j] + by * B.coords[B.padded + j] + bz * B.coords[2 * B.padded + j])
-    count = 0
+        low = min(low, dot(along_b, column_at(B.coords, B.padded, j)))
+    n_corners = 0
     for i in range(A.n):
-        if ax * A.coords[i] + ay * A.coords[A.padded + i] + az * A.coords[2 * A.padded + i] < high - error:
+        a = column_at(A.coords, A.padded, i)
+        if dot(along_a, a) < high - exact.error:
             continue
         for j in range(B.n):
-            if bx * B.coords[j] + by * B.coords[B.padded + j] + bz * B.coords[2 * B.padded + j] > low + error or count == _CORNERS:
+            b = column_at(B.coords, B.padded, j)
+            if dot(along_b, b) > low + exact.error or n_corners == _MAX_CORNERS:
                 continue
-            for axis in range(3):
-                r = p + 3 * axis
-                s = q + 3 * axis
-                a = poses[r] * A.coords[i] + poses[r + 1] * A.coords[A.padded + i] + poses[r + 2] * A.coords[2 * A.padded + i]
-                b = poses[s] * B.coords[j] + poses[s + 1] * B.coords[B.padded + j] + poses[s + 2] * B.coords[2 * B.padded + j]
-                shift = t.x if axis == 0 else (t.y if axis == 1 else t.z)
-                n = nx if axis == 0 else (ny if axis == 1 else nz)
-                corners[5 * count + axis] = (a - b) - shift - depth * n
-            corners[5 * count + 3] = i
-            corners[5 * count + 4] = j
-            count += 1
-    return count
+            difference = sub(rotate(poses, A.pose_at, a), rotate(poses, B.pose_at, b))
+            put_vec3(corners, _CORNER * n_corners, sub(sub(difference, exact.pair.t), foot))
+            corners[_CORNER * n_corners + 3] = i
+            corners[_CORNER * n_corners + 4] = j
+            n_corners += 1
+    return n_corners

@@ -1,7 +1,7 @@
-"""What `answer` tells the exact stage of depths below rounding: the facets nearest the origin, more than one perhaps.
+"""What `answer_pairs` asks of the exact stage: depths below rounding, by the facets of A ⊖ B nearest the origin, maybe several.
 
-A list in the workspace of one call: how many integers it takes, then an entry a row: the row's number, whether all other
-facets are farther for certain, the number of facets, and of each the vertex pairs of its three corners.
+A list in the workspace of one call: how many integers are used, then an entry a row, in the order of rows: the row's number,
+whether all other facets are farther for certain, the number of facets, and of each the vertex pairs of its three corners.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from collide.kernels import kernel
 
 #: Facets an entry may name: around a corner that touches a face there are a dozen.
-MOST_TIED = 24
+MAX_TIED_FACETS = 24
 #: Rows that are answered before the exact stage has its turn; integers of one entry, without its row, and of a list that
 #: fits if all of these rows ask.
-ROWS_TOGETHER = 256
-ENTRY = 2 + 6 * MOST_TIED
-REQUESTS = 1 + ROWS_TOGETHER * (1 + ENTRY)
+ROWS_PER_BATCH = 256
+ENTRY = 2 + 6 * MAX_TIED_FACETS
+REQUESTS = 1 + ROWS_PER_BATCH * (1 + ENTRY)
 
 
 @kernel
@@ -29,8 +29,9 @@ def add_request(requests, row, tied):
 
 
 @kernel
-def find_request(requests, at, row):
-    """Where the entry of a row begins, behind the row's number, or the place to look on for later rows; whether it is."""
+def find_request(requests, row):
+    """Where the entry of a row begins, behind the row's number; 0 where there is none."""
+    at = 1
     while at <= requests[0] and requests[at] < row:
         at += 3 + 6 * requests[at + 2]
-    return at + 1, at <= requests[0] and requests[at] == row
+    return at + 1 if at <= requests[0] and requests[at] == row else 0

@@ -3,92 +3,86 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.narrowphase.exact.exact_directions import direction_double
 from collide.narrowphase.exact.exact_workspace import direction_at, scratch_at
 from collide.numerics.digits import add_double, add_product, carry, clear
+from collide.numerics.vec3 import Vec3, column_at, divide, dot, norm, rotate_back, scale, sub
 from collide.support.support_tree_query import extreme_vertex, rings_of
 
 
-@kernel
-def support_pair(digits, scale, pair, length, error):
-    """(vertex of A, vertex of B) whose difference is the last one against the direction; unit v in doubles."""
-    d, _, _, digits_rot_a, core_a, digits_a, _, digits_rot_b, core_b, digits_b = scale
-    A, B, poses = pair.A, pair.B, pair.poses
-    p, q = A.pose_at, B.pose_at
-    vx, vy, vz = direction_double(digits, d, length)
-    along = math.sqrt(vx * vx + vy * vy + vz * vz)
-    slack = 2.0 * error * along
-    i = _extreme_vertex(
-        digits, d, length, A.coords, A.n, A.padded, A.tree, poses, p, 0, digits_rot_a, core_a, digits_a, vx, vy, vz, slack, 1.0
-    )
-    j = _extreme_vertex(
-        digits, d, length, B.coords, B.n, B.padded, B.tree, poses, q, 9, digits_rot_b, core_b, digits_b, vx, vy, vz, slack, -1.0
-    )
-    return i, j, vx / along, vy / along, vz / along
+class SupportPair(NamedTuple):
+    """Vertices i of A and j of B whose difference is the last one against the direction; v : that as a unit vector."""
+
+    i: int
+    j: int
+    v: Vec3
 
 
 @kernel
-def _extreme_vertex(
-    digits, d, n, coordinates, count, m, tree, poses, p, rotation, digits_rot, core, digits_core, vx, vy, vz, slack, sign
-):
+def support_pair(exact, n):
+    """The `SupportPair` of the direction, whose components have n digits."""
+    direction = direction_double(exact, n)
+    length = norm(direction)
+    i = _extreme_vertex(exact, exact.A, exact.pair.A, n, direction, length, 1.0)
+    j = _extreme_vertex(exact, exact.B, exact.pair.B, n, direction, length, -1.0)
+    return SupportPair(i, j, divide(direction, length))
+
+
+@kernel
+def _extreme_vertex(exact, body, posed, n, direction, length, sign):
     """The vertex with the least sign · (v·R a), v the exact direction; the first of equals.
 
-    Doubles rule out all that are farther than twice the slack from the best; what is left, usually
-    one vertex, is compared exactly. Where there is a support tree, only what it proposes and its
+    Doubles rule out all that are farther than twice the slack from the best; the others, usually
+    one vertex, are compared exactly. Where there is a support tree, only the vertex that it proposes and its
     neighbours are looked at (which of equals is then up to the tree).
     """
-    gx = sign * (poses[p] * vx + poses[p + 3] * vy + poses[p + 6] * vz)
-    gy = sign * (poses[p + 1] * vx + poses[p + 4] * vy + poses[p + 7] * vz)
-    gz = sign * (poses[p + 2] * vx + poses[p + 5] * vy + poses[p + 8] * vz)
-    if tree != 0:
-        turn_direction(digits, d, n, rotation, digits_rot)
-        found = _climb(digits, d, n + digits_rot, coordinates, m, tree, core, digits_core, gx, gy, gz, slack, sign)
-        if found >= 0:
-            return found
+    slack = 2.0 * exact.error * length
+    g = scale(sign, rotate_back(exact.pair.poses, posed.pose_at, direction))
+    if posed.tree != 0:
+        rotate_direction(exact, body, n)
+        vertex = _climb(exact, body, posed, n, g, slack, sign)
+        if vertex >= 0:
+            return vertex
     least = math.inf
-    for i in range(count):
-        least = min(least, coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz)
+    for i in range(posed.n):
+        least = min(least, dot(column_at(posed.coords, posed.padded, i), g))
     best = -1
-    turned = False
-    for i in range(count):
-        value = coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
-        if value > least + slack:
+    rotated = False
+    for i in range(posed.n):
+        if dot(column_at(posed.coords, posed.padded, i), g) > least + slack:
             continue
         if best < 0:
             best = i
             continue
-        if not turned:
-            turn_direction(digits, d, n, rotation, digits_rot)
-            turned = True
-        if compare(digits, d, n + digits_rot, coordinates, m, core, digits_core, i, best) * sign < 0:
+        if not rotated:
+            rotate_direction(exact, body, n)
+            rotated = True
+        if compare(exact, body, posed, n, i, best) * sign < 0:
             best = i
     return max(best, 0)
 
 
 @kernel
-def _climb(digits, d, n, coordinates, m, tree, core, digits_core, gx, gy, gz, slack, sign):
-    """The least vertex by steps along hull edges from what the tree proposes, compared exactly.
+def _climb(exact, body, posed, n, g, slack, sign):
+    """The least vertex by steps along hull edges from the tree's proposal, compared exactly.
 
     −1 where all neighbours are level: a vertex within a face, which may be a face on the far side.
     """
-    best, _, _, _ = extreme_vertex(tree, -gx, -gy, -gz)
-    starts, ring, _ = rings_of(tree)
+    coords, padded = posed.coords, posed.padded
+    best, _, _, _ = extreme_vertex(posed.tree, -g.x, -g.y, -g.z)
+    starts, ring, _ = rings_of(posed.tree)
     while True:
         better = best
         level = True
         for k in range(starts[best], starts[best + 1]):
             i = ring[k]
-            value = (
-                (coordinates[i] - coordinates[best]) * gx
-                + (coordinates[m + i] - coordinates[m + best]) * gy
-                + (coordinates[2 * m + i] - coordinates[2 * m + best]) * gz
-            )
-            if value > slack:
+            if dot(sub(column_at(coords, padded, i), column_at(coords, padded, best)), g) > slack:
                 level = False
                 continue
-            side = compare(digits, d, n, coordinates, m, core, digits_core, i, better) * sign
+            side = compare(exact, body, posed, n, i, better) * sign
             if side < 0:
                 better = i
             level = level and side == 0
@@ -98,27 +92,33 @@ def _climb(digits, d, n, coordinates, m, tree, core, digits_core, gx, gy, gz, sl
 
 
 @kernel
-def turn_direction(digits, d, n, rotation, digits_rot):
+def rotate_direction(exact, body, n):
     """Rᵀv into scratch 1: comparing vertices then takes three products each instead of twenty-one."""
+    digits, d = exact.digits, exact.d
     for j in range(3):
         at = scratch_at(d, 1) + 5 * d * j
-        clear(digits, at, n + digits_rot)
+        clear(digits, at, n + body.rotation.n)
         for axis in range(3):
-            add_product(digits, at, direction_at(d, axis), n, (rotation + 3 * axis + j) * d, digits_rot, 1)
-        carry(digits, at, n + digits_rot)
+            rotation = (body.rotation_at + 3 * axis + j) * d
+            add_product(digits, at, direction_at(d, axis), n, rotation, body.rotation.n, 1)
+        carry(digits, at, n + body.rotation.n)
 
 
 @kernel
-def compare(digits, d, n, coordinates, m, core, digits_core, i, j):
-    """Sign of (Rᵀv)·(a_i − a_j), Rᵀv of n digits standing in scratch 1."""
+def compare(exact, body, posed, n, i, j):
+    """Sign of (Rᵀv)·(a_i − a_j), Rᵀv standing in scratch 1."""
+    digits, d = exact.digits, exact.d
+    length = n + body.rotation.n
     out = scratch_at(d, 2)
     at = scratch_at(d, 3)
-    clear(digits, out, n + digits_core)
+    clear(digits, out, length + body.core.n)
     for axis in range(3):
-        if coordinates[axis * m + i] != coordinates[axis * m + j]:
-            clear(digits, at, digits_core)
-            add_double(digits, at, coordinates[axis * m + i], core)
-            add_double(digits, at, -coordinates[axis * m + j], core)
-            carry(digits, at, digits_core)
-            add_product(digits, out, scratch_at(d, 1) + 5 * d * axis, n, at, digits_core, 1)
-    return carry(digits, out, n + digits_core)
+        x = posed.coords[axis * posed.padded + i]
+        y = posed.coords[axis * posed.padded + j]
+        if x != y:
+            clear(digits, at, body.core.n)
+            add_double(digits, at, x, body.core.grid)
+            add_double(digits, at, -y, body.core.grid)
+            carry(digits, at, body.core.n)
+            add_product(digits, out, scratch_at(d, 1) + 5 * d * axis, length, at, body.core.n, 1)
+    return carry(digits, out, length + body.core.n)

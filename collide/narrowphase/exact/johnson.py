@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.narrowphase.exact.exact_directions import scaled_by, set_normal
+from collide.narrowphase.exact.exact_directions import set_normal
 from collide.narrowphase.exact.exact_workspace import delta_at, direction_at, gram_at, point_at, scratch_at
-from collide.numerics.digits import BITS, add_double, add_number, add_product, as_double_double, carry, clear
-from collide.numerics.double_double import add, divide, square_root
+from collide.numerics import double_double as dd
+from collide.numerics.digits import (
+    BITS,
+    add_double,
+    add_number,
+    add_product,
+    as_double_double,
+    carry,
+    clear,
+    copy,
+)
+from collide.numerics.double_double import DD, ScaledDD
 from collide.numerics.error_free import two_sum
 
 
 @kernel
-def set_gram(digits, d, k):
+def set_gram(exact, k):
     """Products of point k with points 0 … k."""
+    digits, d = exact.digits, exact.d
     for i in range(k + 1):
         at = gram_at(d, k, i)
         clear(digits, at, 2 * d)
@@ -27,9 +38,15 @@ def set_gram(digits, d, k):
 
 
 @kernel
+def count_of(mask):
+    """Points of a set of at most four."""
+    return (mask & 1) + ((mask >> 1) & 1) + ((mask >> 2) & 1) + ((mask >> 3) & 1)
+
+
+@kernel
 def length_of(d, mask):
     """Digits of Δ for a set of points: one more factor of degree two for each point but the first."""
-    count = (mask & 1) + ((mask >> 1) & 1) + ((mask >> 2) & 1) + ((mask >> 3) & 1)
+    count = count_of(mask)
     return 1 if count == 1 else 2 * d * (count - 1)
 
 
@@ -42,11 +59,13 @@ def lowest_member(mask):
 
 
 @kernel
-def set_delta(digits, d, mask, j):
+def set_delta(exact, mask, j):
     """Δ_j(X ∪ {j}) = Σ_{i ∈ X} Δ_i(X)·(y_i·y_k − y_i·y_j), k in X; returns its sign.
 
-    Negative or zero for j outside X: no point of the simplex gets nearer by going towards y_j.
+    mask : the set X, bit i for point i. Negative or zero for j outside X: no point of the simplex gets nearer by going
+    towards y_j.
     """
+    digits, d = exact.digits, exact.d
     k = lowest_member(mask)
     larger = mask | (1 << j)
     out = delta_at(d, larger, j)
@@ -68,30 +87,27 @@ def set_delta(digits, d, mask, j):
 
 
 @kernel
-def nearest_subset(digits, d, n, newest):
+def nearest_subset(exact, n, newest):
     """The subset of n ≤ 4 points that holds the nearest point of their hull in its relative interior.
 
     Subsets with the newest point only, where newest ≥ 0: without it there is nothing nearer than
     before. Sets are visited smaller ones first, so that every Δ needed stands. Affinely dependent
     points are no special case: the nearest point also lies in an independent subset.
     """
-    everything = (1 << n) - 1
-    signs = 0  # two bits a (subset, member): 1 where Δ > 0
+    digits, d = exact.digits, exact.d
     for i in range(n):
         digits[delta_at(d, 1 << i, i)] = 1
-        signs |= 1 << i
     for count in range(1, n + 1):
-        for mask in range(1, everything + 1):
-            size = (mask & 1) + ((mask >> 1) & 1) + ((mask >> 2) & 1) + ((mask >> 3) & 1)
-            if size != count:
+        for mask in range(1, 1 << n):
+            if count_of(mask) != count:
                 continue
             positive = True
             for i in range(n):
-                if (mask >> i) & 1 and count > 1 and _delta_sign(digits, d, mask, i) <= 0:
+                if (mask >> i) & 1 and count > 1 and _delta_sign(exact, mask, i) <= 0:
                     positive = False
             nearest = positive
             for j in range(n):
-                if not (mask >> j) & 1 and set_delta(digits, d, mask, j) > 0:
+                if not (mask >> j) & 1 and set_delta(exact, mask, j) > 0:
                     nearest = False
             if nearest and (newest < 0 or (mask >> newest) & 1):
                 return mask
@@ -99,8 +115,9 @@ def nearest_subset(digits, d, n, newest):
 
 
 @kernel
-def _delta_sign(digits, d, mask, i):
+def _delta_sign(exact, mask, i):
     """Sign of a carried Δ_i(mask)."""
+    digits, d = exact.digits, exact.d
     at = delta_at(d, mask, i)
     n = length_of(d, mask)
     if digits[at + n - 1] < 0:
@@ -112,15 +129,16 @@ def _delta_sign(digits, d, mask, i):
 
 
 @kernel
-def set_direction(digits, d, mask):
+def set_direction(exact, mask):
     """A positive multiple of the nearest point of points 0 … n − 1, into the direction.
 
     For one or two points it is the nearest point times ΣΔ. Across three it is their normal, of degree
-    two instead of five. Returns (digits it takes, whether it is zero: the origin is in the hull).
+    two instead of five. Returns (digits of a component, whether it is zero: the origin is in the hull).
     """
     if mask == 7:
-        n, side = set_normal(digits, d)
+        n, side = set_normal(exact)
         return n, side == 0
+    digits, d = exact.digits, exact.d
     n = length_of(d, mask)
     total = d if n == 1 else n + d
     zero = True
@@ -136,40 +154,47 @@ def set_direction(digits, d, mask):
 
 
 @kernel
-def compact(digits, d, ids, mask, n):
-    """Keep the points of the subset, with their Gram entries, and set their Δ; returns their number."""
-    kept = 0
+def reduce_simplex(exact, ids, mask, n):
+    """Drop all but the points of the subset, with their Gram entries, and set their Δ; returns how many remain."""
+    digits, d = exact.digits, exact.d
+    n_kept = 0
     for k in range(n):
         if not (mask >> k) & 1:
             continue
-        if kept != k:
-            ids[2 * kept] = ids[2 * k]
-            ids[2 * kept + 1] = ids[2 * k + 1]
-            for c in range(3 * d):
-                digits[point_at(d, kept, 0) + c] = digits[point_at(d, k, 0) + c]
+        if n_kept != k:
+            ids[2 * n_kept] = ids[2 * k]
+            ids[2 * n_kept + 1] = ids[2 * k + 1]
+            copy(digits, point_at(d, n_kept, 0), point_at(d, k, 0), 3 * d)
         column = 0
         for j in range(n):
             if (mask >> j) & 1:
-                for c in range(2 * d):
-                    digits[gram_at(d, kept, column) + c] = digits[gram_at(d, k, j) + c]
+                copy(digits, gram_at(d, n_kept, column), gram_at(d, k, j), 2 * d)
                 column += 1
-        kept += 1
-    if kept < n:
-        for subset in range(1, 1 << kept):
+        n_kept += 1
+    if n_kept < n:
+        for subset in range(1, 1 << n_kept):
             if subset & (subset - 1) == 0:
                 digits[delta_at(d, subset, lowest_member(subset))] = 1
-            for j in range(kept):
+            for j in range(n_kept):
                 if not (subset >> j) & 1:
-                    set_delta(digits, d, subset, j)
-    return kept
+                    set_delta(exact, subset, j)
+    return n_kept
+
+
+class Excess(NamedTuple):
+    """Whether |v| ≤ r, and |v| − r [m], for the nearest point v of a simplex and the sum r of the radii."""
+
+    within: bool
+    excess: DD
 
 
 @kernel
-def within_radius(digits, d, mask, grid, radius_a, radius_b):
-    """(|v| ≤ r, |v| − r, low part) for the nearest point v of the subset and the sum r of the radii.
+def within_radius(exact, mask, radius_a, radius_b):
+    """The `Excess` of the subset that holds the nearest point.
 
     |v|² = Σ Δ_i (y_i·y_k) / ΣΔ for any k of the subset, so the test is Σ Δ_i (y_i·y_k) ≤ r² ΣΔ.
     """
+    digits, d = exact.digits, exact.d
     k = lowest_member(mask)
     n = length_of(d, mask)
     total = scratch_at(d, 0)
@@ -182,37 +207,39 @@ def within_radius(digits, d, mask, grid, radius_a, radius_b):
             add_product(digits, square, delta_at(d, mask, i), n, gram_at(d, i, k), 2 * d, 1)
     carry(digits, total, n)
     sign = carry(digits, square, n + 2 * d)
-    over, over_low, over_exponent = as_double_double(digits, total, n)
-    value, value_low, exponent = as_double_double(digits, square, n + 2 * d)
-    scale = 2 * BITS * grid - over_exponent
-    # The root before the power of two: the square of a tiny distance would vanish.
-    half = (exponent + scale) // 2
-    ratio, ratio_low = divide(value, value_low, over, over_low)
-    rest = exponent + scale - 2 * half
-    distance, distance_low = square_root(scaled_by(ratio, rest), scaled_by(ratio_low, rest))
-    distance = scaled_by(distance, half)
-    distance_low = scaled_by(distance_low, half)
+    divisor = as_double_double(digits, total, n)
+    distance = dd.unscaled(dd.scaled_sqrt(_over(exact, as_double_double(digits, square, n + 2 * d), divisor)))
     if radius_a == 0.0 and radius_b == 0.0:
-        return sign == 0, distance, distance_low
+        return Excess(sign == 0, distance)
+    _subtract_square_of_radii(exact, square, total, n, radius_a, radius_b)
+    sign = carry(digits, square, n + 2 * d)
+    # |v| − r without cancellation, as (|v|² − r²) / (|v| + r).
+    difference = _over(exact, as_double_double(digits, square, n + 2 * d), divisor)
+    both = dd.add(distance, two_sum(radius_a, radius_b))
+    excess = dd.unscaled(dd.scaled_div(difference, dd.normalized(both)))
+    if excess.high == 0.0 and sign != 0:  # vanished, but not 0
+        excess = DD(5e-324 * sign, excess.low)
+    return Excess(sign <= 0, excess)
+
+
+@kernel
+def _over(exact, a, divisor):
+    """A number of degree two over one of degree 0 more, in square metres."""
+    ratio = dd.scaled_div(a, divisor)
+    return ScaledDD(ratio.value, ratio.exponent + 2 * BITS * exact.grid)
+
+
+@kernel
+def _subtract_square_of_radii(exact, square, total, n, radius_a, radius_b):
+    """square −= r² · total."""
+    digits, d = exact.digits, exact.d
     radius = scratch_at(d, 2)
     clear(digits, radius, d)
-    add_double(digits, radius, radius_a, grid)
-    add_double(digits, radius, radius_b, grid)
+    add_double(digits, radius, radius_a, exact.grid)
+    add_double(digits, radius, radius_b, exact.grid)
     carry(digits, radius, d)
     power = scratch_at(d, 3)
     clear(digits, power, 2 * d)
     add_product(digits, power, radius, d, radius, d, 1)
     carry(digits, power, 2 * d)
     add_product(digits, square, power, 2 * d, total, n, -1)
-    sign = carry(digits, square, n + 2 * d)
-    # |v| − r without cancellation, as (|v|² − r²) / (|v| + r).
-    value, value_low, exponent = as_double_double(digits, square, n + 2 * d)
-    swept, swept_low = two_sum(radius_a, radius_b)
-    both, both_low = add(distance, distance_low, swept, swept_low)
-    ratio, ratio_low = divide(value, value_low, over, over_low)
-    shift = math.frexp(both)[1]
-    ratio, ratio_low = divide(ratio, ratio_low, scaled_by(both, -shift), scaled_by(both_low, -shift))
-    excess = scaled_by(ratio, exponent + scale - shift)
-    if excess == 0.0 and sign != 0:  # vanished, but not 0
-        excess = 5e-324 * sign
-    return sign <= 0, excess, scaled_by(ratio_low, exponent + scale - shift)

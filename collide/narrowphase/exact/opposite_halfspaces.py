@@ -1,4 +1,4 @@
-"""Two half-spaces whose normals are opposite within rounding, settled in Python's fractions.
+"""A step of the exact stage: two half-spaces whose normals are opposite within rounding, in Python's fractions.
 
 Only exactly opposite ones can miss each other: the slightest tilt lets them meet, however far away.
 A scene has a handful of half-spaces at most, so this needs no kernel.
@@ -8,63 +8,69 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import PoseTable, ShapeTable
+from collide.numerics.exact_points import cross, inner
 from collide.results import EXACT
 
+_Vector = tuple[Fraction, Fraction, Fraction]
 
-def settle(rows: np.ndarray, open_rows: np.ndarray, pairs: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of) -> None:
-    """Settle those of the open rows (their numbers) that are pairs of half-spaces, in place."""
-    for k in open_rows:
-        one, other = (int(part) for part in pairs[k])
-        packed = table.packed[shape_of[one]], table.packed[shape_of[other]]
-        if packed[0].kind != HALFSPACE or packed[1].kind != HALFSPACE:
+
+class _HalfSpace(NamedTuple):
+    """{x : n·x ≤ offset} in the world; p is its frame's origin."""
+
+    n: _Vector
+    offset: Fraction
+    p: _Vector
+
+
+def settle_opposite_halfspaces(
+    rows: np.ndarray, undecided: np.ndarray, pairs: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of: np.ndarray
+) -> None:
+    """Settle those of the undecided rows (their numbers) that are pairs of half-spaces, in place."""
+    for k in undecided.tolist():
+        parts = [int(part) for part in pairs[k]]
+        packed = [table.packed[shape_of[part]] for part in parts]
+        if any(shape.kind != HALFSPACE for shape in packed):
             continue
+        A, B = (_half_space(shape.params, poses.exact(part)) for shape, part in zip(packed, parts))
         # Worked out on the same numbers whichever way the pair is asked.
-        flip = (packed[0].content, poses.rows[one].tobytes()) > (packed[1].content, poses.rows[other].tobytes())
-        if flip:
-            one, other = other, one
-        _settle(rows[k : k + 1], *(_plane(table.packed[shape_of[part]].params, poses.exact(part)) for part in (one, other)))
-        if flip:
-            rows["normal"][k] = 0.0 - rows["normal"][k]
-            rows["point_a"][k], rows["point_b"][k] = rows["point_b"][k].copy(), rows["point_a"][k].copy()
+        keys = [(shape.content, poses.rows[part].tobytes()) for shape, part in zip(packed, parts)]
+        if keys[0] <= keys[1]:
+            _settle(rows[k : k + 1], A, B)
+            continue
+        _settle(rows[k : k + 1], B, A)
+        rows["normal"][k] = 0.0 - rows["normal"][k]
+        rows["point_a"][k], rows["point_b"][k] = rows["point_b"][k].copy(), rows["point_a"][k].copy()
 
 
-def _settle(row: np.ndarray, A, B) -> None:
-    (n, a, p), (m, b, _) = A, B
-    cross = [n[(i + 1) % 3] * m[(i + 2) % 3] - n[(i + 2) % 3] * m[(i + 1) % 3] for i in range(3)]
+def _settle(row: np.ndarray, A: _HalfSpace, B: _HalfSpace) -> None:
     row["how"], row["certified"], row["hit"], row["exact"] = EXACT, True, True, 1
-    if any(cross):
+    if any(cross(A.n, B.n)):
         return  # they meet, and the overlap has no end: as the kernel left it
-    # m = −c n: B is {x : n·x ≥ −b/c}, so the gap is (−b/c − a)/|n|.
-    square = sum(v * v for v in n)
-    c = -sum(u * v for u, v in zip(n, m)) / square
-    gap = -b / c - a
+    # B.n = −c A.n: B is {x : A.n·x ≥ −b/c}, so the gap is (−b/c − a)/|A.n|.
+    square = inner(A.n, A.n)
+    c = -inner(A.n, B.n) / square
+    gap = -B.offset / c - A.offset
     length = math.sqrt(float(square))
     distance = float(gap) / length
     slack = 4 * 2.0**-53 * abs(distance)
     row["hit"] = gap <= 0
     row["distance"], row["lower"], row["upper"] = distance, distance - slack, distance + slack
-    row["normal"] = [float(v) / length for v in n]
-    down = (sum(u * v for u, v in zip(n, p)) - a) / square
-    row["point_a"] = [float(v - down * u) for u, v in zip(n, p)]
+    row["normal"] = [float(v) / length for v in A.n]
+    down = (inner(A.n, A.p) - A.offset) / square
+    row["point_a"] = [float(v - down * u) for u, v in zip(A.n, A.p)]
     row["point_b"] = row["point_a"] + distance * row["normal"]
 
 
-def _plane(params: np.ndarray, pose: list[Fraction]):
-    """(n, offset, p): the half-space is {x : n·x ≤ offset} in the world; p is its frame's origin."""
-    R, p = [pose[0:3], pose[3:6], pose[6:9]], pose[9:12]
-    cofactor = [
-        [
-            R[(i + 1) % 3][(j + 1) % 3] * R[(i + 2) % 3][(j + 2) % 3]
-            - R[(i + 1) % 3][(j + 2) % 3] * R[(i + 2) % 3][(j + 1) % 3]
-            for j in range(3)
-        ]
-        for i in range(3)
-    ]
-    n = [sum(c * Fraction(v) for c, v in zip(row, params[:3].tolist())) for row in cofactor]
-    determinant = sum(a * b for a, b in zip(R[0], cofactor[0]))
-    return n, Fraction(float(params[3])) * determinant + sum(u * v for u, v in zip(n, p)), p
+def _half_space(params: np.ndarray, pose: list[Fraction]) -> _HalfSpace:
+    """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p (`halfspace_convex.plane_in_world`)."""
+    r0, r1, r2, p = (tuple(pose[k : k + 3]) for k in (0, 3, 6, 9))
+    cofactor = cross(r1, r2), cross(r2, r0), cross(r0, r1)
+    m = tuple(map(Fraction, params[:3].tolist()))
+    n = tuple(inner(row, m) for row in cofactor)
+    return _HalfSpace(n, Fraction(float(params[3])) * inner(r0, cofactor[0]) + inner(n, p), p)

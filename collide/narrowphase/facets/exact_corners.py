@@ -1,17 +1,21 @@
 """Six corners of two posed triangles as exact integers, and the signs of polynomials in their coordinates.
 
-A sign is asked of doubles first. What they cannot tell is worked out in `geometry.digits`, from coordinates that
-are loaded once a pair: where B lies in A's frame without rounding (equal poses, or poses that turn by right
-angles) from doubles in A's frame, two or three digits each; else from R v + t in the world, six to eight.
+A sign is computed in doubles first. Where their error bound leaves it open it is computed in `numerics/digits.py`, from
+coordinates that are loaded once a pair: where B lies in A's frame without rounding (equal poses, or poses that rotate
+by right angles) from doubles in A's frame, two or three digits each; otherwise from R v + t in the world, six to eight.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from collide.kernels import kernel
+from collide.mesh.triangle import put_triangle, triangle_at
 from collide.narrowphase.facets.filtered_triangles import TINY, orientation, sign_error
-from collide.narrowphase.facets.posed_surfaces import ERROR, PLAIN, SHIFT, M
+from collide.narrowphase.facets.posed_surfaces import ERROR, PLAIN, SHIFT, M, sum_is_exact
 from collide.numerics.digits import (
     LONGEST_FACTOR,
     add_double,
@@ -22,29 +26,34 @@ from collide.numerics.digits import (
     grid_of,
     lowest_bit,
 )
+from collide.numerics.vec3 import max_abs, sub, vec3_at
 
-#: Most digits of a coordinate: 2^2900 from the lowest bit to the highest. Coordinates below 1e50 that are
+#: Digits of a coordinate at most: 2^2900 from the lowest bit to the highest. Coordinates below 1e50 that are
 #: products of two doubles never take more.
 LONGEST = 112
 assert LONGEST <= LONGEST_FACTOR
-#: Most digits of an entry of a matrix.
+#: Digits of an entry of a matrix at most.
 _ENTRY = 48
+#: Exponent that stands for the lowest bit of 0: above that of any double.
+_NO_BITS = 2000
 
-# Corners, doubles: three of A and three of B in A's frame, B's in its own, and all six in the frame of the exact
-# points, each coordinate good to the last number.
-OWN_AT, SEEN_AT, SEEN_ERROR = 18, 27, 45
+# Corners, doubles: three of A and three of B in A's frame (18); B's in its own frame; all six in the frame of the exact
+# points (`ExactPair.state`), and the bound of the error of a coordinate there.
+B_LOCAL_AT, EXACT_AT, EXACT_ERROR = 18, 27, 45
 CORNERS = 46
 
-# State, integers.
-ROTATIONS_READY, SEEN, POINTS_READY, LENGTH, GRID_RA, DIGITS_RA, GRID_RB, DIGITS_RB, SIGNS = range(9)
-#: What SEEN says: not looked at yet, exact in A's frame, or in the world.
-UNSEEN, IN_A, IN_WORLD = range(3)
-#: Signs of the pair: sides of B's corners (3) and of A's (3), edges of A and B (9); `UNKNOWN` until asked for.
+# State, integers: whether the matrices are loaded, the frame of the exact points, whether they are loaded, their
+# digits, the grid (exponent of the lowest digit) and the digits of both matrices, and how many signs were computed
+# exactly.
+_ROTATIONS_READY, _EXACT_FRAME, _POINTS_READY, _LENGTH, _GRID_RA, _GRID_RB, _SIGNS = 0, 1, 2, 3, 4, 6, 8
+#: Frames of the exact points: none so far, A's, the world's.
+_NO_FRAME, _IN_A, _IN_WORLD = range(3)
+#: Signs of the pair: sides of B's corners (3) and of A's (3), edges of A and B (9); `UNKNOWN` until computed.
 TABLE = 9
 STATE = TABLE + 15
 UNKNOWN = 2
 
-# Digits: matrices, then the corners (18 numbers), then numbers made on the way.
+# Digits: matrices, then the corners (18 numbers), then intermediate numbers.
 _POINTS = 18 * _ENTRY
 _VERTEX = _POINTS + 18 * LONGEST
 _U, _V, _W = (_VERTEX + k * 3 * LONGEST for k in range(3))
@@ -53,54 +62,71 @@ _DOT = _CROSS + 6 * LONGEST
 DIGITS = _DOT + 3 * LONGEST
 
 
-@kernel
-def forget_poses(state):
-    state[ROTATIONS_READY] = 0
-    forget_points(state)
+class ExactPair(NamedTuple):
+    """Two triangles for the exact stage: views of corners, placing (`posed_surfaces.py`), digits and state; both poses.
+
+    All signs of a pair are those in one frame, that of the exact points.
+    """
+
+    corners: np.ndarray
+    placing: np.ndarray
+    digits: np.ndarray
+    state: np.ndarray
+    XA: np.ndarray
+    XB: np.ndarray
+
+
+class _Grid(NamedTuple):
+    """Where numbers have digits: the exponent of the lowest one, and how many from there on."""
+
+    lowest: int
+    length: int
 
 
 @kernel
-def forget_points(state):
-    state[SEEN] = UNSEEN
-    state[POINTS_READY] = 0
-
-
-# A context: corners, placing, digits, state, XA, XB. All signs of a pair are those in one frame.
+def invalidate_pose_cache(state):
+    state[_ROTATIONS_READY] = 0
+    invalidate_points(state)
 
 
 @kernel
-def sign3(context, i, j, k, m):
+def invalidate_points(state):
+    state[_EXACT_FRAME] = _NO_FRAME
+    state[_POINTS_READY] = 0
+
+
+@kernel
+def sign3(pair, i, j, k, m):
     """Sign of (j − i) × (k − i) · (m − i) for corners 0 … 5."""
-    corners, placing, digits, state, _XA, _XB = context
+    corners, digits, state = pair.corners, pair.digits, pair.state
     value = orientation(corners, 3 * i, corners, 3 * j, corners, 3 * k, corners, 3 * m)
-    limit = sign_error(_spread(corners, 0, i, j, k, m), placing[ERROR])
+    limit = sign_error(_spread(corners, i, j, k, m), pair.placing[ERROR])
     if value > limit:
         return 1
     if value < -limit:
         return -1
-    see_points(context)
-    if state[SEEN] == IN_A and (
-        _same(corners, i, j) or _same(corners, i, k) or _same(corners, i, m) or _same(corners, j, k)
-        or _same(corners, j, m) or _same(corners, k, m) or _level(corners, i, j, k, m)
+    choose_exact_frame(pair)
+    if state[_EXACT_FRAME] == _IN_A and (
+        _equal(corners, i, j) or _equal(corners, i, k) or _equal(corners, i, m) or _equal(corners, j, k)
+        or _equal(corners, j, m) or _equal(corners, k, m) or _share_a_coordinate(corners, i, j, k, m)
     ):  # fmt: skip
         return 0
-    load_points(context)
-    state[SIGNS] += 1
-    n = state[LENGTH]
+    _load_points(pair)
+    state[_SIGNS] += 1
+    n = state[_LENGTH]
     _difference(digits, n, _U, j, i)
     _difference(digits, n, _V, k, i)
     _difference(digits, n, _W, m, i)
-    at = _DOT
-    clear(digits, at, 3 * n)
+    clear(digits, _DOT, 3 * n)
     for axis in range(3):
         _component(digits, n, axis, _CROSS)
-        add_product(digits, at, _CROSS, 2 * n, _W + axis * n, n, 1)
-    return carry(digits, at, 3 * n)
+        add_product(digits, _DOT, _CROSS, 2 * n, _W + axis * n, n, 1)
+    return carry(digits, _DOT, 3 * n)
 
 
 @kernel(inline=True)
-def _same(corners, i, j):
-    """Whether two corners are one point, seen exactly."""
+def _equal(corners, i, j):
+    """Whether two corners have equal coordinates, as doubles."""
     return (
         corners[3 * i] == corners[3 * j]
         and corners[3 * i + 1] == corners[3 * j + 1]
@@ -109,8 +135,7 @@ def _same(corners, i, j):
 
 
 @kernel(inline=True)
-def _level(corners, i, j, k, m):
-    """Whether four corners share a coordinate."""
+def _share_a_coordinate(corners, i, j, k, m):
     for axis in range(3):
         x = corners[3 * i + axis]
         if x == corners[3 * j + axis] and x == corners[3 * k + axis] and x == corners[3 * m + axis]:
@@ -119,58 +144,56 @@ def _level(corners, i, j, k, m):
 
 
 @kernel
-def shares_a_corner(context):
-    """Whether a corner of A is, without rounding, one of B; False where that is not seen at once."""
-    corners = context[0]
-    see_points(context)
-    if context[3][SEEN] != IN_A:
+def shares_a_corner(pair):
+    """Whether doubles without rounding show a corner of A to be one of B; False where the frame is the world's."""
+    choose_exact_frame(pair)
+    if pair.state[_EXACT_FRAME] != _IN_A:
         return False
     for i in range(3):
         for j in range(3, 6):
-            if _same(corners, i, j):
+            if _equal(pair.corners, i, j):
                 return True
     return False
 
 
 @kernel
-def sign2(context, axis, i, j, k):
+def sign2(pair, axis, i, j, k):
     """Sign of the component along an axis of (j − i) × (k − i)."""
-    corners, _placing, digits, state, _XA, _XB = context
-    see_points(context)
-    y = SEEN_AT + (axis + 1) % 3
-    z = SEEN_AT + (axis + 2) % 3
+    corners, digits, state = pair.corners, pair.digits, pair.state
+    choose_exact_frame(pair)
+    y = EXACT_AT + (axis + 1) % 3
+    z = EXACT_AT + (axis + 2) % 3
     yj = corners[3 * j + y] - corners[3 * i + y]
     zj = corners[3 * j + z] - corners[3 * i + z]
     yk = corners[3 * k + y] - corners[3 * i + y]
     zk = corners[3 * k + z] - corners[3 * i + z]
     spread = max(abs(yj), abs(zj), abs(yk), abs(zk))
     # Differences are off by f = 2E + 2uD and at most D: 4Df + 4f², and 4uD² by rounding.
-    limit = spread * (16.0 * corners[SEEN_ERROR] + 2.0**-47 * spread) + TINY
+    limit = spread * (16.0 * corners[EXACT_ERROR] + 2.0**-47 * spread) + TINY
     value = yj * zk - zj * yk
     if value > limit:
         return 1
     if value < -limit:
         return -1
-    if corners[SEEN_ERROR] == 0.0 and (
+    if corners[EXACT_ERROR] == 0.0 and (
         (yj == 0.0 and yk == 0.0) or (zj == 0.0 and zk == 0.0) or (yj == 0.0 and zj == 0.0)
-        or (yk == 0.0 and zk == 0.0) or (yj == yk and zj == zk and _same(corners, j, k))
+        or (yk == 0.0 and zk == 0.0) or (yj == yk and zj == zk and _equal(corners, j, k))
     ):  # fmt: skip
         return 0
-    load_points(context)
-    state[SIGNS] += 1
-    n = state[LENGTH]
+    _load_points(pair)
+    state[_SIGNS] += 1
+    n = state[_LENGTH]
     _difference(digits, n, _U, j, i)
     _difference(digits, n, _V, k, i)
     return _component(digits, n, axis, _CROSS)
 
 
 @kernel
-def sign1(context, axis, i, j):
-    """Sign of coordinate j − coordinate i, in the frame of the exact points."""
-    digits = context[2]
-    state = context[3]
-    load_points(context)
-    n = state[LENGTH]
+def sign1(pair, axis, i, j):
+    """Sign of coordinate j − coordinate i along an axis, in the frame of the exact points."""
+    _load_points(pair)
+    digits = pair.digits
+    n = pair.state[_LENGTH]
     clear(digits, _U, n)
     add_number(digits, _U, _POINTS + (3 * j + axis) * n, n, 1)
     add_number(digits, _U, _POINTS + (3 * i + axis) * n, n, -1)
@@ -178,16 +201,12 @@ def sign1(context, axis, i, j):
 
 
 @kernel(inline=True)
-def _spread(corners, at, i, j, k, m):
-    """How far corners j, k, m are from corner i along an axis, at most."""
-    far = 0.0
-    for axis in range(3):
-        x = corners[at + 3 * i + axis]
-        far = max(
-            far, abs(corners[at + 3 * j + axis] - x), abs(corners[at + 3 * k + axis] - x),
-            abs(corners[at + 3 * m + axis] - x),
-        )  # fmt: skip
-    return far
+def _spread(corners, i, j, k, m):
+    """Largest distance of corners j, k, m from corner i along an axis."""
+    first = vec3_at(corners, 3 * i)
+    far_j = max_abs(sub(vec3_at(corners, 3 * j), first))
+    far_k = max_abs(sub(vec3_at(corners, 3 * k), first))
+    return max(far_j, far_k, max_abs(sub(vec3_at(corners, 3 * m), first)))
 
 
 @kernel
@@ -202,7 +221,7 @@ def _difference(digits, n, out, j, i):
 
 @kernel
 def _component(digits, n, axis, out):
-    """Component of U × V; returns its sign."""
+    """Component of U × V along an axis; returns its sign."""
     y = (axis + 1) % 3
     z = (axis + 2) % 3
     clear(digits, out, 2 * n)
@@ -215,73 +234,76 @@ def _component(digits, n, axis, out):
 
 
 @kernel
-def see_points(context):
-    """Choose the frame of the exact points, and see them there in doubles, once a pair."""
-    corners, placing, _digits, state, XA, XB = context
-    if state[SEEN] != UNSEEN:
+def choose_exact_frame(pair):
+    """Choose the frame of the exact points, once a pair, and round the corners to doubles there."""
+    corners, state = pair.corners, pair.state
+    if state[_EXACT_FRAME] != _NO_FRAME:
         return
-    if placing[PLAIN] != 0.0 and _sums_are_exact(corners, placing):
-        state[SEEN] = IN_A
-        corners[SEEN_ERROR] = 0.0
-        for k in range(18):
-            corners[SEEN_AT + k] = corners[k]
+    if pair.placing[PLAIN] != 0.0 and _sums_are_exact(corners, pair.placing):
+        state[_EXACT_FRAME] = _IN_A
+        corners[EXACT_ERROR] = 0.0
+        put_triangle(corners, EXACT_AT, triangle_at(corners, 0))
+        put_triangle(corners, EXACT_AT + 9, triangle_at(corners, 9))
         return
-    state[SEEN] = IN_WORLD
-    error = 0.0
-    for k in range(6):
-        X = XA if k < 3 else XB
-        own = 3 * k if k < 3 else OWN_AT + 3 * (k - 3)
+    state[_EXACT_FRAME] = _IN_WORLD
+    size_a = _round_to_world(corners, pair.XA, 0, EXACT_AT)
+    size_b = _round_to_world(corners, pair.XB, B_LOCAL_AT, EXACT_AT + 9)
+    corners[EXACT_ERROR] = max(size_a, size_b) * 2.0**-50 + TINY
+
+
+@kernel
+def _round_to_world(corners, X, at, to):
+    """R v + t of three corners, rounded; returns the largest sum of the terms' magnitudes."""
+    largest = 0.0
+    for k in range(0, 9, 3):
         for i in range(3):
             value = 0.0
             size = abs(X[4 * i + 3])
             for j in range(3):
-                term = X[4 * i + j] * corners[own + j]
+                term = X[4 * i + j] * corners[at + k + j]
                 value += term
                 size += abs(term)
-            corners[SEEN_AT + 3 * k + i] = value + X[4 * i + 3]
-            error = max(error, size)
-    corners[SEEN_ERROR] = error * 2.0**-50 + TINY
+            corners[to + k + i] = value + X[4 * i + 3]
+            largest = max(largest, size)
+    return largest
 
 
 @kernel
-def load_points(context):
+def _load_points(pair):
     """The six corners as digits, once a pair."""
-    corners, _placing, digits, state, XA, XB = context
-    if state[POINTS_READY] != 0:
+    digits, state = pair.digits, pair.state
+    if state[_POINTS_READY] != 0:
         return
-    state[POINTS_READY] = 1
-    see_points(context)
-    if state[SEEN] == IN_A:
-        _load_doubles(corners, digits, state)
+    state[_POINTS_READY] = 1
+    choose_exact_frame(pair)
+    if state[_EXACT_FRAME] == _IN_A:
+        _load_doubles(pair.corners, digits, state)
     else:
-        if state[ROTATIONS_READY] == 0:
-            state[ROTATIONS_READY] = 1
-            _load_matrix(digits, state, XA, 0, GRID_RA)
-            _load_matrix(digits, state, XB, 9, GRID_RB)
-        _load_world(corners, digits, state, XA, XB)
+        if state[_ROTATIONS_READY] == 0:
+            state[_ROTATIONS_READY] = 1
+            _load_matrix(digits, state, pair.XA, 0, _GRID_RA)
+            _load_matrix(digits, state, pair.XB, 9, _GRID_RB)
+        _load_world(pair)
 
 
 @kernel
 def _sums_are_exact(corners, placing):
-    """Whether every coordinate of M w + m is that sum without rounding: M turns by right angles, or not at all."""
+    """Whether every coordinate of M w + m is that sum without rounding: M rotates by right angles, or not at all."""
     for k in range(3):
         for i in range(3):
-            turned = 0.0
+            rotated = 0.0
             for j in range(3):
-                turned += placing[M + 3 * i + j] * corners[OWN_AT + 3 * k + j]
-            shift = placing[SHIFT + i]
-            total = turned + shift
-            other = total - turned
-            if (turned - (total - other)) + (shift - other) != 0.0:
+                rotated += placing[M + 3 * i + j] * corners[B_LOCAL_AT + 3 * k + j]
+            if not sum_is_exact(rotated, placing[SHIFT + i]):
                 return False
     return True
 
 
 @kernel
 def _range(numbers, at, count, step):
-    """(exponent of the lowest bit, exponent above the highest) of some doubles; (2000, −2000) where all are 0."""
-    lowest = 2000
-    highest = -2000
+    """(exponent of the lowest bit, exponent above the highest) of some doubles; ±_NO_BITS where all are 0."""
+    lowest = _NO_BITS
+    highest = -_NO_BITS
     for k in range(count):
         x = numbers[at + k * step]
         if x != 0.0:
@@ -291,23 +313,29 @@ def _range(numbers, at, count, step):
 
 
 @kernel
-def _load_doubles(corners, digits, state):
-    lowest, highest = _range(corners, 0, 18, 1)
+def _grid_of_coordinates(corners, at, count):
+    """The grid of some coordinates; one digit where all are 0."""
+    lowest, highest = _range(corners, at, count, 1)
     if highest < lowest:
-        lowest = 0
-        highest = 1
-    grid = grid_of(lowest)
-    n = grid_of(highest) - grid + 1
-    state[LENGTH] = n
+        return _Grid(0, 1)
+    return _Grid(grid_of(lowest), grid_of(highest) - grid_of(lowest) + 1)
+
+
+@kernel
+def _load_doubles(corners, digits, state):
+    grid = _grid_of_coordinates(corners, 0, 18)
+    n = grid.length
+    state[_LENGTH] = n
     clear(digits, _POINTS, 18 * n)
     for k in range(18):
-        add_double(digits, _POINTS + k * n, corners[k], grid)
+        add_double(digits, _POINTS + k * n, corners[k], grid.lowest)
 
 
 @kernel
 def _load_matrix(digits, state, X, at, which):
-    lowest = 2000
-    highest = -2000
+    """A rotation's entries as digits, from entry ``at`` on; state[which] and the next become their grid."""
+    lowest = _NO_BITS
+    highest = -_NO_BITS
     for i in range(3):
         low, high = _range(X, 4 * i, 3, 1)
         lowest = min(lowest, low)
@@ -324,40 +352,43 @@ def _load_matrix(digits, state, X, at, which):
 
 
 @kernel
-def _load_world(corners, digits, state, XA, XB):
+def _load_world(pair):
     """R v + t of all six corners, on one grid."""
-    low_a, high_a = _range(corners, 0, 9, 1)
-    low_b, high_b = _range(corners, OWN_AT, 9, 1)
-    low_s, high_s = _range(XA, 3, 3, 4)
-    low_t, high_t = _range(XB, 3, 3, 4)
-    grid_a = grid_of(low_a) if low_a < 2000 else 0
-    grid_b = grid_of(low_b) if low_b < 2000 else 0
-    digits_a = grid_of(high_a) - grid_a + 1 if low_a < 2000 else 1
-    digits_b = grid_of(high_b) - grid_b + 1 if low_b < 2000 else 1
-    grid = grid_of(min(low_s, low_t, 1000))
-    grid = min(grid, state[GRID_RA] + grid_a, state[GRID_RB] + grid_b)
-    top = max(grid_of(max(high_s, high_t)), grid)
-    top = max(top, state[GRID_RA] + state[DIGITS_RA] + grid_a + digits_a - 1)
-    top = max(top, state[GRID_RB] + state[DIGITS_RB] + grid_b + digits_b - 1)
-    n = top - grid + 1
-    state[LENGTH] = n
-    clear(digits, _POINTS, 18 * n)
-    for k in range(6):
-        own = 3 * k if k < 3 else OWN_AT + 3 * (k - 3)
-        first = 0 if k < 3 else 9
-        core = grid_a if k < 3 else grid_b
-        length = digits_a if k < 3 else digits_b
-        turned = state[GRID_RA] if k < 3 else state[GRID_RB]
-        entries = state[DIGITS_RA] if k < 3 else state[DIGITS_RB]
-        offset = turned + core - grid
+    corners, state = pair.corners, pair.state
+    v = _grid_of_coordinates(corners, 0, 9)
+    w = _grid_of_coordinates(corners, B_LOCAL_AT, 9)
+    rotation_a = _Grid(state[_GRID_RA], state[_GRID_RA + 1])
+    rotation_b = _Grid(state[_GRID_RB], state[_GRID_RB + 1])
+    low_s, high_s = _range(pair.XA, 3, 3, 4)
+    low_t, high_t = _range(pair.XB, 3, 3, 4)
+    lowest = grid_of(min(low_s, low_t, 1000))
+    lowest = min(lowest, rotation_a.lowest + v.lowest, rotation_b.lowest + w.lowest)
+    top = max(grid_of(max(high_s, high_t)), lowest)
+    top = max(top, rotation_a.lowest + rotation_a.length + v.lowest + v.length - 1)
+    top = max(top, rotation_b.lowest + rotation_b.length + w.lowest + w.length - 1)
+    grid = _Grid(lowest, top - lowest + 1)
+    state[_LENGTH] = grid.length
+    clear(pair.digits, _POINTS, 18 * grid.length)
+    _load_posed(pair.digits, corners, 0, v, pair.XA, 0, rotation_a, 0, grid)
+    _load_posed(pair.digits, corners, B_LOCAL_AT, w, pair.XB, 9, rotation_b, 9, grid)
+
+
+@kernel
+def _load_posed(digits, corners, at, coordinates, X, matrix, rotation, number, grid):
+    """R v + t of the three corners at ``at``, as the exact points' numbers from ``number`` on.
+
+    coordinates, rotation, grid : of the corners, of R, whose entries are numbers from ``matrix`` on, and of the points.
+    """
+    offset = rotation.lowest + coordinates.lowest - grid.lowest
+    length = coordinates.length
+    for k in range(0, 9, 3):
         clear(digits, _VERTEX, 3 * length)
         for j in range(3):
-            add_double(digits, _VERTEX + j * length, corners[own + j], core)
+            add_double(digits, _VERTEX + j * length, corners[at + k + j], coordinates.lowest)
         for i in range(3):
-            out = _POINTS + (3 * k + i) * n
+            out = _POINTS + (number + k + i) * grid.length
             for j in range(3):
-                entry = (first + 3 * i + j) * _ENTRY
-                add_product(digits, out + offset, entry, entries, _VERTEX + j * length, length, 1)
-            shift = XA[4 * i + 3] if k < 3 else XB[4 * i + 3]
-            add_double(digits, out, shift, grid)
-            carry(digits, out, n)
+                entry = (matrix + 3 * i + j) * _ENTRY
+                add_product(digits, out + offset, entry, rotation.length, _VERTEX + j * length, length, 1)
+            add_double(digits, out, X[4 * i + 3], grid.lowest)
+            carry(digits, out, grid.length)

@@ -6,10 +6,9 @@ Every facet is a hull of three points, and stands before the convex set, whichev
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.facet_table import FacetTable
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import NO_TERMS, POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PoseTable
@@ -17,21 +16,8 @@ from collide.mesh.bvh import MeshTree
 from collide.narrowphase.convex_queries import run_pairs
 
 
-class Posed(NamedTuple):
-    """Poses of one body.
-
-    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from where they put it [m].
-    """
-
-    X: np.ndarray
-    slop: np.ndarray
-
-    def of(self, some) -> Posed:
-        return Posed(self.X[some], self.slop[some])
-
-
 def facet_rows(
-    tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, pose: np.ndarray, place: np.ndarray, *, boolean: bool, limit: float,
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, pose: np.ndarray, place: np.ndarray, *, boolean: bool, limit: float,
     depths: bool = True,
 ) -> np.ndarray:  # fmt: skip
     """Rows (PAIR_DTYPE) of k facets, each at one of n pairs of poses, against a convex set; the facet is A.

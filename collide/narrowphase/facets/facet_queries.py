@@ -24,11 +24,10 @@ from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
 from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, SINGULAR, walk_surfaces
+from collide.narrowphase.facets.surface_pairs import SCRATCH
 
 #: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.
 HEAP = 1 << 14
-#: Bodies with radii: cores are looked for as far as these, and this much farther, so that a bracket tells.
-FARTHER = 1 + 1e-9
 
 
 class SurfacePairs(NamedTuple):
@@ -121,7 +120,7 @@ def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> Su
 def _walked(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(keys, starts, counters) of bodies in order; a key is a facet of A times B's number of facets, and one of B."""
     X_WA, X_WB, n = matched(X_WA, X_WB)
-    work = _workspace(WIDTH * (A.depth + B.depth + 4))
+    work = workspace(WIDTH * (A.depth + B.depth + 4))
     keys = np.empty(64 + n if first_only else 4096, dtype=np.int64)
     told = np.zeros(3 + n + 1 + COUNTERS * n, dtype=np.int64)
     where_at = told.ctypes.data
@@ -168,7 +167,7 @@ def _near(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, n: int, 
     """(results, marks) of `distances.near_surfaces`."""
     results = np.empty((n, distances.RESULT))
     marks = np.zeros((n, distances.MARKS), dtype=np.int64)
-    work = _workspace(WIDTH * (A.depth + B.depth + 4))
+    work = workspace(WIDTH * (A.depth + B.depth + 4))
     stack_at, n_stack, doubles_at, integers_at, decide = work.addresses
     done = distances.near_surfaces(
         A.address, B.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), n, A.content == B.content,
@@ -187,7 +186,7 @@ def facets_within(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, 
     Costs about 0.1 µs a pair of boxes and 0.3 µs a pair listed.
     """
     X_WA, X_WB = (np.ascontiguousarray(X, dtype=np.float64) for X in (X_WA, X_WB))
-    work = _workspace(WIDTH * (A.depth + B.depth + 2))
+    work = workspace(WIDTH * (A.depth + B.depth + 2))
     capacity = 512
     while True:
         out = np.empty((capacity, near_pairs.NUMBERS_OF_PAIR))
@@ -226,7 +225,7 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
         n = len(points)
     answers = np.zeros(n, dtype=np.int64)
     counters = np.zeros((n, 3), dtype=np.int64)
-    work = _workspace(WIDTH * (A.depth + 2))
+    work = workspace(WIDTH * (A.depth + 2))
     inside.points_inside(
         A.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), points.ctypes.data,
         3 if points.ndim == 2 else 0, n, answers.ctypes.data, counters.ctypes.data, *work.addresses,
@@ -246,7 +245,7 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
     keys = np.empty(4096, dtype=np.int64)
     counters, where = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
     planes = np.empty(self_contact.PLANE * len(tree.ids))
-    work = _workspace(WIDTH * WIDTH * (tree.depth + 2))
+    work = workspace(WIDTH * WIDTH * (tree.depth + 2))
     while True:
         said = self_contact.walk_itself(
             tree.address, keys.ctypes.data, len(keys), counters.ctypes.data, where.ctypes.data, planes.ctypes.data,
@@ -269,7 +268,7 @@ def facets_on_rays(A: MeshTree, X_WA, given: np.ndarray, first_only: bool) -> tu
     n = len(given)
     hits = np.empty((n + 64, rays.HIT))
     counters, where = np.zeros((n, 3), dtype=np.int64), np.zeros(2, dtype=np.int64)
-    work = _workspace(WIDTH * (A.depth + 2))
+    work = workspace(WIDTH * (A.depth + 2))
     while True:
         said = rays.cast_rays(
             A.address, X_WA.ctypes.data, step(X_WA), given.ctypes.data, n, first_only, hits.ctypes.data, len(hits),
@@ -322,13 +321,14 @@ class Workspace:
             address_of(self._stack), n_stack, address_of(self._doubles), address_of(self._integers),
             code_of(decide_exactly),
         )  # fmt: skip
-        self.heap_address = address_of(self._heap)
+        self._scratch = np.empty(SCRATCH, dtype=np.int64)
+        self.heap_address, self.scratch_address = address_of(self._heap), address_of(self._scratch)
 
 
 _kept = threading.local()
 
 
-def _workspace(n_stack: int) -> Workspace:
+def workspace(n_stack: int) -> Workspace:
     """This thread's workspace, with room for a stack of this many entries."""
     work = getattr(_kept, "work", None)
     if work is None or work.n_stack < n_stack:

@@ -1,19 +1,22 @@
-"""Whether two triangles meet, in doubles with proven error bounds: yes, no, or more than doubles can tell.
+"""Whether two triangles meet, in doubles with proven error bounds: yes, no, or ambiguous.
 
-O. Devillers and P. Guigue, "Faster triangle-triangle intersection tests" (INRIA RR-4488, 2002): the sides of
-one's corners of the other's plane, and two more orientations. Here a sign counts only beyond its error bound.
+O. Devillers and P. Guigue, "Faster triangle-triangle intersection tests" (INRIA RR-4488, 2002): on which sides of each
+triangle's plane the other's corners are, and two more orientations. Here a sign counts only beyond its error bound.
 
 Bounds, with E the error of a coordinate of B's corners, u = 2⁻⁵³, L the largest component of an edge of the
 plane's triangle and D that of w, from its first corner to one of the other triangle:
 normal of A: edges are off by uL, so each component by 8uL²; sides: 3·(2L²(E + uD) + 8uL²D) + 18uL²D;
-normal of B: edges are off by 2E + uL: 24·L·D·E more. Orientation of any four: `sign_error`. Products may vanish: `TINY`.
+normal of B: edges are off by 2E + uL: 24·L·D·E more. Orientation of any four: `sign_error`. Products may underflow:
+`TINY`.
 """
 
 from __future__ import annotations
 
 from collide.kernels import kernel
+from collide.numerics.vec3 import Vec3, cross, dot, max_abs, sub, vec3_at
 
-APART, MEETING, UNSURE = 0, 1, -1
+#: Verdicts of `meeting_in_doubles`.
+APART, MEETING, AMBIGUOUS = 0, 1, -1
 
 _U = 2.0**-53
 #: Larger than anything that underflows in a product of three numbers below 1e50.
@@ -21,68 +24,53 @@ TINY = 1e-260
 
 
 @kernel(inline=True)
+def same_side(signs, limit):
+    """Whether three numbers are certainly of one sign, errors being at most the limit."""
+    return (signs.x > limit and signs.y > limit and signs.z > limit) or (
+        signs.x < -limit and signs.y < -limit and signs.z < -limit
+    )
+
+
+@kernel(inline=True)
+def _all_certain(signs, limit):
+    return abs(signs.x) > limit and abs(signs.y) > limit and abs(signs.z) > limit
+
+
+@kernel(inline=True)
 def meeting_in_doubles(P, Q, b, a, error):
-    """APART, MEETING or UNSURE for the triangles P[a:a + 9] and Q[b:b + 9], both in A's frame.
+    """APART, MEETING or AMBIGUOUS for the triangles P[a:a + 9] and Q[b:b + 9], both in A's frame.
 
     error : bound of the error of every coordinate of Q.
     """
     # Sides of B's corners of A's plane.
-    x0 = P[a]
-    y0 = P[a + 1]
-    z0 = P[a + 2]
-    ux = P[a + 3] - x0
-    uy = P[a + 4] - y0
-    uz = P[a + 5] - z0
-    vx = P[a + 6] - x0
-    vy = P[a + 7] - y0
-    vz = P[a + 8] - z0
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
-    w0x = Q[b] - x0
-    w0y = Q[b + 1] - y0
-    w0z = Q[b + 2] - z0
-    w1x = Q[b + 3] - x0
-    w1y = Q[b + 4] - y0
-    w1z = Q[b + 5] - z0
-    w2x = Q[b + 6] - x0
-    w2y = Q[b + 7] - y0
-    w2z = Q[b + 8] - z0
-    s0 = nx * w0x + ny * w0y + nz * w0z
-    s1 = nx * w1x + ny * w1y + nz * w1z
-    s2 = nx * w2x + ny * w2y + nz * w2z
-    edge = max(abs(ux), abs(uy), abs(uz), abs(vx), abs(vy), abs(vz))
-    far = max(abs(w0x), abs(w0y), abs(w0z), abs(w1x), abs(w1y), abs(w1z), abs(w2x), abs(w2y), abs(w2z))
-    bound = edge * edge * (8.0 * error + 64.0 * _U * far) + TINY
-    if (s0 > bound and s1 > bound and s2 > bound) or (s0 < -bound and s1 < -bound and s2 < -bound):
+    first = vec3_at(P, a)
+    u = sub(vec3_at(P, a + 3), first)
+    v = sub(vec3_at(P, a + 6), first)
+    w0 = sub(vec3_at(Q, b), first)
+    w1 = sub(vec3_at(Q, b + 3), first)
+    w2 = sub(vec3_at(Q, b + 6), first)
+    n = cross(u, v)
+    sides_b = Vec3(dot(n, w0), dot(n, w1), dot(n, w2))
+    edge = max(max_abs(u), max_abs(v))
+    far = max(max_abs(w0), max_abs(w1), max_abs(w2))
+    limit_b = edge * edge * (8.0 * error + 64.0 * _U * far) + TINY
+    if same_side(sides_b, limit_b):
         return APART
     # Sides of A's corners of B's plane.
-    fx = w1x - w0x
-    fy = w1y - w0y
-    fz = w1z - w0z
-    gx = w2x - w0x
-    gy = w2y - w0y
-    gz = w2z - w0z
-    nx = fy * gz - fz * gy
-    ny = fz * gx - fx * gz
-    nz = fx * gy - fy * gx
-    r0 = -(nx * w0x + ny * w0y + nz * w0z)
-    r1 = nx * (ux - w0x) + ny * (uy - w0y) + nz * (uz - w0z)
-    r2 = nx * (vx - w0x) + ny * (vy - w0y) + nz * (vz - w0z)
+    f = sub(w1, w0)
+    g = sub(w2, w0)
+    n = cross(f, g)
+    sides_a = Vec3(-dot(n, w0), dot(n, sub(u, w0)), dot(n, sub(v, w0)))
     reach = far + edge
     # Edges are differences of differences here: 2E + 3u(D + L) off.
-    side = max(abs(fx), abs(fy), abs(fz), abs(gx), abs(gy), abs(gz))
+    side = max(max_abs(f), max_abs(g))
     slack = 2.0 * error + 4.0 * _U * reach
-    limit = side * (8.0 * side * slack + 32.0 * reach * slack + 64.0 * _U * side * reach) + TINY
-    if (r0 > limit and r1 > limit and r2 > limit) or (r0 < -limit and r1 < -limit and r2 < -limit):
+    limit_a = side * (8.0 * side * slack + 32.0 * reach * slack + 64.0 * _U * side * reach) + TINY
+    if same_side(sides_a, limit_a):
         return APART
-    sure = (
-        abs(s0) > bound and abs(s1) > bound and abs(s2) > bound
-        and abs(r0) > limit and abs(r1) > limit and abs(r2) > limit
-    )  # fmt: skip
-    if not sure:
-        return UNSURE
-    return _crossing(P, Q, b, a, s0, s1, s2, r0, r1, r2, sign_error(reach, error))
+    if not (_all_certain(sides_b, limit_b) and _all_certain(sides_a, limit_a)):
+        return AMBIGUOUS
+    return _intervals_overlap(P, a, sides_a, Q, b, sides_b, sign_error(reach, error))
 
 
 @kernel(inline=True)
@@ -95,50 +83,79 @@ def sign_error(reach, error):
 
 
 @kernel
-def _crossing(P, Q, b, a, s0, s1, s2, r0, r1, r2, limit):
-    """The planes cross, and both triangles cross the line: whether they overlap on it."""
+def _intervals_overlap(P, a, sides_a, Q, b, sides_b, limit):
+    """The planes cross, and both triangles cross the line: whether they overlap on it.
+
+    sides_a : on which sides of B's plane A's corners are, all certain; sides_b likewise.
+    """
     # The corner of A that is alone on its side of B's plane comes first; B is turned over so that it lies above.
-    i = _alone(r0, r1, r2)
-    above = (r0 if i == 0 else (r1 if i == 1 else r2)) > 0.0
-    j = _alone(s0, s1, s2)
-    over = (s0 if j == 0 else (s1 if j == 1 else s2)) > 0.0
+    i = _alone(sides_a)
+    j = _alone(sides_b)
     p1 = a + 3 * i
     q1 = a + 3 * ((i + 1) % 3)
-    r1_at = a + 3 * ((i + 2) % 3)
+    r1 = a + 3 * ((i + 2) % 3)
     p2 = b + 3 * j
     q2 = b + 3 * ((j + 1) % 3)
-    r2_at = b + 3 * ((j + 2) % 3)
-    if not above:
-        q2, r2_at = r2_at, q2
-    if not over:
-        q1, r1_at = r1_at, q1
-    one = orientation(P, p1, P, q1, Q, p2, Q, q2)
-    if one > limit:
+    r2 = b + 3 * ((j + 2) % 3)
+    if not _component(sides_a, i) > 0.0:
+        q2, r2 = r2, q2
+    if not _component(sides_b, j) > 0.0:
+        q1, r1 = r1, q1
+    lower = orientation(P, p1, P, q1, Q, p2, Q, q2)
+    if lower > limit:
         return APART
-    two = orientation(P, p1, P, r1_at, Q, r2_at, Q, p2)
-    if two > limit:
+    upper = orientation(P, p1, P, r1, Q, r2, Q, p2)
+    if upper > limit:
         return APART
-    return MEETING if one < -limit and two < -limit else UNSURE
+    return MEETING if lower < -limit and upper < -limit else AMBIGUOUS
 
 
 @kernel(inline=True)
-def _alone(x, y, z):
+def _component(a, k):
+    return a.x if k == 0 else (a.y if k == 1 else a.z)
+
+
+@kernel(inline=True)
+def _alone(a):
     """Which of three numbers, none 0 and not all of one sign, has a sign of its own."""
-    if (y > 0.0) == (z > 0.0):
+    if (a.y > 0.0) == (a.z > 0.0):
         return 0
-    return 1 if (x > 0.0) == (z > 0.0) else 2
+    return 1 if (a.x > 0.0) == (a.z > 0.0) else 2
 
 
 @kernel
 def orientation(A, a, B, b, C, c, D, d):
     """(b − a) × (c − a) · (d − a), rounded."""
-    ux = B[b] - A[a]
-    uy = B[b + 1] - A[a + 1]
-    uz = B[b + 2] - A[a + 2]
-    vx = C[c] - A[a]
-    vy = C[c + 1] - A[a + 1]
-    vz = C[c + 2] - A[a + 2]
-    wx = D[d] - A[a]
-    wy = D[d + 1] - A[a + 1]
-    wz = D[d + 2] - A[a + 2]
-    return (uy * vz - uz * vy) * wx + (uz * vx - ux * vz) * wy + (ux * vy - uy * vx) * wz
+    first = vec3_at(A, a)
+    return dot(cross(sub(vec3_at(B, b), first), sub(vec3_at(C, c), first)), sub(vec3_at(D, d), first))
+
+
+@kernel(inline=True)
+def opposed(x, y, limit):
+    """Whether two numbers certainly have different signs, errors being at most the limit."""
+    return (x > limit and y < -limit) or (x < -limit and y > limit)
+
+
+@kernel(inline=True)
+def segment_against_triangle(P, t, S, p, q, error):
+    """(APART, MEETING or AMBIGUOUS, whether p is above the plane) for the segment S[p:], S[q:] and the triangle P[t:].
+
+    MEETING : the segment crosses the inside of the triangle.   error : bound of the error of a coordinate of S.
+    """
+    first = vec3_at(P, t)
+    far = max(max_abs(sub(vec3_at(P, t + 3), first)), max_abs(sub(vec3_at(P, t + 6), first)))
+    limit = sign_error(max(far, max_abs(sub(vec3_at(S, p), first)), max_abs(sub(vec3_at(S, q), first))), error)
+    start = orientation(P, t, P, t + 3, P, t + 6, S, p)
+    end = orientation(P, t, P, t + 3, P, t + 6, S, q)
+    above = start > 0.0
+    if (start > limit and end > limit) or (start < -limit and end < -limit):
+        return APART, above
+    x = orientation(P, t, P, t + 3, S, p, S, q)
+    y = orientation(P, t + 3, P, t + 6, S, p, S, q)
+    if opposed(x, y, limit):
+        return APART, above
+    z = orientation(P, t + 6, P, t, S, p, S, q)
+    if opposed(x, z, limit) or opposed(y, z, limit):
+        return APART, above
+    certain = abs(start) > limit and abs(end) > limit and _all_certain(Vec3(x, y, z), limit)
+    return MEETING if certain else AMBIGUOUS, above

@@ -13,15 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.lowering.enclosures import Enclosure
-from collide.lowering.facet_bodies import Body, farthest_told, hull_of, reach_of
+from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, reach_of
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.convex_bodies import convex_rows
-from collide.narrowphase.facets.facet_convex import Posed, facet_rows
+from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.facets.body_pairs import core_hits, farthest_gap, hull_rows
+from collide.narrowphase.facets.facet_convex import facet_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
-from collide.narrowphase.facets.mesh_hits import APART, HIT, OPEN, core_hits, holds_points
 from collide.narrowphase.facets.near_facets import Facets, near_facets
-from collide.narrowphase.facets.separating_translation import way_out
+from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
+from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
@@ -44,7 +45,18 @@ class Decided(NamedTuple):
     place: np.ndarray
 
 
-def decide(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed) -> Decided:
+def curved_states(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) APART, HIT or OPEN for poses (n, 4, 4) or (1, 4, 4); check: refuse matrices that are no rotation."""
+    n = number_of_poses(X_WA, X_WB)
+    near = np.flatnonzero(core_hits(A, E.outer, X_WA, X_WB, check=check).core)
+    state = np.full(n, APART)
+    if len(near):
+        PA, PB = (as_given(np.broadcast_to(X, (n, 4, 4))[near]) for X in (X_WA, X_WB))
+        state[near] = decide(A, E, PA, PB).state
+    return state
+
+
+def decide(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> Decided:
     """Whether a mesh and a shape share a point, proven for the poses and everything within their slops."""
     n = len(X_WA.X)
     done = Decided(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
@@ -73,7 +85,7 @@ def _between_polytopes(A: Body, E: Enclosure, X_WA, X_WB, left: np.ndarray, done
         done.point[left] = within.inside
 
 
-def _by_facets(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, left: np.ndarray, done: Decided) -> None:
+def _by_facets(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, left: np.ndarray, done: Decided) -> None:
     """Ask about every facet that may touch, until one does."""
     PA, PB = X_WA.of(left), X_WB.of(left)
     near = near_facets(A.tree, E.packed, PA, PB, _across(A, E, PA, PB), np.zeros(len(left)))
@@ -106,7 +118,7 @@ def _rounds(near: Facets, wanted):
         size *= _MORE
 
 
-def _across(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
+def _across(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     """(n, 3) from the mesh's middle to the shape's."""
     return _moved(PB.X, E.outer.centre) - _moved(PA.X, A.centre)
 
@@ -118,7 +130,9 @@ def _moved(X: np.ndarray, point: np.ndarray) -> np.ndarray:
 # --- rows ---------------------------------------------------------------------------------------
 
 
-def curved_rows(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, *, limit: float, depths: bool) -> np.ndarray:
+def curved_rows(
+    A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, limit: float, depths: bool
+) -> np.ndarray:
     """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop only."""
     decided = decide(A, E, X_WA, X_WB)
     rows = np.zeros(len(X_WA.X), dtype=PAIR_DTYPE)
@@ -133,15 +147,19 @@ def curved_rows(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, *, limit: float
     return rows
 
 
-def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: float) -> np.ndarray:
+def _gaps(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, farthest: float, limit: float) -> np.ndarray:
     """Rows of bodies that are known to be apart; only what is no farther than ``farthest`` [m] is looked for."""
     rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
     facets = _facets_to_begin_with(A, E, PA, PB, farthest)
     seen = np.flatnonzero(facets >= 0)
     if len(seen):
         rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), facets[seen])
-    for k in np.flatnonzero(facets < 0).tolist():
-        rows[k] = _far(A, E, PA, PB, k, farthest)
+    unseen = np.flatnonzero(facets < 0)
+    if farthest <= farthest_gap(A, E.outer):
+        rows[unseen] = _beyond(A, E, PA.X[unseen], PB.X[unseen], farthest)
+    else:
+        for k in unseen.tolist():
+            rows[k] = _far(A, E, PA, PB, k, farthest)
     rows["vertices_a"] = rows["vertices_b"] = -1
     rows["hit"] = False
     beyond = (rows["lower"] > limit) | rows["beyond"]
@@ -150,7 +168,7 @@ def _gaps(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float, limit: f
     return rows
 
 
-def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest: float) -> np.ndarray:
+def _facets_to_begin_with(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, farthest: float) -> np.ndarray:
     """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``farthest``.
 
     The polytope around the shape tells, by its surface: what comes nearer to the shape than the limit either comes as
@@ -160,14 +178,14 @@ def _facets_to_begin_with(A: Body, E: Enclosure, PA: Posed, PB: Posed, farthest:
     facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf)).facets[:, 0].copy()
     unseen = np.flatnonzero(facets < 0)
     if len(unseen) and farthest < math.inf:
-        enclosed = unseen[holds_points(E.outer, A.points, PB.X[unseen], PA.X[unseen])]
+        enclosed = unseen[core_hits(E.outer, A, PB.X[unseen], PA.X[unseen]).core]
         if len(enclosed):
             nearest = surface_distances(A.tree, E.outer.tree, PA.X[enclosed], PB.X[enclosed]).facets[:, 0]
             facets[enclosed] = np.maximum(nearest, 0)  # any facet will do to begin with
     return facets
 
 
-def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) -> np.ndarray:
+def _nearest(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets: np.ndarray) -> np.ndarray:
     """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
 
     Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need not.
@@ -191,7 +209,7 @@ def _nearest(A: Body, E: Enclosure, PA: Posed, PB: Posed, facets: np.ndarray) ->
     return _least(A, E, PA, PB, pose, place, rows, upper)
 
 
-def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper) -> np.ndarray:
+def _least(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, pose, place, rows, upper) -> np.ndarray:
     """One row a pose from those of its facets."""
     # The nearest by its upper bound and the width of its bracket: where that is wide the distance is a guess, and so are points.
     order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
@@ -216,42 +234,39 @@ def _least(A: Body, E: Enclosure, PA: Posed, PB: Posed, pose, place, rows, upper
     return out
 
 
-def _size(A: Body, E: Enclosure, PA: Posed, PB: Posed) -> np.ndarray:
+def _size(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     """(n,) S of `narrowphase/bounds.py`."""
     return reach_of(A) + E.packed.reach + np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
 
 
-def _far(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
-    """The row of bodies that are out of sight: beyond the limit, or farther than boxes in floats can tell."""
-    if limit <= farthest_told(A, E.outer):
-        return _unseen(A, E, PA, PB, k, limit)
-    hulls = convex_rows(hull_of(A), hull_of(E.outer), PA.X[k : k + 1], PB.X[k : k + 1], limit=limit)
-    row = hulls[0]
+def _far(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, k: int, limit: float):
+    """The row of bodies farther apart than boxes of floats can measure: between their hulls, and one point of each."""
+    row = hull_rows(A, E.outer, PA.X[k : k + 1], PB.X[k : k + 1], limit)[0]
     slop = float(PA.slop[k] + PB.slop[k])
     row["count"], row["part_a"], row["part_b"], row["iterations"] = 0, 0, 0, 0
     row["lower"] = max(float(row["lower"]) - slop, 0.0)
-    one = _moved(PA.X[k], A.points[0])
-    other = _moved(PB.X[k], E.outer.points[0])
-    across = float(np.sqrt(np.square(other - one).sum())) * (1 + 2.0**-45) + slop
-    row["upper"] = max(across, float(row["upper"]))
-    row["certified"] = bool(row["lower"] > 0.0 and row["upper"] - row["lower"] <= PROMISE_STORED * across)
+    across = _moved(PB.X[k], E.outer.points[0]) - _moved(PA.X[k], A.points[0])
+    upper = float(np.sqrt(np.square(across).sum())) * (1 + 2.0**-45) + slop
+    row["upper"] = max(upper, float(row["upper"]))
+    row["certified"] = bool(row["lower"] > 0.0 and row["upper"] - row["lower"] <= PROMISE_STORED * upper)
     return row
 
 
-def _unseen(A: Body, E: Enclosure, PA: Posed, PB: Posed, k: int, limit: float):
-    """The row of bodies beyond a limit: halfway between their middles, as far apart as is proven."""
-    row = np.zeros(1, dtype=PAIR_DTYPE)[0]
-    one, other = _moved(PA.X[k], A.centre), _moved(PB.X[k], E.outer.centre)
-    length = float(np.sqrt(np.square(other - one).sum()))
-    normal = (other - one) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    row["distance"] = row["lower"] = math.nextafter(limit, math.inf)
-    row["upper"], row["beyond"], row["how"], row["normal"] = math.inf, True, EXACT, normal + 0.0
-    half = 0.5 * float(row["distance"]) * normal
-    row["point_a"], row["point_b"] = 0.5 * (one + other) - half, 0.5 * (one + other) + half
-    return row
+def _beyond(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """Rows of bodies beyond a limit: halfway between their middles, as far apart as is proven."""
+    rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    start, end = _moved(X_WA, A.centre), _moved(X_WB, E.outer.centre)
+    across = end - start
+    length = np.sqrt(np.square(across).sum(axis=1))[:, None]
+    normal = np.where(length > 0.0, across / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+    rows["distance"] = rows["lower"] = math.nextafter(limit, math.inf)
+    rows["upper"], rows["beyond"], rows["how"], rows["normal"] = math.inf, True, EXACT, normal + 0.0
+    half = 0.5 * rows["distance"][:, None] * normal
+    rows["point_a"], rows["point_b"] = 0.5 * (start + end) - half, 0.5 * (start + end) + half
+    return rows
 
 
-def _overlap(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, decided: Decided, rows, k: int, depths: bool) -> None:
+def _overlap(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, decided: Decided, rows, k: int, depths: bool) -> None:
     """Fill in row k of bodies that meet, or may."""
     row, some = rows[k], slice(k, k + 1)
     PA, PB = X_WA.of(some), X_WB.of(some)
@@ -271,13 +286,9 @@ def _overlap(A: Body, E: Enclosure, X_WA: Posed, X_WB: Posed, decided: Decided, 
     row["point_a"] = row["point_b"] = point
     row["certified"] = sure
     if depths:
-        hulls = convex_rows(hull_of(A), hull_of(E.outer), PA.X, PB.X)[0]
+        hulls = hull_rows(A, E.outer, PA.X, PB.X, math.inf)[0]
 
-        def meets(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
-            still = np.zeros(len(X_WA))
-            return decide(A, E, Posed(X_WA, still), Posed(X_WB, still)).state != APART
+        def hits(A: Body, B: Body, X_WA, X_WB) -> np.ndarray:
+            return curved_states(A, E, X_WA, X_WB) != APART
 
-        length, bound, normal = way_out(A, E.outer, PA.X[0], PB.X[0], hulls, [], meets)
-        row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
-        row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
-        row["certified"] = bool(sure and bound == 0.0)
+        write_depth(row, point, separating_translation(A, E.outer, PA.X[0], PB.X[0], hulls, [], hits))

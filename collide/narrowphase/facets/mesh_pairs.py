@@ -1,4 +1,8 @@
-"""What pair queries and worlds ask of a pair of shapes with a mesh in it: unions, or two single bodies."""
+"""Two shapes with a mesh in one or both, at n pairs of poses: what pair queries and worlds ask.
+
+Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_rows.py`). Hulls settle
+what facets leave open: the convex engine gives them the last digit, and takes the poses of parts without rounding them.
+"""
 
 from __future__ import annotations
 
@@ -6,82 +10,127 @@ import math
 
 import numpy as np
 
-from collide.lowering.composite_parts import is_union
+from collide.lowering.facet_bodies import body_of
+from collide.lowering.kinds import kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
-from collide.narrowphase.facets.mesh_hits import APART, OPEN
-from collide.narrowphase.facets.mesh_rows import mesh_rows, mesh_states
+from collide.narrowphase.dispatch import Method, method_of
+from collide.narrowphase.facets.body_pairs import SinglePair
+from collide.narrowphase.facets.mesh_rows import checked_poses, mesh_rows, mesh_states
+from collide.narrowphase.facets.surface_pairs import APART, OPEN
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 
 
-def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool for poses (n, 4, 4): whether two shapes, a mesh among them or in one, share a point; True where open."""
-    return _states(A, B, X_WA, X_WB, open_ones=False) != APART
+def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) bool: whether two shapes share a point; True where that is open.
+
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    check : refuse matrices that are no rotation. Raises InvalidPose, UnsupportedQuery.
+    Costs 0.2 µs a pose of bodies of facets that are far apart.
+    """
+    return _states(A, B, X_WA, X_WB, check, parts_open=False) != APART
 
 
-def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) APART, HIT or OPEN for poses (n, 4, 4): what `pair_hits` says, and whether that is proven."""
-    return _states(A, B, X_WA, X_WB, open_ones=True)
+def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) APART, HIT or OPEN: what `pair_hits` says, and whether that is proven."""
+    return _states(A, B, X_WA, X_WB, check, parts_open=True)
 
 
-def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool) -> np.ndarray:
-    if is_union(A) or is_union(B):
-        states = union_states(A, B, X_WA, X_WB, open_ones=open_ones)
+def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:
+    """States of two shapes; parts_open: tell OPEN from HIT among convex parts, too."""
+    if _are_unions(A, B):
+        states = union_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
     else:
-        states = mesh_states(A, B, X_WA, X_WB)
-    left = np.flatnonzero(states == OPEN)
-    covers = _covers(A, B) if len(left) else None  # a mesh's hull is made when it is first needed
+        states = mesh_states(A, B, X_WA, X_WB, check=check)
+    undecided = np.flatnonzero(states == OPEN)
+    covers = _convex_covers(A, B) if len(undecided) else None  # a mesh's hull is made when it is first needed
     if covers is not None:
-        states[left[~convex_hits(*covers, _some(X_WA, left), _some(X_WB, left))]] = APART
+        hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
+        states[undecided[~hulls_meet]] = APART
     return states
 
 
-def pair_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool = True) -> np.ndarray:
-    """Rows (PAIR_DTYPE) for poses (n, 4, 4); limit, depths as in `distance`.
+def pair_rows(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool = True, check: bool = False,
+    out: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Rows (PAIR_DTYPE) of two shapes; poses and check as of `pair_hits`, limit and depths as in `distance`.
 
     part_a, part_b : of a `Compound` the number of its part, in the order of its items, nested ones in their place; of
-    any other shape the facet.
+    any other shape the facet.   out : (n,) zeroed rows, to be filled and returned.
     """
-    rows_of = union_rows if is_union(A) or is_union(B) else mesh_rows
-    rows = rows_of(A, B, X_WA, X_WB, limit=limit, depths=depths)
-    left = np.flatnonzero(rows["how"] == UNDECIDED)
-    covers = _covers(A, B) if len(left) else None
+    if _are_unions(A, B):
+        rows = union_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
+    else:
+        rows = mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+    undecided = np.flatnonzero(rows["how"] == UNDECIDED)
+    covers = _convex_covers(A, B) if len(undecided) else None
     if covers is not None:
-        told = convex_rows(*covers, _some(X_WA, left), _some(X_WB, left), depths=False)
-        apart = told["lower"] > 0.0
-        _part(rows, left[apart], told[apart], limit)
+        poses = _poses_of(X_WA, undecided), _poses_of(X_WB, undecided)
+        hulls = convex_rows(*covers, *poses, depths=False)
+        apart = hulls["lower"] > 0.0
+        _make_gaps(rows, undecided[apart], hulls[apart], limit)
+    if out is not None and rows is not out:
+        out[:] = rows
+        rows = out
     return rows
 
 
-def convex_cover(shape: Shape) -> Shape | None:
-    """What holds the shape and is made of convex parts, where there is such: the convex engine settles what facets leave
-    open, since integers give it the last digits, and takes the poses of parts without rounding them."""
-    if isinstance(shape, Mesh):
-        return shape.convex_hull
-    return None if shape.meshed else shape
+def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """What `pair_rows` gives for checked poses, but that pairs beyond ``limit`` [m] may have any proven bound.
+
+    Hulls that are proven farther apart answer for the bodies in them: then no facet is looked at, and no tree is built.
+    Raises UnsupportedQuery where the hulls are not enough and the shapes are not answered.
+    """
+    covers = _convex_covers(A, B) if limit < math.inf else None
+    if covers is None:
+        return pair_rows(A, B, X_WA, X_WB, limit=limit)
+    rows = convex_rows(*covers, X_WA, X_WB, limit=limit, depths=False)
+    beyond = rows["beyond"] | (rows["lower"] > limit)
+    rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hulls, not of the meshes
+    rows["part_a"], rows["part_b"] = 0, 0
+    near = np.flatnonzero(~beyond)
+    if len(near):
+        rows[near] = pair_rows(A, B, _poses_of(X_WA, near), _poses_of(X_WB, near), limit=limit)
+    return rows
 
 
-def _covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
-    one, other = convex_cover(A), convex_cover(B)
-    return None if one is None or other is None else (one, other)
+def single_pair(A: Shape, B: Shape) -> SinglePair | None:
+    """Two bodies of facets made ready for single calls; None where these are batches of one: of very many parts.
+
+    The pair holds trees and points, not the shapes.
+    """
+    bodies = body_of(A), body_of(B)
+    return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
 
 
-def _some(X: np.ndarray, which: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(X[which])
+def _are_unions(A: Shape, B: Shape) -> bool:
+    """Whether one is a `Compound`, to be taken apart."""
+    return method_of(kind_of(A), kind_of(B)) is Method.MESH_PARTS
 
 
-def _part(rows: np.ndarray, at: np.ndarray, told: np.ndarray, limit: float) -> None:
-    """Make open rows gaps, in place, as their covers are proven to be apart."""
-    row = rows[at]
-    row["hit"], row["how"], row["normal"] = False, told["how"], told["normal"]
-    row["lower"] = told["lower"]
+def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
+    """Two shapes of convex parts that hold the given ones, where there are such."""
+    covers = [shape.convex_hull if isinstance(shape, Mesh) else None if shape.meshed else shape for shape in (A, B)]
+    return None if None in covers else (covers[0], covers[1])
+
+
+def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
+    return X if len(X) == 1 else X[some]
+
+
+def _make_gaps(rows: np.ndarray, which: np.ndarray, hulls: np.ndarray, limit: float) -> None:
+    """Make undecided rows gaps, in place, where their hulls are proven to be apart."""
+    row = rows[which]
+    row["hit"], row["how"], row["normal"] = False, hulls["how"], hulls["normal"]
+    row["lower"] = hulls["lower"]
     row["beyond"] = row["lower"] > limit
     row["certified"] = row["beyond"]
     upper = np.maximum(row["upper"], row["lower"])
-    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(told["distance"], row["lower"], upper))
+    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(hulls["distance"], row["lower"], upper))
     row["upper"] = np.where(row["beyond"], math.inf, upper)
     lay_points_apart(row, np.arange(len(row)))
-    rows[at] = row
+    rows[which] = row

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS, PackedConvex
 from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
-from collide.narrowphase.facets.facet_convex import Posed
 
 #: More boxes at once are walked in two halves of the poses.
 _MOST_BOXES = 1 << 16
@@ -36,7 +36,7 @@ class Facets:
         return np.arange(len(self.pose)) - np.repeat(starts, counts)
 
 
-def near_facets(tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, along: np.ndarray, upper: np.ndarray) -> Facets:
+def near_facets(tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray) -> Facets:
     """Facets of A not proven farther than ``upper`` (n,) from the set at B, at n pairs of poses.
 
     along : (n, 3) a direction worth trying, of any length.
@@ -87,7 +87,7 @@ class _Spans:
     Everything is relative to the origin of A's frame.
     """
 
-    def __init__(self, tree: MeshTree, packed: PackedConvex, A: Posed, B: Posed, along: np.ndarray):
+    def __init__(self, tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray):
         RA, RB = A.X[:, :3, :3], B.X[:, :3, :3]
         D = np.concatenate([RA.transpose(0, 2, 1), RB.transpose(0, 2, 1), along[:, None]], axis=1)
         lengths = np.sqrt(_dot(D, D))

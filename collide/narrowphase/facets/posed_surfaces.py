@@ -5,30 +5,34 @@ affine map, so everything happens in A's frame: y = C (R_B w + t_B − t_A) with
 C R_A = I + F. Then what R_A⁻¹ would have given differs from what C gives by |F|/(1 − |F|) of its size, and rounding
 adds at most 12u of the terms summed (t_B − t_A: 1, C R_B: 3, times w: 3, sums: 3). No rotation is assumed.
 
-Boxes are compared in floats, v = 2⁻²⁴: eight roundings on either side of the comparison, 32 v = 2⁻¹⁹ of the terms hold them twice over.
+Boxes are compared in floats, v = 2⁻²⁴: eight roundings on either side of the comparison, 32 v = 2⁻¹⁹ of the terms hold
+them twice over.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.kernels import kernel
 from collide.mesh.bvh import CENTRE, EXPONENT, RADIUS, REACH
+from collide.numerics.error_free import two_sum
+from collide.numerics.vec3 import Vec3, add, cross, dot, put_vec3, rotate, vec3_at
 
-# A placing, doubles: M (9) and m (3) take B's frame to A's; N (9) and n (3) take A's to B's.
-M, SHIFT, N, N_SHIFT = 0, 9, 12, 21
-#: Largest error of a coordinate of M w + m; of N v + n.
+# A placing, doubles: M (9) and m (3) take points of B's frame to A's, M w + m; N (9) and n (3) take A's to B's.
+M, SHIFT, N = 0, 9, 12
+#: Bound of the error of a coordinate of M w + m; of N v + n.
 ERROR, N_ERROR = 24, 25
 #: 1 where M w + m is exact, so far as its sums are.
 PLAIN = 26
-#: A's unit of boxes over B's.
+#: Unit of A's boxes over that of B's.
 UNITS = 27
-#: For the boxes of A [0] and of B [1] as probes: matrix from the other tree's boxes to the own ones (9), shift (3),
-#: what rounding can add to a half length (3).
+#: For probes of A's boxes [0] and of B's [1]: the matrix from the other tree's boxes to their own (9), shift (3), and
+#: the bound of what rounding adds to a half length (3).
 FRAMES, FRAME_SIZE = 28, 15
-# Inverses of both matrices (9 each), each with a bound of |C R − I| behind it.
+# Inverses of both matrices (9 each), each followed by a bound of the largest row sum of |C R − I|.
 INVERSE_A, INVERSE_B = 58, 68
 PLACING = 78
 
@@ -39,47 +43,55 @@ _EXTENT = 1.001
 #: Added to half lengths: products of floats may vanish.
 _TINY = 2.0**-110
 #: Trees whose units differ by more powers of two than this are compared in the larger one's only.
-MOST_UNLIKE = 90
-#: How far from a rotation a matrix may be for balls to stand for bodies, and lengths whose squares might vanish.
-_LITTLE, _VANISHING = 2.0**-10, 1e-140
+MAX_UNIT_EXPONENT = 90
+#: Largest deviation from a rotation at which balls stand for bodies; lengths whose squares might underflow.
+_MAX_DEVIATION, _MIN_LENGTH = 2.0**-10, 1e-140
 #: A matrix whose computed inverse is worse than this is refused.
-_WORST_INVERSE = 2.0**-10
+_MAX_RESIDUAL = 2.0**-10
+
+
+class Extent(NamedTuple):
+    """Where a tree's boxes are: its numbers (centre, reach; `mesh/bvh.py`), and the exponent of its unit."""
+
+    numbers: np.ndarray
+    exponent: int
+
+
+@kernel(inline=True)
+def extent_of(tree):
+    return Extent(tree.numbers, tree.header[EXPONENT])
 
 
 @kernel
-def place(header_a, numbers_a, XA, header_b, numbers_b, XB, out, frames):
-    """The placing of B (pose XB, 16 doubles) from A; False where a matrix is not clearly invertible.
+def place(A, XA, B, XB, placing, frame_a, frame_b):
+    """Relate two bodies, given as `Extent` and pose (16 doubles); False where a matrix is not clearly invertible.
 
-    frames : 18 floats out, the matrices of both kinds of probe.
+    placing : PLACING doubles out.   frame_a, frame_b : 9 floats out each, the matrices of the probes of A and of B.
     """
-    worst_a = _inverse(XA, out, INVERSE_A)
-    worst_b = _inverse(XB, out, INVERSE_B)
-    if not (worst_a <= _WORST_INVERSE and worst_b <= _WORST_INVERSE):
+    if not (_inverse(XA, placing, INVERSE_A) <= _MAX_RESIDUAL and _inverse(XB, placing, INVERSE_B) <= _MAX_RESIDUAL):
         return False
-    same = True
+    same_rotation = True
     for i in range(3):
         for j in range(3):
-            same = same and XA[4 * i + j] == XB[4 * i + j]
-    out[ERROR] = _compose(XA, XB, numbers_b, out, INVERSE_A, M, SHIFT, worst_a, same)
-    out[N_ERROR] = _compose(XB, XA, numbers_a, out, INVERSE_B, N, N_SHIFT, worst_b, same)
-    out[PLAIN] = 1.0 if _plain(XA, XB, same) else 0.0
-    ea = header_a[EXPONENT]
-    eb = header_b[EXPONENT]
-    out[UNITS] = math.ldexp(1.0, int(ea - eb))
-    _frame(out, frames, 0, M, SHIFT, out[ERROR], numbers_a, numbers_b, ea, eb)
-    _frame(out, frames, 1, N, N_SHIFT, out[N_ERROR], numbers_b, numbers_a, eb, ea)
+            same_rotation = same_rotation and XA[4 * i + j] == XB[4 * i + j]
+    placing[ERROR] = _compose(XA, XB, B.numbers, placing, INVERSE_A, M, same_rotation)
+    placing[N_ERROR] = _compose(XB, XA, A.numbers, placing, INVERSE_B, N, same_rotation)
+    placing[PLAIN] = 1.0 if _is_exact(XA, XB, same_rotation) else 0.0
+    placing[UNITS] = math.ldexp(1.0, int(A.exponent - B.exponent))
+    _set_frame(A, B, placing, M, placing[ERROR], FRAMES, frame_a)
+    _set_frame(B, A, placing, N, placing[N_ERROR], FRAMES + FRAME_SIZE, frame_b)
     return True
 
 
 @kernel
-def balls_apart(XA, numbers_a, XB, numbers_b):
-    """Whether the balls around two bodies are certainly apart; False of matrices that are not close to rotations.
+def balls_apart(XA, numbers_a, XB, numbers_b, margin):
+    """Whether the balls around two bodies are certainly farther apart than a margin [m].
 
-    For a rotation but for d, the largest row sum of |RᵀR − I|, lengths grow by no more than 1 + d.
+    False of matrices that are not close to rotations. With d the largest row sum of |RᵀR − I|, lengths grow by a factor of at most 1 + d.
     """
-    stretch_a = _off_rotation(XA)
-    stretch_b = _off_rotation(XB)
-    if not (stretch_a <= _LITTLE and stretch_b <= _LITTLE):
+    stretch_a = deviation_from_rotation(XA)
+    stretch_b = deviation_from_rotation(XB)
+    if not (stretch_a <= _MAX_DEVIATION and stretch_b <= _MAX_DEVIATION):
         return False
     square = 0.0
     size = 0.0
@@ -91,30 +103,31 @@ def balls_apart(XA, numbers_a, XB, numbers_b):
         size += 2.0 * (abs(numbers_a[CENTRE + i]) + abs(numbers_b[CENTRE + i]))
         square += gap * gap
     reach = numbers_a[RADIUS] * (1.0 + stretch_a) + numbers_b[RADIUS] * (1.0 + stretch_b)
+    reach += margin
     reach += 2.0**-40 * (reach + size)
-    return square > reach * reach and reach > _VANISHING
+    return square > reach * reach and reach > _MIN_LENGTH
 
 
 @kernel(inline=True)
-def _off_rotation(X):
+def deviation_from_rotation(X):
     """Largest row sum of |RᵀR − I|, rounded upwards; infinite where R mirrors."""
-    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8]
-    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9]
-    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10]
-    xy = abs(X[0] * X[1] + X[4] * X[5] + X[8] * X[9])
-    xz = abs(X[0] * X[2] + X[4] * X[6] + X[8] * X[10])
-    yz = abs(X[1] * X[2] + X[5] * X[6] + X[9] * X[10])
-    det = (
-        X[0] * (X[5] * X[10] - X[6] * X[9]) - X[1] * (X[4] * X[10] - X[6] * X[8]) + X[2] * (X[4] * X[9] - X[5] * X[8])
-    )
-    if not det > 0.0:
+    x = Vec3(X[0], X[4], X[8])
+    y = Vec3(X[1], X[5], X[9])
+    z = Vec3(X[2], X[6], X[10])
+    if not dot(vec3_at(X, 0), cross(vec3_at(X, 4), vec3_at(X, 8))) > 0.0:
         return math.inf
-    return max(abs(xx - 1.0) + xy + xz, abs(yy - 1.0) + xy + yz, abs(zz - 1.0) + xz + yz) + 2.0**-48
+    xx = abs(dot(x, x) - 1.0)
+    yy = abs(dot(y, y) - 1.0)
+    zz = abs(dot(z, z) - 1.0)
+    xy = abs(dot(x, y))
+    xz = abs(dot(x, z))
+    yz = abs(dot(y, z))
+    return max(xx + xy + xz, yy + xy + yz, zz + xz + yz) + 2.0**-48
 
 
 @kernel
-def later(XA, XB):
-    """Whether, of two bodies alike, the one at XB is to be taken first: by the numbers of the poses."""
+def is_swapped_order(XA, XB):
+    """Whether the pose XB comes before XA in the order of poses, in which two equal trees are taken."""
     for k in range(12):
         if XA[k] != XB[k]:
             return XA[k] > XB[k]
@@ -123,7 +136,7 @@ def later(XA, XB):
 
 @kernel
 def _inverse(X, out, at):
-    """Inverse of the matrix of a pose; returns a bound of the largest row sum of |C R − I|."""
+    """The inverse C of a pose's matrix R (9) and the bound of the largest row sum of |C R − I|, which it returns."""
     for i in range(3):
         for j in range(3):
             a = 4 * ((j + 1) % 3)
@@ -153,12 +166,13 @@ def _inverse(X, out, at):
 
 
 @kernel
-def _compose(XA, XB, reach_of_b, out, inverse, matrix, shift, worst, same):
+def _compose(XA, XB, numbers_b, out, inverse, matrix, same_rotation):
     """Matrix and shift from B's frame to A's; returns the bound of the error of what they give."""
+    residual = out[inverse + 9]
     error = 0.0
     for i in range(3):
-        turned = 0.0
-        moved = 0.0
+        rotated = 0.0
+        shifted = 0.0
         for j in range(3):
             value = 0.0
             size = 0.0
@@ -166,100 +180,97 @@ def _compose(XA, XB, reach_of_b, out, inverse, matrix, shift, worst, same):
                 term = out[inverse + 3 * i + k] * XB[4 * k + j]
                 value += term
                 size += abs(term)
-            if same:
+            if same_rotation:
                 value = 1.0 if i == j else 0.0
                 size = value
             out[matrix + 3 * i + j] = value
-            turned += size * reach_of_b[REACH + j]
+            rotated += size * numbers_b[REACH + j]
         total = 0.0
         for k in range(3):
             term = out[inverse + 3 * i + k] * (XB[4 * k + 3] - XA[4 * k + 3])
             total += term
-            moved += abs(term)
-        out[shift + i] = total
-        error = max(error, 12.0 * _U * (turned + moved) + 2.0 * worst * (moved if same else turned + moved))
+            shifted += abs(term)
+        out[matrix + 9 + i] = total
+        size = shifted if same_rotation else rotated + shifted
+        error = max(error, 12.0 * _U * (rotated + shifted) + 2.0 * residual * size)
     return error
 
 
 @kernel
-def _plain(XA, XB, same):
-    """Whether matrix and shift are exact, and a vertex is turned without rounding."""
-    if same and XA[3] == XB[3] and XA[7] == XB[7] and XA[11] == XB[11]:
+def _is_exact(XA, XB, same_rotation):
+    """Whether matrix and shift are exact, and a vertex is rotated without rounding."""
+    if same_rotation and XA[3] == XB[3] and XA[7] == XB[7] and XA[11] == XB[11]:
         return True
     for i in range(3):
-        in_row_a = 0
-        in_row_b = 0
+        ones_a = 0
+        ones_b = 0
         for j in range(3):
             a = abs(XA[4 * i + j])
             b = abs(XB[4 * i + j])
             if not (a == 0.0 or a == 1.0) or not (b == 0.0 or b == 1.0):
                 return False
-            in_row_a += a == 1.0
-            in_row_b += b == 1.0
-        if in_row_a != 1 or in_row_b != 1:
-            return False
-        # Knuth's sum: the difference of the shifts is a double where nothing is left over.
-        s = XB[4 * i + 3]
-        t = -XA[4 * i + 3]
-        total = s + t
-        other = total - s
-        if (s - (total - other)) + (t - other) != 0.0:
+            ones_a += a == 1.0
+            ones_b += b == 1.0
+        if ones_a != 1 or ones_b != 1 or not sum_is_exact(XB[4 * i + 3], -XA[4 * i + 3]):
             return False
     return True
 
 
+@kernel(inline=True)
+def sum_is_exact(x, y):
+    """Whether x + y is a double."""
+    return two_sum(x, y)[1] == 0.0
+
+
 @kernel
-def _frame(out, frames, which, matrix, shift, error, own, other, own_exponent, other_exponent):
-    """From the other tree's boxes to the own ones, in units of either."""
-    at = FRAMES + FRAME_SIZE * which
-    if other_exponent - own_exponent > MOST_UNLIKE:  # floats might overflow: nothing is parted in this frame
+def _set_frame(own, other, placing, matrix, error, at, frame):
+    """From the other tree's boxes to the own ones: FRAME_SIZE doubles at ``at``, and the matrix as floats."""
+    if other.exponent - own.exponent > MAX_UNIT_EXPONENT:  # floats might overflow: nothing is culled in this frame
         for k in range(9):
-            out[at + k] = 0.0
-            frames[9 * which + k] = np.float32(0.0)
+            placing[at + k] = 0.0
+            frame[k] = np.float32(0.0)
         for i in range(3):
-            out[at + 9 + i] = 0.0
-            out[at + 12 + i] = 1e30
+            placing[at + 9 + i] = 0.0
+            placing[at + 12 + i] = 1e30
         return
-    units = math.ldexp(1.0, int(other_exponent - own_exponent))
-    scale = math.ldexp(1.0, int(-own_exponent))
+    units = math.ldexp(1.0, int(other.exponent - own.exponent))
+    scale = math.ldexp(1.0, int(-own.exponent))
     for i in range(3):
-        moved = out[shift + i] - own[CENTRE + i]
-        size = abs(out[shift + i]) + abs(own[CENTRE + i])
+        shift = placing[matrix + 9 + i]
+        centre = own.numbers[CENTRE + i]
+        moved = shift - centre
+        size = abs(shift) + abs(centre)
         spread = 0.0
         for j in range(3):
-            entry = out[matrix + 3 * i + j]
-            moved += entry * other[CENTRE + j]
-            size += abs(entry * other[CENTRE + j])
+            entry = placing[matrix + 3 * i + j]
+            moved += entry * other.numbers[CENTRE + j]
+            size += abs(entry * other.numbers[CENTRE + j])
             spread += abs(entry * units) * _EXTENT
-            out[at + 3 * i + j] = entry * units
-            frames[9 * which + 3 * i + j] = np.float32(entry * units)
+            placing[at + 3 * i + j] = entry * units
+            frame[3 * i + j] = np.float32(entry * units)
         moved *= scale
-        out[at + 9 + i] = moved
+        placing[at + 9 + i] = moved
         rounding = _FLOAT_ERROR * (abs(moved) + spread + _EXTENT) + _TINY
-        out[at + 12 + i] = rounding + 2.0 * scale * (error + 8.0 * _U * size)
-    return
+        placing[at + 12 + i] = rounding + 2.0 * scale * (error + 8.0 * _U * size)
 
 
 @kernel(inline=True)
-def transform(placing, w, at, out, to):
-    """Three corners of B, seen from A."""
-    for k in range(3):
-        x = w[at + 3 * k]
-        y = w[at + 3 * k + 1]
-        z = w[at + 3 * k + 2]
-        for i in range(3):
-            out[to + 3 * k + i] = (
-                placing[3 * i] * x + placing[3 * i + 1] * y + placing[3 * i + 2] * z
-            ) + placing[SHIFT + i]
+def put_in_frame_of_a(placing, points, at, out, to):
+    """Three points of B's frame, as A's frame has them."""
+    for k in range(0, 9, 3):
+        put_vec3(out, to + k, add(rotate(placing, M, vec3_at(points, at + k)), vec3_at(placing, SHIFT)))
 
 
 @kernel(inline=True)
-def to_world(X, sx, sy, sz, V, at, out, to):
-    """Three corners in the world's axes."""
-    for k in range(3):
-        x = V[at + 3 * k]
-        y = V[at + 3 * k + 1]
-        z = V[at + 3 * k + 2]
-        out[to + 3 * k] = (X[0] * x + X[1] * y + X[2] * z) + sx
-        out[to + 3 * k + 1] = (X[4] * x + X[5] * y + X[6] * z) + sy
-        out[to + 3 * k + 2] = (X[8] * x + X[9] * y + X[10] * z) + sz
+def shift_between(XA, XB):
+    """t_B − t_A of two poses."""
+    return Vec3(XB[3] - XA[3], XB[7] - XA[7], XB[11] - XA[11])
+
+
+@kernel(inline=True)
+def put_in_world(X, shift, points, at, out, to):
+    """Three points, rotated by a pose X into the world's axes, and shifted."""
+    for k in range(0, 9, 3):
+        p = vec3_at(points, at + k)
+        rotated = Vec3(dot(vec3_at(X, 0), p), dot(vec3_at(X, 4), p), dot(vec3_at(X, 8), p))
+        put_vec3(out, to + k, add(rotated, shift))

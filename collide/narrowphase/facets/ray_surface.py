@@ -15,26 +15,42 @@ settle in exact arithmetic which of several overlapping brackets comes first.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.mesh.box_overlap import FRAME, PROBE, boxes_meeting
-from collide.mesh.bvh import (
-    CENTRE,
-    EXPONENT,
-    INTS,
-    NODE,
-    NUMBERS,
-    REACH,
-    WIDTH,
-    open_tree,
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, NUMBERS, REACH, WIDTH, TreeView, box_at, open_tree
+from collide.mesh.triangle import normal_of, put_triangle, triangle_at
+from collide.narrowphase.facets.box_probes import clear_slab, put_floats
+from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE, invalidate_pose_cache
+from collide.narrowphase.facets.exact_triangles import MEET, ExactCall, ask_exactly
+from collide.narrowphase.facets.filtered_triangles import (
+    AMBIGUOUS,
+    APART,
+    MEETING,
+    TINY,
+    opposed,
+    same_side,
+    sign_error,
 )
-from collide.narrowphase.facets.exact_corners import CORNERS, OWN_AT, STATE, forget_poses
-from collide.narrowphase.facets.exact_triangles import MEET, call_exactly
-from collide.narrowphase.facets.filtered_triangles import TINY, sign_error
-from collide.narrowphase.facets.posed_surfaces import ERROR, PLACING, M, place, transform
-from collide.narrowphase.facets.surface_collision import link_of, no_slab
+from collide.narrowphase.facets.posed_surfaces import ERROR, PLACING, Extent, M, extent_of, place, put_in_frame_of_a
+from collide.narrowphase.facets.traversal import box_of_tree, make_traversal
+from collide.numerics.vec3 import (
+    Vec3,
+    absolute,
+    add,
+    cross,
+    divide,
+    dot,
+    max_abs,
+    put_vec3,
+    rotate,
+    scale,
+    sub,
+    vec3_at,
+)
 
 #: Doubles of a ray: origin (3), direction (3), T, and the largest t that counts.
 RAY = 8
@@ -44,378 +60,385 @@ _T, _LIMIT = 6, 7
 HIT = 6
 RAY_OF, FACET_OF, LOWER, VALUE, UPPER, OPEN = range(HIT)
 
-#: Where a walk stands: ray, hits found.
+# Progress, integers: the ray, the hits found.
 AT_RAY, FOUND = range(2)
 DONE, FULL, SINGULAR = range(3)
+# Counters, a row of integers a ray: boxes compared, triangles tested, of them decided exactly.
+_BOXES, _TRIANGLES, _EXACT = range(3)
+_COUNTERS = 3
 #: Hits that a leaf may add.
-_MOST_AT_ONCE = 8
-#: Doubles and floats of workspace. A ray in the units of the boxes: origin (3), direction to T (3), the error of a point on
-#: it, the direction's largest component, and the least t at which it may meet boxes; then its direction in A's frame (3), and
-#: room for a bracket (3).
-_OWN = 9
-_LINE = PLACING + CORNERS + NUMBERS + 16
-DOUBLES = _LINE + _OWN + 6
+_MAX_HITS = 8
+# Doubles of workspace besides a placing, corners, and the numbers and pose of the ray as a body. What changes on the
+# way: the least upper bound of t so far, and a bracket of t (3).
+_BEST, _BRACKET = 0, 1
+_OWN = PLACING + CORNERS + NUMBERS + 16
+DOUBLES = _OWN + 4
 FLOATS = 3 * FRAME + PROBE
 
 _U = 2.0**-53
+_FLOAT_ERROR = 2.0**-19
 #: Boxes of a tree stay within this, in its units, and some.
 _EXTENT = 1.01
-MISSED, MET, UNCLEAR = range(3)
+
+
+class _Line(NamedTuple):
+    """A ray's segment from its origin to T times its direction.
+
+    direction : in A's frame, as long as to T.   error : bound of the error of a coordinate there.
+    In units of the boxes, from the tree's centre:
+    start, to_end : origin, and from there to the end.   box_error : bound of the error of a point's coordinate.
+    size : the largest component of to_end.   first, last : t between which boxes may be met.
+    """
+
+    direction: Vec3
+    error: float
+    start: Vec3
+    to_end: Vec3
+    box_error: float
+    size: float
+    first: float
+    last: float
+
+
+class _Query(NamedTuple):
+    """One ray.
+
+    along : to_end over its largest component.
+    height, pace, slack : heights along it, of the start, of a step of t = 1, and the bound of their error.
+    keys : the heights at which the boxes on the stack begin.   best : _BEST, then a bracket.
+    hits : out, room for ``capacity``.   progress : as above.
+    """
+
+    tree: TreeView
+    corners: np.ndarray
+    frame: np.ndarray
+    probe: np.ndarray
+    exact: ExactCall
+    line: _Line
+    along: Vec3
+    height: float
+    pace: float
+    slack: float
+    keys: np.ndarray
+    best: np.ndarray
+    ray: int
+    first_only: bool
+    hits: np.ndarray
+    capacity: int
+    progress: np.ndarray
+    counters: np.ndarray
 
 
 @kernel
-def _set_line(header, numbers, placing, corners, ends, line, frame, probe):
-    """The ray in the units of the boxes, and the axes across it; False where it clearly misses all of them.
+def _line_of(tree, placing, corners, ends):
+    """The ray's segment; ``last`` is below ``first`` where it clearly misses all boxes."""
+    unit = math.ldexp(1.0, int(-tree.header[EXPONENT]))
+    centre = vec3_at(tree.numbers, CENTRE)
+    direction = rotate(placing, M, vec3_at(ends, 3))
+    start = scale(unit, sub(vec3_at(corners, 9), centre))
+    to_end = scale(unit, direction)
+    size = max_abs(to_end)
+    error = 8.0 * unit * placing[ERROR] + 2.0**-46 * (max(max_abs(start), max_abs(scale(unit, centre))) + size)
+    half = _EXTENT + error
+    first, last = _clip(start.x, to_end.x, half, size, 0.0, 1.0)
+    first, last = _clip(start.y, to_end.y, half, size, first, last)
+    first, last = _clip(start.z, to_end.z, half, size, first, last)
+    if not size > 0.0:
+        last = -1.0
+    return _Line(direction, placing[ERROR], start, to_end, error, size, first, last)
 
-    line : origin, direction, error of a point on it, largest component of the direction, first and last t.
-    """
-    scale = math.ldexp(1.0, int(-header[EXPONENT]))
-    largest = 0.0
-    away = 0.0
-    for i in range(3):
-        turned = 0.0
-        for j in range(3):
-            turned += placing[M + 3 * i + j] * ends[3 + j]
-        line[_OWN + i] = turned
-        line[i] = (corners[9 + i] - numbers[CENTRE + i]) * scale
-        line[3 + i] = turned * scale
-        largest = max(largest, abs(line[3 + i]))
-        away = max(away, abs(line[i]), abs(numbers[CENTRE + i] * scale))
-    error = 8.0 * scale * placing[ERROR] + 2.0**-46 * (away + largest)
-    line[6] = error
-    line[7] = largest
-    first = 0.0
-    last = 1.0
-    room = _EXTENT + error
-    for i in range(3):
-        step = line[3 + i]
-        if abs(step) > 2.0**-60 * largest:
-            near = (-room - line[i]) / step
-            far = (room - line[i]) / step
-            if step < 0.0:
-                near, far = far, near
-            first = max(first, near)
-            last = min(last, far)
-        elif abs(line[i]) > room + abs(step):
-            return False
-    # A quotient is off by its rounding only: far less than what the room is too wide.
-    if not first <= last or not largest > 0.0:
-        return False
-    line[8] = first
-    x = line[3] / largest
-    y = line[4] / largest
-    z = line[5] / largest
-    middle = 0.5 * (first + last)
-    for k in range(FRAME):
-        frame[k] = np.float32(0.0)
-    frame[1] = np.float32(-z)
-    frame[2] = np.float32(y)
-    frame[3] = np.float32(z)
-    frame[5] = np.float32(-x)
-    frame[6] = np.float32(-y)
-    frame[7] = np.float32(x)
-    cx = line[0] + middle * line[3]
-    cy = line[1] + middle * line[4]
-    cz = line[2] + middle * line[5]
-    probe[6] = np.float32(z * cy - y * cz)
-    probe[7] = np.float32(x * cz - z * cx)
-    probe[8] = np.float32(y * cx - x * cy)
+
+@kernel(inline=True)
+def _clip(start, step, half, size, first, last):
+    """(first, last) t of a line within −half … half along an axis, and within those given; last is −1 for none."""
+    if abs(step) > 2.0**-60 * size:
+        near = (-half - start) / step
+        far = (half - start) / step
+        if step < 0.0:
+            near, far = far, near
+        # A quotient is off by its rounding only: far less than what ``half`` is too wide.
+        return max(first, near), min(last, far)
+    return first, (-1.0 if abs(start) > half + abs(step) else last)
+
+
+@kernel
+def _set_probe(line, frame, probe):
+    """The axes across the line, and its box, as the probe of the tree's boxes."""
+    along = divide(line.to_end, line.size)
+    put_floats(frame, 0, Vec3(0.0, -along.z, along.y))
+    put_floats(frame, 3, Vec3(along.z, 0.0, -along.x))
+    put_floats(frame, 6, Vec3(-along.y, along.x, 0.0))
+    centre = add(line.start, scale(0.5 * (line.first + line.last), line.to_end))
+    put_floats(probe, 6, cross(centre, along))
     # Floats: 2^-24 of terms, at most 8 of them; the line is off by its error along each of two axes.
-    size = max(abs(cx), abs(cy), abs(cz))
-    reach = 2.0 * error + 2.0**-19 * (2.0 + 2.0 * size) + 2.0**-110
-    for k in range(3):
-        probe[9 + k] = np.float32(reach)
-    _set_ends(line, last, probe)
-    return True
+    reach = 2.0 * line.box_error + _FLOAT_ERROR * (2.0 + 2.0 * max_abs(centre)) + 2.0**-110
+    put_floats(probe, 9, Vec3(reach, reach, reach))
+    clear_slab(probe)
+    _set_ends(line, line.last, probe)
 
 
 @kernel(inline=True)
 def _set_ends(line, last, probe):
-    """The box around the ray's segment from where it may begin to meet boxes to ``last``."""
-    middle = 0.5 * (line[8] + last)
-    half = 0.5 * (last - line[8])
-    for i in range(3):
-        centre = line[i] + middle * line[3 + i]
-        length = abs(half * line[3 + i])
-        probe[i] = np.float32(centre)
-        probe[3 + i] = np.float32(length + line[6] + 2.0**-19 * (abs(centre) + length + 1.0) + 2.0**-110)
+    """The box around the line from where it may begin to meet boxes to t = ``last``, as the probe's."""
+    centre = add(line.start, scale(0.5 * (line.first + last), line.to_end))
+    half = absolute(scale(0.5 * (last - line.first), line.to_end))
+    put_floats(probe, 0, centre)
+    put_floats(
+        probe, 3,
+        Vec3(_enlarged(line, centre.x, half.x), _enlarged(line, centre.y, half.y), _enlarged(line, centre.z, half.z)),
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _enlarged(line, centre, half):
+    return half + line.box_error + _FLOAT_ERROR * (abs(centre) + half + 1.0) + 2.0**-110
 
 
 @kernel
-def _bracket(P, a, corners, line, error, out):
-    """Bracket of t of the crossing of a facet's plane, in out[0 … 2]; False where doubles cannot tell.
+def _bracket(P, a, corners, line, out):
+    """Bracket of t of the crossing of a facet's plane, in out[_BRACKET …]; False where doubles cannot tell.
 
     Bounds as in `filtered_triangles.py`: with edges up to L, sides of points at distance w: L² (8E + 64 u w).
     """
-    ux = P[a + 3] - P[a]
-    uy = P[a + 4] - P[a + 1]
-    uz = P[a + 5] - P[a + 2]
-    vx = P[a + 6] - P[a]
-    vy = P[a + 7] - P[a + 1]
-    vz = P[a + 8] - P[a + 2]
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
-    wx = P[a] - corners[9]
-    wy = P[a + 1] - corners[10]
-    wz = P[a + 2] - corners[11]
-    dx = line[_OWN]
-    dy = line[_OWN + 1]
-    dz = line[_OWN + 2]
-    side = nx * wx + ny * wy + nz * wz
-    slope = nx * dx + ny * dy + nz * dz
-    edge = max(abs(ux), abs(uy), abs(uz), abs(vx), abs(vy), abs(vz))
+    triangle = triangle_at(P, a)
+    n = normal_of(triangle)
+    w = sub(triangle.p, vec3_at(corners, 9))
+    side = dot(n, w)
+    slope = dot(n, line.direction)
+    edge = max(max_abs(sub(triangle.q, triangle.p)), max_abs(sub(triangle.r, triangle.p)))
     square = edge * edge
-    side_error = square * (8.0 * error + 64.0 * _U * max(abs(wx), abs(wy), abs(wz))) + TINY
-    slope_error = square * (8.0 * error + 64.0 * _U * max(abs(dx), abs(dy), abs(dz))) + TINY
+    side_error = square * (8.0 * line.error + 64.0 * _U * max_abs(w)) + TINY
+    slope_error = square * (8.0 * line.error + 64.0 * _U * max_abs(line.direction)) + TINY
     if not abs(slope) > 2.0 * slope_error:
         return False
     t = side / slope
     # |side'/slope' − side/slope| ≤ (δside + |t| δslope) / (|slope| − δslope), and some for the rounding here.
-    off = (side_error + abs(t) * slope_error) / (abs(slope) - slope_error) * (1.0 + 2.0**-40) + abs(t) * 2.0**-50
-    out[0] = t - off
-    out[1] = t
-    out[2] = t + off
+    error = (side_error + abs(t) * slope_error) / (abs(slope) - slope_error) * (1.0 + 2.0**-40) + abs(t) * 2.0**-50
+    put_vec3(out, _BRACKET, Vec3(t - error, t, t + error))
     return True
 
 
 @kernel
-def _meets(P, a, corners, line, error, out):
-    """MISSED, MET or UNCLEAR by doubles, for the ray and one facet; where MET, out is the bracket of t."""
-    ax = P[a] - corners[9]
-    ay = P[a + 1] - corners[10]
-    az = P[a + 2] - corners[11]
-    bx = P[a + 3] - corners[9]
-    by = P[a + 4] - corners[10]
-    bz = P[a + 5] - corners[11]
-    cx = P[a + 6] - corners[9]
-    cy = P[a + 7] - corners[10]
-    cz = P[a + 8] - corners[11]
-    dx = line[_OWN]
-    dy = line[_OWN + 1]
-    dz = line[_OWN + 2]
-    reach = max(abs(ax), abs(ay), abs(az), abs(bx), abs(by), abs(bz), abs(cx), abs(cy), abs(cz))
-    reach = max(reach, abs(dx), abs(dy), abs(dz))
-    limit = sign_error(reach, error)
-    one = (ay * bz - az * by) * dx + (az * bx - ax * bz) * dy + (ax * by - ay * bx) * dz
-    two = (by * cz - bz * cy) * dx + (bz * cx - bx * cz) * dy + (bx * cy - by * cx) * dz
-    if (one > limit and two < -limit) or (one < -limit and two > limit):
-        return MISSED
-    three = (cy * az - cz * ay) * dx + (cz * ax - cx * az) * dy + (cx * ay - cy * ax) * dz
-    if (one > limit and three < -limit) or (one < -limit and three > limit):
-        return MISSED
-    if (two > limit and three < -limit) or (two < -limit and three > limit):
-        return MISSED
-    if not _bracket(P, a, corners, line, error, out):
-        return UNCLEAR
-    if out[2] < 0.0 or out[0] > 1.0:
-        return MISSED
-    sure = (one > limit and two > limit and three > limit) or (one < -limit and two < -limit and three < -limit)
-    return MET if sure and out[0] > 0.0 and out[2] < 1.0 else UNCLEAR
+def _meets(P, a, corners, line, out):
+    """APART, MEETING or AMBIGUOUS by doubles, for the ray and one facet; where MEETING, out is the bracket of t."""
+    origin = vec3_at(corners, 9)
+    p = sub(vec3_at(P, a), origin)
+    q = sub(vec3_at(P, a + 3), origin)
+    r = sub(vec3_at(P, a + 6), origin)
+    d = line.direction
+    limit = sign_error(max(max_abs(p), max_abs(q), max_abs(r), max_abs(d)), line.error)
+    x = dot(cross(p, q), d)
+    y = dot(cross(q, r), d)
+    if opposed(x, y, limit):
+        return APART
+    z = dot(cross(r, p), d)
+    if opposed(x, z, limit) or opposed(y, z, limit):
+        return APART
+    if not _bracket(P, a, corners, line, out):
+        return AMBIGUOUS
+    if out[_BRACKET + 2] < 0.0 or out[_BRACKET] > 1.0:
+        return APART
+    certain = same_side(Vec3(x, y, z), limit) and out[_BRACKET] > 0.0 and out[_BRACKET + 2] < 1.0
+    return MEETING if certain else AMBIGUOUS
 
 
 @kernel
-def _range_of_corners(P, a, corners, line, error, out):
-    """Bracket of t by the facet's corners, seen along the ray: for facets known to be met."""
-    square = 0.0
-    size = 0.0
-    for i in range(3):
-        d = line[_OWN + i]
-        square += d * d
-        size = max(size, abs(d))
+def _bracket_by_corners(P, a, corners, line, out):
+    """Bracket of t by the facet's corners, projected onto the ray: for facets known to be met."""
+    square = dot(line.direction, line.direction)
+    size = max_abs(line.direction)
     low = math.inf
     high = -math.inf
     far = 0.0
-    for k in range(3):
-        along = 0.0
-        for i in range(3):
-            w = P[a + 3 * k + i] - corners[9 + i]
-            along += w * line[_OWN + i]
-            far = max(far, abs(w))
-        low = min(low, along)
-        high = max(high, along)
+    for k in range(a, a + 9, 3):
+        w = sub(vec3_at(P, k), vec3_at(corners, 9))
+        low = min(low, dot(w, line.direction))
+        high = max(high, dot(w, line.direction))
+        far = max(far, max_abs(w))
     # Corners are off by E + u far, the direction by E: far more than enough for both, and the square.
-    off = (8.0 * error + 64.0 * _U * (far + size)) * (size + far) * (1.0 + (far + size) / size)
-    out[0] = (low - off) / square * (1.0 - math.copysign(2.0**-40, low - off))
-    out[2] = (high + off) / square * (1.0 + math.copysign(2.0**-40, high + off))
-    out[1] = 0.5 * out[0] + 0.5 * out[2]
+    error = (8.0 * line.error + 64.0 * _U * (far + size)) * (size + far) * (1.0 + (far + size) / size)
+    lower = (low - error) / square * (1.0 - math.copysign(2.0**-40, low - error))
+    upper = (high + error) / square * (1.0 + math.copysign(2.0**-40, high + error))
+    put_vec3(out, _BRACKET, Vec3(lower, 0.5 * lower + 0.5 * upper, upper))
 
 
 @kernel
-def _facets(P, ids, run, corners, line, out, error, arguments, decide, counters, ray, best, first_only, hits, found):
-    """All triangles of a leaf; returns (hits there are now, the least t from above)."""
-    for k in range(run & 7):
-        a = 9 * ((run >> 3) + k)
-        counters[1] += 1
-        how = _meets(P, a, corners, line, error, out)
-        if how == MISSED:
-            continue
-        unclear = how == UNCLEAR
-        if unclear:
-            counters[2] += 1
-            for word in range(9):
-                corners[word] = P[a + word]
-            if call_exactly(decide, (MEET, *arguments)) == 0:
-                continue
-            if not _bracket(P, a, corners, line, error, out):
-                _range_of_corners(P, a, corners, line, error, out)
-        if out[0] > best:
-            continue
-        at = HIT * found
-        hits[at + RAY_OF] = ray
-        hits[at + FACET_OF] = ids[a // 9]
-        hits[at + LOWER] = max(out[0], 0.0)
-        hits[at + VALUE] = min(max(out[1], 0.0), out[2])
-        hits[at + UPPER] = max(out[2], 0.0)
-        hits[at + OPEN] = 1.0 if unclear else 0.0
-        found += 1
-        if first_only:
-            best = min(best, out[2])
-    return found, best
+def _test_facet(query, a):
+    """Add facet a to the hits where the ray meets it and may meet it first."""
+    P, corners, line, out = query.tree.triangles, query.corners, query.line, query.best
+    query.counters[_TRIANGLES] += 1
+    verdict = _meets(P, 9 * a, corners, line, out)
+    if verdict == APART:
+        return
+    if verdict == AMBIGUOUS:
+        query.counters[_EXACT] += 1
+        put_triangle(corners, 0, triangle_at(P, 9 * a))
+        if ask_exactly(query.exact, MEET) == 0:
+            return
+        if not _bracket(P, 9 * a, corners, line, out):
+            _bracket_by_corners(P, 9 * a, corners, line, out)
+    t = vec3_at(out, _BRACKET)
+    if t.x > out[_BEST]:
+        return
+    at = HIT * query.progress[FOUND]
+    query.hits[at + RAY_OF] = query.ray
+    query.hits[at + FACET_OF] = query.tree.ids[a]
+    query.hits[at + LOWER] = max(t.x, 0.0)
+    query.hits[at + VALUE] = min(max(t.y, 0.0), t.z)
+    query.hits[at + UPPER] = max(t.z, 0.0)
+    query.hits[at + OPEN] = 1.0 if verdict == AMBIGUOUS else 0.0
+    query.progress[FOUND] += 1
+    if query.first_only:
+        out[_BEST] = min(out[_BEST], t.z)
 
 
 @kernel(inline=True)
-def _begins(boxes, at, slot, x, y, z):
-    """The least height of a box of a node along the direction (x, y, z)."""
-    middle = x * boxes[at + slot] + y * boxes[at + WIDTH + slot] + z * boxes[at + 2 * WIDTH + slot]
-    half = (
-        abs(x) * boxes[at + 3 * WIDTH + slot] + abs(y) * boxes[at + 4 * WIDTH + slot] + abs(z) * boxes[at + 5 * WIDTH + slot]
-    )
-    return middle - half
+def _nearest_box(query, _stack, top):
+    """The stack's height without boxes on top that begin beyond the nearest hit."""
+    while top > 0 and query.keys[top - 1] > query.height + query.best[_BEST] * query.pace + query.slack:
+        top -= 1
+    return top
+
+
+@kernel(inline=True)
+def _visit_leaf(query, pair):
+    """Test the ray and a leaf's facets; True where there may be no room for all of them."""
+    if query.progress[FOUND] + _MAX_HITS > query.capacity:
+        query.progress[FOUND] = -1
+        return True
+    best = query.best[_BEST]
+    run = ~pair.link_a
+    for a in range(run >> 3, (run >> 3) + (run & 7)):
+        _test_facet(query, a)
+    if query.best[_BEST] < best:
+        _set_ends(query.line, max(min(1.0, query.best[_BEST]), query.line.first), query.probe)
+    return False
+
+
+@kernel(inline=True)
+def _open_box(query, pair, stack, top):
+    """Push the children that the ray may meet, the one that begins first on top."""
+    keys = query.keys
+    query.counters[_BOXES] += 1
+    mask = boxes_meeting(query.tree.boxes, NODE * pair.link_a, query.frame, query.probe)
+    base = top
+    for slot in range(WIDTH):
+        if (mask >> slot) & 1:
+            box = box_at(query.tree.boxes, WIDTH * pair.link_a + slot)
+            key = dot(query.along, box.centre) - dot(absolute(query.along), box.half)
+            at = top
+            while at > base and keys[at - 1] < key:
+                keys[at] = keys[at - 1]
+                stack[at] = stack[at - 1]
+                at -= 1
+            keys[at] = key
+            stack[at] = WIDTH * pair.link_a + slot
+            top += 1
+    return top
+
+
+_traverse = make_traversal(_nearest_box, box_of_tree, _visit_leaf, _open_box)
 
 
 @kernel
-def _cast(
-    boxes, links, P, ids, line, out, placing, corners, frame, probe, stack, keys, arguments, decide, counters, ray, limit,
-    first_only, hits, found, capacity,
-):  # fmt: skip
-    """All candidates of one ray; returns how many hits there are now, −1 where there is no room."""
-    begin = found
-    best = limit
-    x = line[3] / line[7]
-    y = line[4] / line[7]
-    z = line[5] / line[7]
-    start = x * line[0] + y * line[1] + z * line[2]
-    pace = x * line[3] + y * line[4] + z * line[5]
-    # Heights of boxes are sums of doubles and floats, rounded; the ray is off by its error.
-    slack = 4.0 * line[6] + 2.0**-40 * (abs(start) + pace + 4.0)
+def _cast(query, stack):
+    """All candidates of one ray; False where there is no room for more hits."""
+    begin = query.progress[FOUND]
     stack[0] = 0
-    keys[0] = -math.inf
-    top = 1
-    while top > 0:
-        top -= 1
-        if keys[top] > start + best * pace + slack:
-            continue
-        link = int(link_of(links, stack[top]))
-        if link < 0:
-            if found + _MOST_AT_ONCE > capacity:
-                return -1
-            before = best
-            found, best = _facets(
-                P, ids, ~link, corners, line, out, placing[ERROR], arguments, decide, counters, ray, best, first_only, hits,
-                found,
-            )  # fmt: skip
-            if best < before:
-                _set_ends(line, max(min(1.0, best), line[8]), probe)
-            continue
-        counters[0] += 1
-        at = NODE * link
-        mask = boxes_meeting(boxes, at, frame, probe)
-        base = top
-        for slot in range(WIDTH):
-            if (mask >> slot) & 1:
-                key = _begins(boxes, at, slot, x, y, z)
-                place_at = top
-                while place_at > base and keys[place_at - 1] < key:
-                    keys[place_at] = keys[place_at - 1]
-                    stack[place_at] = stack[place_at - 1]
-                    place_at -= 1
-                keys[place_at] = key
-                stack[place_at] = link * WIDTH + slot
-                top += 1
-    if not first_only:
-        return found
-    kept = begin
-    for k in range(begin, found):
-        if hits[HIT * k + LOWER] <= best:
-            if kept < k:
-                for word in range(HIT):
-                    hits[HIT * kept + word] = hits[HIT * k + word]
-            kept += 1
-    return kept
+    query.keys[0] = -math.inf
+    _traverse(query, stack, 1)
+    end = query.progress[FOUND]
+    if end < 0:
+        query.progress[FOUND] = begin
+        return False
+    if query.first_only:  # drop what begins beyond the nearest hit after all
+        hits = query.hits
+        n_kept = begin
+        for k in range(begin, end):
+            if hits[HIT * k + LOWER] <= query.best[_BEST]:
+                if n_kept < k:
+                    for word in range(HIT):
+                        hits[HIT * n_kept + word] = hits[HIT * k + word]
+                n_kept += 1
+        query.progress[FOUND] = n_kept
+    return True
 
 
-#: Of `cast_rays`.
-SIGNATURE = (
+@kernel
+def _set_ray(ray, XB, numbers_b, ends):
+    """The ray as a body: its pose and numbers, and the corners 0, T d, T d of its segment; returns its exponent."""
+    largest = 0.0
+    for k in range(16):
+        XB[k] = 1.0 if k % 5 == 0 else 0.0
+    for i in range(3):
+        XB[4 * i + 3] = ray[i]
+        ends[i] = 0.0
+        ends[3 + i] = ray[3 + i] * ray[_T]
+        ends[6 + i] = ends[3 + i]
+        numbers_b[CENTRE + i] = 0.0
+        numbers_b[REACH + i] = abs(ends[3 + i])
+        largest = max(largest, abs(ends[3 + i]))
+    return 0 + math.frexp(largest)[1]  # 64 bits, as the exponents of trees
+
+
+@entry(
     "int64(int64, int64, int64, int64, int64, boolean, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
 )
-
-
-@entry(SIGNATURE)
 def cast_rays(
-    header_at, XA_at, step_a, rays_at, n, first_only, hits_at, capacity, counters_at, where_at, stack_at, n_stack, doubles_at,
-    integers_at, decide,
+    header_at, XA_at, step_a, rays_at, n, first_only, hits_at, capacity, counters_at, progress_at, stack_at, n_stack,
+    doubles_at, integers_at, decide,
 ):  # fmt: skip
-    """Facets that n rays (RAY doubles each, in the world) meet, from where an earlier call stopped; DONE, FULL or SINGULAR.
+    """Facets that n rays (RAY doubles each, in the world) meet, from where an earlier call stopped.
 
+    Returns DONE, FULL or SINGULAR. Arguments are flat, as those of all entries.
     first_only : of each ray only those that may be met first, by their brackets of t.
-    hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : boxes, triangles, exact, a row a ray.
+    hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : _COUNTERS integers a ray.
     """
-    header, numbers, boxes, links, P, ids = open_tree(header_at)
+    tree = open_tree(header_at)
     hits = view_f64(hits_at, HIT * capacity)
-    where = view_i64(where_at, 2)
+    progress = view_i64(progress_at, 2)
     stack = view_i64(stack_at, n_stack)
-    header_b = view_i64(stack_at + 8 * n_stack, INTS)
     keys = view_f64(stack_at + 8 * (n_stack + 16), n_stack)
     placing = view_f64(doubles_at, PLACING)
     corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
-    ends = view_f64(doubles_at + 8 * (PLACING + OWN_AT), 9)
+    ends = view_f64(doubles_at + 8 * (PLACING + B_LOCAL_AT), 9)
     numbers_b = view_f64(doubles_at + 8 * (PLACING + CORNERS), NUMBERS)
     XB_at = doubles_at + 8 * (PLACING + CORNERS + NUMBERS)
     XB = view_f64(XB_at, 16)
-    line = view_f64(doubles_at + 8 * _LINE, _OWN + 3)
-    out = view_f64(doubles_at + 8 * (_LINE + _OWN + 3), 3)
-    frames = view_f32(doubles_at + 8 * DOUBLES, 2 * FRAME)
+    best = view_f64(doubles_at + 8 * _OWN, 4)
+    frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
+    frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
     frame = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, FRAME)
     probe = view_f32(doubles_at + 8 * DOUBLES + 12 * FRAME, PROBE)
     state = view_i64(integers_at, STATE)
-    for k in range(16):
-        XB[k] = 1.0 if k % 5 == 0 else 0.0
-    no_slab(probe)
-    found = where[FOUND]
-    for ray in range(where[AT_RAY], n):
-        given = view_f64(rays_at + 8 * RAY * ray, RAY)
-        counters = view_i64(counters_at + 24 * ray, 3)
-        largest = 0.0
-        for i in range(3):
-            XB[4 * i + 3] = given[i]
-            ends[i] = 0.0
-            ends[3 + i] = given[3 + i] * given[_T]
-            ends[6 + i] = ends[3 + i]
-            numbers_b[CENTRE + i] = 0.0
-            numbers_b[REACH + i] = abs(ends[3 + i])
-            largest = max(largest, abs(ends[3 + i]))
-        header_b[EXPONENT] = math.frexp(largest)[1]
-        XA_here = XA_at + 8 * step_a * ray
-        if not place(header, numbers, view_f64(XA_here, 16), header_b, numbers_b, XB, placing, frames):
-            where[AT_RAY] = ray
+    for k in range(progress[AT_RAY], n):
+        ray = view_f64(rays_at + 8 * RAY * k, RAY)
+        exponent = _set_ray(ray, XB, numbers_b, ends)
+        exact = ExactCall(decide, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at)
+        XA = view_f64(exact.XA_at, 16)
+        progress[AT_RAY] = k
+        if not place(extent_of(tree), XA, Extent(numbers_b, exponent), XB, placing, frame_a, frame_b):
             return SINGULAR
-        forget_poses(state)
-        transform(placing, ends, 0, corners, 9)
-        if not _set_line(header, numbers, placing, corners, ends, line, frame, probe):
+        invalidate_pose_cache(state)
+        put_in_frame_of_a(placing, ends, 0, corners, 9)
+        line = _line_of(tree, placing, corners, ends)
+        if not line.first <= line.last:
             continue
-        arguments = (doubles_at + 8 * PLACING, doubles_at, integers_at, XA_here, XB_at)
-        now = _cast(
-            boxes, links, P, ids, line, out, placing, corners, frame, probe, stack, keys, arguments, decide, counters, ray,
-            given[_LIMIT], first_only, hits, found, capacity,
+        _set_probe(line, frame, probe)
+        along = divide(line.to_end, line.size)
+        height = dot(along, line.start)
+        pace = dot(along, line.to_end)
+        # Heights of boxes are sums of doubles and floats, rounded; the ray is off by its error.
+        slack = 4.0 * line.box_error + 2.0**-40 * (abs(height) + pace + 4.0)
+        best[_BEST] = ray[_LIMIT]
+        counters = view_i64(counters_at + 8 * _COUNTERS * k, _COUNTERS)
+        query = _Query(
+            tree, corners, frame, probe, exact, line, along, height, pace, slack, keys, best, k, first_only, hits,
+            capacity, progress, counters,
         )  # fmt: skip
-        if now < 0:
-            where[AT_RAY] = ray
-            where[FOUND] = found
-            for k in range(3):
-                counters[k] = 0
+        if not _cast(query, stack):
+            for word in range(_COUNTERS):
+                counters[word] = 0
             return FULL
-        found = now
-    where[AT_RAY] = n
-    where[FOUND] = found
+    progress[AT_RAY] = n
     return DONE

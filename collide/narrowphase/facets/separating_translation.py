@@ -14,7 +14,6 @@ import numpy as np
 
 from collide.lowering.facet_bodies import Body
 from collide.narrowphase.facets.facet_queries import all_hits
-from collide.narrowphase.facets.mesh_hits import hits
 
 #: Lengths tried in every direction: what parts the hulls, halved so many times; the same again from the last of them
 #: where that parts the bodies, too: they touch, or nearly.
@@ -26,10 +25,10 @@ _FACETS = 3
 _UP = 1 + 2.0**-48
 
 #: (A, B, poses of A, poses of B) → (n,) bool, False only where they are proven apart.
-Meets = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
+Hits = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
 
 
-class Parting(NamedTuple):
+class SeparatingTranslation(NamedTuple):
     """A translation of B that parts it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
 
     length: float
@@ -37,30 +36,39 @@ class Parting(NamedTuple):
     normal: np.ndarray
 
 
-def way_out(A: Body, B: Body, X_WA, X_WB, hull_row, more: list[np.ndarray], meets: Meets | None = None) -> Parting:
+def separating_translation(
+    A: Body, B: Body, X_WA, X_WB, hull_row: np.ndarray, candidates: list[np.ndarray], hits: Hits
+) -> SeparatingTranslation:
     """A translation that parts two bodies that meet, at poses (4, 4).
 
-    hull_row : the hulls' answer.   more : translations (3,) to be tried first.   meets : what tells whether bodies
-    meet, as `hits` does, where these are not the bodies themselves.
+    hull_row : the row of their hulls.   candidates : translations (3,) to be tried first.   hits : whether bodies meet.
     """
     best, bound, normal = -float(hull_row["distance"]), -float(hull_row["lower"]), hull_row["normal"].copy()
-    known = Parting(max(best, 0.0), max(bound, 0.0), normal)
+    known = SeparatingTranslation(max(best, 0.0), max(bound, 0.0), normal)
     if known.bound == 0.0:
         return known
-    told = hits if meets is None else meets
-    return shortened(
-        lambda X, Y: told(A, B, X, Y), X_WA, X_WB, known, _directions(A, B, X_WA, X_WB, [normal, *more]), more
-    )
+    directions = _directions(A, B, X_WA, X_WB, [normal, *candidates])
+    return shortened(lambda X, Y: hits(A, B, X, Y), X_WA, X_WB, known, directions, candidates)
 
 
-def shortened(meet: Callable, X_WA, X_WB, known: Parting, directions: np.ndarray, more: list[np.ndarray]) -> Parting:
+def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTranslation) -> None:
+    """Make a row of bodies that meet as deep as a translation is long, in place; point: (3,) a common one."""
+    length, bound, normal = translation
+    row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
+    row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
+    row["certified"] &= bound == 0.0
+
+
+def shortened(
+    meet: Callable, X_WA, X_WB, known: SeparatingTranslation, directions: np.ndarray, candidates: list[np.ndarray]
+) -> SeparatingTranslation:  # fmt: skip
     """The shortest translation found that parts two bodies, at most as long as one that is known to.
 
     meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit
-    vectors that are tried.   more : translations (3,) to be tried first.
+    vectors that are tried.   candidates : translations (3,) to be tried first.
     """
     best, bound, normal = known
-    tried = [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, np.array(more).reshape(-1, 3))]
+    tried = [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, np.array(candidates).reshape(-1, 3))]
     top = bound
     for _ in range(_AGAIN):
         ladder = top * 2.0 ** -np.arange(1, _HALVINGS + 1)
@@ -82,7 +90,7 @@ def shortened(meet: Callable, X_WA, X_WB, known: Parting, directions: np.ndarray
             if value < best:
                 best, bound = value, upwards
         low = max(low, best - step)
-    return Parting(best, bound, normal)
+    return SeparatingTranslation(best, bound, normal)
 
 
 def _parting(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:

@@ -4,6 +4,8 @@ Features first: nine pairs of edges, then six corners over the other's face (E. 
 D. Manocha, "Fast proximity queries with swept sphere volumes", 1999). Whatever rounding did to them, the points
 found are points of the triangles, so their distance is an upper bound; the slab between the triangles across
 the line that joins them is a lower one, since triangles are convex.
+
+Two triangles T are 18 doubles: the corners of A's, then of B's.
 """
 
 from __future__ import annotations
@@ -11,17 +13,18 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel
+from collide.mesh.triangle import normal_of, triangle_at
+from collide.numerics.vec3 import Vec3, add, cross, divide, dot, neg, put_vec3, scale, sub, vec3_at
 
-#: A slab is as wide as two points are apart where it is so but for rounding.
+#: A slab at least so many times as wide as two points are apart is that wide but for rounding.
 _AS_WIDE = 1.0 - 2.0**-44
-
 #: A barycentric coordinate that rounding may have made of 0.
 _INSIDE = 2.0**-30
 
 
 @kernel
 def nearest_points(T, out):
-    """(distance, slab) of the triangles T[0:9] and T[9:18] that do not meet; out becomes a point of either (6).
+    """(distance, slab) of two triangles that do not meet; out becomes a point of A's and a point of B's (6 doubles).
 
     The slab is the width of the one across the line between the points; once it is as wide as they are apart,
     nothing nearer can be found.
@@ -32,37 +35,21 @@ def nearest_points(T, out):
     if width >= length * _AS_WIDE:
         return length, width
     for i in range(3):
-        a = 3 * i
-        ex = T[3 * ((i + 1) % 3)] - T[a]
-        ey = T[3 * ((i + 1) % 3) + 1] - T[a + 1]
-        ez = T[3 * ((i + 1) % 3) + 2] - T[a + 2]
-        ee = ex * ex + ey * ey + ez * ez
+        a = vec3_at(T, 3 * i)
+        e = sub(vec3_at(T, 3 * ((i + 1) % 3)), a)
+        ee = dot(e, e)
         for j in range(3):
-            b = 9 + 3 * j
-            c = 9 + 3 * ((j + 1) % 3)
-            fx = T[c] - T[b]
-            fy = T[c + 1] - T[b + 1]
-            fz = T[c + 2] - T[b + 2]
-            wx = T[a] - T[b]
-            wy = T[a + 1] - T[b + 1]
-            wz = T[a + 2] - T[b + 2]
-            ff = fx * fx + fy * fy + fz * fz
-            s, t = _along_edges(
-                ee, ff, ex * fx + ey * fy + ez * fz, ex * wx + ey * wy + ez * wz, fx * wx + fy * wy + fz * wz
-            )
-            dx = wx + s * ex - t * fx
-            dy = wy + s * ey - t * fy
-            dz = wz + s * ez - t * fz
-            square = dx * dx + dy * dy + dz * dz
+            b = vec3_at(T, 9 + 3 * j)
+            f = sub(vec3_at(T, 9 + 3 * ((j + 1) % 3)), b)
+            w = sub(a, b)
+            s, t = _nearest_on_segments(ee, dot(f, f), dot(e, f), dot(e, w), dot(f, w))
+            d = sub(add(w, scale(s, e)), scale(t, f))
+            square = dot(d, d)
             if square < best:
                 best = square
                 length = math.sqrt(square)
-                out[0] = T[a] + s * ex
-                out[1] = T[a + 1] + s * ey
-                out[2] = T[a + 2] + s * ez
-                out[3] = T[b] + t * fx
-                out[4] = T[b + 1] + t * fy
-                out[5] = T[b + 2] + t * fz
+                put_vec3(out, 0, add(a, scale(s, e)))
+                put_vec3(out, 3, add(b, scale(t, f)))
                 width = _slab_between(T, out, length)
                 if width >= length * _AS_WIDE:
                     return length, width
@@ -70,25 +57,24 @@ def nearest_points(T, out):
 
 
 @kernel(inline=True)
-def _slab_between(T, new, length):
+def _slab_between(T, points, length):
     """Width of the slab across the line between two points."""
     if not length > 0.0:
         return 0.0
-    share = (1.0 - 2.0**-50) / length
-    return slab(T, (new[3] - new[0]) * share, (new[4] - new[1]) * share, (new[5] - new[2]) * share)
+    return slab(T, scale((1.0 - 2.0**-50) / length, sub(vec3_at(points, 3), vec3_at(points, 0))))
 
 
 @kernel(inline=True)
-def beyond(T, bound):
+def separated_by(T, bound):
     """Whether a slab between the triangles is wider than the bound: across the line between their middles, or across
-    the normal of either. A quick look that spares three of four the long one."""
-    x = (T[9] + T[12] + T[15]) - (T[0] + T[3] + T[6])
-    y = (T[10] + T[13] + T[16]) - (T[1] + T[4] + T[7])
-    z = (T[11] + T[14] + T[17]) - (T[2] + T[5] + T[8])
-    width = slab(T, x, y, z)
-    if width > 0.0 and width * width > bound * bound * (x * x + y * y + z * z):
+    the normal of either. A quick test that spares three of four pairs `nearest_points`."""
+    a = triangle_at(T, 0)
+    b = triangle_at(T, 9)
+    n = sub(add(add(b.p, b.q), b.r), add(add(a.p, a.q), a.r))
+    width = slab(T, n)
+    if width > 0.0 and width * width > bound * bound * dot(n, n):
         return True
-    return _face_slab(T, 0, 9, bound) or _face_slab(T, 9, 0, bound)
+    return _face_separates(T, 0, 9, bound) or _face_separates(T, 9, 0, bound)
 
 
 @kernel
@@ -100,71 +86,57 @@ def common_point(T, length, out):
     """
     best = -_INSIDE
     for face in range(0, 18, 9):
-        ux = T[face + 3] - T[face]
-        uy = T[face + 4] - T[face + 1]
-        uz = T[face + 5] - T[face + 2]
-        vx = T[face + 6] - T[face]
-        vy = T[face + 7] - T[face + 1]
-        vz = T[face + 8] - T[face + 2]
-        nx = uy * vz - uz * vy
-        ny = uz * vx - ux * vz
-        nz = ux * vy - uy * vx
-        square = nx * nx + ny * ny + nz * nz
+        triangle = triangle_at(T, face)
+        n = normal_of(triangle)
+        square = dot(n, n)
         for k in range(3):
-            a = 9 - face + 3 * k
-            b = 9 - face + 3 * ((k + 1) % 3)
-            one = nx * (T[a] - T[face]) + ny * (T[a + 1] - T[face + 1]) + nz * (T[a + 2] - T[face + 2])
-            two = nx * (T[b] - T[face]) + ny * (T[b + 1] - T[face + 1]) + nz * (T[b + 2] - T[face + 2])
-            if not (one * two <= 0.0 and one != two and square > 0.0):
+            a = vec3_at(T, 9 - face + 3 * k)
+            b = vec3_at(T, 9 - face + 3 * ((k + 1) % 3))
+            height_a = dot(n, sub(a, triangle.p))
+            height_b = dot(n, sub(b, triangle.p))
+            if not (height_a * height_b <= 0.0 and height_a != height_b and square > 0.0):
                 continue
-            s = one / (one - two)
-            x = T[a] + s * (T[b] - T[a])
-            y = T[a + 1] + s * (T[b + 1] - T[a + 1])
-            z = T[a + 2] + s * (T[b + 2] - T[a + 2])
-            wx = x - T[face]
-            wy = y - T[face + 1]
-            wz = z - T[face + 2]
-            beta = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / square
-            gamma = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / square
+            x = add(a, scale(height_a / (height_a - height_b), sub(b, a)))
+            beta, gamma = _barycentric(triangle, n, square, x)
             inside = min(beta, gamma, 1.0 - beta - gamma)
             if length > 0.0 and inside > best:
                 best = inside
-                out[0] = x
-                out[1] = y
-                out[2] = z
-                out[3] = x
-                out[4] = y
-                out[5] = z
+                put_vec3(out, 0, x)
+                put_vec3(out, 3, x)
 
 
 @kernel(inline=True)
-def _face_slab(T, face, corners, bound):
-    ux = T[face + 3] - T[face]
-    uy = T[face + 4] - T[face + 1]
-    uz = T[face + 5] - T[face + 2]
-    vx = T[face + 6] - T[face]
-    vy = T[face + 7] - T[face + 1]
-    vz = T[face + 8] - T[face + 2]
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
+def _barycentric(triangle, n, square, x):
+    """Coordinates along q − p and r − p of the point of the plane below x: (w × v)·n and (u × w)·n over n·n."""
+    w = sub(x, triangle.p)
+    beta = dot(cross(w, sub(triangle.r, triangle.p)), n) / square
+    return beta, dot(cross(sub(triangle.q, triangle.p), w), n) / square
+
+
+@kernel(inline=True)
+def _face_separates(T, face, corners, bound):
+    """Whether the slab across the normal of one triangle is wider than the bound."""
+    triangle = triangle_at(T, face)
+    n = normal_of(triangle)
     # Seen across a computed normal the face itself has a width, of slivers no small one.
-    one = nx * ux + ny * uy + nz * uz
-    two = nx * vx + ny * vy + nz * vz
+    height_q = dot(n, sub(triangle.q, triangle.p))
+    height_r = dot(n, sub(triangle.r, triangle.p))
     low = math.inf
     high = -math.inf
-    for k in range(3):
-        p = corners + 3 * k
-        height = nx * (T[p] - T[face]) + ny * (T[p + 1] - T[face + 1]) + nz * (T[p + 2] - T[face + 2])
+    for k in range(corners, corners + 9, 3):
+        height = dot(n, sub(vec3_at(T, k), triangle.p))
         low = min(low, height)
         high = max(high, height)
-    height = max(low - max(one, two, 0.0), min(one, two, 0.0) - high)
-    return height > 0.0 and height * height > bound * bound * (nx * nx + ny * ny + nz * nz)
+    width = max(low - max(height_q, height_r, 0.0), min(height_q, height_r, 0.0) - high)
+    return width > 0.0 and width * width > bound * bound * dot(n, n)
 
 
 @kernel(inline=True)
-def _along_edges(ee, ff, ef, ew, fw):
-    """Where on two edges, 0 to 1 each, their nearest points are; either may be a point."""
+def _nearest_on_segments(ee, ff, ef, ew, fw):
+    """Where the nearest points of two segments are, each from 0 to 1 along it; either may be a point.
+
+    e, f : the segments.   w : from the start of f to that of e; the arguments are products of these.
+    """
     if ee <= 0.0:
         return 0.0, (min(max(fw / ff, 0.0), 1.0) if ff > 0.0 else 0.0)
     if ff <= 0.0:
@@ -181,70 +153,52 @@ def _along_edges(ee, ff, ef, ew, fw):
 
 @kernel
 def _over_face(T, face, corners, best, out):
-    """The corners of one triangle that lie over the inside of the other, the sides of its edges decided in doubles."""
-    ux = T[face + 3] - T[face]
-    uy = T[face + 4] - T[face + 1]
-    uz = T[face + 5] - T[face + 2]
-    vx = T[face + 6] - T[face]
-    vy = T[face + 7] - T[face + 1]
-    vz = T[face + 8] - T[face + 2]
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
-    square = nx * nx + ny * ny + nz * nz
+    """The least squared distance, and its points, of corners of one triangle over the inside of the other.
+
+    best : the least so far.   face, corners : where both triangles start, 0 or 9.
+    """
+    triangle = triangle_at(T, face)
+    n = normal_of(triangle)
+    square = dot(n, n)
     if not square > 0.0:
         return best
-    for k in range(3):
-        p = corners + 3 * k
-        wx = T[p] - T[face]
-        wy = T[p + 1] - T[face + 1]
-        wz = T[p + 2] - T[face + 2]
-        height = nx * wx + ny * wy + nz * wz
+    for k in range(corners, corners + 9, 3):
+        x = vec3_at(T, k)
+        height = dot(n, sub(x, triangle.p))
         if height * height >= best * square:
             continue
-        # Barycentric: (u × w)·n and (w × v)·n over n·n.
-        beta = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / square
-        gamma = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / square
+        beta, gamma = _barycentric(triangle, n, square, x)
         if beta < 0.0 or gamma < 0.0 or beta + gamma > 1.0:
             continue
-        qx = T[face] + (beta * ux + gamma * vx)
-        qy = T[face + 1] + (beta * uy + gamma * vy)
-        qz = T[face + 2] + (beta * uz + gamma * vz)
-        dx = T[p] - qx
-        dy = T[p + 1] - qy
-        dz = T[p + 2] - qz
-        length = dx * dx + dy * dy + dz * dz
-        if length < best:
-            best = length
-            first = 0 if face == 0 else 3
-            out[first] = qx
-            out[first + 1] = qy
-            out[first + 2] = qz
-            out[3 - first] = T[p]
-            out[4 - first] = T[p + 1]
-            out[5 - first] = T[p + 2]
+        along = add(scale(beta, sub(triangle.q, triangle.p)), scale(gamma, sub(triangle.r, triangle.p)))
+        foot = add(triangle.p, along)
+        d = sub(x, foot)
+        if dot(d, d) < best:
+            best = dot(d, d)
+            put_vec3(out, 0 if face == 0 else 3, foot)
+            put_vec3(out, 3 if face == 0 else 0, x)
     return best
 
 
 @kernel(inline=True)
-def slab(T, nx, ny, nz):
-    """Width of the slab across n between the triangles, n pointing from the first: least minus largest product."""
-    high = nx * T[0] + ny * T[1] + nz * T[2]
-    low = nx * T[9] + ny * T[10] + nz * T[11]
-    for k in range(1, 3):
-        high = max(high, nx * T[3 * k] + ny * T[3 * k + 1] + nz * T[3 * k + 2])
-        low = min(low, nx * T[9 + 3 * k] + ny * T[10 + 3 * k] + nz * T[11 + 3 * k])
+def slab(T, n):
+    """Width of the slab across n between the triangles, n pointing from A's to B's: least minus largest product."""
+    high = dot(n, vec3_at(T, 0))
+    low = dot(n, vec3_at(T, 9))
+    for k in range(3, 9, 3):
+        high = max(high, dot(n, vec3_at(T, k)))
+        low = min(low, dot(n, vec3_at(T, 9 + k)))
     return low - high
 
 
 @kernel
 def widest_slab(T):
-    """(width, nx, ny, nz): the widest slab across a normal of either triangle or of a pair of edges, its unit vector from the
-    first to the second: for pairs whose nearest points came out badly. (−∞, 0, 0, 0) where nothing has a direction."""
+    """(width, unit vector from A's to B's) of the widest slab across a normal of either triangle or of a pair of edges.
+
+    For pairs whose nearest points came out badly. (−∞, 0) where nothing has a direction.
+    """
     best = -math.inf
-    nx = 0.0
-    ny = 0.0
-    nz = 0.0
+    n = Vec3(0.0, 0.0, 0.0)
     for i in range(3):
         a = 3 * i
         b = 3 * ((i + 1) % 3)
@@ -260,34 +214,23 @@ def widest_slab(T):
                 b = a + 3
                 c = a
                 d = a + 6
-            width, x, y, z = _across(T, a, b, c, d)
+            width, across = _slab_across(T, a, b, c, d)
             if width > best:
                 best = width
-                nx = x
-                ny = y
-                nz = z
-    return best, nx, ny, nz
+                n = across
+    return best, n
 
 
 @kernel
-def _across(T, a, b, c, d):
-    ex = T[b] - T[a]
-    ey = T[b + 1] - T[a + 1]
-    ez = T[b + 2] - T[a + 2]
-    fx = T[d] - T[c]
-    fy = T[d + 1] - T[c + 1]
-    fz = T[d + 2] - T[c + 2]
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+def _slab_across(T, a, b, c, d):
+    """(width, unit vector) of the slab across the edges from a to b and from c to d."""
+    n = cross(sub(vec3_at(T, b), vec3_at(T, a)), sub(vec3_at(T, d), vec3_at(T, c)))
+    length = math.sqrt(dot(n, n))
     if not length > 0.0:
-        return -math.inf, 0.0, 0.0, 0.0
-    nx /= length
-    ny /= length
-    nz /= length
-    width = slab(T, nx, ny, nz)
-    opposite = slab(T, -nx, -ny, -nz)
+        return -math.inf, Vec3(0.0, 0.0, 0.0)
+    n = divide(n, length)
+    width = slab(T, n)
+    opposite = slab(T, neg(n))
     if opposite > width:
-        return opposite, -nx, -ny, -nz
-    return width, nx, ny, nz
+        return opposite, neg(n)
+    return width, n

@@ -3,7 +3,7 @@
 A hull is convex: a vertex none of whose neighbours is lower is the lowest of all. That is no truth of rounded heights.
 Where edges nearly are opposite, as on a cap of thousands of vertices, rounding at two neighbours is a thousand times as
 much across the cap. So the direction is rounded once, to two doubles a component in the frame of the body, and along
-that one every step is certain: by doubles, by double-doubles, or by the exact sum of all products. What is found is then
+that one every step is certain: by doubles, by double-doubles, or by the exact sum of all products. The vertex is then
 the lowest along a direction off by 2⁻¹⁰⁰, wherever the vertices lie.
 
 Steps on level vertices: those of the hull that `quickhull` makes of a cap, logarithmic in their number.
@@ -21,159 +21,156 @@ less than `HEIGHT_ERROR`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from collide.kernels import kernel, view_i64
-from collide.numerics.double_double import product_of_vectors
-from collide.numerics.error_free import two_sum
-from collide.numerics.exact_dot_sign import exact_sign_of_pairs
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD, DDVec3
+from collide.numerics.exact_dot_sign import exact_sign_of_dot
+from collide.numerics.vec3 import column_at, dot, sub, vec3_at
 from collide.support.support_tree import FLAT, HEADER
 from collide.support.support_tree_query import rings_of
 
-#: Neighbours that may be looked at on the way down; those left are for `lowest_of_all`.
-MOST_NEIGHBOURS = 768
+#: Neighbours that may be visited on the way down; a longer way is for `lowest_of_all`.
+MAX_NEIGHBOURS = 768
 #: Error of a product of vectors in doubles, in units of Σ|products|: both factors, the product and two sums round once.
-_ROUGH = 8.0 * 2.0**-53
-#: The same of `product_of_vectors`; and of either, products below the smallest normal double.
-_FINE, _TINY = 2.0**-101, 2.0**-960
+_DOUBLE_ERROR = 8.0 * 2.0**-53
+#: The same of `dd.inner`; and of either, products below the smallest normal double.
+_DD_ERROR, _TINY = 2.0**-101, 2.0**-960
+
+
+class LowestVertex(NamedTuple):
+    """proven : false where it could not be found.   height : over the first vertex, ≤ 0.   n_visited : vertices compared."""
+
+    proven: bool
+    vertex: int
+    height: DD
+    n_visited: int
+
+
+class HeightSign(NamedTuple):
+    """certain : whether the sign is proven.   sign : −1, 0 or 1.   height : the same number in doubles, nearly."""
+
+    certain: bool
+    sign: int
+    height: float
 
 
 @kernel
-def direction_in_body(poses, p, low, at, direction, sign):
-    """(gx, low, gy, low, gz, low): Rᵀ times a direction of the world, six doubles, times ±1.
+def direction_in_body(poses, p, low, low_at, direction, sign):
+    """Rᵀ times a stored direction of the world, times ±1.
 
-    p : row of the pose.   low, at : where what it is more than the row says begins; no doubles where it is as given.
+    p : row of the pose.   low, low_at : where its low parts begin; no doubles where it is as given.
     """
-    gx, gx_low = _component(poses, p, low, at, direction)
-    gy, gy_low = _component(poses, p + 1, low, at + 1, direction)
-    gz, gz_low = _component(poses, p + 2, low, at + 2, direction)
-    return sign * gx, sign * gx_low, sign * gy, sign * gy_low, sign * gz, sign * gz_low
+    d = dd.vec3_at(direction, 0)
+    x = dd.inner(_column(poses, p, low, low_at), d)
+    y = dd.inner(_column(poses, p + 1, low, low_at + 1), d)
+    z = dd.inner(_column(poses, p + 2, low, low_at + 2), d)
+    return dd.scale_vec3(sign, DDVec3(x, y, z))
 
 
-@kernel
-def _component(poses, p, low, at, direction):
-    """A column of R times the direction."""
+@kernel(inline=True)
+def _column(poses, p, low, low_at):
+    """A column of R."""
     x_low = 0.0
     y_low = 0.0
     z_low = 0.0
     if len(low) > 0:
-        x_low = low[at]
-        y_low = low[at + 3]
-        z_low = low[at + 6]
-    return product_of_vectors(
-        poses[p], x_low, poses[p + 3], y_low, poses[p + 6], z_low,
-        direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-    )  # fmt: skip
+        x_low = low[low_at]
+        y_low = low[low_at + 3]
+        z_low = low[low_at + 6]
+    return DDVec3(DD(poses[p], x_low), DD(poses[p + 3], y_low), DD(poses[p + 6], z_low))
 
 
 @kernel
-def descend(tree, first, gx, gx_low, gy, gy_low, gz, gz_low, terms):
-    """(proven, vertex, height, low, looked): a lowest vertex of a hull, exactly, and its height over the first one.
+def descend(tree, first, g, terms):
+    """A lowest vertex of a hull, exactly, by steps along its edges; `n_visited` is O(log n) of a level cap.
 
-    tree : address of a support tree.   first : the row to start from.   terms : PRODUCT_TERMS doubles to work in.
-    looked : neighbours looked at, O(log n) of a level cap.
+    tree : address of a support tree.   first : the row to start from.   g : `DDVec3`.   terms : workspace of PRODUCT_TERMS
+    doubles.
 
     Not proven: too many neighbours, or products too small to be exact, or a vertex in the middle of a facet, from which
     edges do not lead to the other side.
     """
     starts, ring, corners = rings_of(tree)
     vertex = first
-    looked = 0
+    n_visited = 0
     while True:
         begin = starts[vertex]
         end = starts[vertex + 1]
-        looked += end - begin
-        if end == begin or looked > MOST_NEIGHBOURS:
-            return False, first, 0.0, 0.0, looked
+        n_visited += end - begin
+        if end == begin or n_visited > MAX_NEIGHBOURS:
+            return LowestVertex(False, first, DD(0.0, 0.0), n_visited)
         best = vertex
         lowest = 0.0
         plateau = True
-        certain = True
-        for at in range(begin, end):
-            sure, sign, height = _compare(corners, ring[at], vertex, gx, gx_low, gy, gy_low, gz, gz_low, terms)
-            certain = certain and sure
+        all_certain = True
+        for k in range(begin, end):
+            certain, sign, height = _compare(vec3_at(corners, 3 * ring[k]), vec3_at(corners, 3 * vertex), g, terms)
+            all_certain = all_certain and certain
             plateau = plateau and sign == 0
             if sign < 0 and (best == vertex or height < lowest):
-                best = ring[at]
+                best = ring[k]
                 lowest = height
         if best == vertex:
             break
         vertex = best
-    if not certain or (plateau and view_i64(tree, HEADER)[FLAT] == 0):
-        return False, first, 0.0, 0.0, looked
-    v = 3 * first
-    w = 3 * vertex
-    x, x_low = two_sum(corners[w], -corners[v])
-    y, y_low = two_sum(corners[w + 1], -corners[v + 1])
-    z, z_low = two_sum(corners[w + 2], -corners[v + 2])
-    height, height_low = product_of_vectors(x, x_low, y, y_low, z, z_low, gx, gx_low, gy, gy_low, gz, gz_low)
-    if height > 0.0:  # rounded: it is not higher
-        return True, vertex, 0.0, 0.0, looked
-    return True, vertex, height, height_low, looked
+    if not all_certain or (plateau and view_i64(tree, HEADER)[FLAT] == 0):
+        return LowestVertex(False, first, DD(0.0, 0.0), n_visited)
+    height = dd.inner(dd.difference(vec3_at(corners, 3 * vertex), vec3_at(corners, 3 * first)), g)
+    if height.high > 0.0:  # rounded: it is not higher
+        return LowestVertex(True, vertex, DD(0.0, 0.0), n_visited)
+    return LowestVertex(True, vertex, height, n_visited)
 
 
 @kernel(inline=True)
-def _compare(corners, i, j, gx, gx_low, gy, gy_low, gz, gz_low, terms):
-    """(certain, sign, height): of (corner i − corner j)·g the sign, and what it is, nearly."""
-    v = 3 * j
-    w = 3 * i
-    x = corners[w] - corners[v]
-    y = corners[w + 1] - corners[v + 1]
-    z = corners[w + 2] - corners[v + 2]
-    height = x * gx + y * gy + z * gz
-    size = abs(x * gx) + abs(y * gy) + abs(z * gz)
-    if height > _ROUGH * size + _TINY:
-        return True, 1, height
-    if height < -(_ROUGH * size + _TINY):
-        return True, -1, height
-    if (x == 0.0 or gx == 0.0) and (y == 0.0 or gy == 0.0) and (z == 0.0 or gz == 0.0):
-        return True, 0, 0.0
-    return _compare_finely(
-        corners[w], corners[w + 1], corners[w + 2], corners[v], corners[v + 1], corners[v + 2],
-        gx, gx_low, gy, gy_low, gz, gz_low, _FINE * size + _TINY, terms,
-    )  # fmt: skip
+def _compare(a, b, g, terms):
+    """The sign of (a − b)·g."""
+    d = sub(a, b)
+    h = dd.leading(g)
+    height = dot(d, h)
+    size = abs(d.x * h.x) + abs(d.y * h.y) + abs(d.z * h.z)
+    if height > _DOUBLE_ERROR * size + _TINY:
+        return HeightSign(True, 1, height)
+    if height < -(_DOUBLE_ERROR * size + _TINY):
+        return HeightSign(True, -1, height)
+    if (d.x == 0.0 or h.x == 0.0) and (d.y == 0.0 or h.y == 0.0) and (d.z == 0.0 or h.z == 0.0):
+        return HeightSign(True, 0, 0.0)
+    return _compare_finely(a, b, g, _DD_ERROR * size + _TINY, terms)
 
 
 @kernel
-def _compare_finely(ax, ay, az, bx, by, bz, gx, gx_low, gy, gy_low, gz, gz_low, bound, terms):
-    """`_compare` of points a and b, where doubles do not tell."""
-    x, x_low = two_sum(ax, -bx)
-    y, y_low = two_sum(ay, -by)
-    z, z_low = two_sum(az, -bz)
-    height, _ = product_of_vectors(x, x_low, y, y_low, z, z_low, gx, gx_low, gy, gy_low, gz, gz_low)
-    if height > bound:
-        return True, 1, height
-    if height < -bound:
-        return True, -1, height
-    certain, sign = exact_sign_of_pairs(x, x_low, y, y_low, z, z_low, gx, gx_low, gy, gy_low, gz, gz_low, terms)
-    return certain, sign, height
+def _compare_finely(a, b, g, error, terms):
+    """`_compare` where doubles leave it open: in double-doubles, then as an exact sum."""
+    d = dd.difference(a, b)
+    height = dd.inner(d, g)
+    if height.high > error:
+        return HeightSign(True, 1, height.high)
+    if height.high < -error:
+        return HeightSign(True, -1, height.high)
+    certain, sign = exact_sign_of_dot(d, g, terms)
+    return HeightSign(certain, sign, height.high)
 
 
 @kernel
-def lowest_of_all(coordinates, n, m, first, gx, gx_low, gy, gy_low, gz, gz_low):
-    """(vertex, height, low, fine): the lowest of all n vertices, and its height over the first one.
-
-    fine : how many heights were taken in double-doubles: those that doubles do not tell from the lowest so far. O(n).
-    """
-    vx = coordinates[first]
-    vy = coordinates[m + first]
-    vz = coordinates[2 * m + first]
+def lowest_of_all(coords, n, padded, first, g):
+    """The lowest of all n vertices by a scan, O(n); `n_visited` counts heights taken in double-doubles, those that doubles
+    cannot tell from the lowest so far."""
+    start = column_at(coords, padded, first)
     best = first
-    least = 0.0
-    least_low = 0.0
-    fine = 0
+    lowest = DD(0.0, 0.0)
+    n_fine = 0
     for i in range(n):
-        x = (coordinates[i] - vx) * gx
-        y = (coordinates[m + i] - vy) * gy
-        z = (coordinates[2 * m + i] - vz) * gz
+        vertex = column_at(coords, padded, i)
+        x = (vertex.x - start.x) * g.x.high
+        y = (vertex.y - start.y) * g.y.high
+        z = (vertex.z - start.z) * g.z.high
         # Level is as good: where all heights are exactly 0 none is taken again.
-        if x + y + z - _ROUGH * (abs(x) + abs(y) + abs(z)) >= least:
+        if x + y + z - _DOUBLE_ERROR * (abs(x) + abs(y) + abs(z)) >= lowest.high:
             continue
-        fine += 1
-        ex, ex_low = two_sum(coordinates[i], -vx)
-        ey, ey_low = two_sum(coordinates[m + i], -vy)
-        ez, ez_low = two_sum(coordinates[2 * m + i], -vz)
-        height, low = product_of_vectors(ex, ex_low, ey, ey_low, ez, ez_low, gx, gx_low, gy, gy_low, gz, gz_low)
-        if height < least or (height == least and low < least_low):
+        n_fine += 1
+        height = dd.inner(dd.difference(vertex, start), g)
+        if dd.less(height, lowest):
             best = i
-            least = height
-            least_low = low
-    return best, least, least_low, fine
+            lowest = height
+    return LowestVertex(True, best, lowest, n_fine)

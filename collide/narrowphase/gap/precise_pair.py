@@ -1,4 +1,4 @@
-"""A pair of cores of points in double-doubles: posed differences and planes across them.
+"""A pair of cores of points in double-doubles: differences of posed vertices, planes across them, and heights along these.
 
 Doubles find the deciding feature; here its numbers get their last digits. Points are taken straight from the
 shapes and the poses as given, so nothing that doubles rounded before has a say. Everything is scaled by a power
@@ -8,28 +8,32 @@ Error of a point, in units of S (`bounds.py`): a coordinate is eight terms, each
 upper halves are added without error and whose lower ones are rounded: 16u of at most 9u·ΣT, ΣT ≤ S. Across three
 coordinates less than 2⁻⁹⁸ S. The height of a point along a direction, as a double-double an exact vector, is good to
 2⁻¹⁰⁰·√3 of the product of lengths besides: `HEIGHT_ERROR` covers both.
+
+Points and directions are `DDVec3`s; ``fine`` is a workspace of points, dd.STRIDE doubles each.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64
 from collide.kernels.lanes import any_of, root_of, select
 from collide.lowering.shape_table import LOW_PARTS, POSE_SLOP, POSE_TERMS, TERM_ROW
-from collide.numerics.double_double import cross, multiply, product_of_vectors, square_root, subtract
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD, DDVec3
 from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.vec3 import column_at, dot, neg, norm1
 
-#: Doubles stored a point: three double-doubles.
-FINE = 6
 #: Error of a height over the length of its direction, in units of S, and what composed poses add to it in units of
 #: their slop.
 HEIGHT_ERROR, SLOP_ERROR = 2.0**-97, 2.0**-49
-#: Pairs beyond these sizes are left to integers: products of products would overflow or vanish.
-SMALLEST_FINE, LARGEST_FINE = 2.0**-300, 2.0**300
+#: Doubles of the low parts of two poses.
+LOW_PARTS_OF_PAIR = 24
+# Pairs beyond these sizes are left to integers: products of products would overflow or vanish.
+_SMALLEST_SIZE, _LARGEST_SIZE = 2.0**-300, 2.0**300
 #: Directions shorter than this, of a pair of size 1, say nothing.
 _SHORTEST = 2.0**-200
-
 
 
 @kernel(inline=True)
@@ -43,38 +47,120 @@ def smaller(a, b):
 
 
 @kernel(inline=True)
-def scale_of(size):
+def is_refinable(size):
+    """Whether double-doubles can work on a pair of this size [m] without overflow or underflow."""
+    return _SMALLEST_SIZE < size < _LARGEST_SIZE
+
+
+@kernel(inline=True)
+def unit_scale(size):
     """A power of two that brings the pair to a size between ½ and 1."""
     return math.ldexp(1.0, -math.frexp(size)[1])
 
 
-@kernel
-def low_parts(poses, p, terms, low, at):
-    """What the twelve entries of a pose are more than the row says, into low[at:]; for a pose as given, zeros."""
-    at_terms = TERM_ROW * int(poses[p + POSE_TERMS]) + LOW_PARTS
-    for k in range(12):
-        low[at + k] = terms[at_terms + k] if at_terms >= 0 else 0.0
+# --- poses ----------------------------------------------------------------------------------------
 
 
 @kernel(inline=True)
 def is_composed(poses, p):
-    """Whether a pose is a product, its row only near what is meant."""
+    """Whether a pose is a product of two, its row only near what is meant."""
     return poses[p + POSE_SLOP] != 0.0
 
 
 @kernel(inline=True)
-def add_turned(total, rest, rx, ry, rz, x, y, z):
+def put_low_parts(pair, terms_at, low_at):
+    """What both poses are more than their rows say, written to an address: LOW_PARTS_OF_PAIR doubles, A's first.
+
+    terms_at : of the `PoseTable`.   Returns how many doubles it wrote: none where both poses are as given.
+    """
+    if not (is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)):
+        return 0
+    return _put_low_parts(pair, terms_at, low_at)
+
+
+@kernel
+def _put_low_parts(pair, terms_at, low_at):
+    rows = int(max(pair.poses[pair.A.pose_at + POSE_TERMS], pair.poses[pair.B.pose_at + POSE_TERMS])) + 1
+    low = view_f64(low_at, LOW_PARTS_OF_PAIR)
+    terms = view_f64(terms_at, TERM_ROW * rows)
+    for body in range(2):
+        at_terms = TERM_ROW * int(pair.poses[(pair.A.pose_at if body == 0 else pair.B.pose_at) + POSE_TERMS]) + LOW_PARTS
+        for k in range(12):
+            low[12 * body + k] = terms[at_terms + k] if at_terms >= 0 else 0.0
+    return LOW_PARTS_OF_PAIR
+
+
+class PosedDifference(NamedTuple):
+    """Two poses, for points of A ⊖ B.
+
+    poses, A_at, B_at : where their rows begin.   low, low_A_at, low_B_at : where their low parts do, if composed.
+    """
+
+    poses: Any
+    A_at: int
+    B_at: int
+    low: Any
+    low_A_at: int
+    low_B_at: int
+    composed: bool
+
+
+@kernel(inline=True)
+def posed_difference(pair, low):
+    """low : of `put_low_parts`, or no doubles where both poses are as given."""
+    return PosedDifference(pair.poses, pair.A.pose_at, pair.B.pose_at, low, 0, 12, len(low) > 0)
+
+
+# --- points ---------------------------------------------------------------------------------------
+
+
+@kernel(inline=True)
+def add_products(total, rest, matrix, row, v):
     """(total, rest) with a row of a rotation times a vector added: the total without error, the rest rounded."""
-    term, e = two_product(rx, x)
-    total, f = two_sum(total, term)
-    rest += e + f
-    term, e = two_product(ry, y)
-    total, f = two_sum(total, term)
-    rest += e + f
-    term, e = two_product(rz, z)
-    total, f = two_sum(total, term)
-    rest += e + f
-    return total, rest
+    x = two_product(matrix[row], v.x)
+    total, error = two_sum(total, x.high)
+    rest += x.low + error
+    y = two_product(matrix[row + 1], v.y)
+    total, error = two_sum(total, y.high)
+    rest += y.low + error
+    z = two_product(matrix[row + 2], v.z)
+    total, error = two_sum(total, z.high)
+    rest += z.low + error
+    return DD(total, rest)
+
+
+@kernel(inline=True)
+def put_difference(out, k, X, a, b, scale):
+    """R_A a + p_A − R_B b − p_B times a power of two, six numbers at ``k``; of doubles or of Lanes.
+
+    X : the `PosedDifference`.   a, b : points in their bodies' frames.
+    """
+    for axis in range(3):
+        r = X.A_at + 3 * axis
+        s = X.B_at + 3 * axis
+        total, rest = two_sum(X.poses[X.A_at + 9 + axis], -X.poses[X.B_at + 9 + axis])
+        total, rest = add_products(total, rest, X.poses, r, a)
+        total, rest = add_products(total, rest, X.poses, s, neg(b))
+        if X.composed:
+            r = X.low_A_at + 3 * axis
+            s = X.low_B_at + 3 * axis
+            rest += X.low[X.low_A_at + 9 + axis] - X.low[X.low_B_at + 9 + axis]
+            rest += X.low[r] * a.x + X.low[r + 1] * a.y + X.low[r + 2] * a.z
+            rest -= X.low[s] * b.x + X.low[s + 1] * b.y + X.low[s + 2] * b.z
+        total, rest = two_sum(total, rest)
+        out[k + 2 * axis] = total * scale
+        out[k + 2 * axis + 1] = rest * scale
+
+
+@kernel(inline=True)
+def fine_point(pair, low, fine, k, i, j, scale):
+    """Point k of ``fine`` becomes the difference of vertex i of A and vertex j of B, times ``scale``.
+
+    low : of `put_low_parts`, or no doubles where both poses are as given.
+    """
+    a = column_at(pair.A.coords, pair.A.padded, i)
+    b = column_at(pair.B.coords, pair.B.padded, j)
+    put_difference(fine, dd.STRIDE * k, posed_difference(pair, low), a, b, scale)
 
 
 @kernel(inline=True)
@@ -84,170 +170,80 @@ def fine_points(pair, low, fine, ids, n, scale):
         fine_point(pair, low, fine, k, ids[2 * k], ids[2 * k + 1], scale)
 
 
-@kernel(inline=True)
-def fine_point(pair, low, fine, k, i, j, scale):
-    """Point k becomes the difference of vertex i of A and vertex j of B, times ``scale``.
-
-    low : `write_low_parts` of both poses, or no doubles where both are as given.
-    """
-    A, B, poses = pair.A, pair.B, pair.poses
-    p, q = A.pose_at, B.pose_at
-    ax = A.coords[i]
-    ay = A.coords[A.padded + i]
-    az = A.coords[2 * A.padded + i]
-    bx = B.coords[j]
-    by = B.coords[B.padded + j]
-    bz = B.coords[2 * B.padded + j]
-    for axis in range(3):
-        r = p + 3 * axis
-        s = q + 3 * axis
-        total, rest = two_sum(poses[p + 9 + axis], -poses[q + 9 + axis])
-        total, rest = add_turned(total, rest, poses[r], poses[r + 1], poses[r + 2], ax, ay, az)
-        total, rest = add_turned(total, rest, poses[s], poses[s + 1], poses[s + 2], -bx, -by, -bz)
-        if len(low) > 0:
-            at = 3 * axis
-            rest += low[9 + axis] - low[21 + axis]
-            rest += low[at] * ax + low[at + 1] * ay + low[at + 2] * az
-            rest -= low[12 + at] * bx + low[13 + at] * by + low[14 + at] * bz
-        total, rest = two_sum(total, rest)
-        fine[FINE * k + 2 * axis] = total * scale
-        fine[FINE * k + 2 * axis + 1] = rest * scale
-
-
 @kernel
 def fine_edge(fine, k, j):
-    """Point k minus point j, as three double-doubles."""
-    at = FINE * k
-    to = FINE * j
-    x, x_low = subtract(fine[at], fine[at + 1], fine[to], fine[to + 1])
-    y, y_low = subtract(fine[at + 2], fine[at + 3], fine[to + 2], fine[to + 3])
-    z, z_low = subtract(fine[at + 4], fine[at + 5], fine[to + 4], fine[to + 5])
-    return x, x_low, y, y_low, z, z_low
+    """Point k minus point j."""
+    return dd.sub_vec3(dd.vec3_at(fine, dd.STRIDE * k), dd.vec3_at(fine, dd.STRIDE * j))
 
 
 @kernel
 def fine_height(fine, k, direction):
-    """Point k along a direction of six doubles."""
-    at = FINE * k
-    return product_of_vectors(
-        fine[at], fine[at + 1], fine[at + 2], fine[at + 3], fine[at + 4], fine[at + 5],
-        direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-    )  # fmt: skip
+    """Point k along a direction, both stored."""
+    return dd.inner(dd.vec3_at(fine, dd.STRIDE * k), dd.vec3_at(direction, 0))
+
+
+# --- directions -----------------------------------------------------------------------------------
+
+
+@kernel(inline=True)
+def direction_length(d):
+    """|d|, or 0 where the direction says nothing."""
+    length = dd.sqrt(dd.inner(d, d))
+    return dd.dd_select(norm1(dd.leading(d)) > _SHORTEST, length, DD(0.0, 0.0))
+
+
+@kernel
+def fine_length(direction):
+    """`direction_length` of a stored direction."""
+    return direction_length(dd.vec3_at(direction, 0))
 
 
 @kernel
 def set_plane(fine, i, j, k, direction):
     """The normal of three points, as long as twice their area, into ``direction``."""
-    ex, ex_low, ey, ey_low, ez, ez_low = fine_edge(fine, j, i)
-    fx, fx_low, fy, fy_low, fz, fz_low = fine_edge(fine, k, i)
-    x, x_low, y, y_low, z, z_low = normal_of_edges(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low)
-    direction[0] = x
-    direction[1] = x_low
-    direction[2] = y
-    direction[3] = y_low
-    direction[4] = z
-    direction[5] = z_low
+    dd.put_vec3(direction, 0, normal_of_edges(fine_edge(fine, j, i), fine_edge(fine, k, i)))
 
 
 @kernel
-def normal_of_edges(ex, ex_low, ey, ey_low, ez, ez_low, fx, fx_low, fy, fy_low, fz, fz_low):
-    """e × f, of two edges e and f from a corner of a triangle, as three double-doubles.
+def normal_of_edges(e, f):
+    """e × f, of two edges e and f from a corner of a triangle.
 
     From the two shorter of its three edges: long ones that are nearly parallel would leave little of it.
     """
-    gx, gx_low = subtract(fx, fx_low, ex, ex_low)
-    gy, gy_low = subtract(fy, fy_low, ey, ey_low)
-    gz, gz_low = subtract(fz, fz_low, ez, ez_low)
-    ee = ex * ex + ey * ey + ez * ez
-    ff = fx * fx + fy * fy + fz * fz
-    gg = gx * gx + gy * gy + gz * gz
+    g = dd.sub_vec3(f, e)
+    ee = dot(dd.leading(e), dd.leading(e))
+    ff = dot(dd.leading(f), dd.leading(f))
+    gg = dot(dd.leading(g), dd.leading(g))
     without_e = (ee >= ff) & (ee >= gg)
     without_f = (ff > ee) & (ff >= gg)
     # e × f = f × g = g × −e, with g from e's end to f's.
-    ux = select(without_e, fx, select(without_f, gx, ex))
-    ux_low = select(without_e, fx_low, select(without_f, gx_low, ex_low))
-    uy = select(without_e, fy, select(without_f, gy, ey))
-    uy_low = select(without_e, fy_low, select(without_f, gy_low, ey_low))
-    uz = select(without_e, fz, select(without_f, gz, ez))
-    uz_low = select(without_e, fz_low, select(without_f, gz_low, ez_low))
-    vx = select(without_e, gx, select(without_f, -ex, fx))
-    vx_low = select(without_e, gx_low, select(without_f, -ex_low, fx_low))
-    vy = select(without_e, gy, select(without_f, -ey, fy))
-    vy_low = select(without_e, gy_low, select(without_f, -ey_low, fy_low))
-    vz = select(without_e, gz, select(without_f, -ez, fz))
-    vz_low = select(without_e, gz_low, select(without_f, -ez_low, fz_low))
-    return cross(ux, ux_low, uy, uy_low, uz, uz_low, vx, vx_low, vy, vy_low, vz, vz_low)
+    u = dd.select_vec3(without_e, f, dd.select_vec3(without_f, g, e))
+    v = dd.select_vec3(without_e, g, dd.select_vec3(without_f, dd.neg_vec3(e), f))
+    return dd.cross(u, v)
 
 
 @kernel
-def across_edge(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low):
-    """The part of a point across an edge from it, three double-doubles, lengthened by the edge's square.
+def across_edge(w, e):
+    """The part of a point w across an edge e from it, lengthened by the edge's square.
 
     Taken twice where that is short: the first time leaves what rounding at |w| makes, the second what rounding at the
     result makes. Where the edge is not much nearer than its length, once is enough.
     """
-    square, square_low = product_of_vectors(ex, ex_low, ey, ey_low, ez, ez_low, ex, ex_low, ey, ey_low, ez, ez_low)
-    full = abs(x) + abs(y) + abs(z)
-    x, x_low, y, y_low, z, z_low = _less_along(
-        x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low
-    )
-    left = abs(x) + abs(y) + abs(z)
-    again = left <= 2.0**-20 * square * (full + root_of(square))
+    square = dd.inner(e, e)
+    across = _reject(w, e, square)
+    once = norm1(dd.leading(across))
+    again = once <= 2.0**-20 * square.high * (norm1(dd.leading(w)) + root_of(square.high))
     if any_of(again):
-        u, u_low, v, v_low, w, w_low = _less_along(
-            x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low
-        )
-        x = select(again, u, x)
-        x_low = select(again, u_low, x_low)
-        y = select(again, v, y)
-        y_low = select(again, v_low, y_low)
-        z = select(again, w, z)
-        z_low = select(again, w_low, z_low)
-    return x, x_low, y, y_low, z, z_low
+        across = dd.select_vec3(again, _reject(across, e, square), across)
+    return across
 
 
 @kernel
-def _less_along(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low, square, square_low):
+def _reject(w, e, square):
     """w |e|² − e (w·e)."""
-    along, along_low = product_of_vectors(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low)
-    p, p_low = multiply(x, x_low, square, square_low)
-    q, q_low = multiply(ex, ex_low, along, along_low)
-    x, x_low = subtract(p, p_low, q, q_low)
-    p, p_low = multiply(y, y_low, square, square_low)
-    q, q_low = multiply(ey, ey_low, along, along_low)
-    y, y_low = subtract(p, p_low, q, q_low)
-    p, p_low = multiply(z, z_low, square, square_low)
-    q, q_low = multiply(ez, ez_low, along, along_low)
-    z, z_low = subtract(p, p_low, q, q_low)
-    return x, x_low, y, y_low, z, z_low
-
-
-@kernel
-def fine_length(direction):
-    """(|d|, low), or zeros where the direction says nothing."""
-    square, square_low = product_of_vectors(
-        direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-        direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-    )  # fmt: skip
-    length, length_low = square_root(square, square_low)
-    some = abs(direction[0]) + abs(direction[2]) + abs(direction[4]) > _SHORTEST
-    return select(some, length, 0.0), select(some, length_low, 0.0)
-
-
-@kernel
-def _write_low_parts(pair, terms_at, low_at):
-    poses = pair.poses
-    rows = int(max(poses[pair.A.pose_at + POSE_TERMS], poses[pair.B.pose_at + POSE_TERMS])) + 1
-    low = view_f64(low_at, 24)
-    terms = view_f64(terms_at, TERM_ROW * rows)
-    low_parts(poses, pair.A.pose_at, terms, low, 0)
-    low_parts(poses, pair.B.pose_at, terms, low, 12)
-    return 24
-
-
-@kernel(inline=True)
-def write_low_parts(pair, terms_at, low_at):
-    """Put the low parts of both poses at an address; returns their number, none where both poses are as given."""
-    if not (is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)):
-        return 0
-    return _write_low_parts(pair, terms_at, low_at)
+    along = dd.inner(w, e)
+    return DDVec3(
+        dd.sub(dd.mul(w.x, square), dd.mul(e.x, along)),
+        dd.sub(dd.mul(w.y, square), dd.mul(e.y, along)),
+        dd.sub(dd.mul(w.z, square), dd.mul(e.z, along)),
+    )

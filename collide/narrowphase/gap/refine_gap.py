@@ -1,4 +1,4 @@
-"""The gap of two cores of points to its last digit, from the feature that GJK found, for eight pairs at a time.
+"""The last digits of the distance of two cores of points, from the feature that GJK found, for eight pairs at a time.
 
 In double-doubles: a direction across the feature, whose least height over A ⊖ B is a lower bound of the distance, and
 the heights of the feature's own points, whose greatest is an upper bound if the foot of the origin lies within
@@ -17,318 +17,222 @@ height of a point is off by less than `HEIGHT_ERROR`.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from collide.kernels import kernel
 from collide.kernels.lanes import select
+from collide.narrowphase.gap import gap_layout as at
 from collide.narrowphase.gap.precise_pair import (
-    FINE,
     HEIGHT_ERROR,
     SLOP_ERROR,
+    PosedDifference,
     across_edge,
-    add_turned,
-    fine_edge,
-    fine_height,
-    fine_length,
+    direction_length,
     larger,
     normal_of_edges,
+    put_difference,
     smaller,
 )
-from collide.numerics.double_double import add, bracket, divide, loose_product
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD
 from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.vec3 import (
+    add,
+    cross,
+    divide,
+    dot,
+    neg,
+    norm1,
+    put_vec3,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
 
 #: Rounding of a weight's numerator in doubles, of points and edges rounded once, with a dozen roundings to spare.
 _WEIGHT_ERROR = 64 * 2.0**-53
 
-# A question, one number each of eight pairs: both poses (R row by row, then p) and what composed ones are more than
-# that; the first point's vertices a and b; a power of two that brings the pair to a size of about 1, the slop
-# and error of the pair, both radii, 1 where the nearest point lies in the parallelogram of two segments, and two edges.
-POSE_A, POSE_B, LOW_A, LOW_B, CORNER_A, CORNER_B, SCALE, SLOP, ERROR, RADIUS_A, RADIUS_B, PARALLELOGRAM, EDGES = (
-    0, 12, 24, 36, 48, 51, 54, 55, 56, 57, 58, 59, 60
-)  # fmt: skip
-# An edge is R (head − tail) of a body, or the sum of one of A and one of B.
-HEAD, TAIL, OF_A = 0, 3, 6
-PART = 7
-EDGE = 2 * PART
-QUESTION = EDGES + 2 * EDGE
 
-# An answer: 1 where proven, as far as the feature itself says; the core distance, the spread of the feature's heights and
-# the direction's length, all scaled; the gap (double-double), its bracket and the double nearest; the unit vector
-# from B to A; the cores' points; that vector in either body, and how low other vertices must not be along it.
-(
-    PROVEN, CORE, SPREAD, LENGTH, GAP, GAP_LOW, GAP_LOWER, GAP_NEAREST, GAP_UPPER, UNIT, POINT_A, POINT_B, ALONG_A, ALONG_B,
-    LIMIT_A, LIMIT_B,
-) = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 18, 21, 24, 25)  # fmt: skip
-ANSWER = 26
+class Foot(NamedTuple):
+    """The foot of the origin on a feature.
 
-#: Numbers of a feature: the first point and two edges.
-FEATURE = 3 * FINE
-
-
-@kernel(inline=True)
-def _within_edge(x, y, z, ex, ey, ez):
-    """(whether the foot of the origin on the line along e from (x, y, z) certainly lies on e, its share of e)."""
-    w = abs(x) + abs(y) + abs(z)
-    e = abs(ex) + abs(ey) + abs(ez)
-    square = ex * ex + ey * ey + ez * ez
-    along = -(x * ex + y * ey + z * ez)
-    margin = _WEIGHT_ERROR * w * e
-    some = square > 0.0
-    share = select(some, smaller(larger(along / select(some, square, 1.0), 0.0), 1.0), 0.0)
-    return (margin < along) & (along < square - margin), share
-
-
-@kernel(inline=True)
-def _within_face(x, y, z, ex, ey, ez, fx, fy, fz, parallelogram):
-    """(whether the foot of the origin certainly lies between edges e and f from (x, y, z), its shares of both)."""
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    square = nx * nx + ny * ny + nz * nz
-    beta = -(nx * (y * fz - z * fy) + ny * (z * fx - x * fz) + nz * (x * fy - y * fx))
-    gamma = -(nx * (ey * z - ez * y) + ny * (ez * x - ex * z) + nz * (ex * y - ey * x))
-    w = abs(x) + abs(y) + abs(z)
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    # A product of four lengths, each as good as doubles are, and the normal off by as much of |e||f|.
-    margin = _WEIGHT_ERROR * w * larger(e, f) * e * f
-    farther = select(parallelogram, larger(beta, gamma), beta + gamma)
-    some = square > 0.0
-    divisor = select(some, square, 1.0)
-    first = select(some, larger(beta / divisor, 0.0), 0.0)
-    second = select(some, larger(gamma / divisor, 0.0), 0.0)
-    total = select(parallelogram, 1.0, larger(first + second, 1.0))
-    return (beta > margin) & (gamma > margin) & (farther < square - margin), first / total, second / total
-
-
-@kernel
-def weigh_foot(fine, n, parallelogram, weights):
-    """Weights of n ≤ 3 points at the foot of the origin, brought among the points; whether it certainly lies there.
-
-    Edges are taken finely and rounded once, so that weights are good to u·|w| over the feature's length, and the
-    foot to a few ulps of the pair's size.
+    within : whether it certainly lies within the feature.   first, second : its shares of the two edges, in [0, 1].
     """
-    weights[0] = 1.0
-    weights[1] = 0.0
-    weights[2] = 0.0
-    if n == 1:
-        return True
-    ex, _, ey, _, ez, _ = fine_edge(fine, 1, 0)
-    if n == 2:
-        inside, weights[1] = _within_edge(fine[0], fine[2], fine[4], ex, ey, ez)
-        weights[0] = 1.0 - weights[1]
-        return inside
-    fx, _, fy, _, fz, _ = fine_edge(fine, 2, 0)
-    inside, weights[1], weights[2] = _within_face(fine[0], fine[2], fine[4], ex, ey, ez, fx, fy, fz, parallelogram)
-    weights[0] = 1.0 - weights[1] - weights[2]
-    return inside
 
-
-@kernel
-def _set_first_point(room, feature, composed):
-    """w₀ into ``feature``, scaled; good to 2⁻⁹⁸ S as points of `precise_pair.py` are."""
-    for axis in range(3):
-        r = POSE_A + 3 * axis
-        s = POSE_B + 3 * axis
-        ax = room[CORNER_A]
-        ay = room[CORNER_A + 1]
-        az = room[CORNER_A + 2]
-        bx = room[CORNER_B]
-        by = room[CORNER_B + 1]
-        bz = room[CORNER_B + 2]
-        total, rest = two_sum(room[POSE_A + 9 + axis], -room[POSE_B + 9 + axis])
-        total, rest = add_turned(total, rest, room[r], room[r + 1], room[r + 2], ax, ay, az)
-        total, rest = add_turned(total, rest, room[s], room[s + 1], room[s + 2], -bx, -by, -bz)
-        if composed:
-            r += LOW_A - POSE_A
-            s += LOW_B - POSE_B
-            rest += room[LOW_A + 9 + axis] - room[LOW_B + 9 + axis]
-            rest += room[r] * ax + room[r + 1] * ay + room[r + 2] * az
-            rest -= room[s] * bx + room[s + 1] * by + room[s + 2] * bz
-        total, rest = two_sum(total, rest)
-        feature[2 * axis] = total * room[SCALE]
-        feature[2 * axis + 1] = rest * room[SCALE]
-
-
-@kernel
-def _set_edge(room, at, feature, to, part, composed):
-    """R (head − tail) of the part of an edge that stands at ``at``, scaled; the second part of two is added."""
-    of_a = room[at + OF_A] > 0.5
-    x, x_low = two_sum(room[at + HEAD], -room[at + TAIL])
-    y, y_low = two_sum(room[at + HEAD + 1], -room[at + TAIL + 1])
-    z, z_low = two_sum(room[at + HEAD + 2], -room[at + TAIL + 2])
-    for axis in range(3):
-        k = 3 * axis
-        rx = select(of_a, room[POSE_A + k], room[POSE_B + k])
-        ry = select(of_a, room[POSE_A + k + 1], room[POSE_B + k + 1])
-        rz = select(of_a, room[POSE_A + k + 2], room[POSE_B + k + 2])
-        total, rest = two_product(rx, x)
-        term, e = two_product(ry, y)
-        total, f = two_sum(total, term)
-        rest += e + f
-        term, e = two_product(rz, z)
-        total, f = two_sum(total, term)
-        rest += (e + f) + (rx * x_low + ry * y_low + rz * z_low)
-        if composed:
-            rest += select(of_a, room[LOW_A + k], room[LOW_B + k]) * x
-            rest += select(of_a, room[LOW_A + k + 1], room[LOW_B + k + 1]) * y
-            rest += select(of_a, room[LOW_A + k + 2], room[LOW_B + k + 2]) * z
-        total, rest = two_sum(total, rest)
-        total *= room[SCALE]
-        rest *= room[SCALE]
-        if part > 0:
-            total, rest = add(feature[to + 2 * axis], feature[to + 2 * axis + 1], total, rest)
-        feature[to + 2 * axis] = total
-        feature[to + 2 * axis + 1] = rest
+    within: Any
+    first: Any
+    second: Any
 
 
 @kernel(inline=True)
-def unsure_of(spread, excess, length, slop, scale):
+def _foot_on_edge(w, e):
+    """Of the segment from w to w + e."""
+    square = dot(e, e)
+    along = -dot(w, e)
+    margin = _WEIGHT_ERROR * norm1(w) * norm1(e)
+    nonzero = square > 0.0
+    share = select(nonzero, smaller(larger(along / select(nonzero, square, 1.0), 0.0), 1.0), 0.0)
+    return Foot((margin < along) & (along < square - margin), share, 0.0 * share)
+
+
+@kernel(inline=True)
+def _foot_on_face(w, e, f, parallelogram):
+    """Of the triangle, or parallelogram, of edges e and f from w."""
+    n = cross(e, f)
+    square = dot(n, n)
+    beta = -dot(n, cross(w, f))
+    gamma = -dot(n, cross(e, w))
+    e_length = norm1(e)
+    f_length = norm1(f)
+    # A product of four lengths, each as good as doubles are, and the normal off by as much of |e||f|.
+    margin = _WEIGHT_ERROR * norm1(w) * larger(e_length, f_length) * e_length * f_length
+    farther = select(parallelogram, larger(beta, gamma), beta + gamma)
+    nonzero = square > 0.0
+    divisor = select(nonzero, square, 1.0)
+    first = select(nonzero, larger(beta / divisor, 0.0), 0.0)
+    second = select(nonzero, larger(gamma / divisor, 0.0), 0.0)
+    total = select(parallelogram, 1.0, larger(first + second, 1.0))
+    return Foot((beta > margin) & (gamma > margin) & (farther < square - margin), first / total, second / total)
+
+
+@kernel
+def _put_edge(question, edge_at, feature, k, is_second_part, composed):
+    """R (head − tail) of a part of an edge into ``feature``, scaled; a second part is added to the first."""
+    of_a = question[edge_at + at.OF_A] > 0.5
+    e = dd.difference(vec3_at(question, edge_at + at.HEAD), vec3_at(question, edge_at + at.TAIL))
+    for axis in range(3):
+        row = 3 * axis
+        rx = select(of_a, question[at.POSE_A + row], question[at.POSE_B + row])
+        ry = select(of_a, question[at.POSE_A + row + 1], question[at.POSE_B + row + 1])
+        rz = select(of_a, question[at.POSE_A + row + 2], question[at.POSE_B + row + 2])
+        total, rest = two_product(rx, e.x.high)
+        y = two_product(ry, e.y.high)
+        total, error = two_sum(total, y.high)
+        rest += y.low + error
+        z = two_product(rz, e.z.high)
+        total, error = two_sum(total, z.high)
+        rest += (z.low + error) + (rx * e.x.low + ry * e.y.low + rz * e.z.low)
+        if composed:
+            rest += select(of_a, question[at.LOW_A + row], question[at.LOW_B + row]) * e.x.high
+            rest += select(of_a, question[at.LOW_A + row + 1], question[at.LOW_B + row + 1]) * e.y.high
+            rest += select(of_a, question[at.LOW_A + row + 2], question[at.LOW_B + row + 2]) * e.z.high
+        total, rest = two_sum(total, rest)
+        coordinate = DD(total * question[at.SCALE], rest * question[at.SCALE])
+        if is_second_part:
+            coordinate = dd.add(DD(feature[k + 2 * axis], feature[k + 2 * axis + 1]), coordinate)
+        feature[k + 2 * axis] = coordinate.high
+        feature[k + 2 * axis + 1] = coordinate.low
+
+
+@kernel(inline=True)
+def core_error(spread, excess, length, slop, scale):
     """How far a scaled core distance may be off: level pairs of the feature's vertices, and the foot, are within the
     spread of the first point's height; and so is what lies beyond it by the excess."""
     return 3.0 * (spread + abs(excess)) / length + HEIGHT_ERROR + SLOP_ERROR * slop * scale
 
 
 @kernel
-def polish_gaps(room, n, parts, composed, feature, direction, answer):
+def refine_gaps(question, n, parts, composed, feature, direction, answer):
     """The distances of eight pairs of cores of points that are apart, from the n ≤ 3 points nearest the origin.
 
-    room : QUESTION numbers, each the same number of eight pairs.   parts : of an edge, 1 or 2.   composed : whether low
-    parts of poses are there.   feature, direction, answer : FEATURE, FINE, ANSWER numbers, out.
+    question : a lane block of `gap_layout.py`, or one pair's question as doubles.   parts : of an edge, 1 or 2.
+    composed : whether low parts of poses are there.   feature, direction, answer : FEATURE, dd.STRIDE, ANSWER numbers, out.
 
     What other vertices lie as low is for the caller to see (`tied_vertices.py`).
     """
-    _set_first_point(room, feature, composed)
+    poses = PosedDifference(question, at.POSE_A, at.POSE_B, question, at.LOW_A, at.LOW_B, composed)
+    put_difference(
+        feature, 0, poses, vec3_at(question, at.CORNER_A), vec3_at(question, at.CORNER_B), question[at.SCALE]
+    )
     for k in range(1, n):
         for part in range(parts):
-            _set_edge(room, EDGES + EDGE * (k - 1) + PART * part, feature, FINE * k, part, composed)
-    x = feature[0]
-    x_low = feature[1]
-    y = feature[2]
-    y_low = feature[3]
-    z = feature[4]
-    z_low = feature[5]
-    proven = room[SCALE] > 0.0
-    first = 0.0 * x
+            _put_edge(question, at.EDGES + at.EDGE * (k - 1) + at.PART * part, feature, dd.STRIDE * k, part > 0, composed)
+    w = dd.vec3_at(feature, 0)
+    across = w
+    proven = question[at.SCALE] > 0.0
+    first = 0.0 * w.x.high
     second = first
     if n > 1:
-        ex = feature[6]
-        ex_low = feature[7]
-        ey = feature[8]
-        ey_low = feature[9]
-        ez = feature[10]
-        ez_low = feature[11]
+        e = dd.vec3_at(feature, dd.STRIDE)
         if n == 2:
-            proven, first = _within_edge(x, y, z, ex, ey, ez)
-            x, x_low, y, y_low, z, z_low = across_edge(x, x_low, y, y_low, z, z_low, ex, ex_low, ey, ey_low, ez, ez_low)
+            proven, first, _ = _foot_on_edge(dd.leading(w), dd.leading(e))
+            across = across_edge(w, e)
         else:
-            fx = feature[12]
-            fy = feature[14]
-            fz = feature[16]
-            proven, first, second = _within_face(x, y, z, ex, ey, ez, fx, fy, fz, room[PARALLELOGRAM] > 0.5)
-            x, x_low, y, y_low, z, z_low = normal_of_edges(
-                ex, ex_low, ey, ey_low, ez, ez_low, fx, feature[13], fy, feature[15], fz, feature[17]
-            )
+            f = dd.vec3_at(feature, 2 * dd.STRIDE)
+            is_parallelogram = question[at.PARALLELOGRAM] > 0.5
+            proven, first, second = _foot_on_face(dd.leading(w), dd.leading(e), dd.leading(f), is_parallelogram)
+            across = normal_of_edges(e, f)
     # Roughly, for the sign alone: a gap between directions that doubles cannot tell apart is not proven.
-    turn = select(feature[0] * x + feature[2] * y + feature[4] * z < 0.0, -1.0, 1.0)
-    direction[0] = turn * x
-    direction[1] = turn * x_low
-    direction[2] = turn * y
-    direction[3] = turn * y_low
-    direction[4] = turn * z
-    direction[5] = turn * z_low
-    _measure(room, n, feature, direction, answer, proven)
-    _set_witnesses(room, n, parts, first, second, answer)
+    sign = select(dot(dd.leading(w), dd.leading(across)) < 0.0, -1.0, 1.0)
+    across = dd.scale_vec3(sign, across)
+    dd.put_vec3(direction, 0, across)
+    _set_distance(question, n, feature, across, answer, proven)
+    _set_witnesses(question, n, parts, first, second, answer)
     if parts == 1:
-        _set_limits(room, n, answer)
+        _set_limits(question, n, answer)
 
 
 @kernel(inline=True)
-def _measure(room, n, feature, direction, answer, proven):
+def _set_distance(question, n, feature, direction, answer, proven):
     """Everything of an answer that is a number along the direction."""
-    length, length_low = fine_length(direction)
-    height, height_low = fine_height(feature, 0, direction)
-    some = length > 0.0
-    length = select(some, length, 1.0)
-    spread = 0.0 * length
+    length = direction_length(direction)
+    height = dd.inner(dd.vec3_at(feature, 0), direction)
+    nonzero = length.high > 0.0
+    length = DD(select(nonzero, length.high, 1.0), length.low)
+    spread = 0.0 * length.high
     for k in range(1, n):
-        at = FINE * k
-        slope, rest = loose_product(
-            feature[at], feature[at + 1], feature[at + 2], feature[at + 3], feature[at + 4], feature[at + 5],
-            direction[0], direction[1], direction[2], direction[3], direction[4], direction[5],
-        )  # fmt: skip
-        spread = larger(spread, abs(slope + rest))
-    distance, distance_low = divide(height, height_low, length, length_low)
-    unsure = unsure_of(spread, 0.0, length, room[SLOP], room[SCALE])
-    answer[PROVEN] = select(proven & some & (unsure < 2.0**-54 * distance), 1.0, 0.0)
-    answer[CORE] = distance
-    answer[SPREAD] = spread
-    answer[LENGTH] = length
-    over = 1.0 / room[SCALE]
-    swept, swept_low = two_sum(room[RADIUS_A], room[RADIUS_B])
-    gap, gap_low = add(distance * over, distance_low * over, -swept, -swept_low)
-    answer[GAP] = gap
-    answer[GAP_LOW] = gap_low
-    answer[GAP_LOWER], answer[GAP_NEAREST], answer[GAP_UPPER] = bracket(gap, gap_low, unsure * over)
-    for axis in range(3):
-        answer[UNIT + axis] = direction[2 * axis] / length
+        slope = dd.unnormalized_inner(dd.vec3_at(feature, dd.STRIDE * k), direction)
+        spread = larger(spread, abs(slope.high + slope.low))
+    distance = dd.div(height, length)
+    error = core_error(spread, 0.0, length.high, question[at.SLOP], question[at.SCALE])
+    answer[at.PROVEN] = select(proven & nonzero & (error < 2.0**-54 * distance.high), 1.0, 0.0)
+    answer[at.CORE] = distance.high
+    answer[at.SPREAD] = spread
+    answer[at.LENGTH] = length.high
+    over = 1.0 / question[at.SCALE]
+    swept = two_sum(question[at.RADIUS_A], question[at.RADIUS_B])
+    gap = dd.sub(dd.scale(over, distance), swept)
+    answer[at.GAP] = gap.high
+    answer[at.GAP_LOW] = gap.low
+    answer[at.GAP_LOWER], answer[at.GAP_NEAREST], answer[at.GAP_UPPER] = dd.bracket(gap, error * over)
+    put_vec3(answer, at.UNIT, divide(dd.leading(direction), length.high))
 
 
 @kernel(inline=True)
-def _set_witnesses(room, n, parts, first, second, answer):
+def _set_witnesses(question, n, parts, first, second, answer):
     """The points of both cores at the foot, at shares ``first`` and ``second`` of the edges."""
-    ax = room[CORNER_A]
-    ay = room[CORNER_A + 1]
-    az = room[CORNER_A + 2]
-    bx = room[CORNER_B]
-    by = room[CORNER_B + 1]
-    bz = room[CORNER_B + 2]
+    a = vec3_at(question, at.CORNER_A)
+    b = vec3_at(question, at.CORNER_B)
     for k in range(1, n):
         for part in range(parts):
-            at = EDGES + EDGE * (k - 1) + PART * part
+            edge_at = at.EDGES + at.EDGE * (k - 1) + at.PART * part
             share = select(k == 1, first, second)
-            to_a = select(room[at + OF_A] > 0.5, share, 0.0)
-            to_b = share - to_a
-            x = room[at + HEAD] - room[at + TAIL]
-            y = room[at + HEAD + 1] - room[at + TAIL + 1]
-            z = room[at + HEAD + 2] - room[at + TAIL + 2]
-            ax += to_a * x
-            ay += to_a * y
-            az += to_a * z
-            bx -= to_b * x
-            by -= to_b * y
-            bz -= to_b * z
-    for axis in range(3):
-        r = POSE_A + 3 * axis
-        answer[POINT_A + axis] = (room[r] * ax + room[r + 1] * ay + room[r + 2] * az) + room[POSE_A + 9 + axis]
-        r = POSE_B + 3 * axis
-        answer[POINT_B + axis] = (room[r] * bx + room[r + 1] * by + room[r + 2] * bz) + room[POSE_B + 9 + axis]
+            to_a = select(question[edge_at + at.OF_A] > 0.5, share, 0.0)
+            e = sub(vec3_at(question, edge_at + at.HEAD), vec3_at(question, edge_at + at.TAIL))
+            a = add(a, scale(to_a, e))
+            b = sub(b, scale(share - to_a, e))
+    put_vec3(answer, at.POINT_A, add(rotate(question, at.POSE_A, a), vec3_at(question, at.POSE_A + 9)))
+    put_vec3(answer, at.POINT_B, add(rotate(question, at.POSE_B, b), vec3_at(question, at.POSE_B + 9)))
 
 
 @kernel(inline=True)
-def _set_limits(room, n, answer):
+def _set_limits(question, n, answer):
     """The direction in the frames of both bodies, and what is level with the feature's vertices along it, in doubles."""
-    x = answer[UNIT]
-    y = answer[UNIT + 1]
-    z = answer[UNIT + 2]
-    for axis in range(3):
-        r = POSE_A + axis
-        answer[ALONG_A + axis] = room[r] * x + room[r + 3] * y + room[r + 6] * z
-        r = POSE_B + axis
-        answer[ALONG_B + axis] = -(room[r] * x + room[r + 3] * y + room[r + 6] * z)
-    least_a = _along(room, CORNER_A, answer, ALONG_A)
-    least_b = _along(room, CORNER_B, answer, ALONG_B)
+    unit = vec3_at(answer, at.UNIT)
+    along_a = rotate_back(question, at.POSE_A, unit)
+    along_b = neg(rotate_back(question, at.POSE_B, unit))
+    put_vec3(answer, at.ALONG_A, along_a)
+    put_vec3(answer, at.ALONG_B, along_b)
+    least_a = dot(vec3_at(question, at.CORNER_A), along_a)
+    least_b = dot(vec3_at(question, at.CORNER_B), along_b)
     for k in range(1, n):
-        at = EDGES + EDGE * (k - 1)
-        of_a = room[at + OF_A] > 0.5
-        least_a = select(of_a, smaller(least_a, _along(room, at + HEAD, answer, ALONG_A)), least_a)
-        least_b = select(of_a, least_b, smaller(least_b, _along(room, at + TAIL, answer, ALONG_B)))
+        edge_at = at.EDGES + at.EDGE * (k - 1)
+        of_a = question[edge_at + at.OF_A] > 0.5
+        least_a = select(of_a, smaller(least_a, dot(vec3_at(question, edge_at + at.HEAD), along_a)), least_a)
+        least_b = select(of_a, least_b, smaller(least_b, dot(vec3_at(question, edge_at + at.TAIL), along_b)))
     # The unit vector is rounded: what doubles may be wrong along it, and along any that is a little longer.
-    slack = room[ERROR] * (abs(x) + abs(y) + abs(z))
-    answer[LIMIT_A] = least_a + slack
-    answer[LIMIT_B] = least_b + slack
-
-
-@kernel(inline=True)
-def _along(room, corner, answer, direction):
-    return (
-        room[corner] * answer[direction] + room[corner + 1] * answer[direction + 1] + room[corner + 2] * answer[direction + 2]
-    )
+    slack = question[at.ERROR] * norm1(unit)
+    answer[at.LIMIT_A] = least_a + slack
+    answer[at.LIMIT_B] = least_b + slack

@@ -1,148 +1,152 @@
-"""What is level with the least of A ⊖ B along a direction: told apart in doubles where that is enough, else finely."""
+"""Which vertices are the least of A ⊖ B along a direction: told apart in doubles where that is enough, else in double-doubles."""
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64
 from collide.narrowphase.gap.hull_descent import descend, direction_in_body, lowest_of_all
-from collide.numerics.double_double import add
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
+from collide.numerics.vec3 import Vec3, column_at, dot, norm1, rotate_back, scale, vec3_at
 from collide.support.block_scan import count_level
 from collide.support.support_tree_query import rings_of
 
-#: Most level vertices that `tied_vertices` lists.
-MOST_TIES = 24
-#: Vertices scanned in the time of a look at one neighbour, about.
-SCANNED_PER_NEIGHBOUR = 16
+#: Tied vertices that `tied_vertices` lists at most.
+MAX_TIES = 24
+#: Vertices scanned in the time that a visit of one neighbour takes, about.
+_SCANNED_PER_NEIGHBOUR = 16
+
+
+class Vertices(NamedTuple):
+    """Points of one body: coords, n and padded as in `PosedBody`; tree : address of the support tree, or 0."""
+
+    coords: Any
+    n: int
+    padded: int
+    tree: int
 
 
 @kernel(inline=True)
-def are_alone(pair, ids, n, direction, slack):
-    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with level pairs of theirs alone.
+def vertices_of(body):
+    """Those of a `PosedBody`."""
+    return Vertices(body.coords, body.n, body.padded, body.tree)
+
+
+@kernel(inline=True)
+def is_unique_minimiser(pair, ids, n, direction, slack):
+    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with tied pairs of their own vertices alone.
 
     ids : their vertex pairs.   slack : how far doubles may be wrong along |direction| = 1. False also where a pair of
-    their vertices might not be level with them: n pairs over n + 1 vertices hang together, so that it must be.
+    their vertices might not be tied with them: n pairs over n + 1 vertices hang together, so that it must be.
     """
-    A, B, poses = pair.A, pair.B, pair.poses
-    p, q = A.pose_at, B.pose_at
-    own_a, own_b = own_vertices(ids, n)
-    if own_a + own_b != n + 1:
+    n_of_a, n_of_b = distinct_vertices(ids, n)
+    if n_of_a + n_of_b != n + 1:
         return False
     largest = max(abs(direction[0]), abs(direction[2]), abs(direction[4]))
-    dx = direction[0] / largest
-    dy = direction[2] / largest
-    dz = direction[4] / largest
-    slack *= abs(dx) + abs(dy) + abs(dz)
-    for body in range(2):
-        coordinates = A.coords if body == 0 else B.coords
-        m = A.padded if body == 0 else B.padded
-        at = p if body == 0 else q
-        sign = 1.0 if body == 0 else -1.0
-        gx = sign * (poses[at] * dx + poses[at + 3] * dy + poses[at + 6] * dz)
-        gy = sign * (poses[at + 1] * dx + poses[at + 4] * dy + poses[at + 7] * dz)
-        gz = sign * (poses[at + 2] * dx + poses[at + 5] * dy + poses[at + 8] * dz)
+    d = Vec3(direction[0] / largest, direction[2] / largest, direction[4] / largest)
+    slack *= norm1(d)
+    for turn in range(2):
+        body = pair.A if turn == 0 else pair.B
+        g = scale(1.0 if turn == 0 else -1.0, rotate_back(pair.poses, body.pose_at, d))
         least = math.inf
         for k in range(n):
-            least = min(least, _product(coordinates, m, ids[2 * k + body], gx, gy, gz))
-        if not no_other_is_level(
-            coordinates, A.n if body == 0 else B.n, m, A.tree if body == 0 else B.tree, ids, n, body,
-            own_a if body == 0 else own_b, gx, gy, gz, least + slack,
-        ):  # fmt: skip
+            least = min(least, dot(column_at(body.coords, body.padded, ids[2 * k + turn]), g))
+        n_distinct = n_of_a if turn == 0 else n_of_b
+        if not no_other_is_tied(vertices_of(body), ids, n, turn, n_distinct, g, least + slack):
             return False
     return True
 
 
 @kernel(inline=True)
-def own_vertices(ids, n):
+def distinct_vertices(ids, n):
     """How many different vertices of A, and of B, n ≤ 3 pairs have."""
     last = 2 * (n - 1)
     middle = min(last, 2)
-    own_a = 1 + (1 if ids[middle] != ids[0] else 0)
-    own_a += 1 if ids[last] != ids[0] and ids[last] != ids[middle] else 0
-    own_b = 1 + (1 if ids[middle + 1] != ids[1] else 0)
-    own_b += 1 if ids[last + 1] != ids[1] and ids[last + 1] != ids[middle + 1] else 0
-    return own_a, own_b
-
-
-@kernel(inline=True)
-def _product(coordinates, m, i, gx, gy, gz):
-    return coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz
+    n_of_a = 1 + (1 if ids[middle] != ids[0] else 0)
+    n_of_a += 1 if ids[last] != ids[0] and ids[last] != ids[middle] else 0
+    n_of_b = 1 + (1 if ids[middle + 1] != ids[1] else 0)
+    n_of_b += 1 if ids[last + 1] != ids[1] and ids[last + 1] != ids[middle + 1] else 0
+    return n_of_a, n_of_b
 
 
 @kernel
-def no_other_is_level(coordinates, n, m, tree, ids, pairs, body, own, gx, gy, gz, limit):
+def no_other_is_tied(body, ids, n_pairs, which, n_distinct, g, limit):
     """Whether those of a body's vertices in some vertex pairs, and no others, have a product with g of at most the limit.
 
-    ids : the pairs, at most three, with ``own`` different vertices of body 0 or 1.
+    body : `Vertices`.   ids : at most three pairs, with ``n_distinct`` different vertices of body ``which``, 0 for A, 1 for B.
 
-    A scan; or, where there is a support tree, a look at their neighbours: the vertices of a hull below a level hang
+    A scan; or, where there is a support tree, a visit of their neighbours: the vertices of a hull below a level hang
     together. Also a scan where they have very many, as the tip of a cone has.
     """
-    i = ids[body]
-    j = ids[2 * min(pairs - 1, 1) + body]
-    k = ids[2 * (pairs - 1) + body]
-    # Vertices of a facet as thin as rounding need not be level themselves, and then they must not be counted for others.
+    i = ids[which]
+    j = ids[2 * min(n_pairs - 1, 1) + which]
+    k = ids[2 * (n_pairs - 1) + which]
+    coords, padded = body.coords, body.padded
+    # Vertices of a facet as thin as rounding need not be tied themselves, and then they must not be counted for others.
     if (
-        _product(coordinates, m, i, gx, gy, gz) > limit
-        or _product(coordinates, m, j, gx, gy, gz) > limit
-        or _product(coordinates, m, k, gx, gy, gz) > limit
+        dot(column_at(coords, padded, i), g) > limit
+        or dot(column_at(coords, padded, j), g) > limit
+        or dot(column_at(coords, padded, k), g) > limit
     ):
         return False
-    if tree == 0 or _has_many_neighbours(tree, m, i, j, k):
+    if body.tree == 0 or _has_many_neighbours(body.tree, padded, i, j, k):
         # What fills up the last block are copies of vertex 0.
-        copies = m - n if _product(coordinates, m, 0, gx, gy, gz) <= limit else 0
-        return count_level(coordinates, m, m, gx, gy, gz, limit) - copies == own
-    starts, ring, corners = rings_of(tree)
-    for turn in range(own):
+        copies = padded - body.n if dot(column_at(coords, padded, 0), g) <= limit else 0
+        return count_level(coords, padded, padded, g.x, g.y, g.z, limit) - copies == n_distinct
+    starts, ring, corners = rings_of(body.tree)
+    for turn in range(n_distinct):
         # The last is a new one if the one in the middle is not.
         v = i if turn == 0 else (k if turn == 2 or j == i else j)
         for at in range(starts[v], starts[v + 1]):
             w = ring[at]
-            height = corners[3 * w] * gx + corners[3 * w + 1] * gy + corners[3 * w + 2] * gz
-            if height <= limit and w != i and w != j and w != k:
+            if dot(vec3_at(corners, 3 * w), g) <= limit and w != i and w != j and w != k:
                 return False
     return True
 
 
 @kernel(inline=True)
-def _has_many_neighbours(tree, m, i, j, k):
-    """Whether a scan of all m vertices, in vectors, takes less time than a look at the neighbours of three."""
+def _has_many_neighbours(tree, padded, i, j, k):
+    """Whether a scan of all vertices, in vectors, takes less time than a visit of the neighbours of three."""
     starts, _, _ = rings_of(tree)
     degree = max(starts[i + 1] - starts[i], starts[j + 1] - starts[j], starts[k + 1] - starts[k])
-    return SCANNED_PER_NEIGHBOUR * degree > m
+    return _SCANNED_PER_NEIGHBOUR * degree > padded
 
 
 @kernel
-def tied_vertices(coordinates, n, m, tree, ties, gx, gy, gz, slack):
+def tied_vertices(body, ties, g, slack):
     """(number of vertices whose product with g is at most the limit, the limit).
 
-    ties : the first is known in; all out, unless there are more than MOST_TIES. The limit is ``slack`` above the first.
+    body : `Vertices`.   ties : the first is given; all are written, unless there are more than MAX_TIES. The limit is
+    ``slack`` above the first.
 
     Along hull edges where there is a support tree: the vertices of a hull below a level hang together.
     """
-    limit = _product(coordinates, m, ties[0], gx, gy, gz) + slack
+    coords, padded = body.coords, body.padded
+    limit = dot(column_at(coords, padded, ties[0]), g) + slack
     count = 1
-    if tree != 0:
-        starts, ring, corners = rings_of(tree)
+    if body.tree != 0:
+        starts, ring, corners = rings_of(body.tree)
         k = 0
         while k < count:
             for at in range(starts[ties[k]], starts[ties[k] + 1]):
                 i = ring[at]
-                if corners[3 * i] * gx + corners[3 * i + 1] * gy + corners[3 * i + 2] * gz <= limit:
+                if dot(vec3_at(corners, 3 * i), g) <= limit:
                     count = _with_tie(ties, count, i)
-                    if count > MOST_TIES:
+                    if count > MAX_TIES:
                         return count, limit
             k += 1
         return count, limit
-    level = 0
-    for i in range(n):
-        level += 1 if coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz <= limit else 0
-    if 1 < level <= MOST_TIES:
-        for i in range(n):
-            if coordinates[i] * gx + coordinates[m + i] * gy + coordinates[2 * m + i] * gz <= limit:
+    n_tied = 0
+    for i in range(body.n):
+        n_tied += 1 if dot(column_at(coords, padded, i), g) <= limit else 0
+    if 1 < n_tied <= MAX_TIES:
+        for i in range(body.n):
+            if dot(column_at(coords, padded, i), g) <= limit:
                 count = _with_tie(ties, count, i)
-    return max(level, count), limit
+    return max(n_tied, count), limit
 
 
 @kernel(inline=True)
@@ -155,35 +159,36 @@ def _with_tie(ties, count, i):
     return count + 1
 
 
+class LowestPair(NamedTuple):
+    """Vertices i of A and j of B that are the least of A ⊖ B along a direction: ``excess`` ≤ 0 over a first pair."""
+
+    excess: DD
+    i: int
+    j: int
+
+
 @kernel
-def settle_level(pair, low, ids, direction, terms_at, scale):
+def lowest_pair(pair, low, ids, direction, terms_at, scale):
     """How far the least of A ⊖ B along a direction lies beyond the first of points that nearly are the least.
 
-    ids : the first one's vertex pair.
-    low : low parts of both poses, or no doubles where both are as given.
-    terms_at : workspace of PRODUCT_TERMS numbers.   scale : what heights are multiplied with, a power of two.
+    low : low parts of both poses, or no doubles where both are as given.   ids : the first point's vertex pair.
+    terms_at : workspace of PRODUCT_TERMS doubles.   scale : what heights are multiplied with, a power of two.
 
-    Returns (excess, low, i, j): the least height is that of the first point plus the excess, ≤ 0, at vertices i, j. For
-    the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `hull_descent.py`.
-    Asked where they are not alone (`are_alone`). O(log n) where there are support trees, but for vertices of very many
-    neighbours; else O(n).
+    For the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `hull_descent.py`.
+    Asked where they are not alone (`is_unique_minimiser`). O(log n) where there are support trees, but for vertices of very
+    many neighbours; else O(n).
     """
-    A, B, poses = pair.A, pair.B, pair.poses
-    p, q = A.pose_at, B.pose_at
-    i, excess, excess_low = _lowest(A.coords, A.n, A.padded, A.tree, ids[0], poses, p, low, 0, direction, 1.0, terms_at)
-    j, more, more_low = _lowest(B.coords, B.n, B.padded, B.tree, ids[1], poses, q, low, 12, direction, -1.0, terms_at)
-    excess, excess_low = add(excess, excess_low, more, more_low)
-    return excess * scale, excess_low * scale, i, j
+    of_a = _lowest(pair.A, pair.poses, ids[0], low, 0, direction, 1.0, terms_at)
+    of_b = _lowest(pair.B, pair.poses, ids[1], low, 12, direction, -1.0, terms_at)
+    return LowestPair(dd.scale(scale, dd.add(of_a.height, of_b.height)), of_a.vertex, of_b.vertex)
 
 
 @kernel
-def _lowest(coordinates, n, m, tree, first, poses, p, low, at, direction, sign, terms_at):
-    """(vertex, height, low): the lowest vertex of a body along ±direction, and its height over the first one."""
-    gx, gx_low, gy, gy_low, gz, gz_low = direction_in_body(poses, p, low, at, direction, sign)
-    if tree != 0:
-        terms = view_f64(terms_at, PRODUCT_TERMS)
-        proven, vertex, height, height_low, _ = descend(tree, first, gx, gx_low, gy, gy_low, gz, gz_low, terms)
-        if proven:
-            return vertex, height, height_low
-    vertex, height, height_low, _ = lowest_of_all(coordinates, n, m, first, gx, gx_low, gy, gy_low, gz, gz_low)
-    return vertex, height, height_low
+def _lowest(body, poses, first, low, low_at, direction, sign, terms_at):
+    """The lowest vertex of a body along ±direction."""
+    g = direction_in_body(poses, body.pose_at, low, low_at, direction, sign)
+    if body.tree != 0:
+        lowest = descend(body.tree, first, g, view_f64(terms_at, PRODUCT_TERMS))
+        if lowest.proven:
+            return lowest
+    return lowest_of_all(body.coords, body.n, body.padded, first, g)

@@ -22,7 +22,7 @@ from surfaces import joined
 import collide
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.enclosures import enclosure_of
-from collide.narrowphase.facets.facet_convex import Posed
+from collide.lowering.facet_bodies import PosesWithSlop
 from collide.narrowphase.facets.near_facets import near_facets
 from collide.results import HOW
 
@@ -366,7 +366,7 @@ def test_bounds_of_facets_never_exceed_their_distance(kind):
             if case == 3:
                 X[:3, :3] += rng.normal(size=(3, 3)) * 0.1
             still, along = np.zeros(1), Y[None, :3, 3] - X[None, :3, 3]
-            posed = Posed(X[None], still), Posed(Y[None], still)
+            posed = PosesWithSlop(X[None], still), PosesWithSlop(Y[None], still)
             found = near_facets(mesh.tree, enclosure_of(shape).packed, *posed, along, np.full(1, np.inf))
             assert sorted(found.place.tolist()) == list(range(len(faces)))
             hulls = [collide.ConvexHull(vertices[faces[k]]) for k in mesh.tree.ids[found.place]]

@@ -15,8 +15,9 @@ import pytest
 import collide
 from collide.hull.exact_hull import convex_hull
 from collide.kernels import address_of, entry, view_f64
-from collide.narrowphase.gap.hull_descent import MOST_NEIGHBOURS, descend, lowest_of_all
-from collide.numerics.exact_dot_sign import PRODUCT_TERMS, exact_sign_of_pairs
+from collide.narrowphase.gap.hull_descent import MAX_NEIGHBOURS, descend, lowest_of_all
+from collide.numerics import double_double as dd
+from collide.numerics.exact_dot_sign import PRODUCT_TERMS, exact_sign_of_dot
 from collide.support.build_support_tree import build_support_tree
 from collide.support.lazy_support_tree import PlantedTree
 
@@ -232,22 +233,21 @@ def test_gaps_of_composed_poses():
 
 @entry("int64(int64, int64, int64, int64, int64)")
 def _descend(tree_at, first, direction_at, terms_at, out_at):
-    g = view_f64(direction_at, 6)
     out = view_f64(out_at, 2)
-    proven, vertex, out[0], out[1], looked = descend(
-        tree_at, first, g[0], g[1], g[2], g[3], g[4], g[5], view_f64(terms_at, PRODUCT_TERMS)
-    )
-    return (1 << 40) * int(looked) + int(vertex) if proven else -1 - int(looked)
+    g = dd.vec3_at(view_f64(direction_at, dd.STRIDE), 0)
+    lowest = descend(tree_at, first, g, view_f64(terms_at, PRODUCT_TERMS))
+    out[0], out[1] = lowest.height
+    visited = int(lowest.n_visited)
+    return (1 << 40) * visited + int(lowest.vertex) if lowest.proven else -1 - visited
 
 
 @entry("int64(int64, int64, int64, int64, int64)")
 def _lowest_of_all(coordinates_at, n, first, direction_at, out_at):
-    g = view_f64(direction_at, 6)
     out = view_f64(out_at, 2)
-    vertex, out[0], out[1], fine = lowest_of_all(
-        view_f64(coordinates_at, 3 * n), n, n, first, g[0], g[1], g[2], g[3], g[4], g[5]
-    )
-    return (1 << 40) * int(fine) + int(vertex)
+    g = dd.vec3_at(view_f64(direction_at, dd.STRIDE), 0)
+    lowest = lowest_of_all(view_f64(coordinates_at, 3 * n), n, n, first, g)
+    out[0], out[1] = lowest.height
+    return (1 << 40) * int(lowest.n_visited) + int(lowest.vertex)
 
 
 def directions(Q, rng):
@@ -294,7 +294,7 @@ def test_the_lowest_of_level_vertices(turned):
             assert abs(sum(map(Fraction, out.tolist())) - min(heights)) <= Fraction(2.0**-98)
         costs[n] = np.mean(looked), max(looked)
     for n, (mean, most) in costs.items():
-        assert mean <= 14 * np.log2(n) and most <= 30 * np.log2(n) <= MOST_NEIGHBOURS, costs
+        assert mean <= 14 * np.log2(n) and most <= 30 * np.log2(n) <= MAX_NEIGHBOURS, costs
     assert costs[32768][0] < 4 * costs[400][0], costs
 
 
@@ -359,7 +359,5 @@ def test_exact_signs_of_sums_that_cancel():
 @entry("int64(int64, int64)")
 def _exact_sign(pairs_at, terms_at):
     p = view_f64(pairs_at, 12)
-    certain, sign = exact_sign_of_pairs(
-        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], view_f64(terms_at, PRODUCT_TERMS)
-    )
+    certain, sign = exact_sign_of_dot(dd.vec3_at(p, 0), dd.vec3_at(p, dd.STRIDE), view_f64(terms_at, PRODUCT_TERMS))
     return sign if certain else 2

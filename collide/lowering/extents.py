@@ -1,4 +1,4 @@
-"""How far posed convex sets reach along a direction, in plain doubles: whoever asks adds the error."""
+"""How far posed convex sets reach along a direction, in plain doubles: callers add the error."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
+from collide.lowering.packed_convex import PackedConvex
+from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 
 def extent_of(packed: PackedConvex, X: np.ndarray, n: np.ndarray) -> float:

@@ -20,7 +20,7 @@ import pytest
 import collide
 from collide.kernels import sources as kernel_sources
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = {"collide": "collide", "adapters": "collide.adapters", "scenes": "collide.scenes"}
 
 #: What the modules of a room of the engine may import; a room may always import itself.
@@ -47,7 +47,7 @@ ROOMS = {
         "errors", "kernels", "transforms", "numerics", "hull", "support", "mesh", "shapes", "lowering", "broadphase", "results",
         "threads",
     },
-    "certificates": {"errors", "transforms", "lowering", "results"},
+    "certificates": {"errors", "transforms", "numerics", "lowering", "results"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
     "security_margin": {"errors", "argument_checks", "transforms", "shapes", "lowering", "narrowphase", "results", "batches"},
@@ -68,8 +68,8 @@ ROOMS = {
     },
     "packed_world": {"errors", "lowering", "broadphase", "narrowphase", "results", "threads"},
     "world": {
-        "errors", "argument_checks", "log", "transforms", "shapes", "broadphase", "results", "contact", "security_margin",
-        "packed_world",
+        "errors", "argument_checks", "log", "transforms", "shapes", "broadphase", "results", "certificates", "contact",
+        "security_margin", "packed_world",
     },
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "shapes", "cache_folder", "kernels", ""},
@@ -80,14 +80,11 @@ ROOMS = {
 #: Imports against the flow that are still there: rooms, and what they have to let go of. Each is asserted to be needed.
 TO_GO = {
     "shapes": {"lowering"},
-    "support": {"lowering"},
     "lowering": {"broadphase", "narrowphase"},
-    "results": {"certificates"},
 }
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
     "kernels": {"numba", "llvmlite"},
-    "robot": {"scenes"},
     "reports": {"rich", "matplotlib"},
     "cli": {"scenes", "adapters", "hierarchies"},
 }
@@ -208,6 +205,23 @@ def test_engine_flows_one_way():
     none_of(wrong)
 
 
+#: Rooms whose functions may import modules of collide: the command line, so that ``--help`` answers at once, and, until
+#: they are mended, those with numbers of such imports.
+LATE_WITHIN = {"kernels": 2, "lowering": 3, "packed_world": 5, "shapes": 13, "support": 2}
+
+
+def test_functions_import_nothing_of_collide():
+    """A late import hides a circle, or what a module needs. Extras are imported where they are used: `LATE`."""
+    by_room: dict[str, list[str]] = {}
+    for file in sources():
+        place = room(dotted(file))
+        for module, late, line in imports(file):
+            if late and module.split(".")[0] == "collide" and line not in guarded(file):
+                by_room.setdefault(place, []).append(f"{shown(file)}:{line}: {module}")
+    by_room.pop("cli", None)
+    none_of(line for name, lines in by_room.items() if len(lines) > LATE_WITHIN.get(name, 0) for line in lines)
+
+
 def test_what_is_to_go_is_still_there():
     """A list of exceptions that nobody needs any more would let them come back."""
     found = {
@@ -281,8 +295,8 @@ def test_scenes_ask_no_engine():
     none_of(
         f"{shown(file)}:{line}: {module}"
         for file in sources("scenes")
-        for module, late, line in imports(file)
-        if module.startswith("collide.adapters") and not (late and module == "collide.adapters.peers.exact")
+        for module, _, line in imports(file)
+        if module.startswith("collide.adapters") and module != "collide.adapters.peers.exact"
     )
 
 

@@ -1,0 +1,68 @@
+"""What a certificate is: vertex ids that prove that two bodies meet, or that they are apart.
+
+A certificate names vertices and carries no rounded number. Write D for the difference points a_i − b_j of its
+vertex pairs, r_A and r_B for the radii swept over the bodies:
+
+apart     v, the point of hull(D) nearest the origin (one to four pairs), is a separating axis: v·(a − b) > (r_A + r_B)|v|
+          for all vertices a of A and b of B.
+together  hull(D) (one to four pairs) comes within r_A + r_B of the origin. Of a half-space and a body: a vertex named
+          lies within the body's radius of the half-space, or in it.
+inside    one vertex named, −1 standing for the other body, lies in that body, a solid mesh: its winding number there is positive.
+
+Unions of convex parts: together, one certificate names the two parts that meet; apart, there is one for each pair of
+parts. Pairs with a mesh have one certificate: together, of two facets that come within r_A + r_B of each other, whose
+corners are the vertices named (a convex shape is taken whole, its facet is 0); apart, an axis between the convex hulls.
+
+Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; results whose sign is open or that are beyond
+the query's max_distance; meshes apart whose hull meets the other body (it would take an axis for every pair of facets).
+
+Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as handed in, the corners of a `Box` by sign
+(−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its ``vertices``.
+"""
+
+from __future__ import annotations
+
+from operator import index
+from typing import NamedTuple
+
+from collide.errors import CollideError
+
+APART, TOGETHER, INSIDE = "apart", "together", "inside"
+#: Stands for a body that names no vertex: a half-space, or the solid that holds the other body's vertex.
+NO_VERTEX = -1
+
+#: (vertex of A, vertex of B).
+VertexPair = tuple[int, int]
+
+
+class Certificate(NamedTuple):
+    """Proof of a boolean about two parts or facets, as plain data: it survives pickle and JSON.
+
+    Parameters
+    ----------
+    kind : "apart", "together" or "inside".
+    part_a, part_b : numbers of the parts of A and of B, of facets where a body is a mesh; 0 for convex bodies.
+    pairs : ((vertex of A, vertex of B), …), at most four; −1 where a body names no vertex.
+    """
+
+    kind: str
+    part_a: int
+    part_b: int
+    pairs: tuple[VertexPair, ...]
+
+
+class CertificateRefused(CollideError):
+    """A certificate does not prove what the result claims; the message says where it fails."""
+
+
+def read_certificates(values) -> list[Certificate]:
+    """Certificates from what may come from a file, with Python integers. Raises CertificateRefused where it has not their form."""
+    try:
+        return [
+            Certificate(kind, index(i), index(j), tuple((index(p), index(q)) for p, q in pairs))
+            for kind, i, j, pairs in values
+        ]
+    except (TypeError, ValueError):
+        raise CertificateRefused(
+            "a certificate is rows of (kind, part, part, pairs of vertex numbers), all numbers whole"
+        ) from None

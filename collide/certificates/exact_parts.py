@@ -1,0 +1,71 @@
+"""Convex parts at their poses as exact numbers: vertices as integers on one grid, planes as fractions."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import parts_of
+from collide.numerics.exact_points import Point, cross, inner, moved, on_one_grid, placed
+
+IDENTITY = np.eye(4)
+
+
+class ExactPart:
+    """Points swept by a ball, or a half-space, at the pose X_WB X_BP, entries taken as exact numbers.
+
+    points_P : (n, 3) [m].   radius : of the ball [m].   plane_P : (normal, offset), four doubles, of a half-space.
+    """
+
+    def __init__(self, kind: int, points_P: np.ndarray, radius: float, plane_P, X_WB: np.ndarray, X_BP: np.ndarray):
+        self.kind, self.points_P, self.plane_P = kind, points_P, plane_P
+        self.radius = Fraction(radius)
+        self._poses = (X_WB,) if np.array_equal(X_BP, IDENTITY) else (X_BP, X_WB)
+
+    def __len__(self) -> int:
+        return len(self.points_P)
+
+    @cached_property
+    def vertices(self) -> tuple[list[Point], int]:
+        """(integer points, e): the vertices in W are these times 2^e [m]."""
+        first, *rest = self._poses
+        points, grid = placed(first, self.points_P)
+        for X in rest:
+            points, grid = moved(X, points, grid)
+        return points, grid
+
+    @cached_property
+    def plane(self) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction]:
+        """(n, offset) of the half-space {x : n·x ≤ offset} in W: n = cof(R) m, offset = det(R) offset_P + n·t."""
+        x, y, z, offset = (Fraction(v) for v in self.plane_P.tolist())
+        n = x, y, z
+        for X in self._poses:
+            rows = [tuple(Fraction(v) for v in row) for row in X[:3].tolist()]
+            R = [row[:3] for row in rows]
+            cofactors = cross(R[1], R[2]), cross(R[2], R[0]), cross(R[0], R[1])
+            n = tuple(inner(row, n) for row in cofactors)
+            offset = offset * inner(R[0], cofactors[0]) + inner(n, [row[3] for row in rows])
+        return n, offset
+
+
+def exact_parts(shape, X_WB: np.ndarray) -> list[ExactPart]:
+    """The convex parts of a shape at a pose (4, 4), in their order."""
+    return [exact_part(packed, X_WB, X_BP) for packed, X_BP in parts_of(shape)]
+
+
+def exact_part(packed: PackedConvex, X_WB: np.ndarray, X_BP: np.ndarray = IDENTITY) -> ExactPart:
+    return ExactPart(packed.kind, packed.points, packed.radius, packed.params, X_WB, X_BP)
+
+
+def has_exact_numbers(part: ExactPart) -> bool:
+    """Whether a part is made of vertices or a plane: cylinders, cones and ellipsoids are not."""
+    return part.kind in (POINTS, HALFSPACE)
+
+
+def common_vertices(A: ExactPart, B: ExactPart) -> tuple[list[Point], list[Point], int]:
+    """(vertices of A, vertices of B, e) as integers on one grid: in W they are these times 2^e [m]."""
+    (points_a, points_b), grid = on_one_grid(A.vertices, B.vertices)
+    return points_a, points_b, grid

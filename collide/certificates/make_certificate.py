@@ -1,0 +1,161 @@
+"""Certificates of results: the vertices that decided in doubles, or those that an exact search from them ends at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, TOGETHER, Certificate, VertexPair
+from collide.certificates.convex_proofs import flaw_of_proof
+from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts, has_exact_numbers
+from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
+from collide.certificates.nearest_to_origin import nearest_vertex_pairs
+from collide.certificates.verify import check_question
+from collide.errors import InvalidArgument
+from collide.lowering.packed_convex import HALFSPACE
+from collide.numerics.exact_points import inner
+from collide.results import UNDECIDED, PairResult, question_of_row
+from collide.transforms import as_poses
+
+#: Certificates of one pair of bodies; None where it has none.
+Certificates = tuple[Certificate, ...] | None
+
+
+def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates]:
+    """Certificates of the results of `collide.distance`: what ``r.certificate`` gives.
+
+    Parameters
+    ----------
+    A, B : shapes of the question, or sequences of them, one a row of r.
+    X_WA, X_WB : (4, 4) or (N, 4, 4) poses of the question in the world W [m], entries taken as exact numbers.
+    r : the `PairResult` of ``collide.distance(A, B, X_WA, X_WB)``.
+
+    Returns
+    -------
+    A tuple of `Certificate`, one for each pair of parts that the proof takes; None where the pair has none (curved
+    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of these for batches.
+
+    Raises
+    ------
+    InvalidArgument : shapes, results or numbers of poses that do not belong together.
+    InvalidPose : poses that are no (4, 4) matrices of finite numbers.
+
+    The vertices that decided in doubles are tried first, O(vertices) integer operations; where they prove nothing exactly,
+    Gilbert's, Johnson's and Keerthi's algorithm goes on from them in integers.
+    """
+    shapes_a, shapes_b = (S if isinstance(S, Sequence) else [S] for S in (A, B))
+    check_question("certify", shapes_a, shapes_b, r)
+    if not isinstance(r, PairResult):
+        raise InvalidArgument(f"certify: r must be a PairResult, got {type(r).__name__}")
+    X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
+    for name, batch in (("A", shapes_a), ("B", shapes_b), ("X_WA", X_WA), ("X_WB", X_WB)):
+        if len(batch) not in (1, len(r)):
+            raise InvalidArgument(f"certify: {len(r)} results, but {name} has {len(batch)}")
+    questions = (question_of_row((A, B, X_WA, X_WB), k) for k in range(len(r)))
+    certificates = [certificate_of_row(*question, row) for question, row in zip(questions, r.rows)]
+    return certificates[0] if r.is_single else certificates
+
+
+def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
+    """The certificate of one row of `distance` at poses (1, 4, 4); None where the pair has none."""
+    if row["how"] == UNDECIDED or row["beyond"]:
+        return None
+    if A.meshed or B.meshed:
+        return _of_meshes(ProofBody(A, X_WA[0]), ProofBody(B, X_WB[0]), row)
+    parts_a, parts_b = exact_parts(A, X_WA[0]), exact_parts(B, X_WB[0])
+    if all(any(part.kind == HALFSPACE for part in parts) for parts in (parts_a, parts_b)):
+        return None
+    if not all(has_exact_numbers(part) for part in (*parts_a, *parts_b)):
+        return None
+    pairs = list(zip(row["vertices_a"].tolist(), row["vertices_b"].tolist()))[: row["count"]]
+    i, j = decided = int(row["part_a"]), int(row["part_b"])
+    if row["hit"]:
+        return (_of_parts(parts_a[i], parts_b[j], i, j, pairs, hit=True),)
+    return tuple(
+        _of_parts(part_a, part_b, i, j, pairs if (i, j) == decided else [(0, 0)], hit=False)
+        for i, part_a in enumerate(parts_a)
+        for j, part_b in enumerate(parts_b)
+    )
+
+
+def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit: bool) -> tuple[Certificate, ...]:
+    """The certificate of a boolean about two convex polytopes, from vertex pairs to begin the exact search with.
+
+    pairs : one to four (vertex of A, vertex of B) near where the bodies meet, or are nearest each other.
+    """
+    (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
+    return (_of_parts(part_a, part_b, 0, 0, list(pairs)[:4], hit=hit),)
+
+
+def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], *, hit: bool) -> Certificate:
+    kind = TOGETHER if hit else APART
+    if HALFSPACE in (A.kind, B.kind):
+        return Certificate(kind, i, j, tuple(pairs[:1]))
+    if not (pairs and all(0 <= p < len(A) and 0 <= q < len(B) for p, q in pairs)):
+        pairs = [(0, 0)]
+    if flaw_of_proof(A, B, pairs, hit=hit) is not None:
+        pairs = _search(A, B, pairs)
+    return Certificate(kind, i, j, tuple(pairs))
+
+
+def _search(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair] = ((0, 0),)) -> list[VertexPair]:
+    P, Q, _ = common_vertices(A, B)
+    return nearest_vertex_pairs(P, Q, pairs)
+
+
+# --- pairs with a mesh --------------------------------------------------------------------------
+
+
+def _of_meshes(A: ProofBody, B: ProofBody, row) -> Certificates:
+    if not (A.has_certificates and B.has_certificates):
+        return None
+    if HALFSPACE in (A.kind, B.kind):
+        return _of_plane(A, B, bool(row["hit"]))
+    return _together(A, B, row) if row["hit"] else _apart(A, B)
+
+
+def _of_plane(A: ProofBody, B: ProofBody, hit: bool) -> Certificates:
+    """The vertex nearest the plane: it lies in the half-space or within the radius of it, or no vertex does."""
+    halfspace, body = (A, B) if A.kind == HALFSPACE else (B, A)
+    if body.kind == HALFSPACE:
+        return None
+    n, _ = halfspace.part().plane
+    points, _ = body.part().vertices
+    vertex = body.id_of(min(range(len(points)), key=lambda k: inner(n, points[k])), None)
+    pair = (NO_VERTEX, vertex) if halfspace is A else (vertex, NO_VERTEX)
+    return (Certificate(TOGETHER if hit else APART, 0, 0, (pair,)),)
+
+
+def _apart(A: ProofBody, B: ProofBody) -> Certificates:
+    """Vertex pairs that give an axis between the hulls; None where these meet."""
+    part_a, part_b = A.part(), B.part()
+    pairs = _search(part_a, part_b)
+    if flaw_of_proof(part_a, part_b, pairs, hit=False) is not None:
+        return None
+    return (Certificate(APART, 0, 0, tuple((A.id_of(i, None), B.id_of(j, None)) for i, j in pairs)),)
+
+
+def _together(A: ProofBody, B: ProofBody, row) -> Certificates:
+    """Two facets that meet, or a vertex of one body inside the other."""
+    facet_a, facet_b = int(row["part_a"]) if A.is_mesh else 0, int(row["part_b"]) if B.is_mesh else 0
+    ids_a, ids_b = A.corners(facet_a), B.corners(facet_b)
+    part_a, part_b = A.part(ids_a), B.part(ids_b)
+    pairs = _search(part_a, part_b)
+    if flaw_of_proof(part_a, part_b, pairs, hit=True) is None:
+        named = tuple((A.id_of(i, ids_a), B.id_of(j, ids_b)) for i, j in pairs)
+        return (Certificate(TOGETHER, facet_a, facet_b, named),)
+    for solid, body in ((A, B), (B, A)):
+        for vertex in _vertex_of_each_shell(body) if solid.is_solid_mesh else ():
+            pair = (vertex, NO_VERTEX) if body is A else (NO_VERTEX, vertex)
+            if flaw_of_inside_proof(A, B, (pair,)) is None:
+                return (Certificate(INSIDE, 0, 0, (pair,)),)
+    return None
+
+
+def _vertex_of_each_shell(body: ProofBody) -> list[int]:
+    """Vertex ids: one of every connected part of the surface."""
+    if not body.is_mesh:
+        return [0]
+    _, first = np.unique(body.shape.survey.shells, return_index=True)
+    return body.shape.faces[first, 0].tolist()

@@ -1,0 +1,80 @@
+"""The point of a hull of integer points nearest the origin, exactly: Johnson's subalgorithm by definition, and GJK on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+from collide.certificates.certificate import VertexPair
+from collide.numerics.exact_points import Point, inner, minus
+
+
+class NearestPoint(NamedTuple):
+    """The nearest point is vector / scale, scale > 0.
+
+    carrier : ascending indices of the first of the smallest sets of points whose hull holds it.
+    """
+
+    vector: Point
+    scale: int
+    carrier: tuple[int, ...]
+
+
+def nearest_to_origin(points: Sequence[Point]) -> NearestPoint:
+    """The point of the hull of one to four points nearest the origin.
+
+    Of all subsets, the one whose affine hull's nearest point v has positive weights, and to which no other point is an
+    improvement: v·p ≥ v·v for all points p (Johnson's subalgorithm).
+    """
+    for count in range(1, len(points) + 1):
+        for carrier in combinations(range(len(points)), count):
+            corners = [points[k] for k in carrier]
+            weights = _weights(corners)
+            if weights is None or any(w <= 0 for w in weights):
+                continue
+            scale = sum(weights)
+            x, y, z = (sum(w * p[axis] for w, p in zip(weights, corners)) for axis in range(3))
+            v = x, y, z
+            if all(inner(v, p) * scale >= inner(v, v) for p in points):
+                return NearestPoint(v, scale, carrier)
+    raise AssertionError("some subset holds the nearest point")
+
+
+def nearest_vertex_pairs(P: list[Point], Q: list[Point], pairs: Sequence[VertexPair]) -> list[VertexPair]:
+    """Index pairs (i, j) whose points P_i − Q_j span the simplex of P ⊖ Q nearest the origin: GJK in integers.
+
+    pairs : where the search begins; of more than four the first four.
+    """
+    simplex = list(dict.fromkeys(pairs))[:4]
+    while True:
+        v, scale, carrier = nearest_to_origin([minus(P[i], Q[j]) for i, j in simplex])
+        simplex = [simplex[k] for k in carrier]
+        if not any(v):
+            return simplex
+        i = min(range(len(P)), key=lambda k: inner(v, P[k]))
+        j = max(range(len(Q)), key=lambda k: inner(v, Q[k]))
+        if inner(v, minus(P[i], Q[j])) * scale >= inner(v, v):
+            return simplex
+        simplex.append((i, j))
+
+
+def _weights(points: Sequence[Point]) -> list[int] | None:
+    """Integer weights of the point of the affine hull nearest the origin; None where the points are affinely dependent."""
+    base, edges = points[0], [minus(p, points[0]) for p in points[1:]]
+    gram = [[inner(e, f) for f in edges] for e in edges]
+    right = [-inner(e, base) for e in edges]
+    determinant = _determinant(gram)
+    if determinant == 0:
+        return None
+    tail = [  # Cramer's rule
+        _determinant([[right[i] if c == k else row[c] for c in range(len(edges))] for i, row in enumerate(gram)])
+        for k in range(len(edges))
+    ]
+    return [determinant - sum(tail), *tail]
+
+
+def _determinant(m: list[list[int]]) -> int:
+    if not m:
+        return 1
+    return sum((-1) ** k * m[0][k] * _determinant([row[:k] + row[k + 1 :] for row in m[1:]]) for k in range(len(m)))

@@ -1,0 +1,89 @@
+"""`verify`: the certificate of a result, checked in Python integers. No kernel is imported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from collide.certificates.certificate import APART, TOGETHER, Certificate, CertificateRefused, read_certificates
+from collide.certificates.convex_proofs import flaw_of_proof
+from collide.certificates.exact_parts import exact_parts
+from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
+from collide.errors import InvalidArgument
+from collide.transforms import as_poses
+
+
+def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
+    """Check in Python integers that the certificate of a single result proves its boolean.
+
+    Parameters
+    ----------
+    A, B : shapes of the question.
+    X_WA, X_WB : (4, 4) their poses in the world W [m]. Every entry is taken as an exact number; whether the matrices are
+        rotations is not asked.
+    r : `PairResult` of `collide.distance`, or what `collide.walk` returns, at one pair of poses (``r[k]`` of a batch).
+        Of it ``r.hit`` is proven, and ``r.certificate`` read.
+    certificate : rows of (kind, part_a, part_b, pairs) to be checked instead of ``r.certificate``, for example read from
+        a JSON file.
+
+    Returns
+    -------
+    None, where the certificate proves that A and B meet or are apart, whichever ``r.hit`` says.
+
+    Raises
+    ------
+    CertificateRefused : the certificate does not prove it; the message says where it fails.
+    InvalidArgument : there is nothing to check: no shape, no single result, or none that has a certificate.
+    InvalidPose : poses that are no (4, 4) matrices of finite numbers.
+
+    O(vertices) integer operations a pair of parts; O(facets) where a body lies inside a solid mesh. What certificates
+    there are, and what they prove: `collide.certificates.certificate`.
+    """
+    check_question("verify", [A], [B], r)
+    X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
+    if len(X_WA) != 1 or len(X_WB) != 1 or len(r) != 1:
+        raise InvalidArgument("verify: one pair at one pose each; index a batch first")
+    certificate = r.certificate if certificate is None else certificate
+    if certificate is None:
+        raise InvalidArgument(
+            "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which one is "
+            "a mesh whose hull meets the other)"
+        )
+    certificates = read_certificates(certificate)
+    claim = TOGETHER if bool(np.all(r.hit)) else APART
+    flaw_of = flaw_of_mesh_certificates if A.meshed or B.meshed else _flaw_of_parts
+    flaw = flaw_of(A, B, X_WA[0], X_WB[0], certificates, claim)
+    if flaw:
+        raise CertificateRefused(flaw)
+
+
+def check_question(caller: str, A, B, r) -> None:
+    """Raises InvalidArgument where a sequence A or B holds what is no shape, or r is no result."""
+    for name, shapes in (("A", A), ("B", B)):
+        for shape in shapes:
+            if not (hasattr(shape, "meshed") and hasattr(shape, "parts")):
+                raise InvalidArgument(
+                    f"{caller}: {name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}"
+                )
+    if not (hasattr(r, "hit") and hasattr(r, "__len__")):
+        raise InvalidArgument(f"{caller}: r must be a result of distance, got {r!r}")
+
+
+def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim: str) -> str | None:
+    """Why certificates do not prove that two shapes of convex parts are "together" or "apart"; None where they do."""
+    parts_a, parts_b = exact_parts(A, X_WA), exact_parts(B, X_WB)
+    proven = set()
+    for kind, i, j, pairs in certificates:
+        if kind != claim:
+            return f"the result says {claim}, the certificate {kind!r}"
+        if not (0 <= i < len(parts_a) and 0 <= j < len(parts_b)):
+            return f"there are no parts {i} and {j}"
+        flaw = flaw_of_proof(parts_a[i], parts_b[j], pairs, hit=kind == TOGETHER)
+        if flaw:
+            return f"parts {i} and {j}: {flaw}"
+        proven.add((i, j))
+    n_pairs = len(parts_a) * len(parts_b)
+    if not proven or (claim == APART and len(proven) < n_pairs):
+        return f"{n_pairs} pairs of parts, {len(proven)} of them certified"
+    return None

@@ -1,0 +1,99 @@
+"""Bounding boxes of posed convex sets: never too small, judged in Fractions, and larger by rounding only."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import naive
+import numpy as np
+import pytest
+from naive import pose, random_pose, rng_of
+from naive_triangles import world_points
+
+import collide
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.parts import parts_of
+from collide.lowering.shape_table import ShapeTable, pose_table
+
+EYE = np.eye(4)
+
+
+def box_of(shape: collide.Shape, X_WB: np.ndarray) -> np.ndarray:
+    (packed, X_BP), = parts_of(shape)
+    table = ShapeTable([packed])
+    table.plant(np.zeros(1, dtype=np.int64))
+    return boxes_of(table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64))[0]
+
+
+def reaches(shape: collide.Shape, g, bound: Fraction) -> bool:
+    """Whether a curved shape's support value along g, in its own frame, is at most the bound: exactly, without roots."""
+    x, y, z = g
+    if isinstance(shape, collide.Ellipsoid):
+        square = sum((Fraction(r) * c) ** 2 for r, c in zip(shape.radii.tolist(), g))
+        return bound >= 0 and square <= bound**2
+    radius, half = Fraction(float(shape.radius)), Fraction(float(shape.length)) / 2
+    rest = bound - half * abs(z) if isinstance(shape, collide.Cylinder) else bound + half * z
+    disc = rest >= 0 and radius**2 * (x * x + y * y) <= rest**2
+    return disc and (not isinstance(shape, collide.Cone) or half * z <= bound)
+
+
+def holds(shape: collide.Shape, X: np.ndarray, box) -> bool:
+    if isinstance(shape, (collide.Ellipsoid, collide.Cylinder, collide.Cone)):
+        for axis in range(3):
+            g, t = [Fraction(v) for v in X[axis, :3].tolist()], Fraction(float(X[axis, 3]))
+            if not reaches(shape, g, Fraction(box[3 + axis]) - t) or not reaches(shape, [-v for v in g], t - Fraction(box[axis])):
+                return False
+        return True
+    points, radius = naive.corners(shape)
+    r = Fraction(float(radius))
+    return all(
+        Fraction(box[axis]) <= p[axis] - r and p[axis] + r <= Fraction(box[3 + axis])
+        for p in world_points(points, X)
+        for axis in range(3)
+    )
+
+
+def shapes(rng) -> dict[str, collide.Shape]:
+    kinds = naive.one_of_each(rng)
+    kinds["Point"] = collide.ConvexHull([rng.normal(size=3)])
+    kinds["LargeHull"] = collide.ConvexHull(naive.hull_points(rng, 300))
+    kinds["Needle"] = collide.ConvexHull(rng.normal(size=(5, 3)) * (1e3, 1e-9, 1e-9))
+    return {name: kinds[name] for name in kinds if name not in ("Compound", "Halfspace", "HPolytope")}
+
+
+@pytest.mark.parametrize("kind", shapes(rng_of("kinds")))
+def test_boxes_hold_their_shapes_tightly(kind):
+    rng = rng_of("boxes", kind)
+    for k in range(12):
+        shape = shapes(rng)[kind]
+        X = random_pose(rng, 10.0 ** rng.integers(-6, 7))
+        if k % 3 == 0:
+            X = pose(naive.LATTICE_ROTATIONS[k], rng.integers(-3, 4, 3) * 0.25)
+        box = box_of(shape, X)
+        with naive.reproducible(naive.Case(shape, shape, X, X)):
+            assert holds(shape, X, box.tolist())
+            slack = 1e-13 * (np.abs(X[:3, 3]).max() + 2000.0 * (kind == "Needle") + 10.0)
+            for axis, n in enumerate(np.eye(3)):
+                assert naive.extent_along(shape, X, n) - slack <= box[axis]
+                assert box[3 + axis] <= -naive.extent_along(shape, X, -n) + slack
+
+
+def test_halfspaces_have_no_bounds():
+    assert np.array_equal(box_of(collide.Halfspace((0, 0, 1), 2.0), EYE), [-np.inf] * 3 + [np.inf] * 3)
+
+
+def test_parts_with_poses_of_their_own():
+    """The product of two poses is rounded; the box holds the part where it exactly is."""
+    rng = rng_of("boxes of parts")
+    for _ in range(20):
+        hull = collide.ConvexHull(naive.hull_points(rng, 8))
+        X_WB, X_BP = random_pose(rng, 1e6), random_pose(rng, 1e3)
+        (packed, _), = parts_of(hull)
+        rows = pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows
+        box = boxes_of(ShapeTable([packed]), rows, np.zeros(1, dtype=np.int64))[0].tolist()
+        in_body = world_points(hull.points, X_BP)
+        W = [[Fraction(v) for v in row] for row in X_WB[:3].tolist()]
+        for p in in_body:
+            for axis in range(3):
+                x = sum(w * c for w, c in zip(W[axis], p)) + W[axis][3]
+                assert Fraction(box[axis]) <= x <= Fraction(box[3 + axis]), naive.spell(hull)

@@ -1,0 +1,159 @@
+"""The steps of quickhull one by one: what a corner sees, the fan that it gets, the lists of points still outside."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from exact_simplex import determinant, exact
+from naive import rng_of
+
+from collide.hull import quickhull as Q
+from collide.hull.first_simplex import APICES, first_simplex
+from collide.numerics import orientation as O
+
+pytestmark = pytest.mark.plain_kernels
+
+
+class Growing:
+    """A hull that grows by one corner at a time, in whatever order."""
+
+    def __init__(self, points: np.ndarray):
+        n = self.n = len(points)
+        room = n + APICES
+        self.originals = [*points.ravel().tolist(), *[0.0] * (3 * APICES)]
+        self.points, self.work, self.digits = [0.0] * (3 * room), [0.0] * O.WORK, [0] * O.DIGITS
+        self.facets, self.planes = np.zeros(2 * Q.FACET * room, dtype=np.int64), np.zeros(2 * Q.PLANE * room)
+        self.state = [0] * Q.STATE
+        for k in (Q._FREE, Q._FIRST, Q._LAST, Q._CURSOR):
+            self.state[k] = -1
+        self.fan, self.rim, self.region = [0] * room, [0] * (2 * room), [0] * (2 * room)
+        self.starting, self.owner, self.following = [-1] * room, [-1] * room, [-1] * room
+        self.corners = [0] * 4
+        exponent = O.survey(self.originals, self.points, n, self.work)
+        assert first_simplex(self.points, self.originals, self.work, self.digits, n, exponent, self.corners) == 3
+        Q.first_facets(self.points, self.facets, self.planes, self.state, self.corners, self.fan)
+        self.exact = exact(points)
+        self.n_fan, self.orphans = 4, [i for i in range(n) if i not in self.corners]
+        self.deal()
+
+    def deal(self) -> None:
+        """Orphans into the lists of facets of the fan."""
+        Q.distribute(
+            self.points, self.originals, self.work, self.digits, self.facets, self.planes, self.following, self.owner,
+            self.state, self.orphans, len(self.orphans), self.fan, self.n_fan,
+        )  # fmt: skip
+
+    def alive(self) -> dict[int, list[int]]:
+        rows = self.facets.reshape(-1, Q.FACET)[: self.state[Q._USED]]
+        return {f: row[:3].tolist() for f, row in enumerate(rows) if row[0] >= 0}
+
+    def is_above(self, i: int, triangle) -> bool:
+        a, b, c = (self.exact[k] for k in triangle)
+        return determinant(*([x - y for x, y in zip(p, a)] for p in (self.exact[i], b, c))) > 0
+
+    def expand(self, i: int) -> None:
+        f = self.owner[i]
+        n_region, n_edges = Q.visible_region(
+            self.points, self.originals, self.work, self.digits, self.facets, self.planes, self.state, f, i, self.region, self.rim
+        )
+        seen = {g for g, triangle in self.alive().items() if self.is_above(i, triangle)}
+        assert set(map(int, self.region[:n_region])) == seen and n_region == len(seen), "a corner sees all facets it is above"
+        self.check_rim(n_edges, seen)
+        self.orphans = [0] * self.n
+        n_orphans = Q.gather(self.facets, self.following, self.region, n_region, i, self.orphans)
+        self.orphans = [int(k) for k in self.orphans[:n_orphans]]
+        self.owner[i] = -1
+        for g in self.region[:n_region]:
+            Q.free_facet(self.facets, self.state, int(g))
+        assert Q.build_fan(self.points, self.facets, self.planes, self.state, i, self.rim, n_edges, self.fan, self.starting)
+        self.n_fan = n_edges
+        self.deal()
+
+    def check_rim(self, n_edges: int, seen: set[int]) -> None:
+        """Every edge between what is seen and what is not, once."""
+        found = {(int(self.rim[2 * k]), int(self.rim[2 * k + 1])) for k in range(n_edges)}
+        across = self.facets.reshape(-1, Q.FACET)[:, 3:6]
+        alive = self.alive()
+        true = {(g, e) for g in alive if g not in seen for e in range(3) if int(across[g, e]) in seen}
+        assert found == true and len(found) == n_edges
+
+    def check(self) -> None:
+        """Closed and convex so far; every point outside is in the list of one facet that it is above, others are inside."""
+        alive, edges = self.alive(), {}
+        for f, triangle in alive.items():
+            for e in range(3):
+                edges[triangle[e], triangle[(e + 1) % 3]] = f
+        for (i, j), f in edges.items():
+            e = alive[f].index(i)
+            assert int(self.facets[Q.FACET * f + 3 + e]) == edges[j, i]
+        vertices = {v for triangle in alive.values() for v in triangle}
+        assert len(edges) == 3 * len(alive) and len(alive) == 2 * len(vertices) - 4
+        for i in range(self.n):
+            above = [f for f, triangle in alive.items() if self.is_above(i, triangle)]
+            assert (self.owner[i] in above) if above else self.owner[i] == -1
+        for f in alive:
+            listed, i = [], int(self.facets[Q.FACET * f + Q._POINT])
+            while i >= 0:
+                listed.append(i)
+                i = int(self.following[i])
+            assert sorted(listed) == [i for i in range(self.n) if self.owner[i] == f]
+
+
+CLOUDS = {
+    "ball": lambda rng: rng.normal(size=(16, 3)),
+    "lattice": lambda rng: np.unique(rng.integers(-1, 2, size=(20, 3)) * 1.0, axis=0),
+    "sphere": lambda rng: np.array([p / np.linalg.norm(p) for p in rng.normal(size=(14, 3))]),
+    "flat sides": lambda rng: np.concatenate([rng.random(size=(9, 3)) * (1, 1, 0), rng.random(size=(6, 3))]),
+}
+
+
+@pytest.mark.parametrize("kind", CLOUDS)
+def test_steps(kind):
+    rng = rng_of("quickhull", kind)
+    seen: Counter = Counter()
+    for _ in range(6):
+        hull = Growing(CLOUDS[kind](rng))
+        hull.check()
+        while outside := [i for i in range(hull.n) if hull.owner[i] >= 0]:
+            hull.expand(int(rng.choice(outside)))
+            hull.check()
+            seen["steps"] += 1
+        assert not any(hull.is_above(i, t) for i in range(hull.n) for t in hull.alive().values())
+    assert seen["steps"] > 15, seen
+
+
+def test_wide_fans_are_searched_by_halving():
+    """The facet that `locate` finds is one that the point is above, if it is above any of the fan."""
+    rng = rng_of("locate")
+    seen: Counter = Counter()
+    angle = np.arange(60) * (2 * np.pi / 60)
+    for _ in range(4):
+        ring = np.column_stack([30 * np.cos(angle), 30 * np.sin(angle), 0.01 * rng.random(60)])
+        cloud = np.concatenate([ring, [[0.0, 0.0, -3.0]], [[0.0, 0.0, 1.0]], rng.normal(size=(40, 3)) * (9.0, 9.0, 1.0)])
+        hull = Growing(cloud)
+        apex = 61
+        for i in [*range(60), apex]:
+            if hull.owner[i] >= 0:
+                hull.expand(i)
+        if hull.n_fan <= Q.WIDE_FAN or hull.alive()[int(hull.fan[0])][2] != apex:
+            continue
+        fan = [int(f) for f in hull.fan[: hull.n_fan]]
+        for i in range(62, len(cloud)):
+            above = [k for k, f in enumerate(fan) if hull.is_above(i, hull.alive()[f])]
+            place, sure = Q.locate(hull.points, hull.originals, hull.work, hull.digits, hull.facets, hull.state, hull.fan, len(fan), i)
+            assert not sure or not above or place in above, cloud.tolist()
+            seen["above" if above else "inside", bool(sure)] += 1
+    assert seen["above", True] > 20, seen
+
+
+def test_the_order_of_last_resort_is_a_permutation():
+    for n in (1, 2, 3, 100, 5000):
+        order = [0] * n
+        Q.shuffle(order, n)
+        assert sorted(order) == list(range(n))
+        again = [0] * n
+        Q.shuffle(again, n)
+        assert again == order
+    assert sum(abs(i - k) for i, k in enumerate(order)) > n * n / 4, "about n²/3 for a random one"

@@ -1,0 +1,106 @@
+"""Volumes of shells, their signs, and facets without area: against Fractions."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from exact_simplex import determinant, exact
+from mesh_shapes import box, bumpy_sphere
+from naive import rng_of, rotation
+
+from collide.mesh.shell_volumes import Shells, exact_integers, scaled_to_one, shell_volumes, without_area
+
+
+def true_volume(vertices, faces) -> Fraction:
+    points = exact(vertices)
+    return sum((determinant(*(points[v] for v in face)) for face in faces.tolist()), Fraction(0)) / 6
+
+
+def together(*meshes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(vertices, corners int32, shells int32) of several closed surfaces, facets shuffled."""
+    starts = np.cumsum([0, *(len(v) for v, _ in meshes)])
+    corners = np.concatenate([f + s for (_, f), s in zip(meshes, starts)]).astype(np.int32)
+    shells = np.repeat(np.arange(len(meshes)), [len(f) for _, f in meshes]).astype(np.int32)
+    order = rng_of("shuffled").permutation(len(corners))
+    return np.concatenate([v for v, _ in meshes]), np.ascontiguousarray(corners[order]), np.ascontiguousarray(shells[order])
+
+
+def flattened(mesh, factor: float):
+    vertices, faces = mesh
+    return vertices * (1.0, 1.0, factor), faces
+
+
+def turned_over(mesh):
+    return mesh[0], mesh[1][:, ::-1]
+
+
+def tilted(mesh, rng, shift: float):
+    return mesh[0] @ rotation(rng).T + shift, mesh[1]
+
+
+def test_volumes_and_signs():
+    rng = rng_of("volumes")
+    cube, sphere = box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)), bumpy_sphere(200)
+    meshes = [
+        cube, turned_over(cube), sphere, tilted(sphere, rng, 1e9), tilted(flattened(cube, 3e-16), rng, 0.3),
+        turned_over(tilted(flattened(cube, 3e-16), rng, 0.3)), flattened(cube, 0.0), flattened(sphere, 0.0), flattened(cube, 1e-300),
+    ]  # fmt: skip
+    vertices, corners, shells = together(*meshes)
+    volumes, signs = shell_volumes(vertices, Shells(corners, shells, len(meshes)))
+    doubtful = 0
+    for k in range(len(meshes)):
+        true = true_volume(vertices, corners[shells == k])
+        assert signs[k] == (true > 0) - (true < 0), k
+        if true == 0:
+            assert volumes[k] == 0.0
+        else:
+            size = np.ptp(vertices[corners[shells == k]].reshape(-1, 3), axis=0).max() ** 3
+            assert abs(Fraction(float(volumes[k])) - true) <= Fraction(1e-12) * Fraction(float(size))
+            doubtful += abs(true) < Fraction(1e-13) * Fraction(float(size))
+    assert doubtful >= 2 and set(signs.tolist()) == {-1, 0, 1}
+
+
+def test_facets_that_belong_to_no_shell_do_not_count():
+    vertices, faces = box((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+    corners = np.concatenate([faces, [[0, 1, 6]]]).astype(np.int32)
+    shells = np.array([0] * len(faces) + [-1], dtype=np.int32)
+    volumes, signs = shell_volumes(vertices, Shells(corners, shells, 1))
+    assert volumes.tolist() == [pytest.approx(6.0)] and signs.tolist() == [1]
+
+
+def test_shells_hand_out_their_facets():
+    rng = rng_of("shells")
+    shells = rng.integers(-1, 4, 50).astype(np.int32)
+    corners = rng.integers(0, 20, size=(50, 3)).astype(np.int32)
+    parts = Shells(corners, shells, 4)
+    for k in range(4):
+        assert np.array_equal(parts[k], corners[shells == k])
+
+
+def test_facets_without_area():
+    rng = rng_of("without area")
+    flat = 0
+    for scale in (1.0, 1e-300, 1e150):
+        points = rng.integers(-2, 3, size=(60, 3)) * scale
+        points[30:] = rng.normal(size=(30, 1)) * scale * np.array([1.0, 3.0, -0.5])  # near one line
+        points[45:] = points[30:45] * 2.0 + points[30] * 0.0
+        corners = rng.integers(0, 60, size=(300, 3)).astype(np.int32)
+        found = without_area(points, corners)
+        for face, thin in zip(corners.tolist(), found.tolist()):
+            a, b, c = (exact(points[[v]])[0] for v in face)
+            u, v = [x - y for x, y in zip(b, a)], [x - y for x, y in zip(c, a)]
+            cross = [u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3] for k in range(3)]
+            assert thin == (not any(cross)), (points[face].tolist(), thin)
+        flat += int(found.sum())
+    assert 30 < flat < 870, flat
+
+
+def test_one_unit_for_all():
+    values = np.array([[0.1, 5e-324], [0.0, -3.0]])
+    whole = exact_integers(values)
+    ratio = Fraction(int(whole[0, 0])) / Fraction(0.1)
+    assert [[Fraction(int(x)) for x in row] for row in whole] == [[ratio * Fraction(x) for x in row] for row in values.tolist()]
+    scaled, exponent = scaled_to_one(values)
+    assert 0.5 <= np.abs(scaled).max() < 1.0 and np.ldexp(scaled, exponent)[1].tolist() == [0.0, -3.0]

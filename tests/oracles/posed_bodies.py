@@ -1,0 +1,34 @@
+"""Two convex shapes at two poses as kernels take them, for tests that call kernels of the narrowphase one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import collide
+from collide.kernels import address_of
+from collide.lowering.parts import parts_of
+from collide.lowering.shape_table import ShapeTable, pose_table
+from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.posed_pair import ordered_pair
+
+
+class PosedBodies:
+    """The `OrderedPair` of A at X_WA and B at X_WB, and the buffers that it sees.
+
+    ordered, pair : as kernels have them; ``ordered.flip`` says whether B comes first.   error : of a bound in doubles [m].
+    """
+
+    def __init__(self, A: collide.Shape, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):
+        (packed_a, X_AP), (packed_b, X_BP) = (parts_of(shape)[0] for shape in (A, B))
+        self.table = ShapeTable([packed_a, packed_b])
+        self.poses = pose_table(
+            np.array([X_WA, X_WB]), np.array([X_AP, X_BP]), np.array([packed_a.reach, packed_b.reach])
+        )
+        self._shape_of = np.arange(2)
+        self.ordered = ordered_pair(
+            address_of(self.table.ints), address_of(self.table.numbers), address_of(self.poses.rows),
+            address_of(self._shape_of), 0, 1,
+        )  # fmt: skip
+        self.pair = self.ordered.pair
+        self.error = ERROR * self.ordered.size + self.ordered.slop
+        self.radius = packed_a.radius + packed_b.radius
