@@ -48,7 +48,7 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
         plain = [collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)]
         for S in plain:
             if isinstance(S, collide.ConvexHull):
-                object.__setattr__(S, "_tree", None)
+                convex_set_of(S).prepared.with_tree = False
         scanned = collide.distance(*plain, X_WA, X_WB)
         assert with_trees.hit == scanned.hit == collide.collide(A, B, X_WA, X_WB), case.snippet()
         assert max(with_trees.lower, scanned.lower) <= min(with_trees.upper, scanned.upper), case.snippet()
@@ -64,7 +64,7 @@ def test_large_hulls_answer_as_scans_do(axes):
     A, B = (collide.ConvexHull(_ball(rng, 3000, axes)) for _ in range(2))
     scans = [collide.ConvexHull(S.points) for S in (A, B)]
     for S in scans:
-        object.__setattr__(S, "_tree", None)
+        convex_set_of(S).prepared.with_tree = False
     X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
     r, scanned = collide.distance(A, B, EYE, X_WB), collide.distance(*scans, EYE, X_WB)
     assert _planted(A) and _planted(B)
@@ -150,7 +150,7 @@ def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     world.add(B, collide.pose((50, 0, 0)))
     assert not world.collides() and "tree" not in convex_set_of(B).prepared.made, "nothing near: nothing to build"
     world.add(collide.Sphere(0.5))
-    assert world.collides() and B._tree._tree is not None
+    assert world.collides() and support_tree_of(convex_set_of(B))._tree is not None
 
 
 def test_given_faces_are_checked_not_trusted():
