@@ -1,4 +1,5 @@
-"""First calls: kernels are compiled or loaded while other threads use numba, are interrupted, or ask for the first time as well.
+"""First calls: kernels are compiled or loaded while other threads use numba, are interrupted, or ask for the first
+time as well.
 
 Each test forces the order that was met by chance, in a process of its own: what it is about ended in a crash.
 """
@@ -205,8 +206,8 @@ def test_two_first_calls_compile_once(tmp_path):
     assert run_just_in_time(ONCE, tmp_path) == "[8.0, 162.0] [['power']]\n"
 
 
-#: While an entry is compiled or loaded in one thread, another calls functions of its own for the first time. In numba's part
-#: it comes as far as numba's lock, elsewhere to the end.
+#: While an entry is compiled or loaded in one thread, another calls functions of its own for the first time. In
+#: numba's part it comes as far as numba's lock, elsewhere to the end.
 BESIDE = (
     NUMBAS
     + """

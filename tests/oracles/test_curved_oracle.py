@@ -103,7 +103,9 @@ def test_brackets_are_narrow():
     """A wide bracket proves nothing: most convex pairs are known to 1e-15 of their size."""
     widths = []
     for number in range(150):
-        case = soak_pairs.draw(12, number, 1e6, ("sphere", "box", "hull", "swept hull", "cylinder", "cone", "ellipsoid"))
+        case = soak_pairs.draw(
+            12, number, 1e6, ("sphere", "box", "hull", "swept hull", "cylinder", "cone", "ellipsoid")
+        )
         found = bracket(case.A, case.B, case.X_WA, case.X_WB)
         widths.append(float(found.upper - found.lower) / soak_pairs.size_of(case))
     assert np.median(widths) < 1e-19 and np.mean(np.array(widths) < 1e-15) > 0.85, np.sort(widths)[::-10]

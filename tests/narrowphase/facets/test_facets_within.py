@@ -24,7 +24,10 @@ def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
     P, Q = as_integers(*exact)
     scale = max(x.denominator for points in exact for p in points for x in p)
     return np.array(
-        [[float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()] for f in a[1].tolist()]
+        [
+            [float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()]
+            for f in a[1].tolist()
+        ]
     )
 
 

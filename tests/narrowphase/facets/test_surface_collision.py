@@ -51,7 +51,9 @@ def test_batches_are_their_poses_one_by_one():
         one = all_hits(A, B, Xs[k], Ys[k])
         assert np.array_equal(one.pairs, whole.pairs[begin:end]) and np.array_equal(one.counters[0], whole.counters[k])
     fixed = all_hits(A, B, Xs[3], Ys)
-    assert np.array_equal(fixed.pairs[fixed.starts[3] : fixed.starts[4]], whole.pairs[whole.starts[3] : whole.starts[4]])
+    assert np.array_equal(
+        fixed.pairs[fixed.starts[3] : fixed.starts[4]], whole.pairs[whole.starts[3] : whole.starts[4]]
+    )
 
 
 def test_nothing_is_lost_where_there_are_many_pairs():

@@ -1,4 +1,5 @@
-"""Nearest points of two triangles in doubles: points of both, as near as exact arithmetic says; slabs are lower bounds."""
+"""Nearest points of two triangles in doubles: points of both, as near as exact arithmetic says; slabs are lower
+bounds."""
 
 from __future__ import annotations
 

@@ -32,7 +32,16 @@ def run(bodies: PosedBodies, *, boolean=False, limit=math.inf, axis=(0.0, 0.0, 0
     weights = [0.0] * 10
     weights[AXIS:] = axis
     result = gjk(
-        bodies.pair, [0.0] * (5 * POINT), [0] * 10, weights, 0, boolean, bodies.radius, limit, bodies.error, MAX_ITERATIONS
+        bodies.pair,
+        [0.0] * (5 * POINT),
+        [0] * 10,
+        weights,
+        0,
+        boolean,
+        bodies.radius,
+        limit,
+        bodies.error,
+        MAX_ITERATIONS,
     )
     return result, np.array(weights[NEAREST_POINT:AXIS]), np.array(weights[AXIS:])
 
@@ -56,7 +65,10 @@ def test_what_is_said_holds(spread):
             result, v, axis = run(bodies)
             true = float(naive.exact_distance(case))
             assert result.iterations <= MAX_ITERATIONS
-            assert result.lower - bodies.error <= max(true, 0.0) <= np.linalg.norm(v) + bodies.error or result.status == ENCLOSED
+            assert (
+                result.lower - bodies.error <= max(true, 0.0) <= np.linalg.norm(v) + bodies.error
+                or result.status == ENCLOSED
+            )
             if result.status == NEAREST:
                 assert true > 0.0 and np.linalg.norm(v) - true <= 1e-10
                 sign = -1.0 if bodies.ordered.flip else 1.0
