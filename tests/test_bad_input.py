@@ -335,8 +335,14 @@ def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
             take(value)
 
 
-@pytest.mark.parametrize("faces", [RAGGED, np.ones((1, 3), "m8[s]"), np.ma.array([[0, 1, 2]], mask=[[1, 0, 0]]), [["0", "1", "2"]],
-                                   np.array([[0, 1, 2 + 0j]]), [[0, 1, 10**30]], nested(2000), [[0, 1, None]], [[True, False, True]]], ids=range(9))  # fmt: skip
+@pytest.mark.parametrize(
+    "faces",
+    [
+        RAGGED, np.ones((1, 3), "m8[s]"), np.ma.array([[0, 1, 2]], mask=[[1, 0, 0]]), [["0", "1", "2"]],
+        np.array([[0, 1, 2 + 0j]]), [[0, 1, 10**30]], nested(2000), [[0, 1, None]], [[True, False, True]],
+    ],
+    ids=range(9),
+)  # fmt: skip
 def test_faces_are_rows_of_integers(faces):
     for make in (lambda: Mesh(np.eye(3), faces), lambda: ConvexHull(np.eye(3), faces=faces)):
         with pytest.raises(InvalidShape, match="faces"):

@@ -47,8 +47,12 @@ _TYPES = {
     "collide_workspace_free": [c_void_p],
     "collide_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p],
-    "collide_collide_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t)],
-    "collide_distance_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t)],
+    "collide_collide_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_distance_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
+    ],
     "collide_collide_each": [
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],

@@ -174,7 +174,8 @@ int main(void)
 #if defined(__x86_64__)
         if (way == 2) _mm_setcsr(_mm_getcsr() | 0x8040);
 #endif
-        if (collide_box(size, &shapes[0]) || collide_ellipsoid(radii, &shapes[1]) || collide_cone(0.1, 0.3, &shapes[2]) ||
+        if (collide_box(size, &shapes[0]) || collide_ellipsoid(radii, &shapes[1]) ||
+            collide_cone(0.1, 0.3, &shapes[2]) ||
             collide_hull(points, 300, 0.01, &shapes[3]) || collide_workspace_create(&workspace))
             return 1;
         for (i = 0; i < 4; i++)
@@ -493,7 +494,8 @@ NUMBERS = [
     ("collide_sphere", collide.Sphere, radius) for radius in (0.0, -1.0, _NAN, _INF, 1e-51, 1e51, 1e-50, 1e50, 5e-324)
 ] + [
     (f"collide_{kind.__name__.lower()}", kind, pair) for kind in (collide.Capsule, collide.Cylinder, collide.Cone)
-    for pair in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (_NAN, 1.0), (1.0, _INF), (1e-50, 1e50), (1e50, 1e-51), (1.0, -0.0))
+    for pair in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (_NAN, 1.0), (1.0, _INF), (1e-50, 1e50),
+                 (1e50, 1e-51), (1.0, -0.0))
 ] + [
     (f"collide_{name}", kind, np.array(three)) for name,
     kind in (("box", collide.Box), ("ellipsoid", collide.Ellipsoid))

@@ -124,7 +124,10 @@ def test_everything_about_hard_pairs(part):
             radius = part * scale * ratio * float(rng.choice([0.5, 0.25, 0.1]))
             B, fb, solid = collide.ConvexHull(vb, radius=radius), collide.ConvexHull(vb).hull.facets.astype(int), True
         one, other = (va, fa, A.solid), (vb, fb, solid)
-        snippet = f"va, fa = {va.tolist()}, {fa.tolist()}\nvb, fb = {vb.tolist()}, {fb.tolist()}\nradius = {radius}\nX_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
+        snippet = (
+            f"va, fa = {va.tolist()}, {fa.tolist()}\nvb, fb = {vb.tolist()}, {fb.tolist()}\nradius = {radius}\n"
+            f"X_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
+        )
         snippet = f"case {case}\n{snippet}"
         hit, r = collide.collide(A, B, X, Y, check_poses=False), collide.distance(A, B, X, Y, check_poses=False)
         swapped = collide.distance(B, A, Y, X, check_poses=False)

@@ -14,7 +14,10 @@ from reproduction import reproducing
 
 from collide.hull.double_description import halfspace_vertices
 
-SOURCE = "from collide.hull.double_description import halfspace_vertices\nimport numpy as np\nprint(halfspace_vertices(np.array({n}), np.array({b})))"
+SOURCE = (
+    "from collide.hull.double_description import halfspace_vertices\nimport numpy as np\n"
+    "print(halfspace_vertices(np.array({n}), np.array({b})))"
+)
 
 
 def corners_of(normals, offsets) -> set[tuple[Fraction, ...]]:

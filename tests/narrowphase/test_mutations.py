@@ -21,7 +21,8 @@ sys.path.insert(0, sys.argv[1])
 import collide
 assert collide.__file__.startswith(sys.argv[1]), collide.__file__
 from collide.adapters.peers.stress import run
-table = run(["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"], n=int(sys.argv[2]), seed=4)
+names = ["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"]
+table = run(names, n=int(sys.argv[2]), seed=4)
 print(table.wrong + table.failed, table.undecided)
 """
 

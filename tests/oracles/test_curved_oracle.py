@@ -58,7 +58,10 @@ def holds(found, truth: float, within: float = 1e-15) -> None:
         (Ellipsoid((1, 2, 3)), Sphere(1), (0, 5, 0), 2.0),
         (Ellipsoid((1, 2, 3)), Box((1, 1, 1)), (1.25, 0, 0), -0.25),
         (Box((1, 1, 1)), ConvexHull([[0, 0, 0]], radius=0.25), (0, 2, 0), 1.25),
-        (ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), (0.25, 0, 0), 0.0),
+        (
+            ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]),
+            (0.25, 0, 0), 0.0,
+        ),
         (HPolytope(np.vstack([np.eye(3), -np.eye(3)]), np.ones(6)), Sphere(1), (0, 0, 3), 1.0),
         (Halfspace((0, 0, 2), 2), Cone(1, 2), (5, 5, 4), 2.0),
         (Halfspace((0, 0, 2), 2), Mesh(*TETRAHEDRON), (5, 5, 0.5), -0.5),

@@ -234,8 +234,12 @@ def damages(path):
         "an array besides": (changed("extra.npy", files[points]), "another format"),
         "an array less": (lambda: zipped(path, {k: v for k, v in files.items() if k != points}), "another format"),
         "a newer array format": (changed(points, files[points][:6] + b"\x03" + files[points][7:]), "another format"),
-        "encrypted": (lambda: [with_patch(path, b"PK\x01\x02", 8, 1), with_patch(path, b"PK\x03\x04", 6, 1)], "another format"),
-        "compression 99": (lambda: [with_patch(path, b"PK\x01\x02", 10, 99), with_patch(path, b"PK\x03\x04", 8, 99)], "another format"),
+        "encrypted": (
+            lambda: [with_patch(path, b"PK\x01\x02", 8, 1), with_patch(path, b"PK\x03\x04", 6, 1)], "another format",
+        ),
+        "compression 99": (
+            lambda: [with_patch(path, b"PK\x01\x02", 10, 99), with_patch(path, b"PK\x03\x04", 8, 99)], "another format",
+        ),
         "empty": (lambda: path.write_bytes(b""), r"scenes\.load"),
         "another kind": (lambda: path.write_bytes(b"solid ascii stl\nendsolid\n"), r"scenes\.load"),
         "half a file": (lambda: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]), "no file that"),

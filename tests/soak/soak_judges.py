@@ -241,8 +241,11 @@ def judge_ladder(asked: Asked) -> Iterator[Failure]:
         )
     wrong = (hits != rows["hit"]) & (rows["how"] != UNDECIDED)
     for k in np.flatnonzero(wrong)[:1]:
-        ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\nC.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB{', signed=False' if meshed else ''})"
-        found = f"{int(wrong.sum())} of {RUNGS}: collide {hits[k]}, distance in [{rows['lower'][k]!r}, {rows['upper'][k]!r}]"
+        signed = ", signed=False" if meshed else ""
+        ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\n"
+        ask += f"C.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB{signed})"
+        bracket = f"[{rows['lower'][k]!r}, {rows['upper'][k]!r}]"
+        found = f"{int(wrong.sum())} of {RUNGS}: collide {hits[k]}, distance in {bracket}"
         yield asked.failed("collide == distance.hit", found, ask)
 
 
@@ -452,7 +455,8 @@ def judge_group(cases: list[Case], text: str, engine: Engine | None = None) -> I
         np.array([c.X_WB for c in cases]),
     )
     singles = np.concatenate([engine.distance(c.A, c.B, c.X_WA, c.X_WB).rows for c in cases])  # type: ignore[operator]
-    lists = "[c.A for c in cases], [c.B for c in cases], np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])"
+    lists = "[c.A for c in cases], [c.B for c in cases], "
+    lists += "np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])"
     for threads in (1, 2):
         rows = engine.distance(*columns, threads=threads).rows  # type: ignore[operator]
         if differ := same_bits(rows, singles):
@@ -479,7 +483,8 @@ def _world_failures(cases: list[Case], text: str, engine: Engine) -> Iterator[Fa
     world = engine.World()  # type: ignore[operator]
     for shape, X in bodies:
         world.add(shape, X)
-    text += "w = C.World()\nfor c in cases:\n    for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)):\n        isinstance(s, C.Halfspace) or w.add(s, X)\n"
+    text += "w = C.World()\nfor c in cases:\n    for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)):\n"
+    text += "        isinstance(s, C.Halfspace) or w.add(s, X)\n"
     limit = float(np.median([size_of(c) for c in cases])) * 0.1
     rows = world.distances(limit).rows
     found = {(int(row["a"]), int(row["b"])): row for row in rows}

@@ -82,7 +82,9 @@ CURVED = {
     "cone": (collide.Cone(1.0, 2.0), lambda x, y, z: abs(z) <= 1 and x * x + y * y <= ((1 - z) / 2) ** 2),
     "ellipsoid": (collide.Ellipsoid((0.5, 1, 2)), lambda x, y, z: 4 * x * x + y * y + z * z / 4 <= 1),
     "box": (collide.Box((1, 2, 3)), lambda x, y, z: 2 * abs(x) <= 1 and abs(y) <= 1 and 2 * abs(z) <= 3),
-    "capsule": (collide.Capsule(1.25, 2.0), lambda x, y, z: x * x + y * y + max(abs(z) - 1, 0) ** 2 <= Fraction(25, 16)),
+    "capsule": (
+        collide.Capsule(1.25, 2.0), lambda x, y, z: x * x + y * y + max(abs(z) - 1, 0) ** 2 <= Fraction(25, 16),
+    ),
     "corridor": (
         collide.HPolytope([[3, 1, 0], [-3, 0, 1], [0, 7, 1], [0, -1, 0], [1, 0, 3], [0, 0, -1]], [1, 1, 1, 1, 1, 1]),
         lambda x, y, z: 3 * x + y <= 1 and z - 3 * x <= 1 and 7 * y + z <= 1 and -y <= 1 and x + 3 * z <= 1 and -z <= 1,

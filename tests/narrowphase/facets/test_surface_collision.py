@@ -24,7 +24,8 @@ def test_all_pairs_are_those_of_brute_force(family):
         A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
         found = all_hits(A, B, X, Y)
         want = facet_pairs(va, fa, X, vb, fb, Y)
-        told = f"{family} {case}: va, fa, X, vb, fb, Y = {va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist()}"
+        asked = (va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist())
+        told = f"{family} {case}: va, fa, X, vb, fb, Y = {asked}"
         assert list(map(tuple, found.pairs.tolist())) == want, told
         first = first_hits(A, B, X, Y)
         assert len(first.pairs) == bool(want) and set(map(tuple, first.pairs.tolist())) <= set(want), told
