@@ -85,12 +85,14 @@ class PackedWorld:
         again.
         """
         self.X_WBs[bodies] = X_WBs
-        parts = bodies if self._all_of_one_part else self._parts_of(bodies)
+        parts: np.ndarray | slice = bodies if self._all_of_one_part else self._parts_of(bodies)
+        if len(bodies) == len(self.roster.ids):
+            parts = slice(None)  # all of them: nothing is gathered
         X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
         moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
-        before = self._poses.rows[parts, POSE_TERMS]
+        before = self._poses.rows[parts, POSE_TERMS].copy()
         has_terms = before >= 0.0
-        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
+        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # exact terms of products keep their places
             if has_terms.any():
                 self._poses.terms[before[has_terms].astype(np.int64)] = moved.terms
                 moved.rows[has_terms, POSE_TERMS] = before[has_terms]
