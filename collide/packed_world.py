@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
@@ -16,7 +19,7 @@ from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
 from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
-from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
+from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.world_bodies import Roster
 
@@ -270,6 +273,37 @@ class PackedWorld:
         spans[:, 0] += n_own
         spans = np.hstack([np.tile([0, n_own], (len(starts), 1)), spans])
         return combine(rows, starts, spans, table, poses, row_of)
+
+
+@dataclass(frozen=True)
+class QueryRecord:
+    """What `World.stats` of a query are made of, when they are asked for."""
+
+    packed: PackedWorld
+    n_candidates: int
+    hit: np.ndarray
+    how: np.ndarray
+    iterations: np.ndarray
+    convex_pairs: int
+    body_pairs: int
+    mesh_pairs: int
+    seconds: dict
+
+    def stats(self) -> dict:
+        """As `World.stats` says."""
+        roster = self.packed.roster
+        n = len(roster.ids)
+        skipped = count_skipped(roster.static, roster.group, roster.mask, self.packed.allowed)
+        pairs = n * (n - 1) // 2
+        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
+        return {
+            "bodies": n, "static": int(roster.static.sum()), "pairs": pairs, "skipped": skipped,
+            "narrowphase": self.body_pairs, "convex_pairs": self.convex_pairs, "mesh_pairs": self.mesh_pairs,
+            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
+            "how": dict(Counter(HOW[how] for how in self.how)),
+            "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
+            "epa_iterations": int((self.iterations >> 16).sum()), "seconds": self.seconds,
+        }  # fmt: skip
 
 
 def _distinct_shapes(shapes: Sequence[Shape]) -> tuple[np.ndarray, list[Shape]]:
