@@ -11,6 +11,7 @@ import math
 import re
 from typing import NoReturn
 
+from collide import __version__
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -32,9 +33,7 @@ class _Parser(argparse.ArgumentParser):
 
 class _Version(argparse.Action):
     def __call__(self, parser, namespace, values, option_string=None):
-        import collide
-
-        print(f"collide {collide.__version__}")
+        print(f"collide {__version__}")
         raise SystemExit(0)
 
 

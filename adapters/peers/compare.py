@@ -42,20 +42,41 @@ TOLERANCE = 1e-6
 class Disagreement:
     """One pair on which an engine and the reference differ, or an engine contradicts itself.
 
-    kind : "hit" (the booleans differ), "distance" (they do, by more than the tolerance, or the exact
-        one lies outside a proven bracket), "inside" (the engine sees surfaces that do not meet, and one body is
-        inside the other), "contradiction"
-        (the engine's boolean and its own distance do not go together, or its bracket is upside down), or "left out" (a
-        World reports no row where its own pair query finds one).
-    exact_hit, exact_distance : the verdict of exact arithmetic; None where it cannot tell. Of meshes that meet the
-        distance is None: nobody knows how deep they are.
-    lower, upper : the bracket that the reference proves; None where there is none, or where it has no end.
-    judged_by : exact arithmetic, or the bracket; empty where the pair is not judged, and then ``not_judged`` says why.
-    off : how far the engine's distance is from the exact one, or outside the bracket [m]; None where not judged.
-    touching : the pair touches within rounding; None where not judged.
-    wrong : the names of the engines that the verdict refutes.   proven, undecided : of those that claim
-        a proof, and of those that say themselves that the boolean is open.
-    distances in m, negative inside; None where an engine gives none.
+    Distances are in metres, negative inside; None where an engine gives none.
+
+    Parameters
+    ----------
+    engine : str
+        The one that differs.
+    kind : str
+        "hit": the booleans differ. "distance": the distances do, by more than the tolerance, or the exact one lies
+        outside a proven bracket. "inside": the engine sees surfaces that do not meet, and one body is inside the other.
+        "contradiction": the engine's boolean and its own distance do not go together, or its bracket is upside down.
+        "left out": a World reports no row where its own pair query finds one.
+    a, b : str
+        Names of the bodies.
+    size : float
+        Of the pair: the larger bounded body's diagonal [m].
+    reference_hit, reference_distance : bool, float, or None
+        What the reference answers; None where it was not asked.
+    hit, distance : bool, float or None
+        What the engine answers.
+    exact_hit, exact_distance : bool, float, or None
+        The verdict of exact arithmetic; None where it cannot tell. Of meshes that meet the distance is None.
+    lower, upper : float or None
+        The bracket that the reference proves [m]; None where there is none, or where it is unbounded.
+    judged_by : str
+        Exact arithmetic, or the bracket; empty where the pair is not judged.
+    off : float or None
+        How far the engine's distance is from the exact one, or outside the bracket [m]; None where not judged.
+    touching : bool or None
+        The pair touches within rounding; None where not judged.
+    not_judged : str
+        Why the pair is not judged; else empty.
+    wrong, proven, undecided : list of str
+        Engines that the verdict refutes, that claim a proof, and that say themselves that the boolean is open.
+    note : str
+        What the engine remarks.
     """
 
     engine: str
@@ -142,10 +163,22 @@ class Summary:
 
 @dataclass
 class Comparison:
-    """Plain data: what was asked, how each engine did, every disagreement.
+    """What was asked, how each engine did, and every disagreement, as plain data.
 
-    reference : the engine that the others are compared with.
-    summaries : the reference first, then the engines in the order asked for.
+    Parameters
+    ----------
+    reference : str
+        The engine that the others are compared with.
+    bodies, pairs : int
+        How many were asked about.
+    max_distance : float
+        The clearance of interest [m].
+    tolerance : float
+        Of distances, as a part of the pair's size.
+    summaries : list of Summary
+        The reference first, then the engines in the order asked for.
+    disagreements : list of Disagreement
+        Engine by engine, pairs in the order asked.
     """
 
     reference: str
@@ -158,8 +191,10 @@ class Comparison:
 
     @property
     def ours_wrong(self) -> int:
-        """Answers of the reference known to be wrong, or owed: refuted booleans and distances,
-        contradictions, and pairs on which it failed."""
+        """How many answers of the reference are known to be wrong, or owed.
+
+        Refuted booleans and distances, contradictions, and pairs on which it failed.
+        """
         ours = self.summaries[0]
         return ours.wrong + ours.wrong_distances + ours.contradictions + len(ours.failed)
 
@@ -169,20 +204,50 @@ class Comparison:
         return sum(s.wrong + s.wrong_distances + s.contradictions for s in self.summaries[1:])
 
     def summary(self, name: str) -> Summary:
+        """How one engine did.
+
+        Parameters
+        ----------
+        name : str
+            Of the engine.
+
+        Returns
+        -------
+        Summary
+            Its counts.
+
+        Raises
+        ------
+        InvalidArgument
+            Where it was not asked.
+        """
         for summary in self.summaries:
             if summary.engine == name:
                 return summary
         raise InvalidArgument(f"{name!r} was not asked; there are {', '.join(s.engine for s in self.summaries)}")
 
     def to_dict(self) -> dict:
-        """Plain data for JSON: dicts, lists, texts and finite numbers."""
+        """The comparison for JSON.
+
+        Returns
+        -------
+        dict
+            Of dicts, lists, texts and finite numbers.
+        """
         return asdict(self) | {"ours_wrong": self.ours_wrong, "peers_wrong": self.peers_wrong}
 
     def table(self) -> tuple[list[str], list[list[str]]]:
-        """Headers and rows of text for printing, one row per engine.
+        """The comparison as text for printing, one row per engine.
 
         "differ" counts booleans, "inside" those that differ because the engine sees surfaces only, "wrong distances"
         those off by more than the tolerance, "furthest off" the worst of them, "largest" differences both engines' own.
+
+        Returns
+        -------
+        headers : list of str
+            Of the columns.
+        rows : list of list of str
+            A cell a column.
         """
         headers = [
             "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
@@ -199,15 +264,35 @@ def compare(
 ) -> Comparison:
     """Ask every engine about every pair that the scene tests, and judge what they disagree on.
 
-    of : a Scene, a World, a Question, or (A, B, X_WA, X_WB) tuples.
-    engines : names from `protocol.ENGINES`; one whose package is missing is skipped with the reason.
-    reference : what the others are compared with.
-    max_distance : [m] the clearance of interest. Pairs with bounding boxes farther apart than this
-        and than a tenth of the scene are not asked, unless ``every_pair``.
-    tolerance : of distances, as a part of the pair's size.
-    timeout : how long an isolated engine may think about one pair [s].
+    Parameters
+    ----------
+    of : Scene, World, Question, or iterable of (A, B, X_WA, X_WB)
+        What is asked: shapes and their (4, 4) poses.
+    engines : sequence of str
+        Names from `collide.adapters.peers.protocol.ENGINES`; one whose package is missing is skipped with the reason.
+    reference : str
+        What the others are compared with.
+    max_distance : float
+        The clearance of interest [m]. Pairs with bounding boxes farther apart than this, and than a tenth of the scene,
+        are not asked.
+    tolerance : float
+        Of distances, as a part of the pair's size.
+    every_pair : bool
+        Ask far pairs too.
+    timeout : float
+        How long an isolated engine may take for one pair [s].
 
-    Raises InvalidArgument for unknown engines, MissingExtra where the reference itself is missing.
+    Returns
+    -------
+    Comparison
+        Plain data; every disagreement is judged by exact arithmetic, or by the proven bracket.
+
+    Raises
+    ------
+    InvalidArgument
+        For unknown engines.
+    MissingExtra
+        Where the reference itself is missing.
     """
     if isinstance(engines, str) or not all(isinstance(name, str) for name in engines):
         raise InvalidArgument(f"engines must be a sequence of names, got {engines!r}")

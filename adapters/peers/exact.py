@@ -74,8 +74,21 @@ class Depth:
 def world_points(P, R, t):
     """World vertices R p + t, exactly, as integers with a common exponent; O(n).
 
-    P: points in the body frame, shape (n, 3).  R: shape (3, 3).  t: shape (3,).
-    Returns (points, e): n integer 3-tuples; vertex i is points[i] * 2**e.
+    Parameters
+    ----------
+    P : (n, 3) array_like
+        Points in the body frame [m].
+    R : (3, 3) array_like
+        Its rotation in the world, taken as it stands.
+    t : (3,) array_like
+        Its origin in the world [m].
+
+    Returns
+    -------
+    points : list of n tuples of 3 int
+        Vertex i is points[i] · 2**e.
+    e : int
+        The exponent.
     """
     p, e_p = _integers(P)
     r, e_r = _integers(R)
@@ -86,11 +99,25 @@ def world_points(P, R, t):
 
 
 def hit(P, R1, t1, Q, R2, t2, radius_a=0.0, radius_b=0.0):
-    """Whether two bodies meet, each swept by a ball of its radius in the world frame.
+    """Whether two bodies meet, each swept by a ball in the world frame.
 
-    P, Q: shapes (n, 3), (m, 3).  R1, R2: shape (3, 3).  t1, t2: shape (3,).
-    They meet iff their cores are at most the sum of the radii, at least 0, apart.
-    Time O(k (n + m)), k iterations of GJK, about ten.
+    They meet iff their cores are at most the sum of the radii apart.
+
+    Parameters
+    ----------
+    P, Q : (n, 3), (m, 3) array_like
+        Vertices of the two polytopes in their own frames [m].
+    R1, R2 : (3, 3) array_like
+        Their rotations.
+    t1, t2 : (3,) array_like
+        Their origins in the world [m].
+    radius_a, radius_b : float
+        Of the balls [m], ≥ 0.
+
+    Returns
+    -------
+    bool
+        Exact. O(k (n + m)), k iterations of GJK, about ten.
     """
     A, B, e = _world_pair(P, R1, t1, Q, R2, t2)
     reach = _radius_sum(radius_a, radius_b)
@@ -99,10 +126,23 @@ def hit(P, R1, t1, Q, R2, t2, radius_a=0.0, radius_b=0.0):
 
 
 def distance(P, R1, t1, Q, R2, t2, digits=30):
-    """Distance of two bodies with closest points and a certificate: an `Answer`.
+    """Distance of two polytopes with closest points and a certificate.
 
-    P, Q: shapes (n, 3), (m, 3).  R1, R2: shape (3, 3).  t1, t2: shape (3,).
-    Time O(k (n + m)), k iterations of GJK, about ten.
+    Parameters
+    ----------
+    P, Q : (n, 3), (m, 3) array_like
+        Vertices of the two polytopes in their own frames [m].
+    R1, R2 : (3, 3) array_like
+        Their rotations.
+    t1, t2 : (3,) array_like
+        Their origins in the world [m].
+    digits : int
+        Of the square root.
+
+    Returns
+    -------
+    Answer
+        The exact square, its root, closest points and their proof. O(k (n + m)), k iterations of GJK, about ten.
     """
     A, B, e = _world_pair(P, R1, t1, Q, R2, t2)
     nearest = gjk(A, B)
@@ -115,11 +155,29 @@ def distance(P, R1, t1, Q, R2, t2, digits=30):
 
 
 def depth(P, R1, t1, Q, R2, t2, digits=30):
-    """Penetration depth of two bodies that meet, with a certificate: a `Depth`.
+    """Penetration depth of two polytopes that meet, with a certificate.
 
-    P, Q: shapes (n, 3), (m, 3).  R1, R2: shape (3, 3).  t1, t2: shape (3,).
-    Raises ValueError where the bodies are apart.  Time O(k (n + m + f)), k iterations of
-    EPA on a surface of at most f triangles.
+    Parameters
+    ----------
+    P, Q : (n, 3), (m, 3) array_like
+        Vertices of the two polytopes in their own frames [m].
+    R1, R2 : (3, 3) array_like
+        Their rotations.
+    t1, t2 : (3,) array_like
+        Their origins in the world [m].
+    digits : int
+        Of the square root.
+
+    Returns
+    -------
+    Depth
+        The exact square, its root, and their proof. O(k (n + m + f)), k iterations of EPA on a surface of at most f
+        triangles.
+
+    Raises
+    ------
+    ValueError
+        Where the bodies are apart.
     """
     A, B, e = _world_pair(P, R1, t1, Q, R2, t2)
     nearest = gjk(A, B)
@@ -129,13 +187,29 @@ def depth(P, R1, t1, Q, R2, t2, digits=30):
 
 
 def signed_distance(P, R1, t1, Q, R2, t2, digits=30, radius_a=0.0, radius_b=0.0):
-    """Gap of two swept bodies, or minus their depth where they overlap: a Decimal.
+    """Gap of two swept polytopes, or minus their depth where they overlap.
 
-    P, Q: shapes (n, 3), (m, 3).  R1, R2: shape (3, 3).  t1, t2: shape (3,).
-    radius_a, radius_b: radii of balls added in the world frame, at least 0; r their sum.
-    Cores apart: distance - r.  Cores that meet: -(depth + r), the exact penetration of
-    the sums, since a ball moves every supporting plane of A - B by r.  Where A - B has
-    no interior the core depth is 0, hence -r, and right.  Time: `distance` plus `depth`.
+    Cores apart: distance − r, with r the sum of the radii. Cores that meet: −(depth + r), the exact penetration of the
+    sums, since a ball moves every supporting plane of A − B by r. Where A − B has no interior the core depth is 0,
+    hence −r.
+
+    Parameters
+    ----------
+    P, Q : (n, 3), (m, 3) array_like
+        Vertices of the two polytopes in their own frames [m].
+    R1, R2 : (3, 3) array_like
+        Their rotations.
+    t1, t2 : (3,) array_like
+        Their origins in the world [m].
+    digits : int
+        Of the answer.
+    radius_a, radius_b : float
+        Of balls added in the world frame [m], ≥ 0.
+
+    Returns
+    -------
+    Decimal
+        [m]. Time of `distance` plus `depth`.
     """
     A, B, e = _world_pair(P, R1, t1, Q, R2, t2)
     reach = _radius_sum(radius_a, radius_b)
@@ -151,11 +225,31 @@ def signed_distance(P, R1, t1, Q, R2, t2, digits=30, radius_a=0.0, radius_b=0.0)
 
 
 def verify(answer, P, R1, t1, Q, R2, t2):
-    """Check an `Answer` or `Depth` on all vertices; ValueError says what is wrong.
+    """Check an `Answer` or `Depth` on all vertices.
 
-    The checks prove the value from both sides and share only arithmetic with GJK and EPA.
-    One exception: a `Depth` of 0 proves that one plane parts the interiors, not that the
-    bodies meet, which is for `distance` to prove.  Time O(n + m + triangles of the shell).
+    The checks prove the value from both sides and share only arithmetic with GJK and EPA. One exception: a `Depth` of 0
+    proves that one plane parts the interiors, not that the bodies meet, which is for `distance` to prove.
+
+    Parameters
+    ----------
+    answer : Answer or Depth
+        Of these bodies.
+    P, Q : (n, 3), (m, 3) array_like
+        Vertices of the two polytopes in their own frames [m].
+    R1, R2 : (3, 3) array_like
+        Their rotations.
+    t1, t2 : (3,) array_like
+        Their origins in the world [m].
+
+    Returns
+    -------
+    None
+        Where everything holds. O(n + m + triangles of the shell).
+
+    Raises
+    ------
+    ValueError
+        Saying what is wrong.
     """
     checks = _depth_checks if isinstance(answer, Depth) else _distance_checks
     for holds, reason in checks(answer, *_world_pair(P, R1, t1, Q, R2, t2)):

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from collide.adapters.peers import exact, exact_meshes
 from collide.adapters.peers.protocol import PairwisePeer, Reply
 from collide.adapters.peers.question import Body, convex_parts, corners
 from collide.errors import UnsupportedQuery
@@ -57,8 +58,6 @@ class ExactPeer(PairwisePeer):
             yield (_moved(points, poses), radius), body.X_WB
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:
-        from collide.adapters.peers import exact
-
         if isinstance(A, Mesh) or isinstance(B, Mesh):
             return _with_mesh(A, X_WA, B, X_WB)
         (P, radius_a), (Q, radius_b) = A, B
@@ -69,8 +68,6 @@ class ExactPeer(PairwisePeer):
 
 
 def _with_mesh(A, X_WA, B, X_WB) -> Reply:
-    from collide.adapters.peers import exact_meshes
-
     if math.prod(len(body.faces) if isinstance(body, Mesh) else 1 for body in (A, B)) > MAX_PAIRS:
         raise UnsupportedQuery("not judged: so many facets would take exact arithmetic in Python too long")
     a, b = (

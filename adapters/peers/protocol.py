@@ -52,6 +52,8 @@ ENGINES = {
     "pybullet": "collide.adapters.peers.pybullet_peer:PybulletPeer",
     "exact": "collide.adapters.peers.exact_peer:ExactPeer",
 }
+#: Asks one of them in a child process.
+_ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
 
 #: The note of meshes that meet, of engines that look at one pair of facets at a time.
 NO_DEPTH = "boolean only: it gives no depth of meshes"
@@ -100,8 +102,14 @@ class Event(NamedTuple):
 class Table:
     """Answers of one engine: ``rows`` of `TABLE_DTYPE` in the order asked, and ``reasons``.
 
-    reasons : one text per row; empty, or why there is no answer, or a remark about it.
-    engine, version : who answered.
+    ``reasons`` has one text per row: empty, or why there is no answer, or a remark about it.
+
+    Parameters
+    ----------
+    question : Question
+        What was asked.
+    engine, version : str
+        Who answers.
     """
 
     def __init__(self, question: Question, engine: str, version: str):
@@ -121,7 +129,13 @@ class Table:
         return f"Table({self.engine} {self.version}: {len(self)} rows, {counts})"
 
     def record(self, event: Event) -> None:
-        """Write one row's event down; distances that are no finite length are kept out, with a remark."""
+        """Write one row's event down; distances that are no finite length are dropped, with a remark.
+
+        Parameters
+        ----------
+        event : Event
+            About one row.
+        """
         row = self.rows[event.at]
         row["seconds"], row[event.kind] = event.seconds, True
         self.reasons[event.at] = event.reason
@@ -141,9 +155,18 @@ class Table:
 class Peer:
     """An engine behind the protocol.
 
-    name : as in `ENGINES`.   package : its distribution, None where collide brings it.
-    module : what to import.   isolated : ask it in a child process unless told otherwise, because
-    it can end the interpreter or prints where it should not.
+    Attributes
+    ----------
+    name
+        As in `ENGINES`.
+    package
+        Its distribution, None where collide brings it.
+    module
+        What to import.
+    isolated
+        Ask it in a child process by default, because it can end the interpreter, or prints where it should not.
+    hint
+        Added to the reason where the package is missing.
     """
 
     name = ""
@@ -162,20 +185,42 @@ class Peer:
             return "unknown"
 
     def missing(self) -> str | None:
-        """Why the engine cannot be asked here, or None where it can."""
+        """Why the engine cannot be asked here.
+
+        Returns
+        -------
+        str or None
+            None where it can.
+        """
         if self.module is None or find_spec(self.module) is not None:
             return None
         return f"{self.package} is not installed" + (f" ({self.hint})" if self.hint else "")
 
     def require(self) -> None:
-        """Raise `MissingExtra` where the engine's package is absent."""
+        """Complain where the engine's package is absent.
+
+        Raises
+        ------
+        MissingExtra
+            Naming the package and the extra that brings it.
+        """
         if self.missing():
             raise MissingExtra(str(self.package), extra="peers", purpose=f"ask the engine {self.name!r}")
 
     def supports(self, shape: Shape) -> str | None:
-        """Why the engine cannot hold this shape, or None where, by its kind, it can.
+        """Why the engine cannot hold a shape.
 
         A shape may still turn out unsupported when it is built: a hull of given points may be flat.
+
+        Parameters
+        ----------
+        shape : Shape
+            Any.
+
+        Returns
+        -------
+        str or None
+            None where, by its kind, it can.
         """
         for part, _ in convex_parts(shape, np.eye(4)):
             reason = self.refuses(part)
@@ -184,20 +229,61 @@ class Peer:
         return None
 
     def refuses(self, part: Shape) -> str | None:
-        """`supports` for one convex part."""
+        """`supports` for one convex part.
+
+        Parameters
+        ----------
+        part : Shape
+            Convex.
+
+        Returns
+        -------
+        str or None
+            The reason, or None.
+        """
         return None
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
-        """Answers to the rows wanted, in order, with BUILDING and ASKING announced between them."""
-        raise TypeError(f"{type(self).__name__} answers nothing: derive it from Peer and define stream")
+        """Answers to the rows wanted, in order, with BUILDING and ASKING announced between them.
 
-    def answer(self, question: Question) -> Table:
-        """The whole table.
+        Parameters
+        ----------
+        question : Question
+            Bodies and pairs.
+        wanted : iterable of int
+            Rows: pairs by their number in the question.
+
+        Returns
+        -------
+        iterator of Event
+            One that answers for each row.
 
         Raises
         ------
-        MissingExtra : the engine's package is not installed. What goes wrong with a single pair
-            stands in its row instead.
+        TypeError
+            Where a subclass does not define it.
+        """
+        raise TypeError(f"{type(self).__name__} answers nothing: derive it from Peer and define stream")
+
+    def answer(self, question: Question) -> Table:
+        """Answers to all pairs of a question.
+
+        What goes wrong with a single pair stands in its row.
+
+        Parameters
+        ----------
+        question : Question
+            Bodies and pairs.
+
+        Returns
+        -------
+        Table
+            A row a pair, in the order asked.
+
+        Raises
+        ------
+        MissingExtra
+            Where the engine's package is not installed.
         """
         self.require()
         table = Table(question, self.name, self.version)
@@ -285,24 +371,40 @@ def has_radius(part: Shape) -> bool:
 
 def load_engine(spec: str) -> Peer:
     """The engine that a ``module:class`` text names."""
+    return _named(spec)()
+
+
+def _named(spec: str) -> Any:
+    """A class that is found when it is first needed, as engines are: `ENGINES`."""
     module, _, name = spec.partition(":")
-    return getattr(import_module(module), name)()
+    return getattr(import_module(module), name)
 
 
 def engine(name: str, *, isolated: bool | None = None, timeout: float = 10.0) -> Peer:
     """An engine by its name in `ENGINES`.
 
-    isolated : ask it in a child process, so that a crash or a hang costs one pair; None leaves it
-        to the engine.
-    timeout : of a child's answer to one pair [s].
+    Parameters
+    ----------
+    name : str
+        For example "coal".
+    isolated : bool, optional
+        Ask it in a child process, so that a crash or a hang costs one pair; None leaves it to the engine.
+    timeout : float
+        Of a child's answer to one pair [s].
 
-    Raises InvalidArgument for an unknown name; a missing package shows when it is asked.
+    Returns
+    -------
+    Peer
+        A missing package shows when it is asked.
+
+    Raises
+    ------
+    InvalidArgument
+        For an unknown name.
     """
     if name not in ENGINES:
         raise InvalidArgument(f"no engine {name!r}; there are {', '.join(sorted(ENGINES))}")
     peer = load_engine(ENGINES[name])
     if peer.isolated if isolated is None else isolated:
-        from collide.adapters.peers.child import IsolatedPeer
-
-        return IsolatedPeer(ENGINES[name], timeout=timeout)
+        return _named(_ISOLATED)(ENGINES[name], timeout=timeout)
     return peer

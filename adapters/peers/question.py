@@ -36,12 +36,19 @@ class Body(NamedTuple):
 class Question:
     """The same question for every engine.
 
-    bodies : what is where; ids in tables are indices into this list.
-    pairs : (i, j), i < j, in the order in which answers come.
-    max_distance : [m] how far apart a pair may be and still be reported by a World.
-    allowed : pairs of ids that the scene never tests.
-    isolated : the pairs stand for themselves (bodies of different pairs may lie anywhere), so they
-        are asked one by one even of an engine that answers whole worlds.
+    Parameters
+    ----------
+    bodies : list of Body
+        What is where; ids in tables are indices into this list.
+    pairs : list of (i, j)
+        i < j, in the order in which answers come.
+    max_distance : float
+        How far apart a pair may be and still be reported by a World [m].
+    allowed : list of (i, j)
+        Pairs that the scene never tests.
+    isolated : bool
+        The pairs stand for themselves (bodies of different pairs may lie anywhere), so they are asked one by one even
+        of an engine that answers whole worlds.
     """
 
     bodies: list[Body]
@@ -52,7 +59,25 @@ class Question:
 
     @classmethod
     def from_pairs(cls, pairs: Iterable[tuple], max_distance: float = 0.0) -> Question:
-        """A question of unrelated pairs ``(A, B, X_WA, X_WB)``: two shapes and their (4, 4) poses."""
+        """A question of unrelated pairs.
+
+        Parameters
+        ----------
+        pairs : iterable of (A, B, X_WA, X_WB)
+            Two shapes and their (4, 4) poses each.
+        max_distance : float
+            [m]
+
+        Returns
+        -------
+        Question
+            Isolated: two bodies a pair.
+
+        Raises
+        ------
+        InvalidArgument
+            Where an item is no such tuple.
+        """
         bodies = []
         for k, item in enumerate(pairs):
             if len(item) != 4:
@@ -66,14 +91,24 @@ class Question:
 
     @classmethod
     def from_scene(cls, scene, max_distance: float = 0.0, *, every_pair: bool = False) -> Question:
-        """Every pair that the scene's own rules test, near enough to matter.
+        """A question of the pairs that a scene's own rules test, near enough to matter.
 
-        The rules are read from the description, not from a World, and no broadphase is asked: a
-        pair that the engine wrongly drops is still among the questions.
+        The rules are read from the description, not from a World, and no broadphase is asked: a pair that the engine
+        wrongly drops is still among the questions.
 
-        scene : a `collide.scenes.Scene`, or a `collide.World`.
-        every_pair : also ask pairs whose bounding boxes are farther apart than ``max_distance`` and
-            than a tenth of the scene.
+        Parameters
+        ----------
+        scene : Scene or World
+            Its bodies, filters and allowed pairs are taken over.
+        max_distance : float
+            The clearance of interest [m].
+        every_pair : bool
+            Also ask pairs whose bounding boxes are farther apart than ``max_distance`` and than a tenth of the scene.
+
+        Returns
+        -------
+        Question
+            Not isolated.
         """
         bodies, allowed = _read(scene)
         tested = _tested(bodies, allowed)
@@ -82,13 +117,30 @@ class Question:
         return cls(bodies, tested, max_distance, allowed)
 
     def sizes(self) -> list[float]:
-        """What "small" is measured against, pair by pair: the larger bounded body's diagonal [m]."""
+        """What "small" is measured against, pair by pair.
+
+        Returns
+        -------
+        list of float
+            The larger bounded body's diagonal [m]; 1 where neither is bounded.
+        """
         diagonals = [diagonal(*bounds(body)) for body in self.bodies]
         of_pairs = ([d for d in (diagonals[i], diagonals[j]) if np.isfinite(d)] for i, j in self.pairs)
         return [max(lengths, default=1.0) for lengths in of_pairs]
 
     def names(self, k: int) -> tuple[str, str]:
-        """Names of the bodies of pair k."""
+        """Names of the bodies of a pair.
+
+        Parameters
+        ----------
+        k : int
+            Number of the pair.
+
+        Returns
+        -------
+        (str, str)
+            A's and B's.
+        """
         i, j = self.pairs[k]
         return self.bodies[i].name, self.bodies[j].name
 

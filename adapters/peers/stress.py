@@ -21,6 +21,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
+import collide
 from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import InvalidArgument, UnsupportedQuery
@@ -128,7 +129,19 @@ class FamilyResult:
 
 @dataclass
 class StressTable:
-    """Plain data: who was asked what, one row a family, and every finding."""
+    """Who was asked what, one row a family, and every finding, as plain data.
+
+    Parameters
+    ----------
+    engine, version : str
+        Who was asked.
+    n, seed : int
+        Cases a family, and the seed they were made with.
+    families : list of FamilyResult
+        Counts and largest errors.
+    findings : list of Finding
+        Every refuted answer, with a snippet that repeats it.
+    """
 
     engine: str
     version: str
@@ -153,20 +166,39 @@ class StressTable:
         return sum(f.undecided for f in self.families)
 
     def to_dict(self) -> dict:
-        """Plain data for JSON, the findings' numbers included."""
+        """The table for JSON, the findings' numbers included.
+
+        Returns
+        -------
+        dict
+            Of dicts, lists, texts and finite numbers.
+        """
         return {**asdict(self), "wrong": self.wrong, "failed": self.failed, "undecided": self.undecided}
 
     def save(self, path) -> None:
-        """Write every finding to a JSON file, numbers and snippet."""
+        """Write every finding to a JSON file, numbers and snippet.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is overwritten.
+        """
         data = {"engine": self.engine, "version": self.version, "n": self.n, "seed": self.seed}
         text = json.dumps({**data, "findings": [asdict(f) for f in self.findings]}, indent=1, allow_nan=False)
         Path(path).write_text(text + "\n", encoding="utf-8")
 
     def table(self) -> tuple[list[str], list[list[str]]]:
-        """Headers and rows of text for printing, a row a family and one of totals.
+        """The table as text for printing, a row a family and one of totals.
 
-        "wrong" is followed by its largest gap as a part of L, p for false hits and n for false misses;
-        errors are parts of the exact value, the normal's excess of L.
+        "wrong" is followed by its largest gap as a part of L, p for false hits and n for false misses; errors are parts
+        of the exact value, the normal's excess of L.
+
+        Returns
+        -------
+        headers : list of str
+            Of the columns.
+        rows : list of list of str
+            A cell a column.
         """
         headers = [
             "family", "cases", "hits", "wrong", "undecided", "missed brackets", "failed", "unsupported",
@@ -176,7 +208,13 @@ class StressTable:
         return headers, [*rows, _printed(self.total())] if len(rows) > 1 else rows
 
     def total(self) -> FamilyResult:
-        """All families as one row."""
+        """All families as one row.
+
+        Returns
+        -------
+        FamilyResult
+            Named "all": counts added, the largest of errors.
+        """
         total = FamilyResult("all")
         for f in self.families:
             for name, value in vars(f).items():
@@ -193,13 +231,34 @@ def run(
     families: Iterable[str] | str | None = None, n: int = 40, seed: int = 0, engine: str = "collide", *,
     timeout: float = 10.0, progress: Callable[[FamilyResult], None] | None = None,
 ) -> StressTable:
-    """Ask one engine n cases of each family.
+    """Ask one engine n cases of each family, and judge every answer in exact arithmetic.
 
-    families : names of `collide.scenes.families`; None for all of them.
-    engine : a name of `protocol.ENGINES`.   timeout : of an isolated engine's answer to one case [s].
-    progress : called with each family's result as it comes.
+    Parameters
+    ----------
+    families : str or iterable of str, optional
+        Names of `collide.scenes.families`; None for all of them.
+    n : int
+        Cases a family.
+    seed : int
+        Other seeds make other cases.
+    engine : str
+        A name of `collide.adapters.peers.protocol.ENGINES`.
+    timeout : float
+        Of an isolated engine's answer to one case [s].
+    progress : callable, optional
+        Called with each family's result as it comes.
 
-    Raises InvalidArgument for unknown families and engines, MissingExtra where the engine is absent.
+    Returns
+    -------
+    StressTable
+        A row a family, and every refuted answer.
+
+    Raises
+    ------
+    InvalidArgument
+        For unknown families and engines.
+    MissingExtra
+        Where the engine is absent.
     """
     if engine not in ENGINES:
         raise InvalidArgument(f"no engine {engine!r}; there are {', '.join(sorted(ENGINES))}")
@@ -251,12 +310,10 @@ def _from_row(row, reason: str) -> Reply:
 
 def _ask_collide(case: Case | MeshCase) -> Reply:
     """The engine's boolean and its distance; an exception is a failure, whatever its kind."""
-    from collide import collide, distance
-
     try:
         question = case.shapes()
-        hit = bool(collide(*question))
-        row = distance(*question).rows[0]
+        hit = bool(collide.collide(*question))
+        row = collide.distance(*question).rows[0]
     except UnsupportedQuery as error:
         return Reply(unsupported=complaint(error))
     except Exception as error:  # noqa: BLE001 - any failure of the engine under test is a finding

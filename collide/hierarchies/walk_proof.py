@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from collide.kernels import kernel, view_f64, view_i32, view_i64
-from collide.narrowphase.gjk.minkowski_difference import difference_point, has_trees, settle_point
+from collide.narrowphase.gjk.minkowski_difference import difference_point, has_trees, height, settle_point
+from collide.numerics.vec3 import Vec3, divide
 
 # Integers of what is kept of R: addresses of centre and radius (4 doubles), of where each facet's triangles start,
 # and of the triangles (three vertices of R each).
@@ -33,15 +34,13 @@ def planes_apart(pair, points, ids, dx, dy, dz, error):
     span = math.sqrt(dx * dx + dy * dy + dz * dz)
     if not span > 0.0:
         return False
-    dx /= span
-    dy /= span
-    dz /= span
-    difference_point(pair, points, ids, 0, dx, dy, dz)
+    d = divide(Vec3(dx, dy, dz), span)
+    difference_point(pair, points, ids, 0, d)
     if has_trees(pair):
-        if points[0] * dx + points[1] * dy + points[2] * dz >= 0.0:
+        if height(points, 0, d) >= 0.0:
             return False  # a point that is there, farthest or not
-        settle_point(pair, points, ids, 0, dx, dy, dz)
-    return -(points[0] * dx + points[1] * dy + points[2] * dz) > 1.000001 * error
+        settle_point(pair, points, ids, 0, d)
+    return -height(points, 0, d) > 1.000001 * error
 
 
 @kernel

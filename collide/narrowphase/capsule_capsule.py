@@ -8,28 +8,60 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel
-from collide.narrowphase.gjk.minkowski_difference import POINT
+from collide.narrowphase.core_distance import CoreDistance
+from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, height, place_vertices, point_at
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    cross,
+    divide,
+    dot,
+    neg,
+    norm,
+    put_vec3,
+    scale,
+    sub,
+    unit_orthogonal,
+    vec3_at,
+)
+
+#: Segments are parallel where the sine of their angle is at most 1e-12.
+_PARALLEL = 1e-24
 
 
 @kernel
-def _square(points, s, t, weights, best):
-    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best so far."""
+def segment_cores(pair, work, error):
+    """The `CoreDistance` of two cores that are points or segments."""
+    points, weights = work.points, work.weights
+    for k in range(4):  # A0 − B0, A1 − B0, A0 − B1, A1 − B1
+        place_vertices(pair, points, work.ids, k, min(k & 1, pair.A.n - 1), min(k >> 1, pair.B.n - 1))
+    distance, lower = nearest_of_segments(points, weights)
+    if distance > error:
+        nhat = neg(vec3_at(weights, AXIS))
+        return CoreDistance(-distance, lower, distance, -math.inf, math.inf, nhat, 4, 4, 0)
+    nhat = _across_segments(points)
+    depth = -math.inf
+    for k in range(4):
+        depth = max(depth, height(points, k, nhat))
+    return CoreDistance(depth, -depth, distance, -math.inf, math.inf, nhat, 4, 4, 0)
+
+
+@kernel
+def _keep_nearer(points, s, t, weights, best):
+    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best square so far, which is returned."""
     w00 = (1.0 - s) * (1.0 - t)
     w10 = s * (1.0 - t)
     w01 = (1.0 - s) * t
     w11 = s * t
-    x = w00 * points[0] + w10 * points[POINT] + w01 * points[2 * POINT] + w11 * points[3 * POINT]
-    y = w00 * points[1] + w10 * points[POINT + 1] + w01 * points[2 * POINT + 1] + w11 * points[3 * POINT + 1]
-    z = w00 * points[2] + w10 * points[POINT + 2] + w01 * points[2 * POINT + 2] + w11 * points[3 * POINT + 2]
-    square = x * x + y * y + z * z
+    v = add(scale(w00, point_at(points, 0)), scale(w10, point_at(points, 1)))
+    v = add(add(v, scale(w01, point_at(points, 2))), scale(w11, point_at(points, 3)))
+    square = dot(v, v)
     if square < best:
         weights[0] = w00
         weights[1] = w10
         weights[2] = w01
         weights[3] = w11
-        weights[4] = x
-        weights[5] = y
-        weights[6] = z
+        put_vec3(weights, NEAREST_POINT, v)
         return square
     return best
 
@@ -53,112 +85,72 @@ def nearest_of_segments(points, weights):
     Returns (distance, lower bound of it from the plane through the nearest point).
 
     The minimum lies inside both segments or at an end of one of them: all five candidates are
-    compared, so parallel and degenerate segments are no special cases.
+    compared, so parallel and degenerate segments are no special cases (Ericson 2005, 5.1.9).
     """
-    ux = points[POINT] - points[0]
-    uy = points[POINT + 1] - points[1]
-    uz = points[POINT + 2] - points[2]
-    vx = points[2 * POINT] - points[0]
-    vy = points[2 * POINT + 1] - points[1]
-    vz = points[2 * POINT + 2] - points[2]
-    uu = ux * ux + uy * uy + uz * uz
-    vv = vx * vx + vy * vy + vz * vz
-    uv = ux * vx + uy * vy + uz * vz
-    pu = -(points[0] * ux + points[1] * uy + points[2] * uz)
-    pv = -(points[0] * vx + points[1] * vy + points[2] * vz)
+    p = point_at(points, 0)
+    u = sub(point_at(points, 1), p)
+    v = sub(point_at(points, 2), p)
+    uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
+    pu, pv = -dot(p, u), -dot(p, v)
     best = math.inf
-    best = _square(points, _clamp(pu, uu), 0.0, weights, best)
-    best = _square(points, _clamp(pu - uv, uu), 1.0, weights, best)
-    best = _square(points, 0.0, _clamp(pv, vv), weights, best)
-    best = _square(points, 1.0, _clamp(pv - uv, vv), weights, best)
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
-    square = nx * nx + ny * ny + nz * nz
+    best = _keep_nearer(points, _clamp(pu, uu), 0.0, weights, best)
+    best = _keep_nearer(points, _clamp(pu - uv, uu), 1.0, weights, best)
+    best = _keep_nearer(points, 0.0, _clamp(pv, vv), weights, best)
+    best = _keep_nearer(points, 1.0, _clamp(pv - uv, vv), weights, best)
+    n = cross(u, v)
+    square = dot(n, n)
     if square > 0.0:
         # p + s u + t v is nearest the origin where it is along n: the two triple products.
-        x = points[0]
-        y = points[1]
-        z = points[2]
-        s = (nx * (z * vy - y * vz) + ny * (x * vz - z * vx) + nz * (y * vx - x * vy)) / square
-        t = (nx * (y * uz - z * uy) + ny * (z * ux - x * uz) + nz * (x * uy - y * ux)) / square
+        s = dot(n, cross(v, p)) / square
+        t = dot(n, cross(p, u)) / square
         if 0.0 < s < 1.0 and 0.0 < t < 1.0:
-            best = _square(points, s, t, weights, best)
-    lower = _bound(points, weights, -math.inf, weights[4], weights[5], weights[6])
-    # The same direction to full precision, where the gap is tiny beside the segments: from the
-    # segments themselves (see `simplex.across_simplex`).
-    if nx * weights[4] + ny * weights[5] + nz * weights[6] < 0.0:
-        nx = -nx
-        ny = -ny
-        nz = -nz
-    lower = _bound(points, weights, lower, nx, ny, nz)
-    for turn in range(2):
-        ex = ux if turn == 0 else vx
-        ey = uy if turn == 0 else vy
-        ez = uz if turn == 0 else vz
-        square = uu if turn == 0 else vv
-        if square > 0.0:
-            dx = weights[4]
-            dy = weights[5]
-            dz = weights[6]
-            for _ in range(2):
-                along = (dx * ex + dy * ey + dz * ez) / square
-                dx -= along * ex
-                dy -= along * ey
-                dz -= along * ez
-            lower = _bound(points, weights, lower, dx, dy, dz)
-    return math.sqrt(best), lower
+            best = _keep_nearer(points, s, t, weights, best)
+    return math.sqrt(best), _best_bound(points, weights, u, v, n)
 
 
 @kernel
-def _bound(points, weights, lower, dx, dy, dz):
+def _best_bound(points, weights, u, v, n):
+    """The greatest lower bound of the distance from planes across the nearest point, n = u × v, and u and v."""
+    nearest = vec3_at(weights, NEAREST_POINT)
+    lower = _raised_bound(points, weights, -math.inf, nearest)
+    # The same direction to full precision, where the gap is tiny beside the segments: from the
+    # segments themselves (see `simplex.across_simplex`).
+    lower = _raised_bound(points, weights, lower, neg(n) if dot(n, nearest) < 0.0 else n)
+    for turn in range(2):
+        e = u if turn == 0 else v
+        square = dot(e, e)
+        if square > 0.0:
+            d = nearest
+            for _ in range(2):
+                d = sub(d, scale(dot(d, e) / square, e))
+            lower = _raised_bound(points, weights, lower, d)
+    return lower
+
+
+@kernel
+def _raised_bound(points, weights, lower, d):
     """The lower bound, raised by the least value of the four differences along d, and its axis with it."""
-    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    length = norm(d)
     if length == 0.0:
         return lower
     least = math.inf
     for k in range(4):
-        at = POINT * k
-        least = min(least, dx * points[at] + dy * points[at + 1] + dz * points[at + 2])
+        least = min(least, height(points, k, d))
     if not least / length > lower:
         return lower
-    weights[7] = dx / length
-    weights[8] = dy / length
-    weights[9] = dz / length
+    put_vec3(weights, AXIS, divide(d, length))
     return least / length
 
 
 @kernel
-def across_segments(points):
-    """A unit vector orthogonal to both segments: the way out where their cores meet."""
-    ux = points[POINT] - points[0]
-    uy = points[POINT + 1] - points[1]
-    uz = points[POINT + 2] - points[2]
-    vx = points[2 * POINT] - points[0]
-    vy = points[2 * POINT + 1] - points[1]
-    vz = points[2 * POINT + 2] - points[2]
-    nx = uy * vz - uz * vy
-    ny = uz * vx - ux * vz
-    nz = ux * vy - uy * vx
-    uu = ux * ux + uy * uy + uz * uz
-    vv = vx * vx + vy * vy + vz * vz
-    square = nx * nx + ny * ny + nz * nz
-    if square > 1e-24 * uu * vv:
-        length = math.sqrt(square)
-        return nx / length, ny / length, nz / length
-    if uu < vv:
-        ux = vx
-        uy = vy
-        uz = vz
-        uu = vv
-    if uu == 0.0:
-        return 0.0, 0.0, 1.0
-    # Parallel: across the longer one, in the plane of its two largest coordinates.
-    if abs(ux) <= abs(uy) and abs(ux) <= abs(uz):
-        length = math.sqrt(uy * uy + uz * uz)
-        return 0.0, -uz / length, uy / length
-    if abs(uy) <= abs(uz):
-        length = math.sqrt(ux * ux + uz * uz)
-        return uz / length, 0.0, -ux / length
-    length = math.sqrt(ux * ux + uy * uy)
-    return -uy / length, ux / length, 0.0
+def _across_segments(points):
+    """A unit vector orthogonal to both segments: the direction of least penetration where their cores meet."""
+    u = sub(point_at(points, 1), point_at(points, 0))
+    v = sub(point_at(points, 2), point_at(points, 0))
+    n = cross(u, v)
+    uu, vv, square = dot(u, u), dot(v, v), dot(n, n)
+    if square > _PARALLEL * uu * vv:
+        return divide(n, math.sqrt(square))
+    if uu == 0.0 and vv == 0.0:
+        return Vec3(0.0, 0.0, 1.0)
+    return unit_orthogonal(v if uu < vv else u)  # parallel: across the longer one

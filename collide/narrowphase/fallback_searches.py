@@ -11,9 +11,24 @@ import math
 
 import numpy as np
 
-from collide.kernels import address_of, entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels import address_of, entry, kernel, view_i64
 from collide.narrowphase.convex_pairs import answer_pairs
-from collide.narrowphase.rows import BEYOND, CERTIFIED, DISTANCE, HIT, HOW, LOWER, NORMAL, POINT_A, POINT_B, ROW, UPPER
+from collide.narrowphase.rows import (
+    BEYOND,
+    CERTIFIED,
+    DISTANCE,
+    HIT,
+    HOW,
+    LOWER,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    ROW,
+    UPPER,
+    is_undecided,
+    view_row,
+)
+from collide.numerics.vec3 import add, put_vec3, scale, sub, vec3_at
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 #: (boolean, depths) of `answer_pairs`: the search for the sign, for a depth, and for a gap.
@@ -29,64 +44,65 @@ def settle_by_other_searches(
     tables : addresses of the shapes' integers and numbers, the poses' rows and terms, and which shape a part is.
     workspace : addresses of doubles and integers.
     """
-    own = (boolean, depths and not boolean)
+    already_run = (boolean, depths and not boolean)
     for search in (_SIGN, _DEPTH, _GAP):
-        left = np.flatnonzero(rows["how"] == UNDECIDED)
-        if search == own or not len(left):
+        open_rows = np.flatnonzero(rows["how"] == UNDECIDED)
+        n = len(open_rows)
+        if search == already_run or n == 0:
             continue
-        told, asked = np.zeros(len(left), dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[left])
-        answer_pairs(*tables, address_of(asked), len(asked), *search, False, limit, address_of(told), *workspace)
-        take_told(address_of(rows), address_of(left), address_of(told), len(left), search == _SIGN, limit)
+        found, asked = np.zeros(n, dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[open_rows])
+        answer_pairs(*tables, address_of(asked), n, *search, False, limit, address_of(found), *workspace)
+        take_proven(address_of(rows), address_of(open_rows), address_of(found), n, search == _SIGN, limit)
 
 
 @entry("int64(int64, int64, int64, int64, boolean, float64)")
-def take_told(rows_at, left_at, told_at, n, sign, limit):
+def take_proven(rows_at, open_at, found_at, n, sign, limit):
     """Take over what another search has proven of n open rows; returns how many it has.
 
-    left : int64, the numbers of the rows.   told : rows of `answer_pairs`.   sign : the search was for the sign alone.
+    open : int64, the numbers of the open rows.   found : rows of `answer_pairs`.   sign : the search was for the sign alone.
     """
-    left = view_i64(left_at, n)
-    proven = 0
+    open_rows = view_i64(open_at, n)
+    n_proven = 0
     for k in range(n):
-        told = view_i64(told_at + ROW * k, ROW // 8)
-        marks = view_u8(told_at + ROW * k, ROW)
-        if marks[HOW] == UNDECIDED:
+        found_row_at = found_at + ROW * k
+        found = view_row(found_row_at)
+        if is_undecided(found):
             continue
-        proven += 1
-        row_at = rows_at + ROW * left[k]
-        if sign or marks[HIT] != 0:
-            _take_sign(view_f64(row_at, 12), view_u8(row_at, ROW), view_f64(told_at + ROW * k, 12), marks, limit)
+        n_proven += 1
+        row_at = rows_at + ROW * open_rows[k]
+        if sign or found.flags[HIT] != 0:
+            _take_sign(view_row(row_at), found, limit)
         else:  # a gap, with all that is known of one
-            row = view_i64(row_at, ROW // 8)
+            source, target = view_i64(found_row_at, ROW // 8), view_i64(row_at, ROW // 8)
             for i in range(ROW // 8):
-                row[i] = told[i]
-    return proven
+                target[i] = source[i]
+    return n_proven
 
 
 @kernel
-def _take_sign(row, marks, told, told_marks, limit):
+def _take_sign(row, found, limit):
     """Take over whether the bodies meet, and what follows for the bracket; the points stay about their middle."""
-    hit = told_marks[HIT] != 0
-    marks[HOW] = told_marks[HOW]
-    marks[HIT] = told_marks[HIT]
-    if hit:
-        row[UPPER] = min(row[UPPER], 0.0)
+    doubles, flags = row.doubles, row.flags
+    flags[HOW] = found.flags[HOW]
+    flags[HIT] = found.flags[HIT]
+    if found.flags[HIT] != 0:
+        doubles[UPPER] = min(doubles[UPPER], 0.0)
     else:
-        row[LOWER] = max(row[LOWER], told[LOWER])
-        row[UPPER] = max(row[UPPER], row[LOWER])
-    beyond = row[LOWER] > limit
-    marks[BEYOND] = 1 if beyond else 0
+        doubles[LOWER] = max(doubles[LOWER], found.doubles[LOWER])
+        doubles[UPPER] = max(doubles[UPPER], doubles[LOWER])
+    beyond = doubles[LOWER] > limit
+    flags[BEYOND] = 1 if beyond else 0
     if beyond:
-        marks[CERTIFIED] = 1
-        row[DISTANCE] = row[LOWER] + 0.0
-        row[UPPER] = math.inf
+        flags[CERTIFIED] = 1
+        doubles[DISTANCE] = doubles[LOWER] + 0.0
+        doubles[UPPER] = math.inf
     else:
-        row[DISTANCE] = min(max(row[DISTANCE], row[LOWER]), row[UPPER]) + 0.0
-    for axis in range(3):
-        gap = row[DISTANCE] * row[NORMAL + axis]
-        missing = 0.5 * (gap - (row[POINT_B + axis] - row[POINT_A + axis]))
-        row[POINT_A + axis] -= missing
-        row[POINT_B + axis] += missing
+        doubles[DISTANCE] = min(max(doubles[DISTANCE], doubles[LOWER]), doubles[UPPER]) + 0.0
+    p_a, p_b = vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B)
+    gap = scale(doubles[DISTANCE], vec3_at(doubles, NORMAL))
+    missing = scale(0.5, sub(gap, sub(p_b, p_a)))
+    put_vec3(doubles, POINT_A, sub(p_a, missing))
+    put_vec3(doubles, POINT_B, add(p_b, missing))
 
 
 def lay_points_apart(rows: np.ndarray, moved: np.ndarray) -> None:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, view_f64, view_i32, view_u8
+from collide.kernels import entry, kernel
 from collide.narrowphase.rows import (
     BODY_B,
     CERTIFIED,
     DISTANCE,
     HIT,
-    HOW,
     LOWER,
     NORMAL,
     POINT_A,
     POINT_B,
     ROW,
     UPPER,
+    is_undecided,
+    view_row,
 )
-from collide.results import UNDECIDED
+from collide.numerics.vec3 import Vec3, add, put_vec3, scale, vec3_at
 
 
 @entry("boolean(int64, int64, boolean)")
@@ -27,32 +28,30 @@ def close_rows(rows_at, n, depths):
 
     numpy took 100 ns a row for it, as long as some gaps take.
     """
-    endless = False
+    unbounded = False
     for k in range(n):
-        at = rows_at + ROW * k
-        row = view_f64(at, 12)
-        view_i32(at, ROW // 4)[BODY_B] = 1
+        row = view_row(rows_at + ROW * k)
+        row.words[BODY_B] = 1
         if not depths:
-            forget_depth(row, view_u8(at, ROW))
-        endless = endless or row[DISTANCE] == -math.inf
-    return endless
+            forget_depth(row)
+        unbounded = unbounded or row.doubles[DISTANCE] == -math.inf
+    return unbounded
 
 
 @kernel(inline=True)
-def forget_depth(row, marks):
+def forget_depth(row):
     """An overlap becomes distance 0 at a point of both bodies; its bracket is 0, too, unless the sign is open."""
-    if not row[LOWER] > 0.0:
-        row[LOWER] = 0.0
-    if marks[HIT] == 0:
+    if not row.doubles[LOWER] > 0.0:
+        row.doubles[LOWER] = 0.0
+    if row.flags[HIT] == 0:
         return
-    row[DISTANCE] = 0.0
-    for axis in range(3):
-        row[NORMAL + axis] = 0.0
-        middle = 0.5 * (row[POINT_A + axis] + row[POINT_B + axis])
-        row[POINT_A + axis] = middle
-        row[POINT_B + axis] = middle
-    if marks[HOW] != UNDECIDED:
-        row[UPPER] = 0.0
-        marks[CERTIFIED] = 1
+    row.doubles[DISTANCE] = 0.0
+    put_vec3(row.doubles, NORMAL, Vec3(0.0, 0.0, 0.0))
+    middle = scale(0.5, add(vec3_at(row.doubles, POINT_A), vec3_at(row.doubles, POINT_B)))
+    put_vec3(row.doubles, POINT_A, middle)
+    put_vec3(row.doubles, POINT_B, middle)
+    if is_undecided(row):
+        row.flags[CERTIFIED] = 0
     else:
-        marks[CERTIFIED] = 0
+        row.doubles[UPPER] = 0.0
+        row.flags[CERTIFIED] = 1

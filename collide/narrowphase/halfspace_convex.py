@@ -1,4 +1,4 @@
-"""A half-space against anything convex, and against another half-space, in closed form."""
+"""A half-space against anything convex, in closed form: one support query, and the last digits of a height."""
 
 from __future__ import annotations
 
@@ -6,79 +6,112 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
-from collide.narrowphase.gap.precise_pair import (
-    HEIGHT_ERROR,
-    add_products,
-    is_composed,
-    is_refinable,
-    unit_scale,
-)
+from collide.lowering.packed_convex import POINTS
+from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.gap.precise_pair import HEIGHT_ERROR, add_products, is_composed, is_refinable, unit_scale
 from collide.narrowphase.gap.tied_vertices import MAX_TIES, tied_vertices, vertices_of
+from collide.narrowphase.posed_pair import radius_of
+from collide.narrowphase.rows import CERTIFIED, HOW, write_vectors, write_verdict, write_vertices
 from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD, DDVec3
 from collide.numerics.error_free import two_product, two_sum
-from collide.numerics.vec3 import column_at, divide, dot, rotate_back
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    column_at,
+    cross,
+    divide,
+    dot,
+    neg,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
+from collide.results import FORMULA, UNDECIDED
+from collide.support.support_mapping import settled_vertex, support
+
+
+class Plane(NamedTuple):
+    """A half-space {x : normal·(x − p_WA) ≤ offset} in the world's axes.   length : |normal|."""
+
+    normal: Vec3
+    offset: float
+    length: float
 
 
 @kernel
-def plane_in_world(numbers, at, poses, p):
-    """(n, offset, |n|): the half-space at a pose is {x : n·(x − p_WA) ≤ offset}, n in W's axes.
+def plane_in_world(pair, body):
+    """The `Plane` of a posed half-space.
 
     The image of {y : m·y ≤ b} under y ↦ R y + p is {x : m·R⁻¹(x − p) ≤ b}. R⁻¹ is the adjugate over
     the determinant, for the matrix as it stands, not its transpose: n = cof(R) m, offset = b·det R.
     """
-    a = poses[p]
-    b = poses[p + 1]
-    c = poses[p + 2]
-    d = poses[p + 3]
-    e = poses[p + 4]
-    f = poses[p + 5]
-    g = poses[p + 6]
-    h = poses[p + 7]
-    i = poses[p + 8]
-    c0 = e * i - f * h
-    c1 = f * g - d * i
-    c2 = d * h - e * g
-    m0 = numbers[at]
-    m1 = numbers[at + 1]
-    m2 = numbers[at + 2]
-    nx = c0 * m0 + c1 * m1 + c2 * m2
-    ny = (c * h - b * i) * m0 + (a * i - c * g) * m1 + (b * g - a * h) * m2
-    nz = (b * f - c * e) * m0 + (c * d - a * f) * m1 + (a * e - b * d) * m2
-    offset = numbers[at + 3] * (a * c0 + b * c1 + c * c2)
-    return nx, ny, nz, offset, math.sqrt(nx * nx + ny * ny + nz * nz)
+    p = body.pose_at
+    r0, r1, r2 = vec3_at(pair.poses, p), vec3_at(pair.poses, p + 3), vec3_at(pair.poses, p + 6)
+    cofactors = cross(r1, r2)
+    m = vec3_at(pair.numbers, body.params_at)
+    n = Vec3(dot(cofactors, m), dot(cross(r2, r0), m), dot(cross(r0, r1), m))
+    return Plane(n, pair.numbers[body.params_at + 3] * dot(r0, cofactors), math.sqrt(dot(n, n)))
 
 
 @kernel
-def reach_of_plane(numbers, at, poses, p):
+def reach_of_plane(pair, body):
     """(distance of the plane from the frame's origin, skew): what a half-space adds to S, and by what errors grow.
 
     n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; a matrix that is no rotation may make that much of |n|.
     """
-    _, _, _, offset, length = plane_in_world(numbers, at, poses, p)
+    plane = plane_in_world(pair, body)
     row = 0.0
     for k in range(3):
-        r = p + 3 * k
-        row = max(row, poses[r] * poses[r] + poses[r + 1] * poses[r + 1] + poses[r + 2] * poses[r + 2])
-    m0 = numbers[at]
-    m1 = numbers[at + 1]
-    m2 = numbers[at + 2]
-    m = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
-    skew = max(row * m / length, 1.0)
-    return max(abs(offset), abs(numbers[at + 3]) * row * math.sqrt(row)) / length, skew
+        r = vec3_at(pair.poses, body.pose_at + 3 * k)
+        row = max(row, dot(r, r))
+    m = vec3_at(pair.numbers, body.params_at)
+    skew = max(row * math.sqrt(dot(m, m)) / plane.length, 1.0)
+    offset = pair.numbers[body.params_at + 3]
+    return max(abs(plane.offset), abs(offset) * row * math.sqrt(row)) / plane.length, skew
 
 
 @kernel
-def opposite_halfspaces(numbers, at_a, p, at_b, q, poses):
-    """(whether the outward normals are opposite within rounding, also of composed poses; nhat_A)."""
-    ax, ay, az, _, length_a = plane_in_world(numbers, at_a, poses, p)
-    bx, by, bz, _, length_b = plane_in_world(numbers, at_b, poses, q)
-    cx = ay * bz - az * by
-    cy = az * bx - ax * bz
-    cz = ax * by - ay * bx
-    across = math.sqrt(cx * cx + cy * cy + cz * cz)
-    opposite = ax * bx + ay * by + az * bz < 0.0 and across <= 512.0 * 2.0**-53 * length_a * length_b
-    return opposite, ax / length_a, ay / length_a, az / length_a
+def halfspace_convex(ordered, query, row, work):
+    """Write the row of a half-space A and a convex set B: the point of B's core deepest behind the plane, moved by the radius."""
+    pair = ordered.pair
+    A, B, poses = pair.A, pair.B, pair.poses
+    distance, skew = reach_of_plane(pair, A)
+    size = ordered.size + distance
+    error = ERROR * size * skew + ordered.slop
+    plane = plane_in_world(pair, A)
+    nhat = divide(plane.normal, plane.length)
+    g = neg(rotate_back(poses, B.pose_at, nhat))
+    k, x, y, z, _ = support(B.kind, B.coords, B.n, B.padded, pair.numbers, B.params_at, B.tree, 0, -1, g.x, g.y, g.z)
+    corner = Vec3(x, y, z)
+    if B.tree != 0:
+        k = settled_vertex(B.coords, B.n, B.padded, B.tree, k, g.x, g.y, g.z)
+        corner = column_at(B.coords, B.padded, k)
+    b = rotate(poses, B.pose_at, corner)
+    radius = radius_of(pair, B)
+    gap = dot(add(b, pair.t), nhat) - plane.offset / plane.length - radius
+    lower = gap - error
+    upper = gap + error
+    decided = lower > 0.0 or upper <= 0.0
+    exact_numbers = ordered.exact_numbers and B.kind == POINTS
+    if exact_numbers and lower <= query.limit and not query.boolean:
+        refined = refine_height(pair, work.fine_at, work.ties_at, k, size, error, skew)
+        if refined.proven:
+            bracket = dd.bracket(dd.sub(refined.height, DD(radius, 0.0)), refined.error)
+            gap = bracket.nearest
+            lower = max(lower, bracket.lower)
+            upper = min(upper, bracket.upper)
+    width = 0.0 if exact_numbers and not query.boolean else math.inf
+    write_verdict(row, gap, lower, upper, FORMULA, width, query.limit)
+    if exact_numbers and (not decided or (row.flags[CERTIFIED] == 0 and not query.boolean)):
+        row.flags[HOW] = UNDECIDED  # the exact stage settles the sign, or the last digits
+    p_WBb = add(b, sub(vec3_at(poses, B.pose_at + 9), scale(radius, nhat)))
+    write_vectors(row, nhat, sub(p_WBb, scale(gap, nhat)), p_WBb, ordered.flip)
+    work.ids[0] = -1
+    work.ids[1] = k
+    write_vertices(row, work.ids, 1, ordered.flip)
 
 
 @kernel(inline=True)
@@ -92,8 +125,9 @@ def _cofactor(poses, p, i, j):
 
 
 @kernel
-def _put_fine_plane(numbers, at, poses, p, plane):
-    """`plane_in_world` in double-doubles: n and the offset, eight doubles."""
+def _put_fine_plane(pair, plane):
+    """`plane_in_world` of A in double-doubles: n and the offset, eight doubles."""
+    numbers, at, poses, p = pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at
     for i in range(4):
         total = DD(0.0, 0.0)
         for j in range(3):
@@ -130,13 +164,13 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
     doubles_at, ties_at : workspace of eight doubles, MAX_TIES + 1 integers.
     Composed poses are left to the exact stage.
     """
-    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
-    p, q = A.pose_at, B.pose_at
+    B, poses = pair.B, pair.poses
+    p, q = pair.A.pose_at, B.pose_at
     if is_composed(poses, p) or is_composed(poses, q) or not is_refinable(size):
         return RefinedHeight(False, DD(0.0, 0.0), 0.0)
     plane = view_f64(doubles_at, 8)
     ties = view_i64(ties_at, MAX_TIES + 1)
-    _put_fine_plane(numbers, A.params_at, poses, p, plane)
+    _put_fine_plane(pair, plane)
     normal = dd.vec3_at(plane, 0)
     length = dd.sqrt(dd.inner(normal, normal))
     if not (2.0**-300 < length.high < 2.0**300):

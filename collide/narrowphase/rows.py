@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
-from collide.results import PAIR_DTYPE, UNDECIDED
+from collide.numerics.vec3 import put_vec3
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 
 
 def _at(field: str, unit: int) -> int:
@@ -24,80 +26,103 @@ COUNT, HOW, EXACT_ROUNDS, HIT = _at("count", 1), _at("how", 1), _at("exact", 1),
 CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
 
 
-@kernel(inline=True)
-def open_row(row_at):
-    """`view_row`, and the row names no vertices."""
-    row, words, marks = view_row(row_at)
-    for k in range(4):
-        words[VERTICES_A + k] = -1
-        words[VERTICES_B + k] = -1
-    return row, words, marks
+class Row(NamedTuple):
+    """Views of one row of `PAIR_DTYPE`.
+
+    doubles : distance, bracket, normal, witness points.   words : 32-bit integers.   flags : bytes: how, hit, certified, beyond.
+    """
+
+    doubles: Any
+    words: Any
+    flags: Any
 
 
 @kernel(inline=True)
 def view_row(row_at):
-    """A row's doubles, words and bytes."""
-    return view_f64(row_at, 12), view_i32(row_at, ROW // 4), view_u8(row_at, ROW)
+    return Row(view_f64(row_at, 12), view_i32(row_at, ROW // 4), view_u8(row_at, ROW))
 
 
 @kernel(inline=True)
-def write_vectors(row, nx, ny, nz, ax, ay, az, bx, by, bz, flip):
-    """Normal and witness points of the pair as asked, from those of the pair as worked on."""
+def is_undecided(row):
+    return row.flags[HOW] == UNDECIDED
+
+
+@kernel(inline=True)
+def is_open(row):
+    """Whether the row is left to the exact stage, or refused."""
+    return row.flags[HOW] == UNDECIDED or row.flags[HOW] == REFUSED
+
+
+@kernel(inline=True)
+def clear_vertices(row):
+    """The row names no vertices."""
+    for k in range(4):
+        row.words[VERTICES_A + k] = -1
+        row.words[VERTICES_B + k] = -1
+    row.flags[COUNT] = 0
+
+
+@kernel(inline=True)
+def open_row(row_at):
+    """`view_row`, and the row names no vertices."""
+    row = view_row(row_at)
+    clear_vertices(row)
+    return row
+
+
+@kernel(inline=True)
+def write_vectors(row, nhat, p_a, p_b, flip):
+    """Normal and witness points of the pair as asked, from those of the pair as worked on (exchanged if ``flip``)."""
     sign = -1.0 if flip else 1.0
-    row[NORMAL] = sign * nx + 0.0
-    row[NORMAL + 1] = sign * ny + 0.0
-    row[NORMAL + 2] = sign * nz + 0.0
-    first = POINT_B if flip else POINT_A
-    second = POINT_A if flip else POINT_B
-    row[first] = ax
-    row[first + 1] = ay
-    row[first + 2] = az
-    row[second] = bx
-    row[second + 1] = by
-    row[second + 2] = bz
+    row.doubles[NORMAL] = sign * nhat.x + 0.0
+    row.doubles[NORMAL + 1] = sign * nhat.y + 0.0
+    row.doubles[NORMAL + 2] = sign * nhat.z + 0.0
+    put_vec3(row.doubles, POINT_B if flip else POINT_A, p_a)
+    put_vec3(row.doubles, POINT_A if flip else POINT_B, p_b)
 
 
 @kernel(inline=True)
-def write_vertices(words, marks, ids, n, flip):
-    first = VERTICES_B if flip else VERTICES_A
-    second = VERTICES_A if flip else VERTICES_B
-    marks[COUNT] = n
+def write_vertices(row, ids, n, flip):
+    """Name n vertex pairs: ``ids`` holds a vertex of A and one of B a pair, as worked on."""
+    at_a = VERTICES_B if flip else VERTICES_A
+    at_b = VERTICES_A if flip else VERTICES_B
+    row.flags[COUNT] = n
     for k in range(n):
-        words[first + k] = ids[2 * k]
-        words[second + k] = ids[2 * k + 1]
+        row.words[at_a + k] = ids[2 * k]
+        row.words[at_b + k] = ids[2 * k + 1]
 
 
 @kernel(inline=True)
-def write_decision(row, marks, distance, lower, upper, how, limit):
+def write_decision(row, distance, lower, upper, how, limit):
     """`write_verdict` where the sign is known and nothing more is promised."""
-    row[LOWER] = lower
-    row[UPPER] = upper if lower <= limit else math.inf
-    row[DISTANCE] = (min(max(distance, lower), upper) if lower <= limit else lower) + 0.0
-    marks[HOW] = how
-    marks[HIT] = 0 if lower > 0.0 else 1
-    marks[CERTIFIED] = 1
-    marks[BEYOND] = 1 if lower > limit else 0
+    row.doubles[LOWER] = lower
+    row.doubles[UPPER] = upper if lower <= limit else math.inf
+    row.doubles[DISTANCE] = (min(max(distance, lower), upper) if lower <= limit else lower) + 0.0
+    row.flags[HOW] = how
+    row.flags[HIT] = 0 if lower > 0.0 else 1
+    row.flags[CERTIFIED] = 1
+    row.flags[BEYOND] = 1 if lower > limit else 0
 
 
 @kernel(inline=True)
-def write_verdict(row, marks, distance, lower, upper, how, width, limit):
+def write_verdict(row, distance, lower, upper, how, width, limit):
     """The numbers and flags of a row; rounding must not put the distance outside its own bracket.
 
-    width : what is promised beyond the relative width of `bounds.py`, in metres.
+    width : what is promised beyond the relative width of `bounds.py`, in metres.   limit : the query's max_distance.
     """
-    row[LOWER] = lower
-    row[UPPER] = upper
+    row.doubles[LOWER] = lower
+    row.doubles[UPPER] = upper
     distance = min(max(distance, lower), upper) + 0.0  # never −0.0
-    row[DISTANCE] = distance
+    row.doubles[DISTANCE] = distance
     width = max(width, PROMISE_GAP * distance if distance > 0.0 else -PROMISE_DEPTH * distance)
     if distance != 0.0:
         width = max(width, PROMISE_SUBNORMAL)
     decided = lower > 0.0 or upper <= 0.0
-    marks[HOW] = how if decided else UNDECIDED
-    marks[HIT] = 0 if lower > 0.0 else 1
-    marks[CERTIFIED] = 1 if decided and upper - lower <= width else 0
-    marks[BEYOND] = 1 if lower > limit else 0
+    row.flags[HOW] = how if decided else UNDECIDED
+    row.flags[HIT] = 0 if lower > 0.0 else 1
+    row.flags[CERTIFIED] = 1 if decided and upper - lower <= width else 0
+    row.flags[BEYOND] = 1 if lower > limit else 0
     if lower > limit:
-        row[DISTANCE] = lower
-        row[UPPER] = math.inf
-        marks[CERTIFIED] = 1
+        row.doubles[DISTANCE] = lower
+        row.doubles[UPPER] = math.inf
+        row.flags[CERTIFIED] = 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, prepared, view_f64, view_i32, view_i64, view_u8
+from collide.kernels import entry, kernel, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.finalize_rows import forget_depth
 from collide.narrowphase.pose_batches import (
@@ -22,8 +22,7 @@ from collide.narrowphase.pose_batches import (
     answer_at,
     set_pose,
 )
-from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, HOW, ROW
-from collide.results import REFUSED, UNDECIDED
+from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, ROW, is_open, view_row
 
 
 @kernel
@@ -45,10 +44,10 @@ def _single(header_at, XA_at, XB_at, boolean, depths, row_at):
             depths, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip
-    marks = view_u8(row_at, ROW)
-    if marks[HOW] == UNDECIDED or marks[HOW] == REFUSED:
+    row = view_row(row_at)
+    if is_open(row):
         return -1
-    return int(marks[HIT])
+    return int(row.flags[HIT])
 
 
 @entry(prepared.BOOLEAN, nogil=False)
@@ -68,10 +67,9 @@ def collide_single(header_at, XA_at, XB_at):
 def distance_single(header_at, XA_at, XB_at, row_at, depths):
     """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1, too,
     where the depth has no end."""
-    said = _single(header_at, XA_at, XB_at, False, depths, row_at)
-    view_i32(row_at, ROW // 4)[BODY_B] = 1
-    if not depths and said >= 0:
-        forget_depth(view_f64(row_at, 12), view_u8(row_at, ROW))
-    if view_f64(row_at, 1 + DISTANCE)[DISTANCE] == -math.inf:
-        said = -1
-    return said
+    hit = _single(header_at, XA_at, XB_at, False, depths, row_at)
+    row = view_row(row_at)
+    row.words[BODY_B] = 1
+    if not depths and hit >= 0:
+        forget_depth(row)
+    return -1 if row.doubles[DISTANCE] == -math.inf else hit

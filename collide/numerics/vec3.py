@@ -122,3 +122,16 @@ def rotate_back(R, at, a):
         R[at + 1] * a.x + R[at + 4] * a.y + R[at + 7] * a.z,
         R[at + 2] * a.x + R[at + 5] * a.y + R[at + 8] * a.z,
     )
+
+
+@kernel
+def unit_orthogonal(a):
+    """A unit vector orthogonal to a ≠ 0, made from its two largest coordinates."""
+    if abs(a.x) <= abs(a.y) and abs(a.x) <= abs(a.z):
+        length = math.sqrt(a.y * a.y + a.z * a.z)
+        return Vec3(0.0, -a.z / length, a.y / length)
+    if abs(a.y) <= abs(a.z):
+        length = math.sqrt(a.x * a.x + a.z * a.z)
+        return Vec3(a.z / length, 0.0, -a.x / length)
+    length = math.sqrt(a.x * a.x + a.y * a.y)
+    return Vec3(-a.y / length, a.x / length, 0.0)

@@ -13,6 +13,9 @@ from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 
+import collide
+from collide.cache_folder import cache_folder, why_distrusted
+from collide.kernels import library, mode
 from collide.reports.number_format import count, widths
 from collide.reports.progress import silent
 from collide.reports.report import versions
@@ -109,8 +112,6 @@ def _installed() -> list[Check]:
 
 def _kernels() -> list[Check]:
     """How kernels run here, and what of."""
-    from collide.kernels import library, mode
-
     about = library.about()
     if mode.MODE == mode.COMPILED:
         checks = [Check("kernels", f"compiled, level {about['level']} of {about['levels']}")]
@@ -145,17 +146,12 @@ def _optional() -> list[Check]:
 
 
 def _caches() -> list[Check]:
-    from collide.cache_folder import cache_folder
-    from collide.kernels import mode
-
     kernels = _kept_kernels() if mode.MODE == mode.JUST_IN_TIME else []
     return [*kernels, _cache("prepared inputs", cache_folder("scenes"))]
 
 
 def _kept_kernels() -> list[Check]:
     """Of kernels compiled just in time."""
-    from collide.cache_folder import cache_folder, why_distrusted
-
     folder = cache_folder("kernels")
     try:
         why = why_distrusted(folder)
@@ -205,8 +201,6 @@ def _answers() -> list[Check]:
 
 def _known_pairs():
     """(name, A, B, where B stands along x [m], true signed distance [m])."""
-    import collide
-
     box, sphere = collide.Box((1.0, 1.0, 1.0)), collide.Sphere(0.5)
     hull = collide.ConvexHull([(-0.5, 0, 0), (0.5, 0.5, 0), (0.5, -0.5, 0.5), (0.5, -0.5, -0.5)])
     yield "two spheres apart", sphere, sphere, 3.0, 2.0
@@ -219,8 +213,6 @@ def _known_pairs():
 
 
 def _ask(what: str, A, B, x: float, truth: float) -> Check:
-    import collide
-
     X_WB = collide.pose((x, 0.0, 0.0))
     r = collide.distance(A, B, collide.pose(), X_WB)
     hit = collide.collide(A, B, collide.pose(), X_WB)

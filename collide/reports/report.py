@@ -14,7 +14,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+import collide
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.kernels import mode
 from collide.reports import classes, proofs
 from collide.reports import mesh_notes as meshes
 from collide.reports.number_format import brief_length, count
@@ -276,9 +278,6 @@ def _seconds(scene, stats: dict, start: float, tested: float, started: float | N
 
 def versions() -> dict[str, str | None]:
     """What gave the answer; None for a package whose version cannot be told."""
-    import collide
-    from collide.kernels import mode
-
     return {
         "collide": collide.__version__,
         "python": platform.python_version(),

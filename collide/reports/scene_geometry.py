@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import UnsupportedQuery
+from collide.reports.classes import body_sizes
 from collide.shapes.tessellation import tessellate
 
 
@@ -61,6 +62,4 @@ def _parameters(shape) -> dict:
 
 
 def _extent(scene) -> float:
-    from collide.reports.classes import body_sizes
-
     return float(body_sizes(scene.bodies).max(initial=0.0)) or 1.0

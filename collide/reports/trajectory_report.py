@@ -14,6 +14,7 @@ import numpy as np
 
 from collide.errors import InvalidArgument, SceneError, UnsupportedQuery
 from collide.reports import classes
+from collide.reports.number_format import brief_length, count
 from collide.reports.progress import silent
 
 #: Largest change of a joint [rad] or [m] between two samples, unless another is asked for.
@@ -278,8 +279,6 @@ def _finite(value) -> float | None:
 
 def verdict(trajectory: dict) -> str:
     """A trajectory in one line."""
-    from collide.reports.number_format import brief_length, count
-
     if not trajectory["moving"]:
         return f"the trajectory moves no body: {count(trajectory['samples'], 'sample')} at one place"
     first, least = trajectory["first_collision"], trajectory["least"]

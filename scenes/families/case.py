@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.shapes import ConvexHull, Halfspace
+
 HULLS, HALFSPACE = KINDS = "hulls", "halfspace"
 #: Above this many points a snippet asks the generator instead of listing them.
 MAX_POINTS_LISTED = 160
@@ -76,8 +78,6 @@ class Case(NamedTuple):
 
     def shapes(self) -> tuple:
         """(A, B, X_WA, X_WB) as `collide.distance` takes them: two shapes and two (4, 4) poses."""
-        from collide.shapes import ConvexHull, Halfspace
-
         plane = self.kind == HALFSPACE
         A = Halfspace(self.P[0], self.offset) if plane else ConvexHull(self.P, radius=self.radius_a)
         return A, ConvexHull(self.Q, radius=self.radius_b), _matrix(self.R1, self.t1), _matrix(self.R2, self.t2)

@@ -10,6 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from collide.adapters.peers import exact
 from collide.scenes.families.case import Case
 
 #: A gap this much off, relative to itself, is set again; the translation's rounding is the limit.
@@ -21,8 +22,6 @@ def measure(case: Case) -> tuple[float, np.ndarray]:
 
     Where the hulls touch, or one is flat, the normal is that of a plane between them.
     """
-    from collide.adapters.peers import exact
-
     arguments = case[2:8]
     apart = exact.distance(*arguments)
     if not apart.hit:

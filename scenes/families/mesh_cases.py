@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.scenes.families.ingredients import EXACT_ROTATIONS, rotation
+from collide.shapes import Mesh
 
 
 class Surface(NamedTuple):
@@ -38,8 +39,6 @@ class MeshCase(NamedTuple):
 
     def shapes(self) -> tuple:
         """(A, B, X_WA, X_WB) as `collide.distance` takes them."""
-        from collide.shapes import Mesh
-
         A, B = (Mesh(s.vertices, s.faces, solid=s.solid) for s in (self.a, self.b))
         return A, B, self.a.X, self.b.X
 

@@ -15,8 +15,11 @@ from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
+from collide.scenes.loaders import moveit, scene_yaml, states, urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.files import starts_like_xml
+from collide.scenes.loaders.mesh_shapes import part_shape
+from collide.scenes.loaders.xml_text import parse_xml
 
 FORMATS = (
     "URDF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
@@ -52,17 +55,39 @@ def load(
 ) -> Scene:
     """A scene from one file, several files together, or the name of a shipped scene.
 
-    state : the name of a state the files define, a file of joint values, or joint -> value.
-    robot : for MoveIt planning scenes: the robot or its URDF.
-    srdf : the SRDF of a URDF; None looks beside it, False does without.
-    meshes : "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
-        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two
-        leave out.
-    package_path : folders in which ``package://`` names are looked for first.
-    scale : factor on the vertices of mesh files given directly, 0.001 for millimetres.
-    missing_meshes : "error", or "skip": links whose mesh is absent are not checked, which is noted.
+    Parameters
+    ----------
+    path : str or Path
+        A URDF (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene file (docs/scene-format.md), or
+        the name of a shipped scene.
+    *more_paths
+        Further files of the same scene.
+    state : str, Path or mapping of str to float, optional
+        The name of a state that the files define, a file of joint values, or joint → value [rad or m].
+    robot : Robot, str or Path, optional
+        For MoveIt planning scenes: the robot, or its URDF.
+    srdf : str, Path or bool, optional
+        The SRDF of a URDF; None looks beside it, False does without.
+    meshes : {"mesh", "hull", "pieces"}
+        "mesh": triangles as they are, a `collide.Mesh`, solid where they close; "hull": the convex hull of the
+        vertices; "pieces": a union of convex pieces (coacd). Each body's ``approximation`` says what the last two leave
+        out.
+    package_path : str, Path or iterable of them
+        Folders in which ``package://`` names are looked for first.
+    scale : float, optional
+        Factor on the vertices of mesh files that are named directly: 0.001 for millimetres.
+    missing_meshes : {"error", "skip"}
+        "skip": links whose mesh is absent are not checked, which is noted.
 
-    Raises SceneError (and InvalidShape, InvalidPose, MissingExtra) naming file, element and value.
+    Returns
+    -------
+    Scene
+        With everything in metres and radians, at the state named or the default configuration.
+
+    Raises
+    ------
+    SceneError, InvalidShape, InvalidPose, MissingExtra
+        Naming file, element and value.
     """
     started = time.perf_counter()
     options = Options(robot, srdf, meshes, tuple(_paths(package_path)), scale, missing_meshes)
@@ -108,9 +133,7 @@ def _in_state(scene: Scene, state: str | Path | Mapping[str, float]) -> Scene:
     if isinstance(state, Path) or (
         isinstance(state, str) and state not in scene.states and _exists(Path(state)) and not Path(state).is_dir()
     ):
-        from collide.scenes.loaders.states import read_state
-
-        path, state = state, read_state(state)
+        path, state = state, states.read_state(state)
     else:
         path = None
     try:
@@ -134,9 +157,7 @@ def _load_one(path: Path, options: Options) -> Scene:
 
 
 def _load_xml(path: Path, options: Options) -> Scene:
-    from collide.scenes.loaders import urdf
-
-    root = urdf.parse_xml(path, [])
+    root = parse_xml(path, [])
     if root.tag == "mujoco":
         raise SceneError("is an MJCF model (<mujoco>): MJCF is not read yet; export the model as URDF", path=path)
     if root.tag in ("sdf", "world"):
@@ -153,8 +174,6 @@ def _load_xml(path: Path, options: Options) -> Scene:
 
 
 def _load_document(path: Path, options: Options) -> Scene:
-    from collide.scenes.loaders import moveit, scene_yaml, states
-
     data = read_document(path)
     if moveit.is_planning_scene(data):
         return moveit.load_planning_scene(
@@ -178,8 +197,6 @@ def load_meshes(path: Path, options: Options) -> Scene:
     scale = 1.0 if options.scale is None else options.scale
     if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not np.isfinite(scale) or scale == 0:
         raise SceneError(f"scale must be a finite number other than 0, got {scale!r}")
-    from collide.scenes.loaders.mesh_shapes import part_shape
-
     started = time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib.util
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,45 +15,13 @@ import numpy as np
 
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import mesh_cache as cache
+from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
 from collide.scenes.loaders.triangles import SUFFIXES, MeshBytes, open_mesh, triangles_of
-from collide.shapes.shape import Shape
 
 #: What a mesh may become: itself, the hull of its vertices, or a union of convex pieces.
 OPTIONS = ("mesh", "hull", "pieces")
 #: A mesh whose volume is this much of its hull's is its hull.
 CONVEX_RATIO = 1.0 - 1e-6
-
-
-@dataclass
-class MeshPart:
-    """One mesh of a file.
-
-    points : (n, 3) distinct vertices that faces use, in the file's world frame and units.
-    fill : of hulls: volume of the mesh over the volume of its hull; NaN where it has none (open, or scipy is absent).
-    closed : watertight, with consistent winding; of a mesh taken as it is: whether it is a solid.
-    faces : how many triangles.
-    pieces : the convex pieces as point sets, where a decomposition was asked for.
-    facets : (faces, 3) rows of ``points``, as the file has them, where the mesh is taken as it is.
-    own_hull : these are exactly the surface of their convex hull.   made : shapes made of it, by scale.
-    """
-
-    name: str
-    points: np.ndarray
-    fill: float
-    closed: bool
-    faces: int
-    pieces: list[np.ndarray] | None = None
-    facets: np.ndarray | None = None
-    own_hull: bool = False
-    made: dict[tuple, Shape] = field(default_factory=dict)
-
-
-@dataclass
-class MeshFile:
-    """The parts of a mesh file, and what its reader wants to say."""
-
-    parts: list[MeshPart]
-    notes: list[str]
 
 
 def read_mesh(path: Path, meshes: str = "mesh") -> MeshFile:
@@ -152,18 +119,10 @@ def _describe(
 
 
 def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> MeshPart:
-    from collide.scenes.loaders.mesh_shapes import described
-
     try:
         return described(label, vertices, faces)
     except InvalidShape as error:
         raise SceneError(str(error), path=path, element=None if label == path.name else label) from None
-
-
-def distinct(vertices: np.ndarray) -> np.ndarray:
-    """Every point once, in the order of first appearance; −0.0 and 0.0 are one number."""
-    _, first = np.unique(vertices + 0.0, axis=0, return_index=True)
-    return np.ascontiguousarray(vertices[np.sort(first)] + 0.0)
 
 
 def _volumes(vertices: np.ndarray, faces: np.ndarray, path: Path) -> tuple[bool, float]:

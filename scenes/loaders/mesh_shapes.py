@@ -13,7 +13,8 @@ import numpy as np
 
 from collide.errors import InvalidShape, SceneError
 from collide.mesh.convex_surface import is_own_hull
-from collide.scenes.loaders.mesh_file import CONVEX_RATIO, MeshFile, MeshPart
+from collide.scenes.loaders.mesh_file import CONVEX_RATIO
+from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
@@ -102,24 +103,6 @@ def inline_shape(vertices: np.ndarray, faces: np.ndarray, meshes: str, place: st
     return Taken(hull, f"hull of {len(hull.points)} vertices of a mesh in the file")
 
 
-def described(name: str, vertices: np.ndarray, faces: np.ndarray) -> MeshPart:
-    """A part that is to be taken as it is: equal vertices joined, and looked at. Raises InvalidShape."""
-    points, ids = _welded(vertices, faces)
-    mesh = Mesh(points, ids)
-    own_hull = mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
-    return MeshPart(name, points, np.nan, mesh.solid, len(ids), facets=mesh.faces, own_hull=own_hull)
-
-
-def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices that facets use, every point once in the order of first appearance, and facets by these."""
-    corners = vertices[faces.ravel()] + 0.0  # −0.0 and 0.0 are one number
-    _, first, inverse = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return np.ascontiguousarray(corners[first[order]]), rank[inverse.ravel()].reshape(-1, 3).astype(np.int32)
-
-
 def _as_it_is(part: MeshPart, factors: np.ndarray) -> Shape:
     key = tuple(factors.tolist())
     if key not in part.made:
@@ -151,8 +134,6 @@ def _joined(parts: list[MeshPart]) -> MeshPart:
 
 
 def _joined_points(parts: list[MeshPart]) -> MeshPart:
-    from collide.scenes.loaders.mesh_file import distinct
-
     points = distinct(np.concatenate([part.points for part in parts]))
     return MeshPart(parts[0].name, points, np.nan, False, sum(part.faces for part in parts))
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, brief
+from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
+from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 from collide.shapes import (
     Box,
     Capsule,
@@ -121,9 +123,6 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
 
 
 def _mesh(fields: Fields, mesh: Callable) -> Described:
-    from collide.scenes.loaders import mesh_file as mesh_loader
-    from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
-
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
     file = mesh(fields.text("file"), fields.place("file"), taken)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from collide.errors import SceneError, cut, listing
+from collide.scenes.loaders.xml_text import parse_xml
 
 
 @dataclass
@@ -26,8 +27,6 @@ def read_srdf(path: Path, links: list[str], joints: list[str]) -> Semantics:
 
     Entries about links or joints the robot does not have are left out and noted.
     """
-    from collide.scenes.loaders.urdf import parse_xml
-
     semantics = Semantics()
     root = parse_xml(path, semantics.notes)
     if root.tag != "robot":

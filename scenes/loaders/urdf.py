@@ -8,7 +8,6 @@ there. Visual, inertial and transmission elements are not looked at. The SRDF be
 from __future__ import annotations
 
 import math
-import re
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
@@ -23,8 +22,10 @@ from collide.robot import Joint, LinkShape, Mimic, Robot
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.fields import placed
-from collide.scenes.loaders.files import is_file, read_bytes
+from collide.scenes.loaders.files import is_file
 from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
+from collide.scenes.loaders.srdf import read_srdf
+from collide.scenes.loaders.xml_text import parse_xml
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
 from collide.shapes.shape import Shape
 from collide.transforms import pose
@@ -93,8 +94,6 @@ def find_srdf(urdf: Path, robot_name: str | None, srdf) -> Path | None:
 
 
 def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
-    from collide.scenes.loaders.srdf import read_srdf
-
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
         reading.fail("<robot>", "has no <link>" + _expand_advice(root))
@@ -129,52 +128,6 @@ def _note_unchecked(root: ET.Element, geometry: dict, reading: Reading) -> None:
 
 
 # --- XML ----------------------------------------------------------------------------------------
-
-
-def parse_xml(path: Path, notes: list[str]) -> ET.Element:
-    """The root of an XML file, its own default namespace taken off.
-
-    Prefixes nobody declared are common in files made by hand from xacro; they are tolerated, since
-    no element of URDF, SRDF or MJCF has a prefix, and noted. What is not XML at all is refused.
-    """
-    blob = read_bytes(path).lstrip()  # blanks before <?xml ...?> are common, and harmless
-    try:
-        root = ET.fromstring(blob)
-    except ET.ParseError as error:
-        if "unbound prefix" not in str(error):
-            raise SceneError(f"is not well-formed XML: {error}", path=path) from None
-        root = _with_prefixes_declared(blob, path, notes)
-    except (ValueError, LookupError) as error:
-        raise SceneError(f"cannot be decoded as XML: {error}", path=path) from None
-    if root.tag.startswith("{"):
-        namespace = root.tag[: root.tag.index("}") + 1]
-        for element in root.iter():
-            if isinstance(element.tag, str) and element.tag.startswith(namespace):
-                element.tag = element.tag[len(namespace) :]
-    foreign = sorted({element.tag.rsplit("}", 1)[-1] for element in root.iter() if str(element.tag).startswith("{")})
-    if foreign:
-        notes.append(f"elements of another namespace were not read: {listing(foreign)}")
-    return root
-
-
-def _with_prefixes_declared(blob: bytes, path: Path, notes: list[str]) -> ET.Element:
-    text = blob.decode("utf-8", errors="replace")
-    used = set(re.findall(r"</?([A-Za-z_][\w.-]*):[A-Za-z_]", text))
-    used |= set(re.findall(r"\s([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*=", text))
-    declared = set(re.findall(r"xmlns:([A-Za-z_][\w.-]*)\s*=", text))
-    unbound = sorted(used - declared - {"xml", "xmlns"})
-    start = re.search(r"<(?![?!])[^\s/>]+", text)
-    if start is None or not unbound:
-        raise SceneError("is not well-formed XML: a prefix is not declared", path=path)
-    names = "".join(f' xmlns:{prefix}="undeclared:{prefix}"' for prefix in unbound)
-    try:
-        root = ET.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text[: start.end()]) + names + text[start.end() :])
-    except ET.ParseError as error:
-        raise SceneError(
-            f"is not well-formed XML, even with the prefix {listing(unbound)} declared: {error}", path=path
-        ) from None
-    notes.append(f"XML prefix not declared: {listing(unbound)}; what carries it was not read")
-    return root
 
 
 def _expand_advice(root: ET.Element) -> str:

@@ -50,8 +50,8 @@ def distance_single_union(header_at, XA_at, XB_at, row_at, depths):
     the depth is infinite."""
     if not _answer(header_at, XA_at, XB_at, False, depths, row_at):
         return -1
-    row, words, marks = view_row(row_at)
-    words[BODY_B] = 1
+    row = view_row(row_at)
+    row.words[BODY_B] = 1
     if not depths:
-        forget_depth(row, marks)
-    return -1 if row[DISTANCE] == -math.inf else 0
+        forget_depth(row)
+    return -1 if row.doubles[DISTANCE] == -math.inf else 0

@@ -7,154 +7,131 @@ took 27 wrong depths in 9,264 lattice poses.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.narrowphase.bounds import EPA_VERTICES
-from collide.narrowphase.gjk.minkowski_difference import POINT, copy_point, difference_point
+from collide.narrowphase.gjk.minkowski_difference import copy_point, difference_point, point_at
+from collide.narrowphase.gjk.simplex import signed_volume
+from collide.numerics.vec3 import Vec3, add, cross, divide, dot, neg, norm, scale, sub, unit_orthogonal
 
-#: Centres as near as this, in units of S, tell no direction.
+#: Centres as near as this, in units of S, have no direction from one to the other.
 _CENTRED = 2.0**-20
-#: Cosine of directions that need not be told apart.
-_ALIKE = 0.9
-#: How far around the way out three points are looked for: sines.
+#: Cosine of directions that count as the same.
+_SAME_DIRECTION = 0.9
+#: How far around the direction of least penetration three points are looked for: sines.
 _NARROWEST, _WIDEST = 0.35, 0.9
 _HALF_ROOT = math.sqrt(0.75)
 #: Least volume of four points to begin with, times six, in units of S³.
-_SPACIOUS = 2.0**-16
+_LEAST_VOLUME = 2.0**-16
+
+
+class Extremes(NamedTuple):
+    """rank : dimension of what points 0 … 3 span, as far as rounding can tell.   nhat : where less than 3, across it."""
+
+    rank: int
+    nhat: Vec3
 
 
 @kernel
-def extremal_tetrahedron(pair, points, ids, error, again):
-    """Points 0..3 become an extremal tetrahedron; returns (rank found, n) with n across what is flat.
+def extremal_tetrahedron(pair, points, ids, error, start):
+    """Points 0..3 become an extremal tetrahedron; returns `Extremes`.
 
-    again : 0 for the axes of the world, else other ones, so that another tetrahedron is found.
+    start : 0 for the axes of the world, else other ones, so that another tetrahedron is found.
     """
     spare = EPA_VERTICES
-    least = math.inf
-    most = -math.inf
-    # The farthest pair among extremes of the axes, by the axis of greatest width.
-    askew = 0.375 * again
-    for axis in range(3):
-        d0 = 1.0 if axis == 0 else askew
-        d1 = 1.0 if axis == 1 else askew
-        d2 = 1.0 if axis == 2 else askew
-        difference_point(pair, points, ids, spare, d0, d1, d2)
-        difference_point(pair, points, ids, spare + 1, -d0, -d1, -d2)
-        one = POINT * spare
-        other = POINT * (spare + 1)
-        width = d0 * (points[one] - points[other])
-        width += d1 * (points[one + 1] - points[other + 1])
-        width += d2 * (points[one + 2] - points[other + 2])
-        if width > most:
-            most = width
-            copy_point(points, ids, spare, 0)
-            copy_point(points, ids, spare + 1, 1)
-        least = min(least, width)
-    if most <= 8.0 * error:
-        return 0, 0.0, 0.0, 1.0
-    ex = points[POINT] - points[0]
-    ey = points[POINT + 1] - points[1]
-    ez = points[POINT + 2] - points[2]
-    ux, uy, uz = _across(ex, ey, ez)
-    length = math.sqrt(ex * ex + ey * ey + ez * ez)
-    ex /= length
-    ey /= length
-    ez /= length
+    if _farthest_pair(pair, points, ids, 0.375 * start) <= 8.0 * error:
+        return Extremes(0, Vec3(0.0, 0.0, 1.0))
+    e = sub(point_at(points, 1), point_at(points, 0))
+    u = unit_orthogonal(e)
+    e = divide(e, norm(e))
     farthest = -1.0
-    nx = ux
-    ny = uy
-    nz = uz
+    n = u
     for turn in range(4):
         if turn > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
-            ux, uy, uz = ey * uz - ez * uy, ez * ux - ex * uz, ex * uy - ey * ux
-        difference_point(pair, points, ids, spare, ux, uy, uz)
-        qx = points[POINT * spare] - points[0]
-        qy = points[POINT * spare + 1] - points[1]
-        qz = points[POINT * spare + 2] - points[2]
-        cx = ey * qz - ez * qy
-        cy = ez * qx - ex * qz
-        cz = ex * qy - ey * qx
-        height = math.sqrt(cx * cx + cy * cy + cz * cz)
-        if height > farthest:
-            farthest = height
+            u = cross(e, u)
+        difference_point(pair, points, ids, spare, u)
+        across = cross(e, sub(point_at(points, spare), point_at(points, 0)))
+        distance = norm(across)
+        if distance > farthest:
+            farthest = distance
             copy_point(points, ids, spare, 2)
-            nx = cx
-            ny = cy
-            nz = cz
+            n = across
     if farthest <= 8.0 * error:
-        ux, uy, uz = _across(ex, ey, ez)
-        return 1, ux, uy, uz
-    nx /= farthest
-    ny /= farthest
-    nz /= farthest
-    difference_point(pair, points, ids, 3, nx, ny, nz)
-    difference_point(pair, points, ids, spare, -nx, -ny, -nz)
-    above = _height(points, 3, nx, ny, nz)
-    below = -_height(points, spare, nx, ny, nz)
+        return Extremes(1, unit_orthogonal(e))
+    n = divide(n, farthest)
+    difference_point(pair, points, ids, 3, n)
+    difference_point(pair, points, ids, spare, neg(n))
+    above = _height(points, 3, n)
+    below = -_height(points, spare, n)
     if below > above:
         copy_point(points, ids, spare, 3)
     if above <= 8.0 * error and below <= 8.0 * error:
-        return 2, nx, ny, nz
-    return 3, nx, ny, nz
+        return Extremes(2, n)
+    return Extremes(3, n)
+
+
+@kernel
+def _farthest_pair(pair, points, ids, askew):
+    """Points 0 and 1 become the extremes along the axis of greatest width, of three; returns that width.
+
+    askew : component of each axis along the other two axes of the world.
+    """
+    spare = EPA_VERTICES
+    widest = -math.inf
+    for axis in range(3):
+        d = Vec3(1.0 if axis == 0 else askew, 1.0 if axis == 1 else askew, 1.0 if axis == 2 else askew)
+        difference_point(pair, points, ids, spare, d)
+        difference_point(pair, points, ids, spare + 1, neg(d))
+        width = dot(d, sub(point_at(points, spare), point_at(points, spare + 1)))
+        if width > widest:
+            widest = width
+            copy_point(points, ids, spare, 0)
+            copy_point(points, ids, spare + 1, 1)
+    return widest
 
 
 @kernel
 def capped_tetrahedron(pair, points, ids, size):
-    """Points 0..3 become three about the likely way out and the one opposite; whether they did, and span enough.
+    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span enough.
 
-    The likely way out leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
+    The likely direction leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
     are the bodies' centres. The three lie far enough around it for the other sides to be farther off than that.
 
-    Where there are many vertices this saves a quarter to a third of the rounds: 12.6 became 8.6 on hulls of 128 on a
-    sphere. Of long thin bodies it saves none. More rounds than from GJK's own tetrahedron were needed with a corner on
-    the way out, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
+    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on a
+    sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a corner on
+    that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
     """
     spare = EPA_VERTICES
-    ux = pair.t.x
-    uy = pair.t.y
-    uz = pair.t.z
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
+    length = norm(pair.t)
     if not length > _CENTRED * size:
         return False
-    ux /= length
-    uy /= length
-    uz /= length
-    way_out = 0.0
+    u = divide(pair.t, length)
+    depth = 0.0
     width = 0.0
     for turn in range(2):
-        difference_point(pair, points, ids, spare, -ux, -uy, -uz)
-        difference_point(pair, points, ids, spare + 1, ux, uy, uz)
-        at = POINT * spare
-        out = POINT * (spare + 1)
-        way_out = points[out] * ux + points[out + 1] * uy + points[out + 2] * uz
-        width = way_out - (points[at] * ux + points[at + 1] * uy + points[at + 2] * uz)
-        mx = points[at] + points[out]
-        my = points[at + 1] + points[out + 1]
-        mz = points[at + 2] + points[out + 2]
-        length = math.sqrt(mx * mx + my * my + mz * mz)
-        if turn == 1 or not -(mx * ux + my * uy + mz * uz) < _ALIKE * length:
+        difference_point(pair, points, ids, spare, neg(u))
+        difference_point(pair, points, ids, spare + 1, u)
+        near, far = point_at(points, spare), point_at(points, spare + 1)
+        depth = dot(far, u)
+        width = depth - dot(near, u)
+        middle = add(near, far)
+        length = norm(middle)
+        if turn == 1 or not -dot(middle, u) < _SAME_DIRECTION * length:
             break
-        ux = -mx / length
-        uy = -my / length
-        uz = -mz / length
+        u = divide(neg(middle), length)
     if not width > 0.0:
         return False
-    sine = min(max(4.0 * way_out / width, _NARROWEST), _WIDEST)
+    sine = min(max(4.0 * depth / width, _NARROWEST), _WIDEST)
     cosine = math.sqrt(1.0 - sine * sine)
-    ex, ey, ez = _across(ux, uy, uz)
-    fx = uy * ez - uz * ey
-    fy = uz * ex - ux * ez
-    fz = ux * ey - uy * ex
+    e = unit_orthogonal(u)
+    f = cross(u, e)
     for k in range(3):
         along = sine if k == 0 else -0.5 * sine
         beside = 0.0 if k == 0 else (_HALF_ROOT * sine if k == 1 else -_HALF_ROOT * sine)
-        difference_point(
-            pair, points, ids, spare + 1 + k,
-            cosine * ux + along * ex + beside * fx,
-            cosine * uy + along * ey + beside * fy,
-            cosine * uz + along * ez + beside * fz,
-        )  # fmt: skip
-    if not abs(_volume(points, POINT * spare)) > _SPACIOUS * size * size * size:
+        d = add(add(scale(cosine, u), scale(along, e)), scale(beside, f))
+        difference_point(pair, points, ids, spare + 1 + k, d)
+    if not abs(signed_volume(points, spare)) > _LEAST_VOLUME * size * size * size:
         return False
     for k in range(4):
         copy_point(points, ids, spare + k, k)
@@ -162,34 +139,6 @@ def capped_tetrahedron(pair, points, ids, size):
 
 
 @kernel
-def _volume(points, at):
-    """Six times the signed volume of four points in a row."""
-    ex = points[at + POINT] - points[at]
-    ey = points[at + POINT + 1] - points[at + 1]
-    ez = points[at + POINT + 2] - points[at + 2]
-    fx = points[at + 2 * POINT] - points[at]
-    fy = points[at + 2 * POINT + 1] - points[at + 1]
-    fz = points[at + 2 * POINT + 2] - points[at + 2]
-    gx = points[at + 3 * POINT] - points[at]
-    gy = points[at + 3 * POINT + 1] - points[at + 1]
-    gz = points[at + 3 * POINT + 2] - points[at + 2]
-    return gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
-
-
-@kernel
-def _height(points, k, nx, ny, nz):
-    at = POINT * k
-    return (points[at] - points[0]) * nx + (points[at + 1] - points[1]) * ny + (points[at + 2] - points[2]) * nz
-
-
-@kernel
-def _across(x, y, z):
-    """A unit vector orthogonal to (x, y, z), made from its two largest coordinates."""
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        length = math.sqrt(y * y + z * z)
-        return 0.0, -z / length, y / length
-    if abs(y) <= abs(z):
-        length = math.sqrt(x * x + z * z)
-        return z / length, 0.0, -x / length
-    length = math.sqrt(x * x + y * y)
-    return -y / length, x / length, 0.0
+def _height(points, k, n):
+    """Height of point k over point 0."""
+    return dot(sub(point_at(points, k), point_at(points, 0)), n)

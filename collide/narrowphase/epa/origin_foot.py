@@ -5,180 +5,181 @@ is as level, and the area of a needle says nothing about where in it a point lie
 lies within the surface and touches the plane in the foot, so some facet of a closed surface passes it to within the
 width of the bracket, and the nearest point of all of them is no farther.
 
-Weights come from an edge and what is left across it (Gram, Schmidt), each taken of what the last one left: they may be
+Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may be
 far off where a triangle is thin, their point is not (Björck 1967).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.narrowphase.epa.polytope_surface import FACET, number
-from collide.narrowphase.gjk.minkowski_difference import POINT
-from collide.narrowphase.gjk.simplex import weigh_enclosed
+from collide.narrowphase.epa.polytope_surface import FACET, corner
+from collide.narrowphase.gjk.minkowski_difference import POINT, copy_coordinates
+from collide.narrowphase.gjk.simplex import face_weights, weigh_enclosed
+from collide.numerics.vec3 import dot, norm1, scale, sub, vec3_at
+
+#: Facets whose box is farther from a point than this many tolerances are not weighed.
+_FAR_FROM_BOX = 1024.0
+
+
+class OnTriangle(NamedTuple):
+    """The point of a triangle nearest another.   distance : a sum of three coordinates.   wa, wb, wc : its weights."""
+
+    distance: float
+    wa: float
+    wb: float
+    wc: float
 
 
 @kernel
-def nearest_of_triangle(points, a, b, c, x, y, z):
-    """(distance, wa, wb, wc): the point of a triangle that is nearest (x, y, z), to a few roundings of its corners.
-
-    points : coordinates; a, b, c : where the three corners begin. The distance is a sum of three coordinates.
-    """
-    best, wa, wb, wc = _on_edges(points, a, b, c, x, y, z)
-    ex = points[b] - points[a]
-    ey = points[b + 1] - points[a + 1]
-    ez = points[b + 2] - points[a + 2]
-    fx = points[c] - points[a]
-    fy = points[c + 1] - points[a + 1]
-    fz = points[c + 2] - points[a + 2]
-    dx = x - points[a]
-    dy = y - points[a + 1]
-    dz = z - points[a + 2]
-    square = ex * ex + ey * ey + ez * ez
+def nearest_of_triangle(a, b, c, p):
+    """The `OnTriangle` nearest p, to a few roundings of the corners a, b, c."""
+    best = _nearest_of_edges(a, b, c, p)
+    e, f, d = sub(b, a), sub(c, a), sub(p, a)
+    square = dot(e, e)
     if square == 0.0:
-        return best, wa, wb, wc
-    turn = (fx * ex + fy * ey + fz * ez) / square
-    gx = fx - turn * ex
-    gy = fy - turn * ey
-    gz = fz - turn * ez
-    turn = (gx * ex + gy * ey + gz * ez) / square
-    gx -= turn * ex
-    gy -= turn * ey
-    gz -= turn * ez
-    width = gx * gx + gy * gy + gz * gz
+        return best
+    g = sub(f, scale(dot(f, e) / square, e))
+    g = sub(g, scale(dot(g, e) / square, e))
+    width = dot(g, g)
     if width == 0.0:
-        return best, wa, wb, wc
-    along = (dx * ex + dy * ey + dz * ez) / square
-    across = ((dx - along * ex) * gx + (dy - along * ey) * gy + (dz - along * ez) * gz) / width
-    across = min(max(across, 0.0), 1.0)
-    along = ((dx - across * fx) * ex + (dy - across * fy) * ey + (dz - across * fz) * ez) / square
-    along = min(max(along, 0.0), 1.0 - across)
-    away = (
-        abs(dx - across * fx - along * ex) + abs(dy - across * fy - along * ey) + abs(dz - across * fz - along * ez)
-    )
-    if away < best:
-        return away, 1.0 - across - along, along, across
-    return best, wa, wb, wc
+        return best
+    along = dot(d, e) / square
+    across = min(max(dot(sub(d, scale(along, e)), g) / width, 0.0), 1.0)
+    rest = sub(d, scale(across, f))
+    along = min(max(dot(rest, e) / square, 0.0), 1.0 - across)
+    distance = norm1(sub(rest, scale(along, e)))
+    if distance < best.distance:
+        return OnTriangle(distance, 1.0 - across - along, along, across)
+    return best
 
 
 @kernel
-def _on_edges(points, a, b, c, x, y, z):
+def _nearest_of_edges(a, b, c, p):
     """`nearest_of_triangle` of its edges alone."""
-    best = math.inf
-    chosen = 0
-    share = 0.0
-    for k in range(3):
-        p = a if k == 0 else (b if k == 1 else c)
-        q = b if k == 0 else (c if k == 1 else a)
-        ex = points[q] - points[p]
-        ey = points[q + 1] - points[p + 1]
-        ez = points[q + 2] - points[p + 2]
-        dx = x - points[p]
-        dy = y - points[p + 1]
-        dz = z - points[p + 2]
-        square = ex * ex + ey * ey + ez * ez
-        s = min(max((dx * ex + dy * ey + dz * ez) / square, 0.0), 1.0) if square > 0.0 else 0.0
-        away = abs(dx - s * ex) + abs(dy - s * ey) + abs(dz - s * ez)
-        if away < best:
-            best = away
-            chosen = k
-            share = s
-    rest = 1.0 - share
-    if chosen == 0:
-        return best, rest, share, 0.0
-    if chosen == 1:
-        return best, 0.0, rest, share
-    return best, share, 0.0, rest
+    ab, s_ab = _nearest_of_edge(a, b, p)
+    bc, s_bc = _nearest_of_edge(b, c, p)
+    ca, s_ca = _nearest_of_edge(c, a, p)
+    if ca < bc and ca < ab:
+        return OnTriangle(ca, s_ca, 0.0, 1.0 - s_ca)
+    if bc < ab:
+        return OnTriangle(bc, 0.0, 1.0 - s_bc, s_bc)
+    return OnTriangle(ab, 1.0 - s_ab, s_ab, 0.0)
+
+
+@kernel(inline=True)
+def _nearest_of_edge(a, b, p):
+    """(distance, share of b) of the edge's point nearest p."""
+    e, d = sub(b, a), sub(p, a)
+    square = dot(e, e)
+    s = min(max(dot(d, e) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return norm1(sub(d, scale(s, e))), s
 
 
 @kernel
-def weigh_corners(points, stride, n, weights, x, y, z):
-    """Weights of n ≤ 4 points where they come nearest (x, y, z), which does not lie within a tetrahedron of them."""
+def weigh_corners(points, stride, n, weights, p):
+    """Weights of n ≤ 4 points where they come nearest p, which does not lie within a tetrahedron of them."""
     best = math.inf
     for across in range(4 if n == 4 else 1):
         i = 1 if n == 4 and across == 0 else 0
         j = min(i + 1 if i == 1 or across != 1 else 2, n - 1)
         k = n - 1 if n < 4 or across != 3 else 2
-        away, wi, wj, wk = nearest_of_triangle(points, stride * i, stride * j, stride * k, x, y, z)
-        if away < best:
-            best = away
-            for corner in range(n):
-                weights[corner] = 0.0
-            weights[i] += wi
-            weights[j] += wj
-            weights[k] += wk
+        nearest = nearest_of_triangle(
+            vec3_at(points, stride * i), vec3_at(points, stride * j), vec3_at(points, stride * k), p
+        )
+        if nearest.distance < best:
+            best = nearest.distance
+            for v in range(n):
+                weights[v] = 0.0
+            weights[i] += nearest.wa
+            weights[j] += nearest.wb
+            weights[k] += nearest.wc
     return best
 
 
-@kernel
-def weigh_nearest(surface, count, facet, points, ids, weights, with_ids, x, y, z, enough):
-    """The facet that comes nearest (x, y, z) becomes points 0 … 2, weighted for its point there; returns the distance.
+@kernel(inline=True)
+def _copy_corners(surface, f, points, ids, first, with_ids):
+    """The corners of a facet become points ``first`` … first + 2, with the vertices they are made of if ``with_ids``."""
+    for k in range(3):
+        v = corner(surface, f, k)
+        copy_coordinates(surface.points, v, points, first + k)
+        if with_ids:
+            ids[2 * (first + k)] = surface.ids[2 * v]
+            ids[2 * (first + k) + 1] = surface.ids[2 * v + 1]
 
-    The facet given is tried first, and is good if it comes within ``enough``; else the first that does, or the best.
+
+@kernel
+def load_facet(surface, f, points, ids, weights, with_ids, p):
+    """The corners of a facet become points 0 … 2, weighted for the point p of it; returns the least weight."""
+    _copy_corners(surface, f, points, ids, 0, with_ids)
+    w0, w1, w2 = face_weights(vec3_at(points, 0), vec3_at(points, POINT), vec3_at(points, 2 * POINT), p)
+    inside = min(w0, w1, w2)
+    w0, w1, w2 = max(w0, 0.0), max(w1, 0.0), max(w2, 0.0)
+    total = w0 + w1 + w2
+    weights[0] = w0 / total if total > 0.0 else 1.0
+    weights[1] = w1 / total if total > 0.0 else 0.0
+    weights[2] = w2 / total if total > 0.0 else 0.0
+    return inside
+
+
+@kernel
+def weigh_nearest(surface, n_facets, facet, points, ids, weights, with_ids, p, tolerance):
+    """The facet that comes nearest p becomes points 0 … 2, weighted for its point there; returns the distance.
+
+    ``facet`` is tried first, and is good if it comes within the tolerance; else the first that does, or the best.
     """
-    source, _, _, _, source_ids, facets, _, _, _ = surface
     best = math.inf
-    for turn in range(count + 1):
+    for turn in range(n_facets + 1):
         f = facet if turn == 0 else turn - 1
-        a = POINT * number(facets[FACET * f])
-        b = POINT * number(facets[FACET * f + 1])
-        c = POINT * number(facets[FACET * f + 2])
-        if turn > 0 and _is_outside(source, a, b, c, x, y, z, min(best, 1024.0 * enough)):
+        a = vec3_at(surface.points, POINT * corner(surface, f, 0))
+        b = vec3_at(surface.points, POINT * corner(surface, f, 1))
+        c = vec3_at(surface.points, POINT * corner(surface, f, 2))
+        if turn > 0 and _is_outside_box(a, b, c, p, min(best, _FAR_FROM_BOX * tolerance)):
             continue
-        away, wa, wb, wc = nearest_of_triangle(source, a, b, c, x, y, z)
-        if away < best:
-            best = away
-            weights[0] = wa
-            weights[1] = wb
-            weights[2] = wc
-            for j in range(POINT):
-                points[j] = source[a + j]
-                points[POINT + j] = source[b + j]
-                points[2 * POINT + j] = source[c + j]
-            if with_ids:
-                for k in range(3):
-                    v = number(facets[FACET * f + k])
-                    ids[2 * k] = source_ids[2 * v]
-                    ids[2 * k + 1] = source_ids[2 * v + 1]
-            if best <= enough:
+        nearest = nearest_of_triangle(a, b, c, p)
+        if nearest.distance < best:
+            best = nearest.distance
+            weights[0] = nearest.wa
+            weights[1] = nearest.wb
+            weights[2] = nearest.wc
+            _copy_corners(surface, f, points, ids, 0, with_ids)
+            if best <= tolerance:
                 break
     return best
 
 
 @kernel
-def weigh_origin(surface, count, points, ids, weights):
+def weigh_origin(surface, n_facets, points, ids, weights):
     """A vertex and the facet across the origin from it become points 0 … 3, weighted for the origin among them."""
-    source, _, _, _, source_ids, facets, _, _, _ = surface
-    best = math.inf
-    chosen = -1
-    for turn in range(count + 1):
-        f = turn if turn < count else chosen
+    smallest_miss = math.inf
+    nearest = -1
+    for turn in range(n_facets + 1):
+        f = turn if turn < n_facets else nearest
         if f < 0:
             break
-        for k in range(4):
-            v = 0 if k == 0 else number(facets[FACET * f + k - 1])
-            for j in range(POINT):
-                points[POINT * k + j] = source[POINT * v + j]
-            ids[2 * k] = source_ids[2 * v]
-            ids[2 * k + 1] = source_ids[2 * v + 1]
-        if facets[FACET * f] == 0 or facets[FACET * f + 1] == 0 or facets[FACET * f + 2] == 0:
+        copy_coordinates(surface.points, 0, points, 0)
+        ids[0] = surface.ids[0]
+        ids[1] = surface.ids[1]
+        _copy_corners(surface, f, points, ids, 1, True)
+        if surface.facets[FACET * f] == 0 or surface.facets[FACET * f + 1] == 0 or surface.facets[FACET * f + 2] == 0:
             continue
-        away, _ = weigh_enclosed(points, weights)
-        if away < best:
-            best = away
-            chosen = f
-    return chosen >= 0
+        miss, _ = weigh_enclosed(points, weights)
+        if miss < smallest_miss:
+            smallest_miss = miss
+            nearest = f
+    return nearest >= 0
 
 
 @kernel(inline=True)
-def _is_outside(points, a, b, c, x, y, z, slack):
-    """Whether a point lies outside the box of a triangle by more than the slack."""
-    for axis in range(3):
-        p = points[a + axis]
-        q = points[b + axis]
-        r = points[c + axis]
-        at = x if axis == 0 else (y if axis == 1 else z)
-        if at < min(p, q, r) - slack or at > max(p, q, r) + slack:
-            return True
-    return False
+def _is_outside_box(a, b, c, p, slack):
+    """Whether p lies outside the box of a triangle by more than the slack."""
+    return (
+        _is_outside(a.x, b.x, c.x, p.x, slack) or _is_outside(a.y, b.y, c.y, p.y, slack) or _is_outside(a.z, b.z, c.z, p.z, slack)
+    )
+
+
+@kernel(inline=True)
+def _is_outside(a, b, c, p, slack):
+    return p < min(a, b, c) - slack or p > max(a, b, c) + slack

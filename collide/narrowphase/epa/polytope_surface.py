@@ -8,10 +8,13 @@ facets are in use.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.bounds import EPA_FACETS, EPA_VERTICES
-from collide.narrowphase.gjk.minkowski_difference import POINT, copy_point
+from collide.narrowphase.gjk.minkowski_difference import POINT, copy_point, point_at
+from collide.narrowphase.gjk.simplex import signed_volume
+from collide.numerics.vec3 import Vec3, cross, dot, norm1, put_vec3, scale, sub, vec3_at
 
 #: Doubles a facet's plane: unit normal, and the least of its corners along it.
 PLANE = 4
@@ -31,7 +34,7 @@ WIDEST_BORDER = 512
 #: Above every number of a vertex, facet or half-edge.
 _NUMBERS = (1 << 16) - 1
 
-#: Doubles and integers of workspace one run needs (see `workspace`).
+#: Doubles and integers of workspace one run needs (see `surface_at`).
 DOUBLES = (POINT + 6) * POINTS + (PLANE + 4) * EPA_FACETS
 INTEGERS = 3 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST_BORDER
 
@@ -43,43 +46,75 @@ def number(stored):
     return stored & _NUMBERS
 
 
-@kernel(inline=True)
-def workspace(doubles_at, integers_at):
-    """Views: points, planes, reaches, clearances | ids, facets, starts, border, patch.
+class Surface(NamedTuple):
+    """Views of a polytope in its workspace.
 
-    reaches : distance of each facet's plane from the origin, ∞ where it is farther than a known way out.
+    points, ids : of its vertices, POINT doubles and a vertex of A and one of B each.
+    planes : PLANE doubles a facet.   facets : FACET integers a facet.
+    reaches : distance of each facet's plane from the origin, ∞ where it is farther than a known separating translation.
     clearances : proven distance of each facet from the origin, seen from its inner side, or −1.
     starts : by vertex, the new facet whose base begins there, and the apex it was made for.
+    border, patch : half-edges and facets of what is being replaced.
     """
-    at = doubles_at
-    points = view_f64(at, POINT * POINTS)
-    at += 8 * POINT * POINTS
-    planes = view_f64(at, PLANE * EPA_FACETS)
-    at += 8 * PLANE * EPA_FACETS
-    reaches = view_f64(at, EPA_FACETS)
-    at += 8 * EPA_FACETS
-    clearances = view_f64(at, EPA_FACETS)
-    at = integers_at
-    ids = view_i64(at, 2 * POINTS)
-    at += 8 * 2 * POINTS
-    facets = view_i64(at, FACET * EPA_FACETS)
-    at += 8 * FACET * EPA_FACETS
-    starts = view_i64(at, 2 * EPA_VERTICES)
-    at += 8 * 2 * EPA_VERTICES
-    border = view_i64(at, 2 * WIDEST_BORDER)
-    at += 8 * 2 * WIDEST_BORDER
-    patch = view_i64(at, EPA_FACETS)
-    return points, planes, reaches, clearances, ids, facets, starts, border, patch
+
+    points: Any
+    planes: Any
+    reaches: Any
+    clearances: Any
+    ids: Any
+    facets: Any
+    starts: Any
+    border: Any
+    patch: Any
+
+
+class FineSurface(NamedTuple):
+    """Further views for `refine_depth.py`.
+
+    points : FINE doubles a vertex.   distances : a double-double a facet.   known : whether a vertex's fine point is there.
+    """
+
+    points: Any
+    distances: Any
+    known: Any
 
 
 @kernel(inline=True)
-def fine_workspace(doubles_at, integers_at):
-    """Views for `refine_depth.py`: fine points, fine distances (two doubles a facet) | whether a vertex's point is there."""
-    at = doubles_at + 8 * (POINT * POINTS + (PLANE + 2) * EPA_FACETS)
-    fine = view_f64(at, 6 * POINTS)
-    distances = view_f64(at + 8 * 6 * POINTS, 2 * EPA_FACETS)
-    at = integers_at + 8 * (2 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST_BORDER)
-    return fine, distances, view_i64(at, POINTS)
+def surface_at(doubles_at, integers_at):
+    """The `Surface` in DOUBLES doubles and INTEGERS int64."""
+    planes_at = doubles_at + 8 * POINT * POINTS
+    reaches_at = planes_at + 8 * PLANE * EPA_FACETS
+    facets_at = integers_at + 8 * 2 * POINTS
+    starts_at = facets_at + 8 * FACET * EPA_FACETS
+    border_at = starts_at + 8 * 2 * EPA_VERTICES
+    return Surface(
+        view_f64(doubles_at, POINT * POINTS), view_f64(planes_at, PLANE * EPA_FACETS), view_f64(reaches_at, EPA_FACETS),
+        view_f64(reaches_at + 8 * EPA_FACETS, EPA_FACETS), view_i64(integers_at, 2 * POINTS),
+        view_i64(facets_at, FACET * EPA_FACETS), view_i64(starts_at, 2 * EPA_VERTICES),
+        view_i64(border_at, 2 * WIDEST_BORDER), view_i64(border_at + 8 * 2 * WIDEST_BORDER, EPA_FACETS),
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def fine_surface_at(doubles_at, integers_at):
+    """The `FineSurface` in the same workspace, behind the `Surface`."""
+    fine_at = doubles_at + 8 * (POINT * POINTS + (PLANE + 2) * EPA_FACETS)
+    known_at = integers_at + 8 * (2 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST_BORDER)
+    return FineSurface(
+        view_f64(fine_at, 6 * POINTS), view_f64(fine_at + 8 * 6 * POINTS, 2 * EPA_FACETS), view_i64(known_at, POINTS)
+    )
+
+
+@kernel(inline=True)
+def corner(surface, f, k):
+    """Vertex k of facet f."""
+    return number(surface.facets[FACET * f + k])
+
+
+@kernel(inline=True)
+def normal_of(surface, f):
+    """The unit normal of facet f."""
+    return vec3_at(surface.planes, PLANE * f)
 
 
 @kernel(inline=True)
@@ -92,49 +127,44 @@ def ample(size, error):
 
 
 @kernel(inline=True)
-def _sides(determinant, ax, ay, az, ex, ey, ez, fx, fy, fz, error):
+def _sides(determinant, a, e, f, error):
     """(behind, sure) of `plane_of`, from the lengths of this very triangle."""
-    e = abs(ex) + abs(ey) + abs(ez)
-    f = abs(fx) + abs(fy) + abs(fz)
-    a = abs(ax) + abs(ay) + abs(az)
+    e, f, a = norm1(e), norm1(f), norm1(a)
     return determinant > DETERMINANT_ERROR * a * e * f, determinant > 2.0 * error * (e * f + 2.0 * a * (e + f))
 
 
-@kernel(inline=True)
-def plane_of(ax, ay, az, bx, by, bz, cx, cy, cz, error, enough):
-    """(nx, ny, nz, distance, clearance, sure) of a triangle, counter-clockwise from outside; n = 0 where it has no area.
+class FacetPlane(NamedTuple):
+    """The plane of a triangle, counter-clockwise from outside.
 
-    enough : `ample`, which nearly all triangles are beyond, or ∞.
-    distance : the least of the corners' along the unit normal: for any unit normal, however badly a thin triangle
+    normal : unit, 0 where the triangle has no area.
+    distance : the least of the corners' along the normal: for any unit normal, however badly a thin triangle
         defines it, no point of the triangle lies nearer the origin.
     clearance : the same where the origin provably lies behind the triangle of the corners as they stand, else −1.
-    sure : whether it would with corners anywhere within ``error`` of these (see `simplex._height_behind`).
+    sure : whether it would with corners anywhere within ``error`` of these (see `simplex.height_behind`).
     """
-    ex = bx - ax
-    ey = by - ay
-    ez = bz - az
-    fx = cx - ax
-    fy = cy - ay
-    fz = cz - az
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    square = nx * nx + ny * ny + nz * nz
-    determinant = nx * ax + ny * ay + nz * az
+
+    normal: Vec3
+    distance: float
+    clearance: float
+    sure: bool
+
+
+@kernel(inline=True)
+def plane_of(a, b, c, error, enough):
+    """The `FacetPlane` of a triangle.   enough : `ample`, which nearly all triangles are beyond, or ∞."""
+    e, f = sub(b, a), sub(c, a)
+    n = cross(e, f)
+    square = dot(n, n)
+    determinant = dot(n, a)
     behind = True
     sure = True
     if not determinant > enough:
         if square == 0.0:
-            return 0.0, 0.0, 0.0, math.inf, -1.0, False
-        behind, sure = _sides(determinant, ax, ay, az, ex, ey, ez, fx, fy, fz, error)
-    shorten = 1.0 / math.sqrt(square)
-    nx *= shorten
-    ny *= shorten
-    nz *= shorten
-    distance = nx * ax + ny * ay + nz * az
-    distance = min(distance, nx * bx + ny * by + nz * bz)
-    distance = min(distance, nx * cx + ny * cy + nz * cz)
-    return nx, ny, nz, distance, distance if behind else -1.0, sure
+            return FacetPlane(Vec3(0.0, 0.0, 0.0), math.inf, -1.0, False)
+        behind, sure = _sides(determinant, a, e, f, error)
+    n = scale(1.0 / math.sqrt(square), n)
+    distance = min(min(dot(n, a), dot(n, b)), dot(n, c))
+    return FacetPlane(n, distance, distance if behind else -1.0, sure)
 
 
 @kernel(inline=True)
@@ -144,47 +174,29 @@ def set_facet(surface, f, i, j, k, error, enough, depth):
     Eight at a time in vectors took longer than one by one: corners have to be gathered, and what is stored singly
     is slow to load together.
     """
-    points, planes, reaches, clearances, _, facets, _, _, _ = surface
+    points, facets = surface.points, surface.facets
     f = number(f)
-    a = POINT * number(i)
-    b = POINT * number(j)
-    c = POINT * number(k)
-    nx, ny, nz, distance, clearance, sure = plane_of(
-        points[a], points[a + 1], points[a + 2], points[b], points[b + 1], points[b + 2],
-        points[c], points[c + 1], points[c + 2], error, enough,
-    )  # fmt: skip
+    plane = plane_of(point_at(points, number(i)), point_at(points, number(j)), point_at(points, number(k)), error, enough)
     at = FACET * f
     facets[at] = i
     facets[at + 1] = j
     facets[at + 2] = k
     facets[at + 3] = i
-    facets[at + MARKS] = SURE if sure else 0
-    at = PLANE * f
-    planes[at] = nx
-    planes[at + 1] = ny
-    planes[at + 2] = nz
-    planes[at + 3] = distance
-    # A facet farther off than a known way out will never be the nearest.
-    reach = distance if distance <= depth else math.inf
-    reaches[f] = reach
-    clearances[f] = clearance
+    facets[at + MARKS] = SURE if plane.sure else 0
+    put_vec3(surface.planes, PLANE * f, plane.normal)
+    surface.planes[PLANE * f + 3] = plane.distance
+    # A facet farther off than a known separating translation will never be the nearest.
+    reach = plane.distance if plane.distance <= depth else math.inf
+    surface.reaches[f] = reach
+    surface.clearances[f] = plane.clearance
     return reach
 
 
 @kernel
 def set_tetrahedron(surface, error, enough):
     """The first four facets, outwards, over points 0 … 3, with their neighbours."""
-    points, _, reaches, clearances, ids, facets, starts, _, _ = surface
-    ex = points[POINT] - points[0]
-    ey = points[POINT + 1] - points[1]
-    ez = points[POINT + 2] - points[2]
-    fx = points[2 * POINT] - points[0]
-    fy = points[2 * POINT + 1] - points[1]
-    fz = points[2 * POINT + 2] - points[2]
-    gx = points[3 * POINT] - points[0]
-    gy = points[3 * POINT + 1] - points[1]
-    gz = points[3 * POINT + 2] - points[2]
-    if gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx) > 0.0:
+    points, ids, facets = surface.points, surface.ids, surface.facets
+    if signed_volume(points, 0) > 0.0:
         # Vertex 3 must lie behind facet 0, 1, 2.
         copy_point(points, ids, 1, EPA_VERTICES)
         copy_point(points, ids, 2, 1)
@@ -194,9 +206,9 @@ def set_tetrahedron(surface, error, enough):
         j = 1 if f == 0 else 3
         k = 2 if f == 0 or f == 2 else (1 if f == 1 else 0)
         set_facet(surface, f, i, j, k, error, enough, math.inf)
-        starts[2 * f + 1] = -1
-        reaches[f + 4] = math.inf
-        clearances[f + 4] = math.inf
+        surface.starts[2 * f + 1] = -1
+        surface.reaches[f + 4] = math.inf
+        surface.clearances[f + 4] = math.inf
     join(facets, 0, FACET + 2)
     join(facets, 1, 2 * FACET + 2)
     join(facets, 2, 3 * FACET + 2)
@@ -218,77 +230,88 @@ def following(t):
     return t - 2 if t % FACET == 2 else t + 1
 
 
+class Patch(NamedTuple):
+    """What an apex sees of a surface: numbers of its facets, in ``patch``, and of the half-edges around them, in ``border``."""
+
+    n_facets: int
+    n_edges: int
+
+
 @kernel(inline=True)
 def find_patch(surface, f, apex, slack):
-    """(facets, border edges) of what the apex sees, spreading from f over shared edges; marks it as seen.
+    """The `Patch` that the apex sees, spreading from f over shared edges; marks it as seen.
 
     ``border`` gets the half-edges of facets that stay, ``patch`` the facets, whose reach becomes ∞. No branch depends
     on what is seen: a mispredicted one costs more than an edge.
     """
-    points, planes, reaches, _, _, facets, _, border, patch = surface
-    at = POINT * number(apex)
-    x = points[at]
-    y = points[at + 1]
-    z = points[at + 2]
+    facets, planes, border, patch = surface.facets, surface.planes, surface.border, surface.patch
+    p = point_at(surface.points, number(apex))
     facets[FACET * f + MARKS] |= SEEN
     patch[0] = f
-    found = 1
+    n_facets = 1
     visited = 0
-    edges = 0
-    while visited < found:
+    n_edges = 0
+    while visited < n_facets:
         g = number(patch[visited])
-        reaches[g] = math.inf
+        surface.reaches[g] = math.inf
         first = FACET * g + TWIN
         visited += 1
-        margin = slack if found < WIDEST_BORDER - 4 else math.inf
+        margin = slack if n_facets < WIDEST_BORDER - 4 else math.inf
         for e in range(3):
             t = number(facets[first + e])
             h = t // FACET
             marks = facets[FACET * h + MARKS]
-            at = PLANE * h
-            height = planes[at] * x + planes[at + 1] * y + planes[at + 2] * z
             fresh = 1 - (marks & SEEN)
-            seen = fresh if height > planes[at + 3] + margin else 0
+            seen = fresh if dot(normal_of(surface, h), p) > planes[PLANE * h + 3] + margin else 0
             facets[FACET * h + MARKS] = marks | seen
-            patch[number(found)] = h
-            found += seen
-            border[number(edges)] = t
-            edges += fresh - seen
-    return found, edges
+            patch[number(n_facets)] = h
+            n_facets += seen
+            border[number(n_edges)] = t
+            n_edges += fresh - seen
+    return Patch(n_facets, n_edges)
+
+
+class Cone(NamedTuple):
+    """After an expansion: number of facets of the surface; the nearest of the new ones and its reach."""
+
+    n_facets: int
+    nearest: int
+    reach: float
 
 
 @kernel(inline=True)
-def expand(surface, f, apex, count, found, edges, depth, error, enough):
-    """Replace the patch that the apex sees by a cone to it; returns (number of facets, nearest of patch and cone, its reach).
+def expand(surface, f, apex, count, seen, depth, error, enough):
+    """Replace the `Patch` ``seen`` by the apex with a cone to it, in a surface of ``count`` facets; returns a `Cone`.
 
     Where the patch is no disc, as rounding may have it, the facet f alone is replaced.
     """
-    _, planes, reaches, clearances, _, facets, starts, border, patch = surface
+    facets, starts, border, patch = surface.facets, surface.starts, surface.border, surface.patch
+    n_facets, n_edges = seen.n_facets, seen.n_edges
     nearest = EPA_FACETS
     least_reach = math.inf
-    for k in range(edges):
+    for k in range(n_edges):
         start = number(facets[number(border[k]) + 1])
         if starts[2 * start + 1] == apex:
-            edges = 0  # pinched: the border passes a vertex twice
+            n_edges = 0  # pinched: the border passes a vertex twice
             break
-        starts[2 * start] = patch[k] if k < found else count + k - found
+        starts[2 * start] = patch[k] if k < n_facets else count + k - n_facets
         starts[2 * start + 1] = apex
-    if edges == 0:
-        for k in range(1, found):
+    if n_edges == 0:
+        for k in range(1, n_facets):
             h = number(patch[k])
             facets[FACET * h + MARKS] &= SURE
-            distance = planes[PLANE * h + 3]
-            reaches[h] = distance if distance <= depth else math.inf
-            if reaches[h] < least_reach:
-                least_reach = reaches[h]
+            distance = surface.planes[PLANE * h + 3]
+            surface.reaches[h] = distance if distance <= depth else math.inf
+            if surface.reaches[h] < least_reach:
+                least_reach = surface.reaches[h]
                 nearest = h
-        found = 1
-        edges = 3
+        n_facets = 1
+        n_edges = 3
         for e in range(3):
             t = number(facets[FACET * f + TWIN + e])
             border[e] = t
             starts[2 * number(facets[t + 1])] = f if e == 0 else count + e - 1
-    for k in range(edges):
+    for k in range(n_edges):
         t = number(border[k])
         end = number(facets[t])
         start = number(facets[t + 1])
@@ -300,18 +323,18 @@ def expand(surface, f, apex, count, found, edges, depth, error, enough):
         nearest = new if nearer else nearest
         join(facets, FACET * new, t)
         join(facets, FACET * new + 1, FACET * number(starts[2 * end]) + 2)
-    for k in range(edges, found):  # slots of a patch around several vertices: given up
+    for k in range(n_edges, n_facets):  # slots of a patch around several vertices: given up
         h = number(patch[k])
-        reaches[h] = math.inf
-        clearances[h] = math.inf
-        planes[PLANE * h + 3] = math.inf
-    return count + max(edges - found, 0), nearest, least_reach
+        surface.reaches[h] = math.inf
+        surface.clearances[h] = math.inf
+        surface.planes[PLANE * h + 3] = math.inf
+    return Cone(count + max(n_edges - n_facets, 0), nearest, least_reach)
 
 
 @kernel
 def flip(surface, f, e, error):
     """Exchange the diagonal of facet f and its neighbour across edge e: two facets with the same border."""
-    _, _, _, _, _, facets, _, _, _ = surface
+    facets = surface.facets
     s = FACET * f + e
     t = facets[s + TWIN]
     h = t // FACET
@@ -333,6 +356,6 @@ def flip(surface, f, e, error):
 
 
 @kernel(inline=True)
-def has_room(vertices, count):
+def may_expand(n_vertices, n_facets):
     """Whether one more expansion fits."""
-    return vertices + 1 < EPA_VERTICES and count + 2 < EPA_FACETS
+    return n_vertices + 1 < EPA_VERTICES and n_facets + 2 < EPA_FACETS

@@ -7,10 +7,10 @@ runs ended so.
 from __future__ import annotations
 
 from collide.kernels import kernel
-from collide.narrowphase.epa.polytope_surface import FACET
-from collide.narrowphase.gjk.minkowski_difference import POINT
+from collide.narrowphase.epa.polytope_surface import corner
+from collide.narrowphase.gjk.minkowski_difference import point_at
 from collide.numerics import double_double as dd
-from collide.numerics.vec3 import norm1, vec3_at
+from collide.numerics.vec3 import norm1
 
 #: Error of a determinant in double-doubles, in units of |a|·|b − a|·|c − a| as sums of coordinates.
 _DETERMINANT_ERROR = 2.0**-98
@@ -19,14 +19,13 @@ _ROUNDED = 4.0 * 2.0**-53
 
 
 @kernel
-def prove_facets(surface, count):
+def prove_facets(surface, n_facets):
     """Set the clearance of facets that have none, where the origin lies behind their corners as these stand."""
-    points, _, _, clearances, _, facets, _, _, _ = surface
-    for f in range(count):
-        if clearances[f] < 0.0:
-            a = vec3_at(points, POINT * facets[FACET * f])
-            e = dd.difference(vec3_at(points, POINT * facets[FACET * f + 1]), a)
-            g = dd.difference(vec3_at(points, POINT * facets[FACET * f + 2]), a)
+    for f in range(n_facets):
+        if surface.clearances[f] < 0.0:
+            a = point_at(surface.points, corner(surface, f, 0))
+            e = dd.difference(point_at(surface.points, corner(surface, f, 1)), a)
+            g = dd.difference(point_at(surface.points, corner(surface, f, 2)), a)
             normal = dd.cross(e, g)
             height = dd.inner(normal, dd.exact_vec3(a))
             length = dd.sqrt(dd.inner(normal, normal))
@@ -36,4 +35,4 @@ def prove_facets(surface, count):
             if height.high > error:
                 distance = dd.div(height, length).high
                 # The normal, too, is rounded, by as much of |e||g|: no corner is nearer along it than this.
-                clearances[f] = max(distance * (1.0 - _ROUNDED) - 4.0 * error / length.high, 0.0)
+                surface.clearances[f] = max(distance * (1.0 - _ROUNDED) - 4.0 * error / length.high, 0.0)

@@ -9,6 +9,7 @@ small as touching need no other treatment: down to 2⁻⁹⁶ of the size planes
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.epa.polytope_surface import (
@@ -18,12 +19,12 @@ from collide.narrowphase.epa.polytope_surface import (
     SURE,
     TWIN,
     WIDEST_BORDER,
+    Patch,
     expand,
-    fine_workspace,
+    fine_surface_at,
     flip,
     following,
-    has_room,
-    workspace,
+    may_expand,
 )
 from collide.narrowphase.exact.depth_requests import MAX_TIED_FACETS
 from collide.narrowphase.gap.precise_pair import (
@@ -40,80 +41,127 @@ from collide.narrowphase.gap.precise_pair import (
 from collide.narrowphase.gap.tied_vertices import is_unique_minimiser, lowest_pair
 from collide.narrowphase.gjk.minkowski_difference import place_vertices
 from collide.numerics import double_double as dd
-from collide.numerics.double_double import STRIDE
+from collide.numerics.double_double import DD, STRIDE
+from collide.numerics.vec3 import Vec3, absolute, divide, neg, norm1, sub
 from collide.support.block_scan import least
 
 #: Vertices added, diagonals flipped and planes taken again before a run hands over the bracket it has.
 _STEPS = 512
 #: Bounds are handed over in doubles: a quotient, a sum and a product.
 _ROUNDED = 4.0 * 2.0**-53
-#: What is still level, relative to the depth.
-_LEVEL = 2.0**-44
+#: A vertex that lies no farther beyond the facet, relatively to the depth, makes it final.
+_FINAL = 2.0**-44
 #: The plane of a triangle whose corners are off by HEIGHT_ERROR, in units of |corner|·(|e| + |f|): see `_set_distance`.
 _PLANE_ERROR = 8.0 * HEIGHT_ERROR
 
 
-@kernel(inline=True)
-def _load(pair, low, fine, known, ids, v, scale):
-    """Have the fine point of a vertex."""
-    if known[v] == 0:
-        fine_point(pair, low, fine, v, ids[2 * v], ids[2 * v + 1], scale)
-        known[v] = 1
+class RefinedDepth(NamedTuple):
+    """sound : whether anything was gained.
+
+    lower, depth, upper : a proven bracket of the cores' depth, which is the distance of the facet's plane; no lower one
+        unless the origin is proven to lie inside.   nhat : the plane's direction.   n_facets : of the surface now.
+    """
+
+    sound: bool
+    lower: float
+    depth: float
+    upper: float
+    nhat: Vec3
+    facet: int
+    n_facets: int
+
+
+class _Fine(NamedTuple):
+    """The surface, the double-doubles beside it, and what is needed to find more of them.
+
+    low : low parts of both poses.   points, distances, known : of `FineSurface`.   direction : a stored normal.
+    error : of a height over the length of its direction.   scale : what coordinates are multiplied with.
+    """
+
+    pair: Any
+    surface: Any
+    low: Any
+    points: Any
+    distances: Any
+    known: Any
+    direction: Any
+    error: float
+    scale: float
 
 
 @kernel(inline=True)
-def _set_distance(pair, low, surface, fine, distances, known, direction, f, unsure, scale):
+def _load(fine, v):
+    """Compute the fine point of a vertex, if it is not there."""
+    if fine.known[v] == 0:
+        ids = fine.surface.ids
+        fine_point(fine.pair, fine.low, fine.points, v, ids[2 * v], ids[2 * v + 1], fine.scale)
+        fine.known[v] = 1
+
+
+@kernel(inline=True)
+def _load_plane(fine, f):
+    """The fine normal of facet f, as long as twice its area, into ``direction``; returns its corners."""
+    facets = fine.surface.facets
+    a, b, c = facets[FACET * f], facets[FACET * f + 1], facets[FACET * f + 2]
+    _load(fine, a)
+    _load(fine, b)
+    _load(fine, c)
+    set_plane(fine.points, a, b, c, fine.direction)
+    return a, b, c
+
+
+@kernel(inline=True)
+def _leading(fine, v):
+    """The fine point of a vertex, rounded to doubles."""
+    return dd.leading(dd.vec3_at(fine.points, STRIDE * v))
+
+
+@kernel(inline=True)
+def _set_distance(fine, f):
     """Take the plane of facet f again; its distance becomes known, and its clearance if it faces outwards for certain.
 
-    Returns (|n|, spread): 0 where the facet has no area. What is level with the corners, and level with what is level
+    Returns (|n|, spread): 0 where the facet has no area. What is tied with the corners, and tied with what is tied
     with them, is at most the spread farther than the distance.
     """
-    _, _, _, clearances, ids, facets, _, _, _ = surface
-    a = facets[FACET * f]
-    b = facets[FACET * f + 1]
-    c = facets[FACET * f + 2]
-    _load(pair, low, fine, known, ids, a, scale)
-    _load(pair, low, fine, known, ids, b, scale)
-    _load(pair, low, fine, known, ids, c, scale)
-    set_plane(fine, a, b, c, direction)
-    length = fine_length(direction)
+    clearances = fine.surface.clearances
+    a, b, c = _load_plane(fine, f)
+    length = fine_length(fine.direction)
     if length.high == 0.0:
-        distances[2 * f] = math.inf
-        distances[2 * f + 1] = 0.0
+        _put_distance(fine, f, DD(math.inf, 0.0))
         clearances[f] = math.inf
         return 0.0, 0.0
-    height = fine_height(fine, a, direction)
-    distance, distance_low = dd.div(height, length)
-    distances[2 * f] = distance
-    distances[2 * f + 1] = distance_low
+    height = fine_height(fine.points, a, fine.direction)
+    distance = dd.div(height, length)
+    _put_distance(fine, f, distance)
     # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle lies
     # nearer than the nearest corner.
-    most = 0.0
-    least_height = 0.0
-    for corner in range(1, 3):
-        other = dd.sub(fine_height(fine, facets[FACET * f + corner], direction), height)
-        most = max(most, other.high)
-        least_height = min(least_height, other.high)
+    above_b = dd.sub(fine_height(fine.points, b, fine.direction), height).high
+    above_c = dd.sub(fine_height(fine.points, c, fine.direction), height).high
+    highest = max(max(0.0, above_b), above_c)
+    lowest = min(min(0.0, above_b), above_c)
     # Corners off by E move the normal by E(|e| + |f|) at most, so its height at a corner by |corner| times that.
-    corner = 0.0
-    sides = 0.0
-    for axis in range(3):
-        x = fine[STRIDE * a + 2 * axis]
-        corner += abs(x)
-        sides += abs(fine[STRIDE * b + 2 * axis] - x) + abs(fine[STRIDE * c + 2 * axis] - x)
-    tilt = (_PLANE_ERROR + unsure) * corner * sides
-    if height.high > tilt + unsure * length.high:
-        nearest = distance + least_height / length.high
-        clearances[f] = nearest - _ROUNDED * abs(nearest) - unsure
+    corner = _leading(fine, a)
+    e, g = absolute(sub(_leading(fine, b), corner)), absolute(sub(_leading(fine, c), corner))
+    sides = ((e.x + g.x) + (e.y + g.y)) + (e.z + g.z)
+    tilt = (_PLANE_ERROR + fine.error) * norm1(corner) * sides
+    if height.high > tilt + fine.error * length.high:
+        nearest = distance.high + lowest / length.high
+        clearances[f] = nearest - _ROUNDED * abs(nearest) - fine.error
     else:
-        clearances[f] = min(distance, 0.0) - unsure
-    return length.high, (2.0 * most - least_height) / length.high
+        clearances[f] = min(distance.high, 0.0) - fine.error
+    return length.high, (2.0 * highest - lowest) / length.high
+
+
+@kernel(inline=True)
+def _put_distance(fine, f, distance):
+    fine.distances[2 * f] = distance.high
+    fine.distances[2 * f + 1] = distance.low
 
 
 @kernel
-def _find_vertex(ids, vertices, i, j):
+def _find_vertex(ids, n_vertices, i, j):
     """Number of the vertex that is this pair of vertices of the bodies, or −1."""
-    for v in range(vertices):
+    for v in range(n_vertices):
         if ids[2 * v] == i and ids[2 * v + 1] == j:
             return v
     return -1
@@ -121,27 +169,29 @@ def _find_vertex(ids, vertices, i, j):
 
 @kernel
 def _flip_to(surface, f, v, error):
-    """Exchange a diagonal of facet f so that vertex v, across one of its edges, becomes a corner; whether it could."""
-    _, _, _, _, _, facets, _, _, _ = surface
+    """Exchange a diagonal of facet f so that vertex v, across one of its edges, becomes a corner.
+
+    Returns the neighbour that it was exchanged with, or −1.
+    """
     for e in range(3):
-        t = facets[FACET * f + TWIN + e]
-        if facets[following(t) + 1] == v:
+        t = surface.facets[FACET * f + TWIN + e]
+        if surface.facets[following(t) + 1] == v:
             flip(surface, f, e, error)
             return t // FACET
     return -1
 
 
 @kernel
-def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, scale):
-    """`surface.find_patch` by the fine planes."""
-    _, _, _, _, ids, facets, _, border, patch = surface
-    _load(pair, low, fine, known, ids, apex, scale)
+def _find_patch(fine, f, apex):
+    """`polytope_surface.find_patch` by the fine planes."""
+    facets, border, patch = fine.surface.facets, fine.surface.border, fine.surface.patch
+    _load(fine, apex)
     facets[FACET * f + MARKS] |= SEEN
     patch[0] = f
-    found = 1
+    n_facets = 1
     visited = 0
-    edges = 0
-    while visited < found:
+    n_edges = 0
+    while visited < n_facets:
         g = patch[visited]
         visited += 1
         for e in range(3):
@@ -149,137 +199,140 @@ def _find_patch(pair, low, surface, fine, known, direction, f, apex, unsure, sca
             h = t // FACET
             if facets[FACET * h + MARKS] & SEEN:
                 continue
-            if found < WIDEST_BORDER - 2 and _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale):
+            if n_facets < WIDEST_BORDER - 2 and _is_seen(fine, h, apex):
                 facets[FACET * h + MARKS] |= SEEN
-                patch[found] = h
-                found += 1
+                patch[n_facets] = h
+                n_facets += 1
             else:
-                border[edges] = t
-                edges += 1
-    return found, edges
+                border[n_edges] = t
+                n_edges += 1
+    return Patch(n_facets, n_edges)
 
 
 @kernel
-def _is_seen(pair, low, surface, fine, known, direction, h, apex, unsure, scale):
+def _is_seen(fine, h, apex):
     """Whether a vertex lies beyond the fine plane of facet h."""
-    _, _, _, _, ids, facets, _, _, _ = surface
-    for corner in range(3):
-        _load(pair, low, fine, known, ids, facets[FACET * h + corner], scale)
-    a = facets[FACET * h]
-    set_plane(fine, a, facets[FACET * h + 1], facets[FACET * h + 2], direction)
-    height = dd.sub(fine_height(fine, apex, direction), fine_height(fine, a, direction))
-    return height.high > 4.0 * unsure * fine_length(direction).high
+    a, _, _ = _load_plane(fine, h)
+    height = dd.sub(fine_height(fine.points, apex, fine.direction), fine_height(fine.points, a, fine.direction))
+    return height.high > 4.0 * fine.error * fine_length(fine.direction).high
 
 
 @kernel(inline=True)
-def _forget(surface, distances, f, error, scale):
+def _invalidate(fine, f, error):
     """Facet f has a new plane, known in doubles only: what they prove, less their error, or nothing.
 
     What counts here are the true corners, so the origin has to lie behind it wherever they are.
     """
-    _, _, _, clearances, _, facets, _, _, _ = surface
-    distances[2 * f] = -math.inf
+    clearances = fine.surface.clearances
+    fine.distances[2 * f] = -math.inf
     if clearances[f] < math.inf:
-        clearances[f] = (clearances[f] - error) * scale if facets[FACET * f + MARKS] & SURE else -math.inf
+        sure = fine.surface.facets[FACET * f + MARKS] & SURE
+        clearances[f] = (clearances[f] - error) * fine.scale if sure else -math.inf
 
 
 @kernel
-def _name_tied(surface, distance, f, count, tied):
+def _request_nearest(surface, distance, f, n_facets, request):
     """Enter the corners of facet f and of all others that may be as near the origin, for the exact stage."""
-    _, _, _, clearances, ids, facets, _, _, _ = surface
-    tied[0] = 1
-    tied[1] = 0
-    for turn in range(count + 1):
+    request[0] = 1
+    request[1] = 0
+    for turn in range(n_facets + 1):
         g = f if turn == 0 else turn - 1
-        if clearances[g] > distance or (turn > 0 and g == f):
+        if surface.clearances[g] > distance or (turn > 0 and g == f):
             continue
-        if tied[1] == MAX_TIED_FACETS:
-            tied[0] = 0
+        if request[1] == MAX_TIED_FACETS:
+            request[0] = 0
             break
-        at = 2 + 6 * tied[1]
+        at = 2 + 6 * request[1]
         for k in range(3):
-            v = facets[FACET * g + k]
-            tied[at + 2 * k] = ids[2 * v]
-            tied[at + 2 * k + 1] = ids[2 * v + 1]
-        tied[1] += 1
+            v = surface.facets[FACET * g + k]
+            request[at + 2 * k] = surface.ids[2 * v]
+            request[at + 2 * k + 1] = surface.ids[2 * v + 1]
+        request[1] += 1
+
+
+@kernel(inline=True)
+def _fine(pair, terms_at, work, surface, size, slop):
+    """The `_Fine` of a surface, none of whose fine points is known."""
+    fine = fine_surface_at(work.epa_at, work.epa_integers_at)
+    low_at = work.fine_at + 8 * STRIDE
+    low = view_f64(low_at, put_low_parts(pair, terms_at, low_at))
+    scale = unit_scale(size)
+    error = HEIGHT_ERROR + SLOP_ERROR * slop * scale
+    return _Fine(
+        pair, surface, low, fine.points, fine.distances, fine.known, view_f64(work.fine_at, STRIDE), error, scale
+    )
 
 
 @kernel
-def refine(
-    pair, terms_at, doubles_at, integers_at, direction_at, corners_at, exact_at, tied, count, vertices, size, slop, error
-):  # fmt: skip
-    """Grow the surface that `epa` left until its nearest facet is final to the last digits.
+def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, error):
+    """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a `RefinedDepth`.
 
-    direction_at, corners_at, exact_at : further workspace: STRIDE + 24 doubles, 6 integers and `lowest_pair`'s.
-    tied : an entry of `depth_requests.py` out, where the depth is near rounding.
-    count, vertices : as left.   size, slop, error : of the pair.
-
-    Returns (sound, lower, depth, upper, nx, ny, nz, facet, count): a proven bracket of the cores' depth, which is
-    the distance of the facet's plane, and its direction; no lower one unless the origin is proven to lie inside.
-    Not sound: nothing was gained.
+    work : the `Workspace`, whose ``request`` becomes an entry of `depth_requests.py` where the depth is near rounding.
+    size, slop, error : of the pair.
     """
     if not is_refinable(size):
-        return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count
-    surface = workspace(doubles_at, integers_at)
-    points, _, _, clearances, ids, facets, starts, _, _ = surface
-    fine, distances, known = fine_workspace(doubles_at, integers_at)
-    direction = view_f64(direction_at, STRIDE)
-    corners = view_i64(corners_at, 6)
-    low = view_f64(direction_at + 8 * STRIDE, put_low_parts(pair, terms_at, direction_at + 8 * STRIDE))
-    scale = unit_scale(size)
-    over = 1.0 / scale
-    unsure = HEIGHT_ERROR + SLOP_ERROR * slop * scale
-    for v in range(vertices):
-        known[v] = 0
-    for f in range(count):
-        _forget(surface, distances, f, error, scale)
+        return RefinedDepth(False, 0.0, 0.0, 0.0, Vec3(0.0, 0.0, 1.0), -1, n_facets)
+    fine = _fine(pair, terms_at, work, surface, size, slop)
+    corners = view_i64(work.nearest_at, 6)
+    ids, clearances, direction = surface.ids, surface.clearances, fine.direction
+    over = 1.0 / fine.scale
+    for v in range(n_vertices):
+        fine.known[v] = 0
+    for f in range(n_facets):
+        _invalidate(fine, f, error)
     for _ in range(_STEPS):
-        f = least(clearances, max(count, 8))
-        taken = distances[2 * f] > -math.inf
-        length, spread = _set_distance(pair, low, surface, fine, distances, known, direction, f, unsure, scale)
-        if not taken and least(clearances, max(count, 8)) != f:
+        f = least(clearances, max(n_facets, 8))
+        was_known = fine.distances[2 * f] > -math.inf
+        length, spread = _set_distance(fine, f)
+        if not was_known and least(clearances, max(n_facets, 8)) != f:
             continue
-        distance = distances[2 * f]
+        distance = fine.distances[2 * f]
         for k in range(STRIDE):
             direction[k] = -direction[k]
         for k in range(3):
-            corners[2 * k] = ids[2 * facets[FACET * f + k]]
-            corners[2 * k + 1] = ids[2 * facets[FACET * f + k] + 1]
+            v = surface.facets[FACET * f + k]
+            corners[2 * k] = ids[2 * v]
+            corners[2 * k + 1] = ids[2 * v + 1]
         beyond = 0.0
         final = is_unique_minimiser(pair, corners, 3, direction, error)
         i = j = -1
         if not final:
-            excess, i, j = lowest_pair(pair, low, corners, direction, exact_at, scale)
+            excess, i, j = lowest_pair(pair, fine.low, corners, direction, work.ties_at, fine.scale)
             beyond = -excess.high / length
-            # Three heights make a level pair's; what is as good as a corner cannot be added, and widens the bracket.
-            final = beyond <= max(_LEVEL * distance, 3.0 * unsure) or beyond <= spread
+            # Three heights make a tied pair's; what is as good as a corner cannot be added, and widens the bracket.
+            final = beyond <= max(_FINAL * distance, 3.0 * fine.error) or beyond <= spread
         if final:
-            inner = clearances[f] if clearances[f] > 0.0 else -math.inf
-            outer = distance + spread + beyond + 3.0 * unsure
-            outer += _ROUNDED * abs(outer)
+            lower = clearances[f] if clearances[f] > 0.0 else -math.inf
+            upper = distance + spread + beyond + 3.0 * fine.error
+            upper += _ROUNDED * abs(upper)
             if distance * over < 4.0 * error:
-                _name_tied(surface, distance + spread + 8.0 * unsure, f, count, tied)
-            return (
-                True, inner * over, distance * over, outer * over,
-                -direction[0] / length, -direction[2] / length, -direction[4] / length, f, count,
-            )  # fmt: skip
-        v = _find_vertex(ids, vertices, i, j)
+                _request_nearest(surface, distance + spread + 8.0 * fine.error, f, n_facets, work.request)
+            nhat = divide(neg(dd.leading(dd.vec3_at(direction, 0))), length)
+            return RefinedDepth(True, lower * over, distance * over, upper * over, nhat, f, n_facets)
+        v = _find_vertex(ids, n_vertices, i, j)
         if v >= 0:
             h = _flip_to(surface, f, v, error)
             if h < 0:
                 break
-            _forget(surface, distances, f, error, scale)
-            _forget(surface, distances, h, error, scale)
+            _invalidate(fine, f, error)
+            _invalidate(fine, h, error)
             continue
-        if not has_room(vertices, count):
+        if not may_expand(n_vertices, n_facets):
             break
-        place_vertices(pair, points, ids, vertices, i, j)
-        known[vertices] = 0
-        starts[2 * vertices + 1] = -1
-        found, edges = _find_patch(pair, low, surface, fine, known, direction, f, vertices, unsure, scale)
-        count, _, _ = expand(surface, f, vertices, count, found, edges, math.inf, error, math.inf)
-        for g in range(count):
-            if vertices == facets[FACET * g + 2]:  # the apex stands last in what was made for it
-                _forget(surface, distances, g, error, scale)
-        vertices += 1
-    return False, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1, count
+        n_facets = _add_vertex(fine, f, n_vertices, n_facets, i, j, error)
+        n_vertices += 1
+    return RefinedDepth(False, 0.0, 0.0, 0.0, Vec3(0.0, 0.0, 1.0), -1, n_facets)
+
+
+@kernel(inline=True)
+def _add_vertex(fine, f, apex, n_facets, i, j, error):
+    """Expand the surface by the difference of vertices i of A and j of B, seen from facet f; returns how many facets it has."""
+    surface = fine.surface
+    place_vertices(fine.pair, surface.points, surface.ids, apex, i, j)
+    fine.known[apex] = 0
+    surface.starts[2 * apex + 1] = -1
+    cone = expand(surface, f, apex, n_facets, _find_patch(fine, f, apex), math.inf, error, math.inf)
+    for g in range(cone.n_facets):
+        if apex == surface.facets[FACET * g + 2]:  # the apex stands last in what was made for it
+            _invalidate(fine, g, error)
+    return cone.n_facets

@@ -44,6 +44,7 @@ from collide.numerics.vec3 import (
     rotate_back,
     scale,
     sub,
+    vec3_at,
 )
 
 #: Most vertices of both bodies, and most planes: some ten milliseconds.
@@ -323,7 +324,8 @@ def _find_corners(exact, doubles_at, ids, found):
     for i in range(n_corners):
         for j in range(i + 1):
             for k in range(j + 1):
-                distance, _, _, _ = nearest_of_triangle(corners, _CORNER * i, _CORNER * j, _CORNER * k, 0.0, 0.0, 0.0)
+                a, b, c = vec3_at(corners, _CORNER * i), vec3_at(corners, _CORNER * j), vec3_at(corners, _CORNER * k)
+                distance = nearest_of_triangle(a, b, c, Vec3(0.0, 0.0, 0.0)).distance
                 if distance < best:
                     best = distance
                     for corner in range(3):

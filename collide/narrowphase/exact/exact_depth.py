@@ -38,14 +38,13 @@ def exact_depth(
 @kernel(inline=True)
 def _write_depth(ordered, space, row_at, limit):
     """Write the depth of a row; whether it was found."""
-    row, _, marks = view_row(row_at)
+    row = view_row(row_at)
     found = depth_by_all_planes(ordered, space.terms, space.terms_at, space.digits, space.doubles_at, space.facet)
     if not found.proven:
         return False
     bracket = bracket_of_depth(found.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B))
-    put_normal_and_points(
-        row, ordered, space.terms_at, space.facet, 3, space.digits_at, neg(found.nhat), bracket.nearest
+    put_normal_and_points(row.doubles, ordered, space.terms_at, space.facet, 3, space.digits_at, neg(found.nhat), bracket.nearest
     )
-    lower, upper = max(row[LOWER], bracket.lower), min(row[UPPER], bracket.upper)
-    write_verdict(row, marks, bracket.nearest, lower, upper, EXACT, 0.0, limit)
+    lower, upper = max(row.doubles[LOWER], bracket.lower), min(row.doubles[UPPER], bracket.upper)
+    write_verdict(row, bracket.nearest, lower, upper, EXACT, 0.0, limit)
     return True

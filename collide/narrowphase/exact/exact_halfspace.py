@@ -39,7 +39,7 @@ from collide.numerics.digits import (
     lowest_bit,
 )
 from collide.numerics.double_double import DD, ScaledDD
-from collide.numerics.vec3 import Vec3, add, column_at, rotate
+from collide.numerics.vec3 import add, column_at, dot, rotate
 
 #: Most digits of any number that is multiplied once more; a slot holds twice as many.
 _LONGEST = 64
@@ -172,16 +172,15 @@ def reach_plane_exactly(ordered, terms, digits, skew):
         return PlaneContact(UNDONE, 0, DD(0.0, 0.0))
     _load_plane(plane)
     _load_rotation(digits, plane.pose_B, plane.rotation_B, _ROTATION_B)
-    nx, ny, nz, offset, length = plane_in_world(pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at)
-    n = Vec3(nx, ny, nz)
+    world = plane_in_world(pair, pair.A)
     lowest = math.inf
     for k in range(pair.B.n):
-        lowest = min(lowest, _height(pair, k, n, offset))
+        lowest = min(lowest, _height(pair, k, world))
     # Only vertices that may be the lowest are looked at exactly: usually one.
-    threshold = lowest + 2.0 * ((ERROR * ordered.size + ordered.slop) * skew) * length
+    threshold = lowest + 2.0 * ((ERROR * ordered.size + ordered.slop) * skew) * world.length
     deepest = PlaneContact(SEPARATE, 0, DD(math.inf, 0.0))
     for k in range(pair.B.n):
-        if _height(pair, k, n, offset) > threshold:
+        if _height(pair, k, world) > threshold:
             continue
         contact = _reach_of_vertex(plane, k)
         if contact.verdict == UNDONE:
@@ -192,10 +191,10 @@ def reach_plane_exactly(ordered, terms, digits, skew):
 
 
 @kernel
-def _height(pair, k, n, offset):
-    """s of vertex k in doubles."""
+def _height(pair, k, world):
+    """s of vertex k of B in doubles, for the half-space in the world."""
     q = add(rotate(pair.poses, pair.B.pose_at, column_at(pair.B.coords, pair.B.padded, k)), pair.t)
-    return n.x * q.x + n.y * q.y + n.z * q.z - offset
+    return dot(world.normal, q) - world.offset
 
 
 @kernel

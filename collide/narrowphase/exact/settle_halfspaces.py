@@ -48,24 +48,24 @@ def settle_halfspaces(
 @kernel(inline=True)
 def _settle(ordered, space, row_at, boolean, limit):
     """Settle a row; whether integers could."""
-    row, words, marks = view_row(row_at)
+    row = view_row(row_at)
     pair = ordered.pair
-    _, skew = reach_of_plane(pair.numbers, pair.A.params_at, pair.poses, pair.A.pose_at)
+    _, skew = reach_of_plane(pair, pair.A)
     contact = reach_plane_exactly(ordered, space.terms, space.digits, skew)
     if contact.verdict == UNDONE:
-        keep_proven_sign(row, marks)
+        keep_proven_sign(row)
         return False
     bracket = bracket_of_gap(contact.excess)
-    upper = min(row[UPPER], bracket.upper)
+    upper = min(row.doubles[UPPER], bracket.upper)
     if contact.verdict == TOUCHING:
         upper = min(upper, 0.0)
-    lower = max(row[LOWER], bracket.lower)
-    write_verdict(row, marks, bracket.nearest, lower, upper, EXACT, math.inf if boolean else 0.0, limit)
+    lower = max(row.doubles[LOWER], bracket.lower)
+    write_verdict(row, bracket.nearest, lower, upper, EXACT, math.inf if boolean else 0.0, limit)
     if contact.verdict == SEPARATE:  # also where the gap is smaller than the smallest double
-        marks[HIT] = 0
-        marks[HOW] = EXACT
+        row.flags[HIT] = 0
+        row.flags[HOW] = EXACT
     space.simplex[0] = -1
     space.simplex[1] = contact.vertex
-    write_vertices(words, marks, space.simplex, 1, ordered.flip)
-    marks[EXACT_ROUNDS] = 1
+    write_vertices(row, space.simplex, 1, ordered.flip)
+    row.flags[EXACT_ROUNDS] = 1
     return True

@@ -63,18 +63,18 @@ def settle_hulls(
 @kernel(inline=True)
 def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
     """Settle row k."""
-    row, words, marks = view_row(row_at)
+    row = view_row(row_at)
     ids = space.simplex
     radius_a, radius_b = radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B)
-    n = _take_simplex(ids, words, marks, ordered.flip)
+    n = _take_simplex(ids, row, ordered.flip)
     answer = touch_exactly(ordered, space.terms, space.digits, boolean, ids, n, radius_a, radius_b)
     if answer.verdict == UNDONE:
-        keep_proven_sign(row, marks)
+        keep_proven_sign(row)
         return
     touching = answer.verdict == TOUCHING
-    distance = row[DISTANCE]
-    lower = row[LOWER]
-    upper = row[UPPER]
+    distance = row.doubles[DISTANCE]
+    lower = row.doubles[LOWER]
+    upper = row.doubles[UPPER]
     has_depth = False
     if answer.cores_apart:
         # Cores apart by less than the radii are as exact as a gap.
@@ -95,35 +95,35 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
                 upper = min(upper, bracket.upper)
     # The digits have done their work; their place serves as workspace of doubles.
     if answer.cores_apart:
-        put_normal_and_points(row, ordered, space.terms_at, ids, answer.n, space.digits_at, answer.v, distance)
-    write_verdict(row, marks, distance, lower, upper, EXACT, math.inf if boolean else 0.0, limit)
-    if has_depth and is_refinable(ordered.size) and points_miss(row, ordered.size, row[DISTANCE]):
-        put_points(row, ordered, space.terms_at, ids, answer.n, space.digits_at, row[DISTANCE])
+        put_normal_and_points(row.doubles, ordered, space.terms_at, ids, answer.n, space.digits_at, answer.v, distance)
+    write_verdict(row, distance, lower, upper, EXACT, math.inf if boolean else 0.0, limit)
+    if has_depth and is_refinable(ordered.size) and points_miss(row.doubles, ordered.size, row.doubles[DISTANCE]):
+        put_points(row.doubles, ordered, space.terms_at, ids, answer.n, space.digits_at, row.doubles[DISTANCE])
     wants_point = touching and not answer.cores_apart and not (boolean or depths)
-    if wants_point and points_miss(row, ordered.size, 0.0):
-        put_common_point(row, ordered, ids, answer.n, space.digits_at)
+    if wants_point and points_miss(row.doubles, ordered.size, 0.0):
+        put_common_point(row.doubles, ordered, ids, answer.n, space.digits_at)
     if answer.verdict == SEPARATE:  # also where the gap is smaller than the smallest double
-        marks[HIT] = 0
-        marks[HOW] = EXACT
-    write_vertices(words, marks, ids, answer.n, ordered.flip)
-    marks[EXACT_ROUNDS] = min(answer.rounds, 255)
+        row.flags[HIT] = 0
+        row.flags[HOW] = EXACT
+    write_vertices(row, ids, answer.n, ordered.flip)
+    row.flags[EXACT_ROUNDS] = min(answer.rounds, 255)
 
 
 @kernel(inline=True)
-def _take_simplex(ids, words, marks, flip):
+def _take_simplex(ids, row, flip):
     """The vertex pairs that a row names, for the bodies as worked on; how many there are."""
     ids[0] = 0  # a row decided as a boolean names no vertices (asked again only where tests distrust doubles)
     ids[1] = 0
-    for j in range(marks[COUNT]):
-        ids[2 * j] = words[(VERTICES_B if flip else VERTICES_A) + j]
-        ids[2 * j + 1] = words[(VERTICES_A if flip else VERTICES_B) + j]
-    return max(int(marks[COUNT]), 1)
+    for j in range(row.flags[COUNT]):
+        ids[2 * j] = row.words[(VERTICES_B if flip else VERTICES_A) + j]
+        ids[2 * j + 1] = row.words[(VERTICES_A if flip else VERTICES_B) + j]
+    return max(int(row.flags[COUNT]), 1)
 
 
 @kernel(inline=True)
-def keep_proven_sign(row, marks):
+def keep_proven_sign(row):
     """A row for which integers have no workspace is decided if doubles have proven its sign."""
-    if row[LOWER] > 0.0:
-        marks[HOW] = PLANE
-    elif row[UPPER] <= 0.0:
-        marks[HOW] = SWEPT
+    if row.doubles[LOWER] > 0.0:
+        row.flags[HOW] = PLANE
+    elif row.doubles[UPPER] <= 0.0:
+        row.flags[HOW] = SWEPT

@@ -14,7 +14,7 @@ import math
 from collide.kernels import kernel, view_f64
 from collide.narrowphase.epa.origin_foot import weigh_corners
 from collide.narrowphase.gap.precise_pair import fine_points, is_refinable, put_low_parts, unit_scale
-from collide.narrowphase.gjk.minkowski_difference import POINT, combined, place_vertices
+from collide.narrowphase.gjk.minkowski_difference import POINT, POINT_OF_A, POINT_OF_B, place_vertices, weighted_sum
 from collide.narrowphase.gjk.simplex import weigh_enclosed
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import NORMAL, POINT_A, POINT_B
@@ -57,7 +57,7 @@ def put_points(row, ordered, terms_at, ids, n, doubles_at, distance):
     # The normal is that of the pair as asked; the bodies here may be exchanged.
     sign = -1.0 if ordered.flip else 1.0
     foot = scale(-sign * (distance + (radius_a + radius_b)) * unit, vec3_at(row, NORMAL))
-    weigh_corners(corners, STRIDE, n, weights, foot.x, foot.y, foot.z)
+    weigh_corners(corners, STRIDE, n, weights, foot)
     A, B, poses = pair.A, pair.B, pair.poses
     a = Vec3(0.0, 0.0, 0.0)
     b = Vec3(0.0, 0.0, 0.0)
@@ -83,11 +83,9 @@ def put_common_point(row, ordered, ids, n, doubles_at):
         place_vertices(pair, points, ids, k, ids[2 * k], ids[2 * k + 1])
     miss, extent = weigh_enclosed(points, weights) if n == 4 else (math.inf, 0.0)
     if not miss <= _NEAR_MISS * extent:
-        weigh_corners(points, POINT, n, weights, 0.0, 0.0, 0.0)
-    a = Vec3(combined(points, weights, n, 3), combined(points, weights, n, 4), combined(points, weights, n, 5))
-    b = Vec3(combined(points, weights, n, 6), combined(points, weights, n, 7), combined(points, weights, n, 8))
-    a = add(a, vec3_at(pair.poses, pair.A.pose_at + 9))
-    b = add(b, vec3_at(pair.poses, pair.B.pose_at + 9))
+        weigh_corners(points, POINT, n, weights, Vec3(0.0, 0.0, 0.0))
+    a = add(weighted_sum(points, weights, n, POINT_OF_A), vec3_at(pair.poses, pair.A.pose_at + 9))
+    b = add(weighted_sum(points, weights, n, POINT_OF_B), vec3_at(pair.poses, pair.B.pose_at + 9))
     _put_flipped(row, a, b, ordered.flip)
 
 

@@ -189,10 +189,10 @@ def _put_geometry(pair, question, ticket, n_points, parts):
 @kernel(inline=True)
 def write_guess(row, distance, lower, upper, nhat):
     """What doubles say of a row that is enqueued, and `_finish_row` reads: for the pair as worked on."""
-    row[DISTANCE] = distance
-    row[LOWER] = lower
-    row[UPPER] = upper
-    put_vec3_at(row, NORMAL, nhat)
+    row.doubles[DISTANCE] = distance
+    row.doubles[LOWER] = lower
+    row.doubles[UPPER] = upper
+    put_vec3_at(row.doubles, NORMAL, nhat)
 
 
 # --- out ------------------------------------------------------------------------------------------
@@ -288,31 +288,29 @@ def _widen_by_ties(
 @kernel(inline=True)
 def _finish_row(row_at, question, answer, ticket, proven, depths, limit):
     """Finish a row: with proven digits, or as doubles say, for the exact stage to settle."""
-    row, _, marks = view_row(row_at)
+    row = view_row(row_at)
     radius_a = get(question, at.RADIUS_A)
     radius_b = get(question, at.RADIUS_B)
-    distance = row[DISTANCE]
-    lower = row[LOWER]
-    upper = row[UPPER]
-    nhat = vec3_at(row, NORMAL)
+    distance = row.doubles[DISTANCE]
+    lower = row.doubles[LOWER]
+    upper = row.doubles[UPPER]
+    nhat = vec3_at(row.doubles, NORMAL)
     if proven:
         distance = get(answer, at.GAP_NEAREST)
         lower = max(lower, get(answer, at.GAP_LOWER))
         upper = min(upper, get(answer, at.GAP_UPPER))
         nhat = neg(get_vec3(answer, at.UNIT))
-    write_verdict(row, marks, distance, lower, upper, ticket[_HOW], 0.0, limit)
+    write_verdict(row, distance, lower, upper, ticket[_HOW], 0.0, limit)
     decided = lower > 0.0 or upper <= 0.0
-    unfinished = marks[CERTIFIED] == 0 and (depths or upper > 0.0)
+    unfinished = row.flags[CERTIFIED] == 0 and (depths or upper > 0.0)
     # Radii may prove an overlap of cores between which doubles see no clear direction.
     ambiguous = not proven and radius_a + radius_b > 0.0
     # Shares of a triangle's edges say little if it is thin; the exact stage takes more care.
     a = get_vec3(answer, at.POINT_A)
     b = get_vec3(answer, at.POINT_B)
     reach = max(1.0 / get(question, at.SCALE), max_abs(a), max_abs(b))
-    miss = max_abs(sub(sub(b, a), scale(row[DISTANCE] + (radius_a + radius_b), nhat)))
-    missed = proven and miss > _NEAR_MISS * reach and marks[BEYOND] == 0
+    miss = max_abs(sub(sub(b, a), scale(row.doubles[DISTANCE] + (radius_a + radius_b), nhat)))
+    missed = proven and miss > _NEAR_MISS * reach and row.flags[BEYOND] == 0
     if not decided or unfinished or ambiguous or missed:
-        marks[HOW] = UNDECIDED
-    p_a = add(a, scale(radius_a, nhat))
-    p_b = sub(b, scale(radius_b, nhat))
-    write_vectors(row, nhat.x, nhat.y, nhat.z, p_a.x, p_a.y, p_a.z, p_b.x, p_b.y, p_b.z, ticket[_FLIP] == 1)
+        row.flags[HOW] = UNDECIDED
+    write_vectors(row, nhat, add(a, scale(radius_a, nhat)), sub(b, scale(radius_b, nhat)), ticket[_FLIP] == 1)

@@ -6,205 +6,183 @@ for all faces, but rounding may have another face hold it: a prototype that trus
 the result is checked: a point v of the simplex is its nearest one if no corner p has p·v < v·v. Where that is not so,
 or where the origin may lie inside, the caller looks at all faces.
 
-Points are passed as numbers: what the compiler can keep in registers it need not store and load again.
+Points are passed as values: what the compiler can keep in registers it need not store and load again.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.narrowphase.gjk.simplex import height_behind
+from collide.numerics.vec3 import Vec3, add, cross, dot, scale, sub
 
 #: How far, relatively, the square of a length may be from the least product of a corner with it.
 _OPTIMAL = 1.0 - 2.0**-40
 
 
-@kernel(inline=True)
-def with_newest(n, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error, slack):
-    """(kept, turn, weights of D and two more, x, y, z, its square) for n old points A, B, C and the newest, D.
+class Nearest(NamedTuple):
+    """The nearest point of a simplex of old points A, B, C and the newest, D.
 
-    kept : how many points stay, D and the first ones of (A, B, C), (B, C, A) or (C, A, B), as ``turn`` says. 0: look
-        at all faces. 4: the origin lies in the tetrahedron; the weight of D is how deep, at least.
+    n_kept : points that stay, D and the first ones of (A, B, C), (B, C, A) or (C, A, B), as ``rotation`` = 0, 1, 2 says.
+        NOT_FOUND: look at all faces. INSIDE: the origin lies in the tetrahedron; ``w0`` is how deep, at least.
+    w0, w1, w2 : weights of D and of the other two.   v : the point.
+    """
+
+    n_kept: int
+    rotation: int
+    w0: float
+    w1: float
+    w2: float
+    v: Vec3
+
+
+#: Values of ``n_kept`` besides 1 … 3.
+NOT_FOUND, INSIDE = 0, 4
+
+
+@kernel(inline=True)
+def nearest_with_newest(n, A, B, C, D, error, slack):
+    """The `Nearest` for n old points of A, B, C and the newest, D, and its squared distance.
+
     error : how far each point may be from its true place.   slack : how far a square may be off.
     """
     if n == 1:
-        kept, turn, wd, wf, ws, x, y, z = _on_segment(ax, ay, az, dx, dy, dz)
+        nearest = _on_segment(A, D)
     elif n == 2:
-        kept, turn, wd, wf, ws, x, y, z = _on_triangle(ax, ay, az, bx, by, bz, dx, dy, dz)
+        nearest = _on_triangle(A, B, D)
     else:
-        kept, turn, wd, wf, ws, x, y, z = _on_tetrahedron(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error)
-    square = x * x + y * y + z * z
-    least = min(x * dx + y * dy + z * dz, x * ax + y * ay + z * az)
+        nearest = _on_tetrahedron(A, B, C, D, error)
+    v = nearest.v
+    square = dot(v, v)
+    least = min(dot(v, D), dot(v, A))
     if n > 1:
-        least = min(least, x * bx + y * by + z * bz)
+        least = min(least, dot(v, B))
     if n > 2:
-        least = min(least, x * cx + y * cy + z * cz)
-    if kept < 4 and not least >= square * _OPTIMAL - slack:
-        kept = 0
-    return kept, turn, wd, wf, ws, x, y, z, square
+        least = min(least, dot(v, C))
+    n_kept = nearest.n_kept
+    if n_kept < INSIDE and not least >= square * _OPTIMAL - slack:
+        n_kept = NOT_FOUND
+    return Nearest(n_kept, nearest.rotation, nearest.w0, nearest.w1, nearest.w2, v), square
 
 
 @kernel(inline=True)
-def pick(turn, a, b, c):
-    """One of three, as ``turn`` says."""
-    return a if turn == 0 else (b if turn == 1 else c)
+def select(rotation, a, b, c):
+    """One of three, as ``rotation`` says."""
+    return a if rotation == 0 else (b if rotation == 1 else c)
 
 
 @kernel(inline=True)
-def _on_segment(ax, ay, az, dx, dy, dz):
-    """`with_newest` of a segment."""
-    ex = ax - dx
-    ey = ay - dy
-    ez = az - dz
-    along = -(dx * ex + dy * ey + dz * ez)
+def _at_newest(D):
+    return Nearest(1, 0, 1.0, 0.0, 0.0, D)
+
+
+@kernel(inline=True)
+def _along_edge(rotation, along, square, D, e):
+    """The point of the edge from D along e, whose share is along / square."""
+    w = min(along / square, 1.0)
+    return Nearest(2, rotation, 1.0 - w, w, 0.0, add(D, scale(w, e)))
+
+
+@kernel(inline=True)
+def _on_segment(A, D):
+    """`nearest_with_newest` of a segment."""
+    e = sub(A, D)
+    along = -dot(D, e)
     if along <= 0.0:
-        return 1, 0, 1.0, 0.0, 0.0, dx, dy, dz
-    w = min(along / (ex * ex + ey * ey + ez * ez), 1.0)
-    return 2, 0, 1.0 - w, w, 0.0, dx + w * ex, dy + w * ey, dz + w * ez
+        return _at_newest(D)
+    return _along_edge(0, along, dot(e, e), D, e)
 
 
 @kernel(inline=True)
-def _on_triangle(ax, ay, az, bx, by, bz, dx, dy, dz):
-    """`with_newest` of a triangle."""
-    ex = ax - dx
-    ey = ay - dy
-    ez = az - dz
-    fx = bx - dx
-    fy = by - dy
-    fz = bz - dz
-    nx = ey * fz - ez * fy
-    ny = ez * fx - ex * fz
-    nz = ex * fy - ey * fx
-    within, wf, ws = _shares(
-        nx, ny, nz, dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex, dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
-    )
+def _on_triangle(A, B, D):
+    """`nearest_with_newest` of a triangle."""
+    e, f = sub(A, D), sub(B, D)
+    within, w1, w2 = _foot_shares(cross(e, f), cross(D, e), cross(D, f))
     if within:
-        return _on_face(0, wf, ws, dx, dy, dz, ex, ey, ez, fx, fy, fz)
-    p = -(dx * ex + dy * ey + dz * ez)
-    q = -(dx * fx + dy * fy + dz * fz)
+        return _on_face(0, w1, w2, D, e, f)
+    p, q = -dot(D, e), -dot(D, f)
     if p <= 0.0 and q <= 0.0:
-        return 1, 0, 1.0, 0.0, 0.0, dx, dy, dz
-    ee = ex * ex + ey * ey + ez * ez
-    ff = fx * fx + fy * fy + fz * fz
+        return _at_newest(D)
+    ee, ff = dot(e, e), dot(f, f)
     if q <= 0.0 or (p > 0.0 and p * p * ff >= q * q * ee):
-        w = min(p / ee, 1.0)
-        return 2, 0, 1.0 - w, w, 0.0, dx + w * ex, dy + w * ey, dz + w * ez
-    w = min(q / ff, 1.0)
-    return 2, 1, 1.0 - w, w, 0.0, dx + w * fx, dy + w * fy, dz + w * fz
+        return _along_edge(0, p, ee, D, e)
+    return _along_edge(1, q, ff, D, f)
 
 
 @kernel(inline=True)
-def _on_tetrahedron(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, error):
-    """`with_newest` of a tetrahedron."""
-    ex = ax - dx
-    ey = ay - dy
-    ez = az - dz
-    fx = bx - dx
-    fy = by - dy
-    fz = bz - dz
-    gx = cx - dx
-    gy = cy - dy
-    gz = cz - dz
+def _on_tetrahedron(A, B, C, D, error):
+    """`nearest_with_newest` of a tetrahedron."""
+    e, f, g = sub(A, D), sub(B, D), sub(C, D)
     # Normals of the faces (A, B), (B, C), (C, A) at D.
-    lx = ey * fz - ez * fy
-    ly = ez * fx - ex * fz
-    lz = ex * fy - ey * fx
-    mx = fy * gz - fz * gy
-    my = fz * gx - fx * gz
-    mz = fx * gy - fy * gx
-    nx = gy * ez - gz * ey
-    ny = gz * ex - gx * ez
-    nz = gx * ey - gy * ex
-    volume = lx * gx + ly * gy + lz * gz
-    turned = -1.0 if volume < 0.0 else 1.0
-    l_sees = turned * (lx * dx + ly * dy + lz * dz) > 0.0
-    m_sees = turned * (mx * dx + my * dy + mz * dz) > 0.0
-    n_sees = turned * (nx * dx + ny * dy + nz * dz) > 0.0
-    if not (l_sees or m_sees or n_sees):
-        deep = _behind(-turned, lx, ly, lz, dx, dy, dz, ax, ay, az, bx, by, bz, error)
-        deep = min(deep, _behind(-turned, mx, my, mz, dx, dy, dz, bx, by, bz, cx, cy, cz, error))
-        deep = min(deep, _behind(-turned, nx, ny, nz, dx, dy, dz, cx, cy, cz, ax, ay, az, error))
-        ux = fx - ex
-        uy = fy - ey
-        uz = fz - ez
-        vx = gx - ex
-        vy = gy - ey
-        vz = gz - ez
-        wx = uy * vz - uz * vy
-        wy = uz * vx - ux * vz
-        wz = ux * vy - uy * vx
-        deep = min(deep, _behind(turned, wx, wy, wz, ax, ay, az, bx, by, bz, cx, cy, cz, error))
-        deep = math.sqrt(max(deep, 0.0))
-        return 4 if deep > error else 0, 0, deep, 0.0, 0.0, dx, dy, dz
+    ab, bc, ca = cross(e, f), cross(f, g), cross(g, e)
+    volume = dot(ab, g)
+    outwards = -1.0 if volume < 0.0 else 1.0
+    sees_ab = outwards * dot(ab, D) > 0.0
+    sees_bc = outwards * dot(bc, D) > 0.0
+    sees_ca = outwards * dot(ca, D) > 0.0
+    if not (sees_ab or sees_bc or sees_ca):
+        least = _squared_clearance(-outwards, ab, D, A, B, error)
+        least = min(least, _squared_clearance(-outwards, bc, D, B, C, error))
+        least = min(least, _squared_clearance(-outwards, ca, D, C, A, error))
+        opposite = cross(sub(f, e), sub(g, e))
+        least = min(least, _squared_clearance(outwards, opposite, A, B, C, error))
+        clearance = math.sqrt(max(least, 0.0))
+        return Nearest(INSIDE if clearance > error else NOT_FOUND, 0, clearance, 0.0, 0.0, D)
     if volume == 0.0:
-        return 0, 0, 0.0, 0.0, 0.0, dx, dy, dz
-    ux = dy * ez - dz * ey
-    uy = dz * ex - dx * ez
-    uz = dx * ey - dy * ex
-    vx = dy * fz - dz * fy
-    vy = dz * fx - dx * fz
-    vz = dx * fy - dy * fx
-    wx = dy * gz - dz * gy
-    wy = dz * gx - dx * gz
-    wz = dx * gy - dy * gx
-    if l_sees:
-        within, wf, ws = _shares(lx, ly, lz, ux, uy, uz, vx, vy, vz)
+        return Nearest(NOT_FOUND, 0, 0.0, 0.0, 0.0, D)
+    de, df, dg = cross(D, e), cross(D, f), cross(D, g)
+    if sees_ab:
+        within, w1, w2 = _foot_shares(ab, de, df)
         if within:
-            return _on_face(0, wf, ws, dx, dy, dz, ex, ey, ez, fx, fy, fz)
-    if m_sees:
-        within, wf, ws = _shares(mx, my, mz, vx, vy, vz, wx, wy, wz)
+            return _on_face(0, w1, w2, D, e, f)
+    if sees_bc:
+        within, w1, w2 = _foot_shares(bc, df, dg)
         if within:
-            return _on_face(1, wf, ws, dx, dy, dz, fx, fy, fz, gx, gy, gz)
-    if n_sees:
-        within, wf, ws = _shares(nx, ny, nz, wx, wy, wz, ux, uy, uz)
+            return _on_face(1, w1, w2, D, f, g)
+    if sees_ca:
+        within, w1, w2 = _foot_shares(ca, dg, de)
         if within:
-            return _on_face(2, wf, ws, dx, dy, dz, gx, gy, gz, ex, ey, ez)
-    # The edge along which the way to D is shortened most, its square by along² / |edge|².
-    along = max(-(dx * ex + dy * ey + dz * ez), 0.0)
-    edge = ex * ex + ey * ey + ez * ez
-    turn = 0
-    p = max(-(dx * fx + dy * fy + dz * fz), 0.0)
-    q = fx * fx + fy * fy + fz * fz
-    if p * p * edge > along * along * q:
-        along, edge, turn = p, q, 1
-    p = max(-(dx * gx + dy * gy + dz * gz), 0.0)
-    q = gx * gx + gy * gy + gz * gz
-    if p * p * edge > along * along * q:
-        along, edge, turn = p, q, 2
-    if along == 0.0:
-        return 1, 0, 1.0, 0.0, 0.0, dx, dy, dz
-    w = min(along / edge, 1.0)
-    x = dx + w * pick(turn, ex, fx, gx)
-    y = dy + w * pick(turn, ey, fy, gy)
-    z = dz + w * pick(turn, ez, fz, gz)
-    return 2, turn, 1.0 - w, w, 0.0, x, y, z
+            return _on_face(2, w1, w2, D, g, e)
+    return _on_best_edge(D, e, f, g)
 
 
 @kernel(inline=True)
-def _behind(turned, nx, ny, nz, ax, ay, az, bx, by, bz, cx, cy, cz, error):
+def _on_best_edge(D, e, f, g):
+    """The nearest point of three edges from D: of the one that lies lowest, by along² / |edge|²."""
+    along, square, rotation = max(-dot(D, e), 0.0), dot(e, e), 0
+    p, q = max(-dot(D, f), 0.0), dot(f, f)
+    if p * p * square > along * along * q:
+        along, square, rotation = p, q, 1
+    p, q = max(-dot(D, g), 0.0), dot(g, g)
+    if p * p * square > along * along * q:
+        along, square, rotation = p, q, 2
+    if along == 0.0:
+        return _at_newest(D)
+    return _along_edge(rotation, along, square, D, select(rotation, e, f, g))
+
+
+@kernel(inline=True)
+def _squared_clearance(outwards, n, a, b, c, error):
     """h² / |n|² for the normal n of a triangle, turned outwards: see `height_behind`; −1 unless the origin lies behind."""
-    height, square = height_behind(
-        turned * nx, turned * ny, turned * nz, ax, ay, az, bx, by, bz, cx, cy, cz, error
-    )
+    height, square = height_behind(scale(outwards, n), a, b, c, error)
     return height * height / square if height > 0.0 else -1.0
 
 
 @kernel(inline=True)
-def _shares(nx, ny, nz, ux, uy, uz, vx, vy, vz):
-    """(whether the foot lies within a triangle, weights of its second and third corner).
+def _foot_shares(n, de, df):
+    """(whether the origin's foot lies within a triangle at D, weights of its second and third corner).
 
-    n : e × f, the edges from the first corner d to the others.   u, v : d × e and d × f.
+    n : e × f, of the edges from D to the others.   de, df : D × e and D × f.
     """
-    whole = nx * nx + ny * ny + nz * nz
-    first = -(nx * vx + ny * vy + nz * vz)
-    second = nx * ux + ny * uy + nz * uz
-    return first > 0.0 and second > 0.0 and first + second < whole, first / whole, second / whole
+    square = dot(n, n)
+    w1 = -dot(n, df)
+    w2 = dot(n, de)
+    return w1 > 0.0 and w2 > 0.0 and w1 + w2 < square, w1 / square, w2 / square
 
 
 @kernel(inline=True)
-def _on_face(turn, wf, ws, dx, dy, dz, ex, ey, ez, fx, fy, fz):
-    x = dx + wf * ex + ws * fx
-    y = dy + wf * ey + ws * fy
-    z = dz + wf * ez + ws * fz
-    return 3, turn, 1.0 - wf - ws, wf, ws, x, y, z
+def _on_face(rotation, w1, w2, D, e, f):
+    v = add(add(D, scale(w1, e)), scale(w2, f))
+    return Nearest(3, rotation, 1.0 - w1 - w2, w1, w2, v)

@@ -7,133 +7,117 @@ is closest where this set is nearest the origin, overlaps where it contains the 
 from __future__ import annotations
 
 from collide.kernels import kernel
+from collide.numerics.vec3 import Vec3, add, column_at, dot, neg, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 from collide.support.support_mapping import settled_vertex, support
 from collide.support.support_tree_query import two_extreme_vertices
 
-#: Doubles stored a difference point: w, then a and b in W's axes from their own body's origin.
-POINT = 9
+#: Doubles stored a point of A ⊖ B: w = a − b − t, then a and b in W's axes from their own body's origin.
+POINT, POINT_OF_A, POINT_OF_B = 9, 3, 6
+#: Where weights of up to four points are followed by the point they make, and by a unit axis.
+NEAREST_POINT, AXIS = 4, 7
 
 
 @kernel(cold=True)
-def listed_difference_point(pair, points, ids, k, dx, dy, dz, listed_a, listed_b):
+def listed_difference_point(pair, points, ids, k, d, list_a, list_b):
     """`inlined_difference_point` of whole bodies, called: a copy at every place where one is asked for took 8 s to compile."""
-    return inlined_difference_point(pair, points, ids, k, dx, dy, dz, False, listed_a, listed_b)
+    return inlined_difference_point(pair, points, ids, k, d, False, list_a, list_b)
 
 
 @kernel(inline=True)
-def difference_point(pair, points, ids, k, dx, dy, dz):
+def difference_point(pair, points, ids, k, d):
     """The same by walks through whole support trees."""
-    return listed_difference_point(pair, points, ids, k, dx, dy, dz, -1, -1)
+    return listed_difference_point(pair, points, ids, k, d, -1, -1)
 
 
 @kernel(inline=True)
-def inlined_difference_point(pair, points, ids, k, dx, dy, dz, coarse, listed_a, listed_b):
+def inlined_difference_point(pair, points, ids, k, d, coarse, list_a, list_b):
     """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
 
     Returns the lists of the bodies' support trees in which vertices were found (`extreme_vertex_listed`).
 
-    pair : `posed_pair.posed_pair`.   coarse : ask the coarse points alone, where there are any.
+    pair : a `PosedPair`.   coarse : ask the coarse points alone, where there are any.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
-    listed_a, listed_b : lists to look in alone, or −1.
+    list_a, list_b : lists to look in alone, or −1.
     """
-    A, B, numbers, poses = pair.A, pair.B, pair.numbers, pair.poses
-    p, q = A.pose_at, B.pose_at
-    ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
-    fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
+    A, B = pair.A, pair.B
+    e = rotate_back(pair.poses, A.pose_at, d)
+    f = rotate_back(pair.poses, B.pose_at, neg(d))
     if A.tree != 0 and B.tree != 0 and not coarse:
-        ia, ax, ay, az, listed_a, ib, bx, by, bz, listed_b = two_extreme_vertices(
-            A.tree, listed_a, ex, ey, ez, B.tree, listed_b, fx, fy, fz
+        ia, ax, ay, az, list_a, ib, bx, by, bz, list_b = two_extreme_vertices(
+            A.tree, list_a, e.x, e.y, e.z, B.tree, list_b, f.x, f.y, f.z
         )
     else:
-        one, other = (A.coarse_at, B.coarse_at) if coarse else (0, 0)
-        ia, ax, ay, az, listed_a = support(A.kind, A.coords, A.n, A.padded, numbers, A.params_at, A.tree, one, listed_a, ex, ey, ez)
-        ib, bx, by, bz, listed_b = support(B.kind, B.coords, B.n, B.padded, numbers, B.params_at, B.tree, other, listed_b, fx, fy, fz)
+        ia, ax, ay, az, list_a = _support(pair, A, coarse, list_a, e)
+        ib, bx, by, bz, list_b = _support(pair, B, coarse, list_b, f)
     ids[2 * k] = ia
     ids[2 * k + 1] = ib
-    _place(pair, points, k, ax, ay, az, bx, by, bz)
-    return listed_a, listed_b
+    _put_point_of(pair, A, points, POINT * k + POINT_OF_A, Vec3(ax, ay, az))
+    _put_point_of(pair, B, points, POINT * k + POINT_OF_B, Vec3(bx, by, bz))
+    _put_difference(pair, points, k)
+    return list_a, list_b
 
 
 @kernel(inline=True)
-def _turned_back(poses, p, dx, dy, dz):
-    """A direction of the world in the axes of a body."""
-    return (
-        poses[p] * dx + poses[p + 3] * dy + poses[p + 6] * dz,
-        poses[p + 1] * dx + poses[p + 4] * dy + poses[p + 7] * dz,
-        poses[p + 2] * dx + poses[p + 5] * dy + poses[p + 8] * dz,
+def _support(pair, body, coarse, listed, g):
+    """`support` of one body in a direction of its own frame."""
+    coarse_at = body.coarse_at if coarse else 0
+    return support(
+        body.kind, body.coords, body.n, body.padded, pair.numbers, body.params_at, body.tree, coarse_at, listed, g.x, g.y, g.z
     )
 
 
 @kernel(inline=True)
-def _place(pair, points, k, ax, ay, az, bx, by, bz):
-    """Point k becomes the difference of a and b, given in their bodies' frames."""
-    p = pair.A.pose_at
-    q = pair.B.pose_at
-    poses = pair.poses
-    t = pair.t
-    at = POINT * k
-    points[at + 3] = poses[p] * ax + poses[p + 1] * ay + poses[p + 2] * az
-    points[at + 4] = poses[p + 3] * ax + poses[p + 4] * ay + poses[p + 5] * az
-    points[at + 5] = poses[p + 6] * ax + poses[p + 7] * ay + poses[p + 8] * az
-    points[at + 6] = poses[q] * bx + poses[q + 1] * by + poses[q + 2] * bz
-    points[at + 7] = poses[q + 3] * bx + poses[q + 4] * by + poses[q + 5] * bz
-    points[at + 8] = poses[q + 6] * bx + poses[q + 7] * by + poses[q + 8] * bz
-    points[at] = (points[at + 3] - points[at + 6]) - t.x
-    points[at + 1] = (points[at + 4] - points[at + 7]) - t.y
-    points[at + 2] = (points[at + 5] - points[at + 8]) - t.z
+def _put_point_of(pair, body, points, at, p):
+    """A point of a body's frame, in W's axes."""
+    put_vec3(points, at, rotate(pair.poses, body.pose_at, p))
+
+
+@kernel(inline=True)
+def _put_difference(pair, points, k):
+    """Point k from its a and b."""
+    a = vec3_at(points, POINT * k + POINT_OF_A)
+    b = vec3_at(points, POINT * k + POINT_OF_B)
+    put_vec3(points, POINT * k, sub(sub(a, b), pair.t))
 
 
 @kernel
 def place_vertices(pair, points, ids, k, i, j):
     """Point k becomes the difference of vertex i of A and vertex j of B."""
-    A, B = pair.A, pair.B
     ids[2 * k] = i
     ids[2 * k + 1] = j
-    _place(
-        pair, points, k, A.coords[i], A.coords[A.padded + i], A.coords[2 * A.padded + i],
-        B.coords[j], B.coords[B.padded + j], B.coords[2 * B.padded + j],
-    )  # fmt: skip
+    _put_point_of(pair, pair.A, points, POINT * k + POINT_OF_A, column_at(pair.A.coords, pair.A.padded, i))
+    _put_point_of(pair, pair.B, points, POINT * k + POINT_OF_B, column_at(pair.B.coords, pair.B.padded, j))
+    _put_difference(pair, points, k)
 
 
 @kernel(cold=True)
-def settle_point(pair, points, ids, k, dx, dy, dz):
+def settle_point(pair, points, ids, k, d):
     """Make point k, found by `difference_point`, one that is farthest in direction d for certain.
 
-    Support trees propose; nothing may be concluded from a plane before their vertices are settled.
+    Support trees propose; nothing may be concluded from a plane before their vertices are settled. A curved core has no
+    vertex; its point stays as it is.
     """
-    A, B, poses = pair.A, pair.B, pair.poses
-    p, q = A.pose_at, B.pose_at
-    ia = ids[2 * k]
-    ib = ids[2 * k + 1]
-    if A.tree != 0:
-        ex, ey, ez = _turned_back(poses, p, dx, dy, dz)
-        ia = settled_vertex(A.coords, A.n, A.padded, A.tree, ia, ex, ey, ez)
-    if B.tree != 0:
-        fx, fy, fz = _turned_back(poses, q, -dx, -dy, -dz)
-        ib = settled_vertex(B.coords, B.n, B.padded, B.tree, ib, fx, fy, fz)
-    if ia == ids[2 * k] and ib == ids[2 * k + 1]:
+    A, B = pair.A, pair.B
+    i = _settled(pair, A, ids[2 * k], d)
+    j = _settled(pair, B, ids[2 * k + 1], neg(d))
+    if i == ids[2 * k] and j == ids[2 * k + 1]:
         return
-    at = POINT * k
-    # A curved core has no id; its point stays as it is.
-    if ia != ids[2 * k]:
-        x = A.coords[ia]
-        y = A.coords[A.padded + ia]
-        z = A.coords[2 * A.padded + ia]
-        points[at + 3] = poses[p] * x + poses[p + 1] * y + poses[p + 2] * z
-        points[at + 4] = poses[p + 3] * x + poses[p + 4] * y + poses[p + 5] * z
-        points[at + 5] = poses[p + 6] * x + poses[p + 7] * y + poses[p + 8] * z
-    if ib != ids[2 * k + 1]:
-        x = B.coords[ib]
-        y = B.coords[B.padded + ib]
-        z = B.coords[2 * B.padded + ib]
-        points[at + 6] = poses[q] * x + poses[q + 1] * y + poses[q + 2] * z
-        points[at + 7] = poses[q + 3] * x + poses[q + 4] * y + poses[q + 5] * z
-        points[at + 8] = poses[q + 6] * x + poses[q + 7] * y + poses[q + 8] * z
-    ids[2 * k] = ia
-    ids[2 * k + 1] = ib
-    points[at] = (points[at + 3] - points[at + 6]) - pair.t.x
-    points[at + 1] = (points[at + 4] - points[at + 7]) - pair.t.y
-    points[at + 2] = (points[at + 5] - points[at + 8]) - pair.t.z
+    if i != ids[2 * k]:
+        _put_point_of(pair, A, points, POINT * k + POINT_OF_A, column_at(A.coords, A.padded, i))
+    if j != ids[2 * k + 1]:
+        _put_point_of(pair, B, points, POINT * k + POINT_OF_B, column_at(B.coords, B.padded, j))
+    ids[2 * k] = i
+    ids[2 * k + 1] = j
+    _put_difference(pair, points, k)
+
+
+@kernel(inline=True)
+def _settled(pair, body, vertex, d):
+    """The vertex of a body with a support tree that is farthest in a direction of the world for certain."""
+    if body.tree == 0:
+        return vertex
+    g = rotate_back(pair.poses, body.pose_at, d)
+    return settled_vertex(body.coords, body.n, body.padded, body.tree, vertex, g.x, g.y, g.z)
 
 
 @kernel(inline=True)
@@ -143,18 +127,36 @@ def has_trees(pair):
 
 
 @kernel(inline=True)
+def point_at(points, k):
+    """Point k of A ⊖ B."""
+    return vec3_at(points, POINT * k)
+
+
+@kernel(inline=True)
+def height(points, k, d):
+    """Point k along a direction."""
+    return dot(point_at(points, k), d)
+
+
+@kernel(inline=True)
 def copy_point(points, ids, source, target):
     """Point ``target`` becomes point ``source``."""
-    for j in range(POINT):
-        points[POINT * target + j] = points[POINT * source + j]
+    copy_coordinates(points, source, points, target)
     ids[2 * target] = ids[2 * source]
     ids[2 * target + 1] = ids[2 * source + 1]
 
 
 @kernel(inline=True)
-def combined(points, weights, n, j):
-    """Coordinate j of the weighted sum of n stored points."""
-    total = 0.0
+def copy_coordinates(sources, source, points, target):
+    """The POINT doubles of a point, from one list of points to another."""
+    for j in range(POINT):
+        points[POINT * target + j] = sources[POINT * source + j]
+
+
+@kernel(inline=True)
+def weighted_sum(points, weights, n, first):
+    """Weighted sum of n stored points, of the coordinates that begin at ``first``: 0, POINT_OF_A or POINT_OF_B."""
+    total = Vec3(0.0, 0.0, 0.0)
     for k in range(n):
-        total += weights[k] * points[POINT * k + j]
+        total = add(total, scale(weights[k], vec3_at(points, POINT * k + first)))
     return total

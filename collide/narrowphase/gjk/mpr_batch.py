@@ -53,6 +53,7 @@ from collide.narrowphase.rows import (
     open_row,
     write_decision,
 )
+from collide.numerics.vec3 import Vec3, divide, norm, put_vec3, sub, vec3_at
 from collide.results import PLANE, SIMPLEX
 
 #: With fewer booleans than this GJK is as fast.
@@ -150,25 +151,22 @@ def _are_far(numbers, poses, sa, pa, sb, pb, boolean, error, limit, row_at):
     """Whether balls about the frames' origins part the bodies, whose boolean is written then; of gaps, whether they nearly do."""
     p = POSE * pa
     q = POSE * pb
-    tx = poses[q + 9] - poses[p + 9]
-    ty = poses[q + 10] - poses[p + 10]
-    tz = poses[q + 11] - poses[p + 11]
-    length = math.sqrt(tx * tx + ty * ty + tz * tz)
+    t = sub(vec3_at(poses, q + 9), vec3_at(poses, p + 9))
+    length = norm(t)
     reach = sum_of_reaches(numbers, NUMBERS * sa, NUMBERS * sb, poses, p, q)
     lower = length - reach - error
     if boolean and lower > limit:
-        _write_miss(row_at, lower, tx / length, ty / length, tz / length, limit, 0)
+        _write_miss(row_at, lower, divide(t, length), limit, 0)
     return lower > limit if boolean else length > _NEAR * reach
 
 
 @kernel(inline=True)
-def _write_miss(row_at, lower, x, y, z, limit, used):
-    row, words, marks = open_row(row_at)
-    words[ITERATIONS] = used
-    write_decision(row, marks, lower, lower, math.inf, PLANE, limit)
-    row[NORMAL] = x
-    row[NORMAL + 1] = y
-    row[NORMAL + 2] = z
+def _write_miss(row_at, lower, nhat, limit, iterations):
+    """A boolean: apart by ``lower`` at least along nhat, for the pair as asked."""
+    row = open_row(row_at)
+    row.words[ITERATIONS] = iterations
+    write_decision(row, lower, lower, math.inf, PLANE, limit)
+    put_vec3(row.doubles, NORMAL, nhat)
 
 
 @kernel
@@ -192,16 +190,17 @@ def _answer_eight(room_at, notes_at, count, corners, boolean, limit, rows_at):
     for k in range(count):
         row_at = rows_at + ROW * notes[_ROWS + k]
         error = found[LANES * ERROR_OF + k]
-        used = int(found[LANES * USED + k])
+        iterations = int(found[LANES * USED + k])
         lower = -found[LANES * HEIGHT + k] - error
         clearance = found[LANES * CLEARANCE + k]
         if lower > limit:
             at = LANES * ACROSS + k
-            _write_miss(row_at, lower, found[at], found[at + LANES], found[at + 2 * LANES], limit, used)
+            nhat = Vec3(found[at], found[at + LANES], found[at + 2 * LANES])
+            _write_miss(row_at, lower, nhat, limit, iterations)
         elif boolean and clearance > error:
-            row, words, marks = open_row(row_at)
-            words[ITERATIONS] = used
-            write_decision(row, marks, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
+            row = open_row(row_at)
+            row.words[ITERATIONS] = iterations
+            write_decision(row, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
         elif not boolean:
             _write_portal(found, notes, k, corners, clearance, row_at, limit)
 
@@ -212,18 +211,19 @@ def _write_portal(found, notes, k, corners, clearance, row_at, limit):
 
     clearance : of the origin in the tetrahedron of o and the portal, −1 where it is not proven to lie in it.
     """
-    row, words, marks = open_row(row_at)
+    row = open_row(row_at)
+    words = row.words
     for n in range(3):
         name = int(found[LANES * (PORTAL + CORNER * n + NAME) + k])
         words[VERTICES_A + n] = name % MOST
         words[VERTICES_B + n] = name // MOST
-    marks[COUNT] = 3
+    row.flags[COUNT] = 3
     error = found[LANES * ERROR_OF + k]
     if not clearance > error:
         return
     flip = notes[_FLIP + k] != 0
-    first = POINT_B if flip else POINT_A
-    second = POINT_A if flip else POINT_B
+    at_a = POINT_B if flip else POINT_A
+    at_b = POINT_A if flip else POINT_B
     pose = view_f64(notes[_AT_POSE_A + k] - 64, POSE)  # both halves have been taken, and the address moved on
     apart = 0.0
     for axis in range(3):
@@ -236,13 +236,13 @@ def _write_portal(found, notes, k, corners, clearance, row_at, limit):
             a += weight * found[LANES * (VERTICES + corners * axis + words[VERTICES_A + n]) + k]
             b += weight * found[LANES * (VERTICES + corners * (3 + axis) + words[VERTICES_B + n]) + k]
         apart += abs(a - b)
-        row[first + axis] = a + pose[9 + axis]
-        row[second + axis] = b + pose[9 + axis]
+        row.doubles[at_a + axis] = a + pose[9 + axis]
+        row.doubles[at_b + axis] = b + pose[9 + axis]
     if not apart <= _ONE_POINT * error:  # a tetrahedron nearly flat has weights good for nothing
         return
     words[ITERATIONS] = int(found[LANES * USED + k])
-    write_decision(row, marks, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
-    row[NORMAL + 2] = 1.0
+    write_decision(row, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
+    row.doubles[NORMAL + 2] = 1.0
     if flip:
         for n in range(3):
             words[VERTICES_A + n], words[VERTICES_B + n] = words[VERTICES_B + n], words[VERTICES_A + n]

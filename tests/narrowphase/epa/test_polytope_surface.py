@@ -25,7 +25,7 @@ class Surface:
 
     def __init__(self, corners):
         self._doubles, self._integers = np.zeros(E.DOUBLES), np.zeros(E.INTEGERS, dtype=np.int64)
-        self.views = E.workspace(address_of(self._doubles), address_of(self._integers))
+        self.views = E.surface_at(address_of(self._doubles), address_of(self._integers))
         (self.points, self.planes, self.reaches, self.clearances, self.ids, self.facets, self.starts, _, _) = self.views
         self.corners: list = []
         for corner in corners:
@@ -62,12 +62,12 @@ class Surface:
 
     def expand(self, corner) -> bool:
         f = self.facet_below(corner)
-        if f is None or not E.has_room(len(self.corners), self.count):
+        if f is None or not E.may_expand(len(self.corners), self.count):
             return False
         apex = self._put(corner)
         self.starts[2 * apex + 1] = -1
-        n_facets, n_edges = E.find_patch(self.views, f, apex, 0.0)
-        self.count, nearest, reach = E.expand(self.views, f, apex, self.count, n_facets, n_edges, math.inf, 0.0, math.inf)
+        seen = E.find_patch(self.views, f, apex, 0.0)
+        self.count, nearest, reach = E.expand(self.views, f, apex, self.count, seen, math.inf, 0.0, math.inf)
         assert reach == min(self.reaches[int(f)] for f in self.around(apex)) == self.reaches[int(nearest)]
         return True
 

@@ -14,6 +14,7 @@ from reproduction import reproducing
 
 from collide.narrowphase.gjk import simplex as S
 from collide.narrowphase.gjk.minkowski_difference import POINT
+from collide.numerics.vec3 import Vec3
 
 pytestmark = pytest.mark.plain_kernels
 
@@ -130,7 +131,7 @@ def test_face_weights_are_barycentric():
     for _ in range(100):
         corners, at = corners_of(rng, 3, "random"), rng.normal(size=3)
         with reproducing(SOURCE, corners=corners):
-            found = S.face_weights(rows_of(corners), 0, POINT, 2 * POINT, *at.tolist())
+            found = S.face_weights(*(Vec3(*corner) for corner in corners.tolist()), Vec3(*at.tolist()))
             a, b, c = exact(corners)
             e, f, w = ([x - y for x, y in zip(p, a)] for p in (b, c, exact([at])[0]))
             beta, gamma = solved([[inner(e, e), inner(e, f)], [inner(e, f), inner(f, f)]], [inner(w, e), inner(w, f)])
@@ -138,7 +139,7 @@ def test_face_weights_are_barycentric():
             for value, true in zip(found, (1 - beta - gamma, beta, gamma)):
                 assert abs(value - float(true)) <= 1e-13 * thinness * (1 + max(map(abs, found)))
     collinear = [(0.0, 1.0, 2.0), (1.0, 2.0, 3.0), (2.0, 3.0, 4.0)]
-    assert S.face_weights(rows_of(collinear), 0, POINT, 2 * POINT, 0.5, 0.5, 0.5) == (0.0, 0.0, 0.0)
+    assert S.face_weights(*(Vec3(*corner) for corner in collinear), Vec3(0.5, 0.5, 0.5)) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -150,13 +151,13 @@ def test_directions_across_features(n):
         v = nearest_to_origin(corners - 0.0).point if n == 2 else tuple(map(Fraction, rng.normal(size=3).tolist()))
         v = [float(x) for x in v]
         with reproducing(SOURCE + "; v = {v}", corners=corners, v=v):
-            direction = np.array(S.across_simplex(rows_of(corners), n, *v))
+            direction = np.array(S.across_simplex(rows_of(corners), n, Vec3(*v)))
             edges = corners[1:] - corners[0]
             lengths = np.linalg.norm(edges, axis=1) * np.linalg.norm(direction)
             assert (np.abs(edges @ direction) <= 16 * ULP * lengths * (1 + np.linalg.norm(v))).all()
             assert direction @ v >= 0.0
     flat = rows_of([(0.0, 1.0, 2.0), (1.0, 2.0, 3.0), (2.0, 3.0, 4.0)])
-    assert S.across_simplex(flat, 3, 0.1, 0.2, 0.3) == (0.1, 0.2, 0.3)
+    assert S.across_simplex(flat, 3, Vec3(0.1, 0.2, 0.3)) == (0.1, 0.2, 0.3)
 
 
 @pytest.mark.parametrize("height", [1.0, 1e-5, 1e-12])

@@ -1,0 +1,122 @@
+"""Two convex cores, each swept by a ball: the cores' answer, moved by the sum of the radii."""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import kernel
+from collide.lowering.packed_convex import POINTS
+from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.capsule_capsule import segment_cores
+from collide.narrowphase.core_distance import convex_cores, request_plane
+from collide.narrowphase.exact.depth_requests import add_request
+from collide.narrowphase.gap.gap_queue import enqueue, write_guess
+from collide.narrowphase.gap.precise_pair import is_refinable
+from collide.narrowphase.gjk.minkowski_difference import AXIS, POINT_OF_A, POINT_OF_B, weighted_sum
+from collide.narrowphase.posed_pair import radius_of
+from collide.narrowphase.rows import (
+    CERTIFIED,
+    HIT,
+    HOW,
+    ITERATIONS,
+    NORMAL,
+    is_undecided,
+    write_decision,
+    write_vectors,
+    write_verdict,
+    write_vertices,
+)
+from collide.numerics.vec3 import add, put_vec3, scale, sub, vec3_at
+from collide.results import FORMULA, PLANE, SIMPLEX, SWEPT, UNDECIDED
+
+
+@kernel(inline=True)
+def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work):
+    """Write the row of two swept convex cores.
+
+    is_closed_form : both cores are points or segments.   n_start : pairs of vertices for GJK to begin with (`gjk`).
+    Returns the kind of gap of a row that is queued for its last digits and finished then (`gap_queue.py`), or −1.
+    """
+    pair, size, flip = ordered.pair, ordered.size, ordered.flip
+    radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
+    radius = radius_a + radius_b
+    error = ERROR * size + ordered.slop
+    curved = pair.A.kind != POINTS or pair.B.kind != POINTS
+    exact_numbers = ordered.exact_numbers and not curved
+    # A boolean may begin with an axis that separated the bodies before; reported numbers never do.
+    sign = (-1.0 if flip else 1.0) if query.boolean else 0.0
+    put_vec3(work.weights, AXIS, scale(sign, vec3_at(row.doubles, NORMAL)))
+    work.request[1] = 0
+    if is_closed_form:
+        core = segment_cores(pair, work, error)
+    else:
+        core = convex_cores(ordered, query, work, radius, error, curved, n_start)
+    lower = core.lower - error - radius
+    upper = core.upper + error - radius
+    how = _how(core, is_closed_form, lower, radius)
+    row.words[ITERATIONS] = core.iterations
+    distance = -core.depth - radius
+    is_gap = exact_numbers and not query.boolean and core.depth < -error and lower <= query.limit
+    if is_gap and is_refinable(size):
+        write_guess(row, distance, lower, upper, core.nhat)
+        write_vertices(row, work.ids, core.n_vertices, flip)
+        return enqueue(
+            pair, query.terms_at, work.ids, work.weights, core.n_points, flip, how, row_number, size, ordered.slop, error,
+            work.queue_at, work.queue_integers_at,
+        )  # fmt: skip
+    decided = lower > 0.0 or upper <= 0.0
+    if core.deepest < math.inf:
+        rounding = 4.0 * 2.0**-53 * radius
+        lower = max(lower, -core.deepest - radius - rounding)
+        upper = min(upper, -core.shallowest - radius + rounding)
+    width = math.inf
+    if not query.boolean:
+        width = PROMISE_CURVED * size if curved else (0.0 if exact_numbers else PROMISE_STORED * size)
+    if query.boolean and decided:
+        write_decision(row, distance, lower, upper, how, query.limit)
+    else:
+        write_verdict(row, distance, lower, upper, how, width, query.limit)
+    is_open = row.flags[CERTIFIED] == 0 and (core.depth < -error or radius > 0.0) and (query.depths or upper > 0.0)
+    # Radii may prove an overlap of cores between which doubles see no clear direction: such a gap is open, too.
+    if width == 0.0 and (not decided or is_open or (is_gap and radius > 0.0)):
+        row.flags[HOW] = UNDECIDED  # the exact stage settles the sign, or the last digits
+        if is_closed_form:
+            request_plane(work.ids, work.request)
+        if work.request[1] > 0:
+            add_request(work.requests, row_number, work.request)
+    if query.boolean and not is_undecided(row):
+        if row.flags[HIT] == 0:
+            put_vec3(row.doubles, NORMAL, scale(sign, core.nhat))
+        return -1
+    if not (query.boolean or query.depths) and core.lower == -math.inf:
+        radius_a = radius_b = 0.0  # a point of both cores is one of both bodies
+    # On curved cores the last facet still has a width: what the two points miss of depth·n is shared between them.
+    share = 0.5 if curved and not query.boolean else 0.0
+    _write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip)
+    write_vertices(row, work.ids, core.n_vertices, flip)
+    return -1
+
+
+@kernel(inline=True)
+def _how(core, is_closed_form, lower, radius):
+    """What decides the pair, if its bracket leaves out 0: see `results.How`."""
+    if is_closed_form:
+        return FORMULA
+    if lower > 0.0:
+        return PLANE
+    return SIMPLEX if core.upper < 0.0 or radius == 0.0 else SWEPT
+
+
+@kernel(inline=True)
+def _write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip):
+    """Normal and witness points of the bodies, from the deciding feature of the cores.
+
+    share : of what the cores' points miss ``depth · nhat`` by, how much each of them is moved.
+    """
+    a = weighted_sum(work.points, work.weights, core.n_points, POINT_OF_A)
+    b = weighted_sum(work.points, work.weights, core.n_points, POINT_OF_B)
+    shift = scale(share, sub(sub(sub(a, b), pair.t), scale(core.depth, core.nhat)))
+    p_WA, p_WB = vec3_at(pair.poses, pair.A.pose_at + 9), vec3_at(pair.poses, pair.B.pose_at + 9)
+    p_WAa = add(add(sub(a, shift), scale(radius_a, core.nhat)), p_WA)
+    p_WBb = add(sub(add(b, shift), scale(radius_b, core.nhat)), p_WB)
+    write_vectors(row, core.nhat, p_WAa, p_WBb, flip)
