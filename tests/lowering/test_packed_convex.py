@@ -35,11 +35,6 @@ def test_points(n):
     assert not packed.points.flags.writeable and not columns.flags.writeable
 
 
-def test_lowest_bits():
-    for values, lowest in (([0.0], 2000), ([1.0, 0.0], 0), ([0.75, 8.0], -2), ([5e-324], -1074), ([2.0**1000, 3.0], 0)):
-        assert P.lowest_exponent(np.array(values)) == lowest
-
-
 def test_content_tells_sets_apart():
     """Equal for equal sets, also where zeros have other signs; another for any other number."""
     points = np.array([(0.0, 1.0, 2.0), (3.0, -0.0, 1.0)])

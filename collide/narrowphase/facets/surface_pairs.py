@@ -195,19 +195,19 @@ def _point_inside(space, body, X_at, points_at, n_points, Y_at):
 
 
 @kernel
-def _test_inside(space, body, X_at, other, Y_at, inside_at):
-    """HIT where a point of the other body, at Y, lies in the one at X; else APART or SINGULAR.
+def _test_inside(space, A, XA_at, B, XB_at, inside_at):
+    """HIT where a point of a part of B lies in A; else APART or SINGULAR.
 
     inside : 0, or three doubles that become the point in the world.
     """
-    if body.solid == 0:
+    if A.solid == 0:
         return APART
-    k = _point_inside(space, body, X_at, other.points_at, other.n_points, Y_at)
+    k = _point_inside(space, A, XA_at, B.points_at, B.n_points, XB_at)
     if k < 0:
         return APART if k == -1 else SINGULAR
     if inside_at != 0:
-        point = vec3_at(view_f64(other.points_at + 24 * k, 3), 0)
-        put_vec3(view_f64(inside_at, 3), 0, _placed(view_f64(Y_at, 16), point))
+        point = vec3_at(view_f64(B.points_at + 24 * k, 3), 0)
+        put_vec3(view_f64(inside_at, 3), 0, _placed(view_f64(XB_at, 16), point))
     return HIT
 
 
@@ -242,30 +242,30 @@ def _test_cores(space, pair, inside_at):
 @kernel(inline=True)
 def _result(space):
     """The scratch's row of results of distances, and its marks."""
-    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    return view_f64(found_at, RESULT), view_i64(found_at + 8 * RESULT, MARKS)
+    result_at = space.scratch_at + 8 * (KEYS + COUNTERS)
+    return view_f64(result_at, RESULT), view_i64(result_at + 8 * RESULT, MARKS)
 
 
 @kernel
 def _measure(space, pair, limit):
     """The surfaces' distance into the scratch, looked for within the limit; False where a matrix places no mesh."""
-    found_at = space.scratch_at + 8 * (KEYS + COUNTERS)
-    found, marks = _result(space)
+    result_at = space.scratch_at + 8 * (KEYS + COUNTERS)
+    result, marks = _result(space)
     while True:
         for i in range(MARKS):
             marks[i] = 0
         done = _measure_surfaces(
             space.distances,
             (
-                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, found_at,
-                found_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap, space.doubles_at,
+                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, result_at,
+                result_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap, space.doubles_at,
                 space.integers_at, space.exact,
             ),
         )  # fmt: skip
         if done < 1:
             return False
         # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
-        if marks[FACET_A] >= 0 or not found[surface_distance.LOWER] < limit or limit == math.inf:
+        if marks[FACET_A] >= 0 or not result[surface_distance.LOWER] < limit or limit == math.inf:
             return True
         limit = math.inf
 
@@ -273,11 +273,11 @@ def _measure(space, pair, limit):
 @kernel
 def _test_gap(space, radius):
     """APART, HIT or OPEN: swept bodies whose cores, measured just now, do not meet."""
-    found, marks = _result(space)
+    result, marks = _result(space)
     meets = marks[MEETS] != 0
-    if found[surface_distance.LOWER] > radius if radius > 0.0 else not meets:
+    if result[surface_distance.LOWER] > radius if radius > 0.0 else not meets:
         return APART
-    return HIT if found[surface_distance.UPPER] <= radius or meets else OPEN
+    return HIT if result[surface_distance.UPPER] <= radius or meets else OPEN
 
 
 @kernel
@@ -345,6 +345,26 @@ def meet_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, cores, 
     return n
 
 
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, float64, int64)")
+def cull_poses(numbers_a_at, XA_at, step_a, numbers_b_at, XB_at, step_b, first, n, check, margin, states_at):
+    """States of any two bodies by balls around them: APART where these are farther apart than a margin [m], else OPEN.
+
+    numbers_a, numbers_b : as of a tree, NUMBERS doubles: centre, reach by axis, radius of a ball around the centre.
+    XA, XB, first, n, check, states : as of `meet_poses`; returns how many are done: the next is NO_POSE.
+    """
+    numbers_a = view_f64(numbers_a_at, NUMBERS)
+    numbers_b = view_f64(numbers_b_at, NUMBERS)
+    states = view_u8(states_at, n)
+    for k in range(first, n):
+        if not _are_poses(XA_at, step_a, XB_at, step_b, k, first, check):
+            states[k] = NO_POSE
+            return k
+        XA = view_f64(XA_at + 8 * step_a * k, 16)
+        XB = view_f64(XB_at + 8 * step_b * k, 16)
+        states[k] = APART if balls_apart(XA, numbers_a, XB, numbers_b, margin) else OPEN
+    return n
+
+
 # --- rows ---------------------------------------------------------------------------------------
 
 
@@ -387,15 +407,15 @@ def _size(pair):
 
 
 @kernel(inline=True)
-def _set_bracket(row_at, found, radius):
+def _set_bracket(row_at, result, radius):
     """Lower and upper bound and distance of bodies, from those of their cores."""
     row = view_f64(row_at, 12)
-    row[rows.LOWER] = found[surface_distance.LOWER] - radius
-    row[rows.UPPER] = found[surface_distance.UPPER] - radius
+    row[rows.LOWER] = result[surface_distance.LOWER] - radius
+    row[rows.UPPER] = result[surface_distance.UPPER] - radius
     if radius > 0.0:
         _step(row_at, rows.LOWER, False)
         _step(row_at, rows.UPPER, True)
-    row[rows.DISTANCE] = min(max(found[surface_distance.DISTANCE] - radius, row[rows.LOWER]), row[rows.UPPER])
+    row[rows.DISTANCE] = min(max(result[surface_distance.DISTANCE] - radius, row[rows.LOWER]), row[rows.UPPER])
     if row[rows.DISTANCE] == 0.0:  # apart, and nearer than the bracket is wide: 0 would say that they touch
         row[rows.DISTANCE] = row[rows.UPPER]
 
@@ -408,31 +428,31 @@ def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
     other order. Of facets that all but touch rounding leaves many directions, and the pair found may be one around the
     corner of two faces that lie on each other: hulls as far apart, as far as is proven, know the bodies' direction.
     """
-    found, marks = _result(space)
+    result, marks = _result(space)
     row, words, flags = open_row(row_at)
     radius = pair.A.radius + pair.B.radius
     unseen = marks[FACET_A] < 0
     middle_a = _placed(view_f64(pair.XA_at, 16), vec3_at(_numbers(pair.A), CENTRE))
     middle_b = _placed(view_f64(pair.XB_at, 16), vec3_at(_numbers(pair.B), CENTRE))
-    normal = vec3_at(found, surface_distance.NORMAL)
+    normal = vec3_at(result, surface_distance.NORMAL)
     if unseen or (normal.x == 0.0 and normal.y == 0.0 and normal.z == 0.0):
         normal = _unit_or_z(sub(middle_b, middle_a))
     size = _size(pair)
-    _set_bracket(row_at, found, radius)
+    _set_bracket(row_at, result, radius)
     lacks = 0
     turned = False
-    if not unseen and found[surface_distance.DISTANCE] <= NEARLY_TOUCHING * size:
+    if not unseen and result[surface_distance.DISTANCE] <= NEARLY_TOUCHING * size:
         if hull_at == 0:
             lacks = NEARLY_TOUCH
         else:
             hull = view_f64(hull_at, 12)
-            turned = hull[rows.UPPER] + pair.A.radius + pair.B.radius >= found[surface_distance.LOWER]
+            turned = hull[rows.UPPER] + pair.A.radius + pair.B.radius >= result[surface_distance.LOWER]
             if turned:
                 normal = vec3_at(hull, rows.NORMAL)
                 if exchanged:
                     normal = sub(Vec3(0.0, 0.0, 0.0), normal)
-    point_a = add(vec3_at(found, surface_distance.POINT_A), scale(pair.A.radius, normal))
-    point_b = sub(vec3_at(found, surface_distance.POINT_B), scale(pair.B.radius, normal))
+    point_a = add(vec3_at(result, surface_distance.POINT_A), scale(pair.A.radius, normal))
+    point_b = sub(vec3_at(result, surface_distance.POINT_B), scale(pair.B.radius, normal))
     if turned:  # lay the points as far apart, about their middle
         missing = scale(0.5, sub(scale(row[rows.DISTANCE], normal), sub(point_b, point_a)))
         point_a = sub(point_a, missing)
@@ -470,17 +490,17 @@ def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
 
     reach : how far cores are looked for, above the limit and the radii [m].   hull, exchanged : as of `_write_gap`.
     """
-    found, marks = _result(space)
+    result, marks = _result(space)
     _, _, flags = open_row(row_at)
     radius = pair.A.radius + pair.B.radius
     if _balls_apart(pair, reach):
         for i in range(RESULT):
-            found[i] = 0.0
+            result[i] = 0.0
         for i in range(MARKS):
             marks[i] = 0
         marks[FACET_A] = marks[FACET_B] = -1
-        found[surface_distance.DISTANCE] = found[surface_distance.LOWER] = reach
-        found[surface_distance.UPPER] = math.inf
+        result[surface_distance.DISTANCE] = result[surface_distance.LOWER] = reach
+        result[surface_distance.UPPER] = math.inf
     else:
         inside = view_f64(row_at + 8 * rows.POINT_A, 3)
         inside[0] = math.nan
