@@ -265,8 +265,8 @@ NUMBER_TAKERS = {
 }  # fmt: skip
 #: Whole numbers of any size are as good here.
 WHOLE = {("threads", "beyond doubles"), ("threads", "too long to print"), ("threads of distance", "beyond doubles"),
-         ("threads of distance", "too long to print"), ("max_contacts", "beyond "
-         "doubles"), ("max_contacts", "too long to print")}  # fmt: skip
+         ("threads of distance", "too long to print"), ("max_contacts", "beyond doubles"),
+         ("max_contacts", "too long to print")}  # fmt: skip
 
 
 def triangle():

@@ -114,8 +114,8 @@ def test_baselines_are_sorted_and_one_a_line(command, tmp_path):
      ('{"schema": "collide-baseline/1"}', "damaged"),
      ('{"schema": "collide-baseline/1", "collisions": [{"a": 1}]}', "damaged"),
      ('{"schema": "collide-baseline/1", "collisions": [{"class": "x", "a": "b", "b": "c", "depth": 1}]}', "damaged"),
-     ('{"schema": "collide-baseline/1", "collisions": [{"class": "collision", "a": "b", "b": "c", "depth": '
-     '"deep"}]}', "damaged"),
+     ('{"schema": "collide-baseline/1", "collisions": [{"class": "collision", "a": "b", "b": "c", "depth": "deep"}]}',
+      "damaged"),
      ('{"schema": "collide-report/3", "colliding": 4}', "damaged")],
 )  # fmt: skip
 def test_what_is_no_baseline_is_refused_before_the_work(command, tmp_path, text, words):

@@ -170,12 +170,12 @@ def test_yaml_as_moveit_prints_it(tmp_path):
         ("x.csv", "slide,slide\n0,1\n", "every column once"),
         ("x.csv", "slide,lift\n0\n", "row 1.*1 values.*2 columns"), ("x.csv", "slide\nfar\n", "row 1 \"slide\".*'far'"),
         ("x.csv", "time,slide\nnan,0\n", "row 1 \"time\".*finite"), ("x.csv", "slide\ninf\n", "finite"),
-        ("x.json", json.dumps({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}), "several "
-        "degrees of freedom"),
+        ("x.json", json.dumps({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}),
+         "several degrees of freedom"),
         ("x.csv", "time,slide\n1,0\n0,1\n", "times must rise"), ("x.json", "[]", "no waypoint"),
         ("x.json", '{"a": 3}', "no trajectory"),
-        ("x.json", '{"joint_names": ["a"], "points": [{"positions": [1, '
-        '2]}]}', r"points\[0\].positions.*each of the 1"),
+        ("x.json", '{"joint_names": ["a"], "points": [{"positions": [1, 2]}]}',
+         r"points\[0\].positions.*each of the 1"),
         ("x.json", '{"a": [1, 2], "b": [1]}', "no trajectory"), ("x.json", '[{"a": "b"}]', r"\[0\].*number"),
         ("x.json", "3", "must be a mapping"),
     ],
@@ -223,8 +223,8 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
 
 @pytest.mark.parametrize(
     "word, complaint",
-    [("0.1", "1 joint value given.*2 joints: slide, lift"), ("1,2,"
-    "3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
+    [("0.1", "1 joint value given.*2 joints: slide, lift"),
+     ("1,2,3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
      ("swing=1", "unknown joint 'swing'"), ("away", "unknown state 'away'; it has home, hit"),
      ("home,away", "unknown state 'away'"),
      ("slide=nan", "finite")],

@@ -56,8 +56,8 @@ def test_a_stack_rests():
         (
             "cluter",
             {},
-            r"no generated scene is called 'cluter' \(did you mean 'clutter'\?\); there are accordions, chazelle, "
-            r"clutter, harpsicordia, stack, workcell",
+            (r"no generated scene is called 'cluter' \(did you mean 'clutter'\?\); there are accordions, chazelle, "
+            r"clutter, harpsicordia, stack, workcell"),
         ),
         ("clutter", {"m": 3}, "clutter has no argument 'm'.*; it has n, density, static"),
         ("clutter", {"n": 0}, "n must be a whole number ≥ 1, got 0"),
