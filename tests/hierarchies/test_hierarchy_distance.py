@@ -15,7 +15,8 @@ from hierarchy_families import degree_doubling, families, sphere
 
 import collide
 from collide.hierarchies.hierarchy import DEGREE_BOUND, build_hierarchy
-from collide.hierarchies.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hierarchies.hierarchy_distance import hierarchy_distance
+from collide.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families import generate
 
