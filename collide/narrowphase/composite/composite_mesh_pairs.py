@@ -18,7 +18,8 @@ from collide.narrowphase.facets.body_pairs import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, settle_curved
 from collide.narrowphase.facets.mesh_rows import hull_shape, mesh_rows, mesh_states
-from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN, PROMISE
+from collide.narrowphase.facets.surface_gaps import PROMISE
+from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
