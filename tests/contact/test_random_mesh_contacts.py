@@ -1,4 +1,5 @@
-"""`collide.contacts` of random meshes, every row judged in rational arithmetic, and against `collide` and `distance`."""
+"""`collide.contacts` of random meshes, every row judged in rational arithmetic, and against `collide` and
+`distance`."""
 
 from __future__ import annotations
 
@@ -22,10 +23,13 @@ from mesh_shapes import block_ring, box
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
 
 import collide
-from collide.contact.contact_rows import WAY_OUT
+from collide.contact.contact_rows import TRANSLATION
 
 POINT, LINE = np.zeros((1, 3)), np.array([[0, 0, -0.25], [0, 0, 0.25]])
-TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
 
 
 def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
@@ -33,7 +37,10 @@ def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
     P, Q = as_integers(*exact)
     scale = max(x.denominator for points in exact for p in points for x in p)
     return np.array(
-        [[float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()] for f in a[1].tolist()]
+        [
+            [float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()]
+            for f in a[1].tolist()
+        ]
     )
 
 
@@ -69,7 +76,8 @@ def solids_and_balls(rng):
     pool = [
         (collide.Mesh(*box()), *box(), 0.0), (collide.Mesh(*block_ring()), *block_ring(), 0.0),
         (collide.Mesh(*TETRAHEDRON), *TETRAHEDRON, 0.0),
-        (collide.Sphere(0.25), POINT, np.array([[0, 0, 0]]), 0.25), (collide.Capsule(0.125, 0.5), LINE, np.array([[0, 1, 1]]), 0.125),
+        (collide.Sphere(0.25), POINT, np.array([[0, 0, 0]]), 0.25),
+        (collide.Capsule(0.125, 0.5), LINE, np.array([[0, 1, 1]]), 0.125),
     ]  # fmt: skip
     return pool[rng.integers(3)], pool[rng.integers(len(pool))]
 
@@ -107,7 +115,8 @@ def nearly_touching(rng):
 
 
 FAMILIES = [
-    *map(surfaces, (random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case)), solids, solids_on_a_grid,
+    *map(surfaces, (random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case)), solids,
+    solids_on_a_grid,
     nearly_touching,
 ]  # fmt: skip
 
@@ -136,7 +145,7 @@ def judge(family, seed, seen) -> None:
     else:
         assert not len(c), where
     for row in c:
-        if row["kind"] == WAY_OUT:
+        if row["kind"] == TRANSLATION:
             assert row["distance"] == r.distance and (row["normal"] == r.normal).all(), where
             continue
         try:
@@ -147,12 +156,12 @@ def judge(family, seed, seen) -> None:
         own = c.rows[c.patch == patch]
         assert (own["normal"] == own["normal"][0]).all() and (own["apart"] == own["apart"][0]).all(), where
         assert own["distance"][0] <= own["distance"].min() + 1e-12 and len(own) <= 8, where
-        if A[3] + B[3] == 0.0 and 0 < own["apart"][0] < np.inf and own["kind"][0] != WAY_OUT:
+        if A[3] + B[3] == 0.0 and 0 < own["apart"][0] < np.inf and own["kind"][0] != TRANSLATION:
             assert clear_of_each_other(own, A, B, X_WA, X_WB), f"{where}, patch {patch}"
             seen["parted"] += 1
     seen["hit" if hit else "gap" if len(c) else "far"] += 1
     seen["rows"] += len(c)
-    seen["way out"] += int((c.kind == WAY_OUT).any())
+    seen["way out"] += int((c.kind == TRANSLATION).any())
     flipped = collide.contacts(B[0], A[0], X_WB, X_WA, margin=margin)
     if A[0] != B[0] or not np.array_equal(X_WA, X_WB):
         assert np.array_equal(flipped.point_a, c.point_b) and np.array_equal(flipped.normal, -c.normal), where

@@ -24,7 +24,9 @@ import collide
 ROOT = Path(__file__).resolve().parents[2]
 #: Folder of the repository → folder of the installed package.
 FOLDERS = {"collide": "collide", "adapters": "collide/adapters", "scenes": "collide/scenes"}
-LITTER = shutil.ignore_patterns("__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib")
+LITTER = shutil.ignore_patterns(
+    "__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib"
+)
 #: The backend that pyproject.toml asks for.
 SETUPTOOLS = 77
 
@@ -54,9 +56,19 @@ def _built(tree: Path, **environment: str) -> subprocess.CompletedProcess:
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, tree)
     build = "from setuptools.build_meta import build_wheel; build_wheel('dist')"
-    own = {name: value for name, value in os.environ.items() if not name.startswith("COLLIDE_") and name != "NUMBA_DISABLE_JIT"}
+    own = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith("COLLIDE_") and name != "NUMBA_DISABLE_JIT"
+    }
     return subprocess.run(
-        [sys.executable, "-c", build], cwd=tree, env={**own, **environment}, check=False, capture_output=True, text=True, timeout=400
+        [sys.executable, "-c", build],
+        cwd=tree,
+        env={**own, **environment},
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=400,
     )
 
 
@@ -91,8 +103,12 @@ def _folder_files() -> set[str]:
         for folder, package in FOLDERS.items()
         for file in (ROOT / folder).rglob("*")
         if file.is_file() and file.suffix != ".pyc" and not any(part.startswith(".") for part in file.parts[-2:])
-    } - {f"{package}/{file.relative_to(ROOT / folder).as_posix()}" for folder, package in FOLDERS.items()
-         for file in (ROOT / folder).rglob("*") if MADE.fullmatch(f"{package}/{file.relative_to(ROOT / folder).as_posix()}")}
+    } - {
+        f"{package}/{file.relative_to(ROOT / folder).as_posix()}"
+        for folder, package in FOLDERS.items()
+        for file in (ROOT / folder).rglob("*")
+        if MADE.fullmatch(f"{package}/{file.relative_to(ROOT / folder).as_posix()}")
+    }
 
 
 # --- the wheel ----------------------------------------------------------------------------------
@@ -156,8 +172,8 @@ def test_library_leaves_nothing_open_but_the_c_library(wheel, tmp_path):
 
 
 def test_same_sources_give_the_same_bytes(wheel_file, tmp_path):
-    """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the object
-    files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""
+    """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the
+    object files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""
     again = tmp_path / "elsewhere"
     done = _built(again)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -201,7 +217,9 @@ def test_extras_that_errors_name_exist(metadata):
     extras = set(metadata.get_all("Provides-Extra"))
     for folder in FOLDERS:
         for file in (ROOT / folder).rglob("*.py"):
-            for named in re.findall(r"extra=[\"'](\w+)[\"']|collide-robotics\[([a-z]+)\]", file.read_text(encoding="utf-8")):
+            for named in re.findall(
+                r"extra=[\"'](\w+)[\"']|collide-robotics\[([a-z]+)\]", file.read_text(encoding="utf-8")
+            ):
                 assert (named[0] or named[1]) in extras, f"{file.name} names the extra {named}"
 
 
@@ -231,10 +249,6 @@ def test_installed_wheel_imports_from_itself(wheel, tmp_path):
 # --- the checkout -------------------------------------------------------------------------------
 
 
-def _pages() -> list[Path]:
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "benchmarks").glob("*.md"))]
-
-
 def test_version_is_the_same_everywhere():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     assert f'version = "{collide.__version__}"' in text
@@ -244,32 +258,6 @@ def test_every_folder_with_modules_is_a_package():
     for folder in FOLDERS:
         for file in (ROOT / folder).rglob("*.py"):
             assert (file.parent / "__init__.py").is_file(), f"{file.parent.name} has modules and no __init__.py"
-
-
-def test_links_between_pages_lead_somewhere():
-    for page in _pages():
-        for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
-            if "://" not in link and not link.startswith("mailto:"):
-                assert (page.parent / link).exists(), f"{page.name} links to {link}"
-
-
-def test_files_that_pages_name_exist():
-    """``examples/01_two_shapes.py``, ``bash tests/run.sh``, ``collide/narrowphase/bounds.py``: as code, so as files."""
-    named = re.compile(r"(?:\.ci|adapters|benchmarks|collide|docs|examples|scenes|tests)/[\w./-]*\w")
-    for page in _pages():
-        for code in re.findall(r"`[^`]+`|```.*?```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
-            for path in named.findall(code):
-                places = [ROOT / path, *(ROOT / folder / path for folder in FOLDERS)]
-                assert any(place.exists() for place in places), f"{page.name} names {path}"
-
-
-def test_commands_that_pages_show_exist():
-    from collide.cli_arguments import parser
-
-    (commands,) = (set(action.choices) for action in parser()._actions if action.dest == "command")
-    for page in _pages():
-        for word in re.findall(r"^(?:\$ )?collide ([a-z]+)\b", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
-            assert word in commands, f"{page.name} shows `collide {word}`"
 
 
 def test_continuous_integration_calls_the_test_command():
