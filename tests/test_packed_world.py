@@ -12,7 +12,6 @@ from naive import pose, random_pose, rng_of
 
 import collide
 from collide import packed_world
-from collide import world as world_module
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.errors import InvalidArgument, UnknownBody
 from collide.results import PAIR_DTYPE
@@ -83,8 +82,8 @@ def test_moving_one_body_looks_at_one(monkeypatch):
 
 
 def test_statistics_are_worked_out_when_asked_for_and_are_those_of_the_question(monkeypatch):
-    counted, own = [], world_module.count_skipped
-    monkeypatch.setattr(world_module, "count_skipped", lambda *given: counted.append(1) or own(*given))
+    counted, own = [], packed_world.count_skipped
+    monkeypatch.setattr(packed_world, "count_skipped", lambda *given: counted.append(1) or own(*given))
     world = crowd(rng_of("statistics"))
     assert world.stats == {}
     rows = world.distances(0.3)

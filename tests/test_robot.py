@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError
-from collide.robot import Joint, LinkShape, Mimic, Robot
+from collide.kinematic_tree import Joint, Mimic
+from collide.robot import LinkShape, Robot
 from collide.shapes import Sphere
 from collide.transforms import pose
 

@@ -54,7 +54,7 @@ def check(vertices, faces) -> None:
     assert survey.edges == len(known.edges) and survey.euler == known.euler, repeat
     check_orientation(survey, known, repeat)
     assert survey.closed == (bool(known.edges) and known.balanced), repeat
-    groups = [set(np.flatnonzero(survey.shells == k).tolist()) for k in range(survey.many_shells)]
+    groups = [set(np.flatnonzero(survey.shells == k).tolist()) for k in range(survey.n_shells)]
     assert sorted(map(sorted, groups)) == sorted(map(sorted, known.shells())), repeat
     if survey.closed:
         for k, group in enumerate(groups):
@@ -176,7 +176,7 @@ def test_a_book_of_many_pages_takes_no_time():
     assert survey.edges == 2 * many + 1 and flagged(survey, meet.UNBALANCED) == set(range(many))
     fan = np.stack([np.zeros(many - 1), np.arange(2, many + 1), np.arange(3, many + 2)], axis=1).astype(np.int32)
     survey = survey_surface(vertices, fan)
-    assert survey.open_edges == many + 1 and survey.many_shells == 1 and survey.euler == 1
+    assert survey.open_edges == many + 1 and survey.n_shells == 1 and survey.euler == 1
 
 
 # --- inside out -----------------------------------------------------------------------------------

@@ -153,8 +153,8 @@ def _step(X: np.ndarray) -> int:
 
 def _make_slabs(A: Body, B: Body) -> None:
     """Distances look at slabs around the boxes' facets, made at most once."""
-    A.tree.ask_slabs(make_slabs)
-    B.tree.ask_slabs(make_slabs)
+    A.tree.need_slabs(make_slabs)
+    B.tree.need_slabs(make_slabs)
 
 
 def _header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:

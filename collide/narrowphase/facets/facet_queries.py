@@ -146,7 +146,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
         r = surface_distances(B, A, X_WB, X_WA, limit)
         return r._replace(point_a=r.point_b, point_b=r.point_a, normal=-r.normal, facets=r.facets[:, ::-1])
     for tree in (A, B):
-        tree.ask_slabs(make_slabs)
+        tree.need_slabs(make_slabs)
     X_WA, X_WB, n = matched(X_WA, X_WB)
     results, marks = _near(A, B, X_WA, X_WB, n, limit)
     # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
