@@ -80,10 +80,10 @@ class ConvexHull(Shape):
 
     def _pack(self):
         if not hasattr(self, "_tree"):
-            from collide.support.lazy_support_tree import PlantedTree
+            from collide.support.lazy_support_tree import LazySupportTree
 
             large = len(self.points) >= FEWEST_POINTS
-            object.__setattr__(self, "_tree", PlantedTree(self.points) if large else None)
+            object.__setattr__(self, "_tree", LazySupportTree(self.points) if large else None)
         return alone(pack_points(self.points, self.radius, tree=self._tree))
 
     @property

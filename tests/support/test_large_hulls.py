@@ -12,7 +12,7 @@ from collide.errors import InvalidShape
 from collide.results import EXACT
 from collide.scenes.families import generate, names
 from collide.shapes import convex_hull as hull_shape
-from collide.support import lazy_support_tree as planted
+from collide.support import lazy_support_tree
 from collide.support.support_tree import SupportTree, list_coordinates_of
 
 EYE = np.eye(4)
@@ -27,7 +27,7 @@ def _ball(rng, n, axes=(1, 1, 1)):
 def trees_everywhere(monkeypatch):
     """Every hull gets a support tree, however small, so that the hard families meet them."""
     monkeypatch.setattr(hull_shape, "FEWEST_POINTS", 4)
-    monkeypatch.setattr(planted, "FEWEST_VERTICES", 4)
+    monkeypatch.setattr(lazy_support_tree, "MIN_VERTICES", 4)
 
 
 def _planted(shape) -> bool:
@@ -170,12 +170,12 @@ def test_bad_proposals_cost_time_not_truth(axes):
     rng = np.random.default_rng(16)
     points = _ball(rng, 1200, axes)
     A, B = collide.ConvexHull(points), collide.ConvexHull(points)
-    tree = planted._grown(points)
+    tree = lazy_support_tree._built(points)
     entries, last = tree.entries.copy(), tree.nodes[1]  # what follows the first list are rows of points
     entries[last:] = rng.permutation(entries[last:])
     rows = np.concatenate([tree.owners[entries[:last]], entries[last:]])  # a tree of two levels
     coordinates = list_coordinates_of(points, tree.nodes, rows)
-    shuffled = planted.PlantedTree(B.points)
+    shuffled = lazy_support_tree.LazySupportTree(B.points)
     shuffled._tree = SupportTree(
         B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
     )
