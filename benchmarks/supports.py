@@ -24,6 +24,7 @@ from convex_shapes import STRETCH, prism
 from collide.hull.exact_hull import convex_hull
 from collide.kernels import address_of, entry, view_f64, view_i64
 from collide.lowering.packed_convex import pack_points
+from collide.numerics.vec3 import vec3_at
 from collide.support.build_support_tree import build_support_tree
 from collide.support.support_mapping import support_vertex
 from collide.support.support_tree_query import COUNTERS, extreme_vertices
@@ -93,7 +94,7 @@ def _scan(coordinates_at, n, m, directions_at, count, ids_at):
     g = view_f64(directions_at, 3 * count)
     ids = view_i64(ids_at, count)
     for k in range(count):
-        ids[k] = support_vertex(coordinates, n, m, g[3 * k], g[3 * k + 1], g[3 * k + 2])
+        ids[k] = support_vertex(coordinates, n, m, vec3_at(g, 3 * k))
 
 
 scan = entry("void(int64, int64, int64, int64, int64, int64)")(_scan)

@@ -23,6 +23,7 @@ from collide.lowering.shape_table import (
     TREE,
     ShapeTable,
 )
+from collide.numerics.vec3 import column_at, dot, neg, vec3_at
 from collide.support.support_mapping import settled_vertex, support
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
@@ -31,13 +32,10 @@ _OUTWARD = 32 * 2.0**-53
 
 
 @kernel
-def _proven(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
-    """`support`, of a support tree the vertex that is farthest for certain."""
-    k, x, y, z, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, gx, gy, gz)
-    if tree != 0:
-        k = settled_vertex(coordinates, n, m, tree, k, gx, gy, gz)
-        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]
-    return k, x, y, z
+def _proven(kind, coordinates, n, m, params, at, tree, g):
+    """The point of `support`, of a support tree the vertex that is farthest for certain."""
+    k, point, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, g)
+    return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, n, m, tree, k, g))
 
 
 @kernel
@@ -45,18 +43,14 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
     """(low, high) of one posed convex set along a world axis."""
     at = NUMBERS * s
     kind = ints[INTS * s + KIND]
-    rx = poses[POSE * p + 3 * axis]
-    ry = poses[POSE * p + 3 * axis + 1]
-    rz = poses[POSE * p + 3 * axis + 2]
+    r = vec3_at(poses, POSE * p + 3 * axis)
     n = ints[INTS * s + COUNT]
     m = ints[INTS * s + PADDED]
     t = poses[POSE * p + 9 + axis]
     tree = ints[INTS * s + TREE]
-    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, rx, ry, rz)
-    high = (x * rx + y * ry + z * rz) + t
-    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, -rx, -ry, -rz)
-    low = (x * rx + y * ry + z * rz) + t
-    row = math.sqrt(rx * rx + ry * ry + rz * rz)
+    high = dot(_proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, r), r) + t
+    low = dot(_proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, neg(r)), r) + t
+    row = math.sqrt(dot(r, r))
     radius = numbers[at + RADIUS]
     out = radius + numbers[at + SLOP] + poses[POSE * p + 12]
     out += _OUTWARD * (row * numbers[at + REACH] + abs(t) + radius)

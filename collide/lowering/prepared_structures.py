@@ -11,7 +11,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.lowering.packed_convex import PackedConvex, on_cache_lines
 from collide.support.coarse_points import COARSE, choose_coarse
-from collide.support.lazy_support_tree import PlantedTree
+from collide.support.lazy_support_tree import LazySupportTree
 
 #: So many points have coarse points: twice as many as then stand for them.
 _MIN_FOR_COARSE = 64
@@ -38,7 +38,7 @@ def may_have_tree(packed: PackedConvex) -> bool:
     return packed.prepared.with_tree and len(packed.points) >= MIN_FOR_TREE
 
 
-def support_tree_of(packed: PackedConvex) -> PlantedTree:
+def support_tree_of(packed: PackedConvex) -> LazySupportTree:
     """The points' support tree, made when its address is first asked for."""
     made = packed.prepared.made
-    return made["tree"] if "tree" in made else made.setdefault("tree", PlantedTree(packed.points))
+    return made["tree"] if "tree" in made else made.setdefault("tree", LazySupportTree(packed.points))

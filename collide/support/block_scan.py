@@ -37,11 +37,11 @@ def least_one_by_one(numbers, count):
 @kernel
 def count_level_one_by_one(coordinates, stride, count, gx, gy, gz, limit):
     """`count_level`, one point at a time."""
-    found = 0
+    n_level = 0
     for i in range(count):
         if coordinates[i] * gx + coordinates[stride + i] * gy + coordinates[2 * stride + i] * gz <= limit:
-            found += 1
-    return found
+            n_level += 1
+    return n_level
 
 
 if not WITH_NUMBA:
@@ -60,7 +60,7 @@ else:
 #: Values must not be NaN. O(count).
 #: ``farthest_listed``: the same for lists of some 40 points whose lengths differ.
 #: ``least(numbers, count) -> index``: of the least of the first ``count`` numbers, 8 or more.
-#: ``count_level(coordinates, stride, count, gx, gy, gz, limit) -> found``: how many of the first ``count`` points, a
+#: ``count_level(coordinates, stride, count, gx, gy, gz, limit) -> n``: how many of the first ``count`` points, a
 #: multiple of 8, have a product at most the limit.
 __all__ = [
     "count_level", "count_level_one_by_one", "farthest", "farthest_listed", "farthest_one_by_one", "least", "least_one_by_one",

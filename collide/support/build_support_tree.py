@@ -170,7 +170,7 @@ def subset_sizes(h: int, ratio: int = FINE_RATIO) -> list[int]:
     return sizes
 
 
-class _Growing:
+class _TreeInProgress:
     """The tree while levels are added to it, coarsest first."""
 
     def __init__(self, points: np.ndarray):
@@ -202,9 +202,9 @@ def _built(points, scaled, ordered, sizes, rings: Rings, hull_of) -> SupportTree
     """The tree whose subsets are the first so many of ``ordered``; worked out on ``scaled`` points."""
     place = np.full(len(points), -1, dtype=np.int64)
     place[ordered] = np.arange(len(ordered))
-    growing = _Growing(scaled)
+    partial = _TreeInProgress(scaled)
     top = ordered[: sizes[-1]]
-    growing.add_level(np.array([0, len(top)]), top, 1 + place[top] if len(sizes) > 1 else top)
+    partial.add_level(np.array([0, len(top)]), top, 1 + place[top] if len(sizes) > 1 else top)
     owners = [np.array([-1])]
     first_node = 1
     for level in range(len(sizes) - 2, -1, -1):
@@ -213,34 +213,34 @@ def _built(points, scaled, ordered, sizes, rings: Rings, hull_of) -> SupportTree
             fine_rings = Rings(scaled, _checked(scaled, fine, fine[hull_of(np.ascontiguousarray(scaled[fine]))]))
         else:
             fine_rings = rings
-        list_starts, rows = _lists(growing, fine, fine_rings, coarse, first_node)
-        growing.add_level(list_starts, rows, first_node + len(coarse) + place[rows] if level > 0 else rows)
+        list_starts, rows = _lists(partial, fine, fine_rings, coarse, first_node)
+        partial.add_level(list_starts, rows, first_node + len(coarse) + place[rows] if level > 0 else rows)
         first_node += len(coarse)
         owners.append(coarse)
-    rows = np.concatenate(growing.rows)
+    rows = np.concatenate(partial.rows)
     return SupportTree(
-        points, rings.flat, growing.depth, growing.nodes, np.concatenate(owners), growing.entries,
-        list_coordinates_of(points, growing.nodes, rows), rings.starts, rings.ring,
+        points, rings.flat, partial.depth, partial.nodes, np.concatenate(owners), partial.entries,
+        list_coordinates_of(points, partial.nodes, rows), rings.starts, rings.ring,
     )  # fmt: skip
 
 
-def _lists(growing: _Growing, fine, rings: Rings, coarse, first_node) -> tuple[np.ndarray, np.ndarray]:
+def _lists(partial: _TreeInProgress, fine, rings: Rings, coarse, first_node) -> tuple[np.ndarray, np.ndarray]:
     """(list_starts, rows): candidates of every coarse vertex among the fine ones."""
-    n = len(growing.points)
+    n = len(partial.points)
     capacity = 8 * len(fine) + 4 * len(coarse)
     list_starts = np.empty(len(coarse) + 1, dtype=np.int32)
     while True:
-        pairs, room = np.empty(2 * capacity, dtype=np.int32), np.empty(n + capacity + 2 * STACK)
-        found = candidate_lists(
-            address_of(growing.points), n, address_of(fine), len(fine), address_of(rings.starts),
+        pairs, work = np.empty(2 * capacity, dtype=np.int32), np.empty(n + capacity + 2 * STACK)
+        n_pairs = candidate_lists(
+            address_of(partial.points), n, address_of(fine), len(fine), address_of(rings.starts),
             address_of(rings.ring), address_of(rings.ring_facets), address_of(rings.normals), len(rings.normals),
-            address_of(growing.nodes), address_of(growing.entries), address_of(growing.coordinates),
-            len(growing.nodes) - 1, growing.depth, address_of(coarse), len(coarse), first_node,
-            address_of(pairs), capacity, address_of(list_starts), address_of(room),
+            address_of(partial.nodes), address_of(partial.entries), address_of(partial.coordinates),
+            len(partial.nodes) - 1, partial.depth, address_of(coarse), len(coarse), first_node,
+            address_of(pairs), capacity, address_of(list_starts), address_of(work),
         )  # fmt: skip
-        if found <= capacity:
+        if n_pairs <= capacity:
             return list_starts.astype(np.int64), pairs[: list_starts[-1]]
-        capacity = found
+        capacity = n_pairs
 
 
 def _owners_of_long_lists(tree: SupportTree) -> np.ndarray:

@@ -12,9 +12,13 @@ vertices of V that are extreme somewhere along its arc. No coarse hull is inters
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.support.support_tree_query import walk
+from collide.numerics.vec3 import Vec3, absolute, add, cross, divide, dot, max_abs, put_vec3, scale, sub, vec3_at
+from collide.support.support_tree_query import Lists, descend_lists
 
 #: Arcs are followed between points this fraction inside their ends. At the ends themselves, which are facet
 #: normals, many coarse vertices may tie (those around the cap of a prism, say), and only the arc tells which
@@ -22,9 +26,9 @@ from collide.support.support_tree_query import walk
 _INSET = 2.0**-20
 #: Facets whose unit normals differ less are taken for one: the arc between them is nothing but rounding.
 SAME_NORMAL = 1e-12
-#: Directions asked about along one arc, at most. What is left out then costs a climbing step in queries.
+#: At most so many directions are asked about along one arc. What is left out then costs a climbing step in queries.
 _LONGEST_ARC = 4096
-#: Intervals of one arc that may wait to be looked at.
+#: Intervals of one arc that may be on the stack.
 STACK = 512
 
 
@@ -37,7 +41,7 @@ def order_rings(
     Ring place i of a vertex holds neighbour i and the facet between neighbours i and i + 1. Returns 0; 1 where
     two facets have the same directed edge, as both sides of a flat hull may; 2 where the surface is not closed
     or a vertex joins several sheets. place (n) ends as the number of edges at a vertex whose facets have
-    different normals: fewer than 3 make no corner. following (6·n_facets) is room to work in. O(n_facets).
+    different normals: fewer than 3 make no corner. following (6·n_facets) is workspace. O(n_facets).
     """
     points = view_f64(points_at, 3 * n)
     facets = view_i32(facets_at, 3 * n_facets)
@@ -81,14 +85,15 @@ def _bends(normals, ring_facets, begin, end):
     for k in range(begin, end):
         p = 3 * ring_facets[k - 1 if k > begin else end - 1]
         q = 3 * ring_facets[k]
-        if _differ(normals[p] - normals[q], normals[p + 1] - normals[q + 1], normals[p + 2] - normals[q + 2]):
+        if _differ(vec3_at(normals, p), vec3_at(normals, q)):
             bends += 1
     return bends
 
 
 @kernel
-def _differ(x, y, z):
-    return max(abs(x), abs(y), abs(z)) > SAME_NORMAL
+def _differ(p, q):
+    """Whether two unit normals are those of different planes."""
+    return max_abs(sub(p, q)) > SAME_NORMAL
 
 
 @kernel
@@ -103,7 +108,7 @@ def _order_ring(begin, end, ring, ring_facets, following, place):
     for i in range(begin, end):
         if not begin <= slot < end or (slot == begin and i > begin):
             return 2
-        # The slot's own neighbour is what the slot before it says follows: ``ring`` may be overwritten.
+        # The slot's neighbour is the follower of the slot before it: ``ring`` may be overwritten.
         follower = following[2 * slot]
         ring_facets[i] = following[2 * slot + 1]
         slot = place[follower]
@@ -122,30 +127,21 @@ def _order_ring(begin, end, ring, ring_facets, following, place):
 @kernel
 def _unit_normal(points, facets, facet, normals):
     """Outward unit normal, or 0 where rounding leaves nothing of it."""
-    a = 3 * facets[3 * facet]
-    b = 3 * facets[3 * facet + 1]
-    c = 3 * facets[3 * facet + 2]
-    ux = points[b] - points[a]
-    uy = points[b + 1] - points[a + 1]
-    uz = points[b + 2] - points[a + 2]
-    vx = points[c] - points[a]
-    vy = points[c + 1] - points[a + 1]
-    vz = points[c + 2] - points[a + 2]
-    _store_unit(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx, normals, 3 * facet)
+    a = vec3_at(points, 3 * facets[3 * facet])
+    b = vec3_at(points, 3 * facets[3 * facet + 1])
+    c = vec3_at(points, 3 * facets[3 * facet + 2])
+    put_vec3(normals, 3 * facet, _unit(cross(sub(b, a), sub(c, a))))
 
 
 @kernel
-def _store_unit(x, y, z, out, at):
-    largest = max(abs(x), abs(y), abs(z))
-    length = 0.0
-    if largest > 0.0:
-        x /= largest
-        y /= largest
-        z /= largest
-        length = math.sqrt(x * x + y * y + z * z)
-    out[at] = x / length if length > 0.0 else 0.0
-    out[at + 1] = y / length if length > 0.0 else 0.0
-    out[at + 2] = z / length if length > 0.0 else 0.0
+def _unit(v):
+    """v of length 1; zeros where it has none."""
+    largest = max_abs(v)
+    if not largest > 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    scaled = divide(v, largest)
+    length = math.sqrt(dot(scaled, scaled))
+    return divide(scaled, length) if length > 0.0 else Vec3(0.0, 0.0, 0.0)
 
 
 @entry(
@@ -155,7 +151,7 @@ def _store_unit(x, y, z, out, at):
 def candidate_lists(
     points_at, n, fine_at, n_fine, starts_at, ring_at, ring_facets_at, normals_at, n_facets,
     nodes_at, entries_at, coordinates_at, n_nodes, depth, coarse_at, n_coarse, first_node,
-    pairs_at, capacity, list_starts_at, room_at,
+    pairs_at, capacity, list_starts_at, work_at,
 ):  # fmt: skip
     """Candidate lists of ``n_coarse`` vertices among ``n_fine`` ones; returns how many pairs were met.
 
@@ -163,36 +159,35 @@ def candidate_lists(
     vertices: those are no candidates.
     nodes, entries, coordinates, depth : the tree so far; ``depth`` scans end at node first_node + i for
     coarse vertex i, row coarse[i].
-    pairs : room for ``capacity`` pairs of integers. Where more are met nothing is made: call again with more.
+    pairs : ``capacity`` pairs of integers, out. Where more are met nothing is made: call again with more.
     list_starts : (n_coarse + 1), out; the rows of list i end up at pairs[list_starts[i] : list_starts[i + 1]].
-    room : doubles to work in, n + capacity + 2·STACK of them.
+    work : n + capacity + 2·STACK doubles of workspace.
     """  # fmt: skip
-    points = view_f64(points_at, 3 * n)
     fine = view_i32(fine_at, n_fine)
     starts = view_i32(starts_at, n + 1)
     ring = view_i32(ring_at, starts[n])
     ring_facets = view_i32(ring_facets_at, starts[n])
     normals = view_f64(normals_at, 3 * n_facets)
     nodes = view_i32(nodes_at, n_nodes + 1)
-    entries = view_i32(entries_at, nodes[n_nodes])
-    coordinates = view_f64(coordinates_at, 3 * nodes[n_nodes])
-    coarse = view_i32(coarse_at, n_coarse)
-    pairs = view_i32(pairs_at, 2 * capacity)
-    stack = view_f64(room_at, 2 * STACK)
-    stamp = view_i32(room_at + 16 * STACK, n)
-    known = view_i32(room_at + 16 * STACK + 4 * n, n)
-    rows = view_i32(room_at + 16 * STACK + 8 * n, 2 * capacity)
+    lists = Lists(nodes, view_i32(entries_at, nodes[n_nodes]), view_f64(coordinates_at, 3 * nodes[n_nodes]), depth)
+    stamp = view_i32(work_at + 16 * STACK, n)
+    known = view_i32(work_at + 16 * STACK + 4 * n, n)
+    rows = view_i32(work_at + 16 * STACK + 8 * n, 2 * capacity)
     list_starts = view_i32(list_starts_at, n_coarse + 1)
-    size = _sizes(points, fine, n_fine)
+    points = view_f64(points_at, 3 * n)
+    search = ArcSearch(
+        points, lists, view_i32(coarse_at, n_coarse), first_node, _sizes(points, fine, n_fine),
+        view_f64(work_at, 2 * STACK), stamp, view_i32(pairs_at, 2 * capacity), capacity,
+    )  # fmt: skip
     for i in range(n):
         stamp[i] = -1
         known[i] = 0
     for j in range(n_fine):
         known[fine[j]] = 1
     # A coarse vertex is a candidate of its own.
-    found = 0
+    n_pairs = 0
     for i in range(n_coarse):
-        found = _note(pairs, found, capacity, stamp, i, coarse[i])
+        n_pairs = _note(search, n_pairs, i, search.coarse[i])
     for j in range(n_fine):
         a = fine[j]
         begin = starts[a]
@@ -201,13 +196,38 @@ def candidate_lists(
             b = ring[k]
             if a < b or known[b] == 0:
                 before = ring_facets[k - 1 if k > begin else end - 1]
-                found = _follow_edge(
-                    points, a, b, known[b] != 0, normals, 3 * before, 3 * ring_facets[k], nodes, entries, coordinates, depth,
-                    coarse, first_node, size, stack, stamp, pairs, found, capacity,
-                )  # fmt: skip
-    if found <= capacity:
-        _sort_pairs(pairs, found, n, n_coarse, list_starts, stamp, rows)
-    return found
+                p, q = vec3_at(normals, 3 * before), vec3_at(normals, 3 * ring_facets[k])
+                n_pairs = _follow_edge(search, n_pairs, Edge(np.int64(a), np.int64(b), known[b] != 0), p, q)
+    if n_pairs <= capacity:
+        _sort_pairs(search.pairs, n_pairs, n, n_coarse, list_starts, stamp, rows)
+    return n_pairs
+
+
+class ArcSearch(NamedTuple):
+    """What following an arc reads and writes.
+
+    points : three doubles a row.   lists : the tree so far, whose scans end at node first_node + i for row coarse[i].
+    size : largest coordinate in size along each axis.   stack : intervals to be looked at: an end and its owner.
+    stamp : by row, the owner that noted it last.   pairs : owner and row of each candidate, at most capacity of them.
+    """
+
+    points: Any
+    lists: Lists
+    coarse: Any
+    first_node: int
+    size: Vec3
+    stack: Any
+    stamp: Any
+    pairs: Any
+    capacity: int
+
+
+class Edge(NamedTuple):
+    """An edge a → b of the fine hull.   both : whether b is a candidate, too."""
+
+    a: int
+    b: int
+    both: bool
 
 
 @kernel
@@ -217,85 +237,52 @@ def _sizes(points, fine, n_fine):
     y = 0.0
     z = 0.0
     for j in range(n_fine):
-        at = 3 * fine[j]
-        x = max(x, abs(points[at]))
-        y = max(y, abs(points[at + 1]))
-        z = max(z, abs(points[at + 2]))
-    return x, y, z
+        p = absolute(vec3_at(points, 3 * fine[j]))
+        x = max(x, p.x)
+        y = max(y, p.y)
+        z = max(z, p.z)
+    return Vec3(x, y, z)
 
 
 @kernel
-def _note(pairs, found, capacity, stamp, owner, row):
-    """Note a candidate; a repetition right after another is left out."""
-    if stamp[row] == owner:
-        return found
-    stamp[row] = owner
-    if found < capacity:
-        pairs[2 * found] = owner
-        pairs[2 * found + 1] = row
-    return found + 1
+def _note(search, n_pairs, owner, row):
+    """Note a candidate; a repetition right after another is left out. Returns the new number of pairs."""
+    if search.stamp[row] == owner:
+        return n_pairs
+    search.stamp[row] = owner
+    if n_pairs < search.capacity:
+        search.pairs[2 * n_pairs] = owner
+        search.pairs[2 * n_pairs + 1] = row
+    return n_pairs + 1
 
 
 @kernel
-def _follow_edge(
-    points, a, b, both, normals, p, q, nodes, entries, coordinates, depth, coarse, first_node, size, stack, stamp, pairs, found,
-    capacity,
-):  # fmt: skip
-    """Follow the arc of one edge a → b, from the facet on its right, whose normal is at p, to that on its left."""
-    px = normals[p]
-    py = normals[p + 1]
-    pz = normals[p + 2]
-    qx = normals[q]
-    qy = normals[q + 1]
-    qz = normals[q + 2]
-    if px * px + py * py + pz * pz == 0.0 or qx * qx + qy * qy + qz * qz == 0.0:
-        return found
-    pieces = 1
-    mx = qx
-    my = qy
-    mz = qz
-    if px * qx + py * qy + pz * qz <= 0.0:
-        # An arc of 90° and more, up to the 180° of a flat hull's border: through the outward normal.
-        ex = points[3 * b] - points[3 * a]
-        ey = points[3 * b + 1] - points[3 * a + 1]
-        ez = points[3 * b + 2] - points[3 * a + 2]
-        dx = qx - px
-        dy = qy - py
-        dz = qz - pz
-        _store_unit(ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx, stack, 0)
-        mx = stack[0]
-        my = stack[1]
-        mz = stack[2]
-        pieces = 2
-    for piece in range(pieces):
-        if piece == 1:
-            px = mx
-            py = my
-            pz = mz
-            mx = qx
-            my = qy
-            mz = qz
-        if _differ(mx - px, my - py, mz - pz):
-            found = _follow_arc(
-                points, a, b, both, px, py, pz, mx - px, my - py, mz - pz, nodes, entries, coordinates, depth,
-                coarse, first_node, size, stack, stamp, pairs, found, capacity,
-            )  # fmt: skip
-    return found
+def _follow_edge(search, n_pairs, edge, p, q):
+    """Follow the arc of one edge, from the normal p of the facet on its right to the normal q of that on its left."""
+    if dot(p, p) == 0.0 or dot(q, q) == 0.0:
+        return n_pairs
+    if dot(p, q) > 0.0:
+        return _follow_arc(search, n_pairs, edge, p, q)
+    # An arc of 90° and more, up to the 180° of a flat hull's border: through the outward normal.
+    e = sub(vec3_at(search.points, 3 * edge.b), vec3_at(search.points, 3 * edge.a))
+    middle = _unit(cross(e, sub(q, p)))
+    n_pairs = _follow_arc(search, n_pairs, edge, p, middle)
+    return _follow_arc(search, n_pairs, edge, middle, q)
 
 
 @kernel
-def _follow_arc(
-    points, a, b, both, px, py, pz, dx, dy, dz, nodes, entries, coordinates, depth, coarse, first_node, size, stack, stamp, pairs,
-    found, capacity,
-):  # fmt: skip
-    """Note a, and b if ``both``, as candidates of every coarse vertex that is extreme along p + t·d, 0 < t < 1.
+def _follow_arc(search, n_pairs, edge, p, q):
+    """Note a, and b if ``both``, as candidates of every coarse vertex that is extreme along p + t·(q − p), 0 < t < 1.
 
     Between two directions with different owners both are equally far in one direction: who is farthest
     there either is one of them, and nobody comes between, or splits the interval in two.
     """
-    none = view_i64(0, 0)
+    if not _differ(q, p):
+        return n_pairs
+    d = sub(q, p)
+    no_counters = view_i64(0, 0)
     # Point 0 of the loop asks at the end of the arc, point 1 at its start, later ones where two owners tie.
-    waiting = 0
+    depth = 0
     t = 1.0 - _INSET
     t_low = 0.0
     low = -1
@@ -303,21 +290,18 @@ def _follow_arc(
     high = -1
     step = 0
     while step < _LONGEST_ARC:
-        gx = px + t * dx
-        gy = py + t * dy
-        gz = pz + t * dz
-        node, x, y, z, _ = walk(nodes, entries, coordinates, 0, depth, gx, gy, gz, none)
-        owner = node - first_node
+        g = add(p, scale(t, d))
+        extreme = descend_lists(search.lists, 0, g, no_counters)
+        owner = extreme.id - search.first_node
         new = True
         if step >= 2:
-            v = 3 * coarse[low]
-            gain = (x - points[v]) * gx + (y - points[v + 1]) * gy + (z - points[v + 2]) * gz
-            noise = 1e-15 * (size[0] * abs(gx) + size[1] * abs(gy) + size[2] * abs(gz))
+            gain = dot(sub(extreme.point, vec3_at(search.points, 3 * search.coarse[low])), g)
+            noise = 1e-15 * dot(search.size, absolute(g))
             new = owner != low and owner != high and gain > noise
         if new:
-            found = _note(pairs, found, capacity, stamp, owner, a)
-            if both:
-                found = _note(pairs, found, capacity, stamp, owner, b)
+            n_pairs = _note(search, n_pairs, owner, edge.a)
+            if edge.both:
+                n_pairs = _note(search, n_pairs, owner, edge.b)
         if step == 0:
             t_high = t
             high = owner
@@ -329,49 +313,47 @@ def _follow_arc(
             t_low = t
             low = owner
         elif new:
-            if waiting < STACK:
-                stack[2 * waiting] = t_high
-                stack[2 * waiting + 1] = float(high)
-                waiting += 1
+            if depth < STACK:
+                search.stack[2 * depth] = t_high
+                search.stack[2 * depth + 1] = float(high)
+                depth += 1
             t_high = t
             high = owner
         else:
-            # Nobody between low and high: on to the interval that waits behind.
+            # Nobody between low and high: on to the next interval of the stack.
             t_low = t_high
             low = high
-            if waiting == 0:
-                return found
-            waiting -= 1
-            t_high = stack[2 * waiting]
-            high = int(stack[2 * waiting + 1])
+            if depth == 0:
+                return n_pairs
+            depth -= 1
+            t_high = search.stack[2 * depth]
+            high = int(search.stack[2 * depth + 1])
         if low == high:  # the whole arc; ends of later intervals differ
-            return found
-        t = _crossing(points, coarse[low], coarse[high], px, py, pz, dx, dy, dz)
+            return n_pairs
+        t = _crossing(search.points, search.coarse[low], search.coarse[high], p, d)
         t = min(max(t, t_low), t_high)
-    return found
+    return n_pairs
 
 
 @kernel
-def _crossing(points, a, b, px, py, pz, dx, dy, dz):
+def _crossing(points, a, b, p, d):
     """The t where p + t·d is as far along a as along b."""
-    x = points[3 * a] - points[3 * b]
-    y = points[3 * a + 1] - points[3 * b + 1]
-    z = points[3 * a + 2] - points[3 * b + 2]
-    rate = x * dx + y * dy + z * dz
-    ahead = x * px + y * py + z * pz
+    ab = sub(vec3_at(points, 3 * a), vec3_at(points, 3 * b))
+    rate = dot(ab, d)
+    ahead = dot(ab, p)
     return -ahead / rate if rate != 0.0 else 0.5
 
 
 @kernel
-def _sort_pairs(pairs, found, n, n_coarse, list_starts, stamp, rows):
+def _sort_pairs(pairs, n_pairs, n, n_coarse, list_starts, stamp, rows):
     """Group the rows by owner, each row once; the owners' lists replace the pairs."""
     for i in range(n_coarse + 1):
         list_starts[i] = 0
-    for k in range(found):
+    for k in range(n_pairs):
         list_starts[pairs[2 * k] + 1] += 1
     for i in range(n_coarse):
         list_starts[i + 1] += list_starts[i]
-    for k in range(found):
+    for k in range(n_pairs):
         owner = pairs[2 * k]
         rows[list_starts[owner]] = pairs[2 * k + 1]
         list_starts[owner] += 1

@@ -1,4 +1,4 @@
-"""Few of many points: those farthest in directions that are spread over the sphere, of the cloud stretched to a cube.
+"""Coarse points: those of a cloud that are farthest in directions spread over the sphere, the cloud stretched to a cube.
 
 A kernel, since Python and C are to choose the same ones: numpy's sines and cosines differ from platform to platform.
 """
@@ -9,7 +9,7 @@ import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 
-#: As many points stand for many in a first, coarse look.
+#: So many points stand for the whole cloud in a first query.
 COARSE = 32
 #: Cosine and sine of the golden angle, π·(3 − √5): what the spiral of directions turns by from each to the next.
 _COSINE, _SINE = -0.7373688780783197, 0.6754902942615238
@@ -17,14 +17,14 @@ _COSINE, _SINE = -0.7373688780783197, 0.6754902942615238
 
 @entry("int64(int64, int64, int64)")
 def choose_coarse(points_at, n, block_at):
-    """Fill a block of 4·COARSE doubles: x, y, z of the points chosen from n ≥ 1 points (n, 3), and their ids as int64 bits.
+    """Fill a block of 4·COARSE doubles: x, y, z of COARSE points of n ≥ 1 (n, 3), and their ids as int64 bits.
 
     A point is named once as long as there are others; returns how many different ones there are.
     """
     points = view_f64(points_at, 3 * n)
     block = view_f64(block_at, 3 * COARSE)
     ids = view_i64(block_at + 24 * COARSE, COARSE)
-    found = view_i64(block_at, COARSE)
+    farthest_ids = view_i64(block_at, COARSE)
     x_middle, x_extent = _middle_and_extent(points, n, 0)
     y_middle, y_extent = _middle_and_extent(points, n, 1)
     z_middle, z_extent = _middle_and_extent(points, n, 2)
@@ -43,20 +43,20 @@ def choose_coarse(points_at, n, block_at):
             if value > farthest:
                 farthest = value
                 best = i
-        found[d] = best
-        turned = along * _COSINE - across * _SINE
+        farthest_ids[d] = best
+        rotated = along * _COSINE - across * _SINE
         across = along * _SINE + across * _COSINE
-        along = turned
+        along = rotated
     different = 0
     for d in range(COARSE):
         known = False
         for k in range(different):
-            known = known or ids[k] == found[d]
+            known = known or ids[k] == farthest_ids[d]
         if not known:
-            ids[different] = found[d]
+            ids[different] = farthest_ids[d]
             different += 1
     for k in range(COARSE - different):
-        ids[different + k] = found[k]
+        ids[different + k] = farthest_ids[k]
     for k in range(COARSE):
         for axis in range(3):
             block[COARSE * axis + k] = points[3 * ids[k] + axis]

@@ -11,9 +11,13 @@ either side of g, certain by an error bound, leave only the edges between them t
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+import numpy as np
+
 from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.numerics.exact_dot_sign import exact_sign, product_and_bound, scaled_into_range
-from collide.numerics.vec3 import Vec3
+from collide.numerics.vec3 import cross, dot, sub, vec3_at
 from collide.support.support_tree import (
     AT_POINTS,
     AT_RANGE,
@@ -29,15 +33,29 @@ from collide.support.support_tree import (
 SCANNED, STEPS, LOOKED_AT, EXACT_SIGNS = range(4)
 #: Rings longer than this are searched, not scanned.
 _LONG_RING = 64
-#: Corners left between two certain ones where a search stops.
-_FEW = 8
-#: Relative error of a triple product of two facet normals and a direction, with room to spare: each term is
+#: A search stops where so many corners remain between two certain ones.
+_MAX_SCANNED_CORNERS = 8
+#: Relative error of a triple product of two facet normals and a direction, with a margin: each term is
 #: a product of five differences or components, with at most a dozen roundings along the way.
 _TRIPLE_ROUNDING = 64.0 * 2.0**-53
 
 
+class Ring(NamedTuple):
+    """A vertex among its neighbours.
+
+    points : three doubles a row.   neighbours : of all vertices; those of this one are neighbours[begin : begin + degree], in
+    cyclic order, counter-clockwise from outside.
+    """
+
+    points: Any
+    neighbours: Any
+    vertex: int
+    begin: int
+    degree: int
+
+
 @kernel
-def settle_vertex(tree_at, vertex, gx, gy, gz):
+def settle_vertex(tree_at, vertex, g):
     """Id of a vertex farthest in direction g, exactly, near ``vertex``.
 
     Returns −1 − id where nothing can be proven: components of g differ by some 2¹⁸⁰⁰, or are no numbers, or
@@ -45,35 +63,35 @@ def settle_vertex(tree_at, vertex, gx, gy, gz):
     O(1) steps from what `extreme_vertex` gives, each O(log degree) unless the vertex has long thin facets or
     coplanar ones, which take O(degree); O(n) in the middle of a facet across g.
     """
-    return climb(tree_at, vertex, gx, gy, gz, view_i64(0, 0))
+    return climb(tree_at, vertex, g, view_i64(0, 0))
 
 
 @kernel
-def climb(tree_at, vertex, gx, gy, gz, counters):
+def climb(tree_at, vertex, g, counters):
     """`settle_vertex`, adding to ``counters`` unless that is empty."""
     header = view_i64(tree_at, HEADER)
     starts = view_i32(header[AT_RING_STARTS], header[POINTS] + 1)
-    ring = view_i32(header[AT_RING], header[LINKS])
-    coordinates = view_f64(header[AT_POINTS], 3 * header[POINTS])
+    neighbours = view_i32(header[AT_RING], header[LINKS])
+    points = view_f64(header[AT_POINTS], 3 * header[POINTS])
     limits = view_f64(header[AT_RANGE], 3)
-    certain, g = scaled_into_range(limits[0], limits[1], limits[2], Vec3(gx, gy, gz))
-    gx, gy, gz = g
+    certain, g = scaled_into_range(limits[0], limits[1], limits[2], g)
     if not certain or starts[vertex + 1] == starts[vertex]:
         return -1 - vertex
-    if gx == 0.0 and gy == 0.0 and gz == 0.0:
+    if g.x == 0.0 and g.y == 0.0 and g.z == 0.0:
         return vertex
     while True:
-        begin = starts[vertex]
-        degree = starts[vertex + 1] - begin
+        begin = np.int64(starts[vertex])
+        degree = np.int64(starts[vertex + 1]) - begin
+        ring = Ring(points, neighbours, np.int64(vertex), begin, degree)
         first = 0
         end = degree
         if degree > _LONG_RING:
-            first, end = _narrow(coordinates, ring, begin, degree, vertex, gx, gy, gz, counters)
-        better, level = _best_of(coordinates, ring, begin, degree, first, end, vertex, gx, gy, gz, counters)
+            first, end = _narrow(ring, g, counters)
+        better, level = _best_of(ring, first, end, g, counters)
         if better == vertex:
             if not level or header[FLAT] != 0 or end - first < degree:
                 return vertex
-            better = _across_plateau(coordinates, starts, header[POINTS], vertex, gx, gy, gz, counters)
+            better = _across_plateau(points, starts, header[POINTS], vertex, g, counters)
             if better == vertex:
                 return vertex
         if len(counters) > 0:
@@ -82,30 +100,26 @@ def climb(tree_at, vertex, gx, gy, gz, counters):
 
 
 @kernel
-def _best_of(coordinates, ring, begin, degree, first, end, vertex, gx, gy, gz, counters):
+def _best_of(ring, first, end, g, counters):
     """(best, level): the neighbour that looks best among those farther than the vertex, itself if none is; and
     whether all are exactly as far.
     """
-    wx = coordinates[3 * vertex]
-    wy = coordinates[3 * vertex + 1]
-    wz = coordinates[3 * vertex + 2]
-    best = vertex
+    w = vec3_at(ring.points, 3 * ring.vertex)
+    best = ring.vertex
     best_value = 0.0
     level = True
     for i in range(first, end):
-        neighbour = ring[begin + (i if i < degree else i - degree)]
-        x = coordinates[3 * neighbour]
-        y = coordinates[3 * neighbour + 1]
-        z = coordinates[3 * neighbour + 2]
-        value, bound = product_and_bound(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
+        neighbour = ring.neighbours[ring.begin + (i if i < ring.degree else i - ring.degree)]
+        p = vec3_at(ring.points, 3 * neighbour)
+        value, bound = product_and_bound(p, w, g)
         sign = 1 if value > bound else -1
         if not (value < -bound or value > bound):
-            sign = exact_sign(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
+            sign = exact_sign(p, w, g)
             if len(counters) > 0:
                 counters[EXACT_SIGNS] += 1
         if sign != 0:
             level = False
-        if sign > 0 and (best == vertex or value > best_value):
+        if sign > 0 and (best == ring.vertex or value > best_value):
             best = neighbour
             best_value = value
     if len(counters) > 0:
@@ -114,29 +128,24 @@ def _best_of(coordinates, ring, begin, degree, first, end, vertex, gx, gy, gz, c
 
 
 @kernel
-def _across_plateau(coordinates, starts, n, vertex, gx, gy, gz, counters):
+def _across_plateau(points, starts, n, vertex, g, counters):
     """A vertex beyond the facets around this one, which all are level: farther, or the vertex itself if none is.
 
     Only a vertex in the middle of a facet comes here. The first vertex off the facet's plane decides.
     """
-    wx = coordinates[3 * vertex]
-    wy = coordinates[3 * vertex + 1]
-    wz = coordinates[3 * vertex + 2]
-    for other in range(n):
-        if starts[other + 1] > starts[other]:
-            x = coordinates[3 * other]
-            y = coordinates[3 * other + 1]
-            z = coordinates[3 * other + 2]
-            sign = exact_sign(Vec3(x, y, z), Vec3(wx, wy, wz), Vec3(gx, gy, gz))
+    w = vec3_at(points, 3 * vertex)
+    for k in range(n):
+        if starts[k + 1] > starts[k]:
+            sign = exact_sign(vec3_at(points, 3 * k), w, g)
             if len(counters) > 0:
                 counters[EXACT_SIGNS] += 1
             if sign != 0:
-                return other if sign > 0 else vertex
+                return k if sign > 0 else vertex
     return vertex
 
 
 @kernel
-def _narrow(coordinates, ring, begin, degree, vertex, gx, gy, gz, counters):
+def _narrow(ring, g, counters):
     """(first, end): if no neighbour of these ring places is farther, none of the whole ring is.
 
     Corner i of the normal cone is the normal of the facet between neighbours i and i + 1, corner 0 and corner
@@ -144,12 +153,12 @@ def _narrow(coordinates, ring, begin, degree, vertex, gx, gy, gz, counters):
     g lies in the cone of corners 0, low, …, high exactly if neighbours low + 1, …, high are not farther.
     """
     low = 0
-    above = degree  # corners from here on were not certainly before g
-    high = degree
+    above = ring.degree  # corners from here on were not certainly before g
+    high = ring.degree
     below = 0
-    while above - low > _FEW:
+    while above - low > _MAX_SCANNED_CORNERS:
         middle = (low + above) // 2
-        side = _side(coordinates, ring, begin, degree, vertex, middle, gx, gy, gz)
+        side = _side(ring, middle, g)
         if len(counters) > 0:
             counters[LOOKED_AT] += 2
         if side > 0:
@@ -159,9 +168,9 @@ def _narrow(coordinates, ring, begin, degree, vertex, gx, gy, gz, counters):
             above = middle
             if side < 0:
                 high = min(high, middle)
-    while high - below > _FEW:
+    while high - below > _MAX_SCANNED_CORNERS:
         middle = (below + high) // 2
-        side = _side(coordinates, ring, begin, degree, vertex, middle, gx, gy, gz)
+        side = _side(ring, middle, g)
         if len(counters) > 0:
             counters[LOOKED_AT] += 2
         if side < 0:
@@ -172,14 +181,14 @@ def _narrow(coordinates, ring, begin, degree, vertex, gx, gy, gz, counters):
 
 
 @kernel
-def _side(coordinates, ring, begin, degree, vertex, i, gx, gy, gz):
+def _side(ring, i, g):
     """Which side of the plane of corners 0 and i the direction certainly lies on: 1 if i comes before it, −1, 0."""
-    ax, ay, az, a = _corner(coordinates, ring, begin, degree, vertex, 0)
-    bx, by, bz, b = _corner(coordinates, ring, begin, degree, vertex, i)
-    value = (ay * bz - az * by) * gx + (az * bx - ax * bz) * gy + (ax * by - ay * bx) * gz
-    # Every term is at most a·b·|g|, and there are six.
-    bound = _TRIPLE_ROUNDING * (2.0 * a * b * (abs(gx) + abs(gy) + abs(gz)))
-    if not (a > 2.0**-400 and b > 2.0**-400 and bound > 2.0**-900):
+    a, size_a = _corner(ring, 0)
+    b, size_b = _corner(ring, i)
+    value = dot(cross(a, b), g)
+    # Every term is at most size_a·size_b·|g|, and there are six.
+    bound = _TRIPLE_ROUNDING * (2.0 * size_a * size_b * (abs(g.x) + abs(g.y) + abs(g.z)))
+    if not (size_a > 2.0**-400 and size_b > 2.0**-400 and bound > 2.0**-900):
         return 0  # products may have fallen below the smallest normal double
     if value > bound:
         return 1
@@ -187,16 +196,10 @@ def _side(coordinates, ring, begin, degree, vertex, i, gx, gy, gz):
 
 
 @kernel
-def _corner(coordinates, ring, begin, degree, vertex, i):
-    """(nx, ny, nz, size): normal of the facet between neighbours i and i + 1, and a bound of its terms."""
-    p = 3 * ring[begin + i]
-    q = 3 * ring[begin + (i + 1 if i + 1 < degree else 0)]
-    w = 3 * vertex
-    px = coordinates[p] - coordinates[w]
-    py = coordinates[p + 1] - coordinates[w + 1]
-    pz = coordinates[p + 2] - coordinates[w + 2]
-    qx = coordinates[q] - coordinates[w]
-    qy = coordinates[q + 1] - coordinates[w + 1]
-    qz = coordinates[q + 2] - coordinates[w + 2]
-    size = (abs(px) + abs(py) + abs(pz)) * (abs(qx) + abs(qy) + abs(qz))
-    return py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx, size
+def _corner(ring, i):
+    """(normal, size): normal of the facet between neighbours i and i + 1, and a bound of its terms."""
+    w = vec3_at(ring.points, 3 * ring.vertex)
+    p = sub(vec3_at(ring.points, 3 * ring.neighbours[ring.begin + i]), w)
+    q = sub(vec3_at(ring.points, 3 * ring.neighbours[ring.begin + (i + 1 if i + 1 < ring.degree else 0)]), w)
+    size = (abs(p.x) + abs(p.y) + abs(p.z)) * (abs(q.x) + abs(q.y) + abs(q.z))
+    return cross(p, q), size

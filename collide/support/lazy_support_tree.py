@@ -1,39 +1,38 @@
-"""The support tree of a shape's points, made when a query first needs it and kept with the shape."""
+"""The support tree of a shape's points, built when a query first needs it and kept with the shape."""
 
 from __future__ import annotations
 
 import os
 import threading
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide.hull.exact_hull import convex_hull
 from collide.log import log_duration
+from collide.support.build_support_tree import build_support_tree
+from collide.support.support_tree import SupportTree
 
-if TYPE_CHECKING:
-    from collide.support.support_tree import SupportTree
-
-#: A hull of so few vertices is scanned as well, however many points were given.
-FEWEST_VERTICES = 32
+#: A hull of fewer vertices is scanned, too, however many points there are.
+MIN_VERTICES = 32
 
 
-class PlantedTree:
-    """points : (n, 3)."""
+class LazySupportTree:
+    """A support tree that is built when its address is first asked for.   points : (n, 3)."""
 
     def __init__(self, points: np.ndarray):
         self._points = points
         self._tree: SupportTree | None = None
-        self._hopeless = False
+        self._too_small = False
 
     @property
     def tree(self) -> SupportTree | None:
         """The tree; None where the hull has too few vertices for one."""
-        if self._tree is None and not self._hopeless:
-            with _growing():
-                if self._tree is None and not self._hopeless:
+        if self._tree is None and not self._too_small:
+            with _build_lock():
+                if self._tree is None and not self._too_small:
                     with log_duration("support tree of a hull of %d points made", len(self._points)):
-                        self._tree = _grown(self._points)
-                    self._hopeless = self._tree is None
+                        self._tree = _built(self._points)
+                    self._too_small = self._tree is None
         return self._tree
 
     @property
@@ -45,8 +44,8 @@ class PlantedTree:
 _lock = threading.Lock()
 
 
-def _growing() -> threading.Lock:
-    """Held while a tree grows: one at a time, since a tree of 100,000 points is a matter of a second."""
+def _build_lock() -> threading.Lock:
+    """Held while a tree is built: one at a time, since a tree of 100,000 points is a matter of a second."""
     return _lock
 
 
@@ -59,13 +58,9 @@ if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does no
     os.register_at_fork(after_in_child=_new_lock)
 
 
-def _grown(points: np.ndarray) -> SupportTree | None:
-    # Kernels, imported when a tree is made: packing a shape, as `verify` does, needs none.
-    from collide.hull.exact_hull import convex_hull
-    from collide.support.build_support_tree import build_support_tree
-
+def _built(points: np.ndarray) -> SupportTree | None:
     hull = convex_hull(points)
-    if hull.dimension < 2 or len(hull.vertices) < FEWEST_VERTICES:
+    if hull.dimension < 2 or len(hull.vertices) < MIN_VERTICES:
         return None
     try:
         return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)

@@ -3,7 +3,7 @@
 A subset's candidate lists are as long as its normal cones are large, counted in cones of the finer subset. Random
 subsets have cones of very different size: among lists of 46 on average were some of 100, and queries meet the long
 ones oftener. Here the vertices are put in order along a Hilbert curve over the sphere of directions (Hilbert 1891, on
-an octahedron unfolded to a square), and every so-manieth is taken: as long on average, never much longer.
+an octahedron unfolded to a square), and vertices at even distances along it are taken: lists as long on average, never much longer.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def nested_order(vertices: np.ndarray, normals: np.ndarray, late: np.ndarray, si
     ordered: list[np.ndarray] = []
     free = len(vertices) - int(late.sum())
     for size in sizes[1:]:
-        chosen = ((np.arange(size) + 0.5) * (max(free, size) / size)).astype(np.int64)
-        ordered.insert(0, np.delete(along, chosen))
-        along, free = along[chosen], size
+        places = ((np.arange(size) + 0.5) * (max(free, size) / size)).astype(np.int64)
+        ordered.insert(0, np.delete(along, places))
+        along, free = along[places], size
     return vertices[np.concatenate([along, *ordered])]
 
 
@@ -46,8 +46,8 @@ def _place_on_curve(directions: np.ndarray) -> np.ndarray:
     while half > 0:
         right, upper = (column & half) > 0, (row & half) > 0
         place = 4 * place + np.where(right, np.where(upper, 2, 3), upper)
-        turned = right & ~upper
-        column, row = (np.where(turned, cells - 1 - w, w) for w in (column, row))
+        mirrored = right & ~upper
+        column, row = (np.where(mirrored, cells - 1 - w, w) for w in (column, row))
         column, row = np.where(upper, column, row), np.where(upper, row, column)
         half >>= 1
     return place

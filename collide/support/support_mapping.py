@@ -1,97 +1,102 @@
 """Support mappings: the point of a convex set that lies farthest in a direction.
 
 A direction is in the set's own frame and need not have unit length. Support values are good to a
-few units in the last place of |direction|·reach, which is what `narrowphase/bounds.py` assumes.
+few units in the last place of |direction|·reach, as `narrowphase/bounds.py` assumes.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from collide.kernels import kernel, view_f64, view_i64
+from collide.numerics.vec3 import Vec3, column_at, divide, dot, max_abs
 from collide.support.block_scan import farthest
 from collide.support.coarse_points import COARSE
 from collide.support.extreme_vertex import settle_vertex
 from collide.support.shape_kinds import CYLINDER, ELLIPSOID, POINTS
-from collide.support.support_tree_query import extreme_vertex_listed
+from collide.support.support_tree_query import SupportPoint, extreme_vertex_listed
 
 
 @kernel(inline=True)
-def support_vertex(coordinates, n, m, gx, gy, gz):
+def support_vertex(coordinates, n, m, g):
     """Id of a vertex with the largest product with g, by a scan over contiguous blocks.
 
     coordinates : 3·m doubles: all x, all y, all z, filled up to a multiple of BLOCK.
     n, m : number of vertices, and of stored ones. The filling repeats vertex 0 and never wins.
     """
-    k, _ = farthest(coordinates, 0, m, m, gx, gy, gz)
+    k, _ = farthest(coordinates, 0, m, m, g.x, g.y, g.z)
     return k
 
 
 @kernel
-def coarse_vertex(coarse_at, gx, gy, gz):
-    """(id, x, y, z): of the COARSE points that stand for many, the one farthest in direction g.
+def coarse_vertex(coarse_at, g, list_id):
+    """Of the COARSE points that stand for all, the one farthest in direction g; list_id is handed through.
 
     Their hull lies in the whole one: what it overlaps is overlapped; what it misses may be hit.
     """
     coordinates = view_f64(coarse_at, 3 * COARSE)
-    k, _ = farthest(coordinates, 0, COARSE, COARSE, gx, gy, gz)
+    k, _ = farthest(coordinates, 0, COARSE, COARSE, g.x, g.y, g.z)
     ids = view_i64(coarse_at + 24 * COARSE, COARSE)
-    return ids[k], coordinates[k], coordinates[COARSE + k], coordinates[2 * COARSE + k]
+    return SupportPoint(ids[k], column_at(coordinates, COARSE, k), list_id)
 
 
 @kernel
-def settled_vertex(coordinates, n, m, tree, vertex, gx, gy, gz):
+def settled_vertex(coordinates, n, m, tree, vertex, g):
     """Id of a vertex that is farthest in direction g for certain, near one that is likely to be."""
-    proven = settle_vertex(tree, vertex, gx, gy, gz)
-    return proven if proven >= 0 else support_vertex(coordinates, n, m, gx, gy, gz)
+    proven = settle_vertex(tree, vertex, g)
+    return proven if proven >= 0 else support_vertex(coordinates, n, m, g)
 
 
 @kernel(inline=True)
-def support(kind, coordinates, n, m, params, at, tree, coarse, listed, gx, gy, gz):
-    """(id, x, y, z, list): a point of the core farthest in direction g; id is −1 on curved cores.
+def support(kind, coordinates, n, m, params, at, tree, coarse, list_id, g):
+    """The `SupportPoint` of a core farthest in direction g; its id is −1 on curved cores.
 
     tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
-    coarse : address of a few of the points, to be asked alone (`coarse_vertex`), or 0.
+    coarse : address of the coarse points, to be asked alone (`coarse_vertex`), or 0.
     params : a view whose entries from ``at`` on are the shape's numbers (`PackedConvex.params`).
+    list_id : see `extreme_vertex_listed`.
     """
     if coarse != 0:
-        k, x, y, z = coarse_vertex(coarse, gx, gy, gz)
-        return k, x, y, z, listed
+        return coarse_vertex(coarse, g, list_id)
     if tree != 0:
-        return extreme_vertex_listed(tree, listed, gx, gy, gz, view_i64(0, 0))
+        return extreme_vertex_listed(tree, list_id, g, view_i64(0, 0))
     if kind == POINTS:
-        k = support_vertex(coordinates, n, m, gx, gy, gz)
-        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k], listed
+        k = support_vertex(coordinates, n, m, g)
+        return SupportPoint(np.int64(k), column_at(coordinates, m, k), list_id)
+    return SupportPoint(np.int64(-1), curved_support(kind, params, at, g), list_id)
+
+
+@kernel(inline=True)
+def curved_support(kind, params, at, g):
+    """The point of an ellipsoid, cylinder or cone farthest in direction g."""
     p0 = params[at]
     p1 = params[at + 1]
     if kind == ELLIPSOID:
         # The gradient of |D g|, D the diagonal of the radii: D² g / |D g|.
         p2 = params[at + 2]
-        ax = p0 * gx
-        ay = p1 * gy
-        az = p2 * gz
-        largest = max(abs(ax), abs(ay), abs(az))
+        scaled = Vec3(p0 * g.x, p1 * g.y, p2 * g.z)
+        largest = max_abs(scaled)
         if largest == 0.0:
-            return -1, p0, 0.0, 0.0, listed
-        ax /= largest
-        ay /= largest
-        az /= largest
-        length = math.sqrt(ax * ax + ay * ay + az * az)
-        return -1, p0 * (ax / length), p1 * (ay / length), p2 * (az / length), listed
+            return Vec3(p0, 0.0, 0.0)
+        scaled = divide(scaled, largest)
+        unit = divide(scaled, math.sqrt(dot(scaled, scaled)))
+        return Vec3(p0 * unit.x, p1 * unit.y, p2 * unit.z)
     # Cylinder and cone: a disc of radius p0 across z, at ±p1.
-    largest = max(abs(gx), abs(gy))
+    largest = max(abs(g.x), abs(g.y))
     x = 0.0
     y = 0.0
     across = 0.0
     if largest > 0.0:
-        ux = gx / largest
-        uy = gy / largest
+        ux = g.x / largest
+        uy = g.y / largest
         length = math.sqrt(ux * ux + uy * uy)
         x = p0 * (ux / length)
         y = p0 * (uy / length)
         across = p0 * (length * largest)
     if kind == CYLINDER:
-        return -1, x, y, p1 if gz > 0.0 else -p1, listed
-    if p1 * gz >= across - p1 * gz:  # cone: the apex, or the rim of the base
-        return -1, 0.0, 0.0, p1, listed
-    return -1, x, y, -p1, listed
+        return Vec3(x, y, p1 if g.z > 0.0 else -p1)
+    if p1 * g.z >= across - p1 * g.z:  # cone: the apex, or the rim of the base
+        return Vec3(0.0, 0.0, p1)
+    return Vec3(x, y, -p1)

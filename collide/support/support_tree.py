@@ -88,12 +88,12 @@ class SupportTree:
         first, end = 0, 1
         for _ in range(self.depth - 1):
             _require(end < len(self.nodes), "fewer levels than the depth says")
-            own = self.entries[self.nodes[first] : self.nodes[end]]
-            _require(own.min() == end and own.max() < len(self.nodes) - 1, "levels do not lead to each other")
-            first, end = end, int(own.max()) + 1
+            links = self.entries[self.nodes[first] : self.nodes[end]]
+            _require(links.min() == end and links.max() < len(self.nodes) - 1, "levels do not lead to each other")
+            first, end = end, int(links.max()) + 1
         _require(end == len(self.nodes) - 1, "more nodes than the levels lead to")
-        own = self.entries[self.nodes[first] :]
-        _require(own.min() >= 0 and own.max() < len(self.points), "an entry outside the points")
+        ids = self.entries[self.nodes[first] :]
+        _require(ids.min() >= 0 and ids.max() < len(self.points), "an entry outside the points")
         rows = self.rows_of_entries()
         carried = list_coordinates_of(self.points, self.nodes, rows)
         _require(np.array_equal(self.list_coordinates, carried), "entries carry other coordinates than the points")
@@ -125,7 +125,7 @@ def coordinate_places(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def exact_range(points: np.ndarray) -> np.ndarray:
-    """(3,) [least, most, target]: a direction whose components lie between them (or are 0) is settled exactly.
+    """(3,) [least, largest, target]: a direction whose components lie between them (or are 0) is settled exactly.
 
     Products of a component with differences of coordinates, and the rounding errors of these products,
     are then doubles. Other directions are first scaled so that their largest component is near target.
@@ -133,8 +133,8 @@ def exact_range(points: np.ndarray) -> np.ndarray:
     lowest = int(lowest_exponents(points.ravel()))
     highest = int(np.frexp(np.abs(points).max())[1])
     least = max(-1020, -1020 - lowest)
-    most = min(900, 960 - highest)
-    return np.array([math.ldexp(1.0, min(least, 1020)), math.ldexp(1.0, most), float(most - 1)])
+    largest = min(900, 960 - highest)
+    return np.array([math.ldexp(1.0, min(least, 1020)), math.ldexp(1.0, largest), float(largest - 1)])
 
 
 def _checked_points(points) -> np.ndarray:

@@ -74,10 +74,10 @@ def _check_rings(tree: SupportTree) -> None:
 def _check_lists(tree: SupportTree) -> None:
     rows = tree.rows_of_entries()
     node = np.repeat(np.arange(len(tree.nodes) - 1), np.diff(tree.nodes))
-    own = np.zeros(len(tree.nodes) - 1, dtype=bool)
-    own[node[rows == tree.owners[node]]] = True
-    own[0] = True
-    assert own.all(), f"vertex {tree.owners[~own][0]} is not on its own list"
+    has_owner = np.zeros(len(tree.nodes) - 1, dtype=bool)
+    has_owner[node[rows == tree.owners[node]]] = True
+    has_owner[0] = True
+    assert has_owner.all(), f"vertex {tree.owners[~has_owner][0]} is not on its own list"
     first = tree.points[rows[tree.nodes[node]]]
     filling = (tree.points[rows] == first).all(axis=1)  # short lists are filled up with their first entry
     keys = (node.astype(np.int64) * len(tree.points) + rows)[~filling]
@@ -89,16 +89,16 @@ def _facet_directions(tree: SupportTree, samples: int, rng) -> tuple[np.ndarray,
     """Normals of facets, and sums of the unit normals of two that share an edge."""
     degree = np.diff(tree.ring_starts)
     vertices = rng.choice(np.flatnonzero(degree > 0), size=samples)
-    turn = rng.integers(0, 1 << 30, size=samples)
+    shift = rng.integers(0, 1 << 30, size=samples)
 
     def neighbour(i):
-        return tree.points[tree.ring[tree.ring_starts[vertices] + (turn + i) % degree[vertices]]] - tree.points[vertices]
+        return tree.points[tree.ring[tree.ring_starts[vertices] + (shift + i) % degree[vertices]]] - tree.points[vertices]
 
     scale = 1.0 / np.abs(tree.points).max()
     corners = [neighbour(i) * scale for i in range(3)]
     normals = np.cross(corners[0], corners[1])
-    others = np.cross(corners[1], corners[2])
-    units = [n / np.maximum(np.sqrt((n * n).sum(axis=1)), 1e-300)[:, None] for n in (normals, others)]
+    next_normals = np.cross(corners[1], corners[2])
+    units = [n / np.maximum(np.sqrt((n * n).sum(axis=1)), 1e-300)[:, None] for n in (normals, next_normals)]
     between = units[0] + units[1]
     flat = np.abs(between).max(axis=1) < 1e-9  # both sides of a flat hull
     between[flat] = corners[0][flat]

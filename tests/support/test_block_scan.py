@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from collide.kernels import address_of, entry, view_f64, view_i64
+from collide.numerics.vec3 import Vec3
 from collide.support.block_scan import farthest, farthest_listed, farthest_one_by_one
 from collide.support.support_mapping import support_vertex
 
@@ -39,7 +40,7 @@ scan_all = entry("void(int64,int64,int64,int64,int64,int64,int64,int64,int64,int
 
 
 def _support(at_coordinates, n, m, gx, gy, gz):
-    return support_vertex(view_f64(at_coordinates, 3 * m), n, m, gx, gy, gz)
+    return support_vertex(view_f64(at_coordinates, 3 * m), n, m, Vec3(gx, gy, gz))
 
 
 support = entry("int64(int64,int64,int64,float64,float64,float64)")(_support)

@@ -14,7 +14,7 @@ from collide.lowering.parts import convex_set_of
 from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
-from collide.support import lazy_support_tree as planted
+from collide.support import lazy_support_tree
 from collide.support.support_tree import SupportTree, list_coordinates_of
 
 EYE = np.eye(4)
@@ -29,10 +29,10 @@ def _ball(rng, n, axes=(1, 1, 1)):
 def trees_everywhere(monkeypatch):
     """Every hull gets a support tree, however small, so that the hard families meet them."""
     monkeypatch.setattr(prepared_structures, "MIN_FOR_TREE", 4)
-    monkeypatch.setattr(planted, "FEWEST_VERTICES", 4)
+    monkeypatch.setattr(lazy_support_tree, "MIN_VERTICES", 4)
 
 
-def _planted(shape) -> bool:
+def _is_built(shape) -> bool:
     packed = convex_set_of(shape)
     return may_have_tree(packed) and support_tree_of(packed).tree is not None
 
@@ -44,7 +44,7 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
     for case in generate(family, 12, 31):
         A, B, X_WA, X_WB = case.shapes()
         with_trees = collide.distance(A, B, X_WA, X_WB)
-        trees += _planted(A) + _planted(B)
+        trees += _is_built(A) + _is_built(B)
         plain = [
             collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)
         ]
@@ -73,7 +73,7 @@ def test_large_hulls_answer_as_scans_do(axes):
         [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
     )
     r, scanned = collide.distance(A, B, EYE, X_WB), collide.distance(*scans, EYE, X_WB)
-    assert _planted(A) and _planted(B)
+    assert _is_built(A) and _is_built(B)
     assert 20 < r.hit.sum() < 280 and np.array_equal(r.hit, scanned.hit)
     assert np.array_equal(collide.collide(A, B, EYE, X_WB), r.hit)
     np.testing.assert_allclose(r.distance, scanned.distance, rtol=0, atol=1e-12)
@@ -115,7 +115,7 @@ def test_prisms_on_their_caps_meet_exactly():
         r = collide.distance(prism, prism, EYE, collide.pose((shift, 0.1, 1)))
         assert r.hit and r.distance == 0.0 and r.how == EXACT
         collide.verify(prism, prism, EYE, collide.pose((shift, 0.1, 1)), r)
-    assert _planted(prism)
+    assert _is_built(prism)
 
 
 def test_interior_and_repeated_points_change_nothing():
@@ -183,12 +183,12 @@ def test_bad_proposals_cost_time_not_truth(axes):
     rng = np.random.default_rng(16)
     points = _ball(rng, 1200, axes)
     A, B = collide.ConvexHull(points), collide.ConvexHull(points)
-    tree = planted._grown(points)
+    tree = lazy_support_tree._built(points)
     entries, last = tree.entries.copy(), tree.nodes[1]  # what follows the first list are rows of points
     entries[last:] = rng.permutation(entries[last:])
     rows = np.concatenate([tree.owners[entries[:last]], entries[last:]])  # a tree of two levels
     coordinates = list_coordinates_of(points, tree.nodes, rows)
-    shuffled = planted.PlantedTree(B.points)
+    shuffled = lazy_support_tree.LazySupportTree(B.points)
     shuffled._tree = SupportTree(
         B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
     )

@@ -11,7 +11,7 @@ from hull_families import HULLS, directions_for, farthest_of, hull_of, integers,
 
 from collide.kernels import address_of, entry, view_f64
 from collide.numerics.exact_dot_sign import exact_sign
-from collide.numerics.vec3 import vec3_at
+from collide.numerics.vec3 import put_vec3, vec3_at
 from collide.support.build_support_tree import build_support_tree
 from collide.support.extreme_vertex import settle_vertex
 from collide.support.support_tree_query import extreme_vertex, extreme_vertices
@@ -47,13 +47,9 @@ def _settle_from(tree_at, points_at, n, starts_at, directions_at, m, out_at):
     out = view_f64(out_at, 4 * m)
     for i in range(m):
         if from_view[i] < 0:
-            _, out[4 * i + 1], out[4 * i + 2], out[4 * i + 3] = extreme_vertex(
-                tree_at, g[3 * i], g[3 * i + 1], g[3 * i + 2]
-            )
+            put_vec3(out, 4 * i + 1, extreme_vertex(tree_at, vec3_at(g, 3 * i)).point)
             continue
-        out[4 * i] = settle_vertex(
-            tree_at, int(from_view[i]), g[3 * i], g[3 * i + 1], g[3 * i + 2]
-        )
+        out[4 * i] = settle_vertex(tree_at, int(from_view[i]), vec3_at(g, 3 * i))
 
 
 settle_from = entry("void(int64, int64, int64, int64, int64, int64, int64)")(_settle_from)

@@ -31,7 +31,7 @@ from collide.narrowphase.rows import (
     UPPER,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, add, dot, neg, norm1, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import add, dot, neg, norm1, put_vec3, rotate_back, scale, sub, vec3_at
 from collide.support.support_mapping import support
 
 #: Normals of overlapping parts that are tried for a separating translation, deepest first.
@@ -249,11 +249,11 @@ def _extent(parts, first, n_parts, origin, n):
         if body.kind == HALFSPACE:
             return math.inf  # bounded in one direction only, which a rounded normal never is
         g = rotate_back(parts.poses, body.pose_at, n)
-        _, x, y, z, _ = support(
-            body.kind, body.coords, body.n, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g.x, g.y, g.z
-        )
+        farthest_point = support(
+            body.kind, body.coords, body.n, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g
+        ).point
         shift = dot(sub(vec3_at(parts.poses, body.pose_at + 9), origin), n)
-        farthest = max(farthest, dot(Vec3(x, y, z), g) + shift + radius_of(parts, body))
+        farthest = max(farthest, dot(farthest_point, g) + shift + radius_of(parts, body))
     return farthest
 
 

@@ -9,7 +9,7 @@ from collide.kernels import kernel
 from collide.narrowphase.exact.exact_directions import direction_double
 from collide.narrowphase.exact.exact_workspace import direction_at, scratch_at
 from collide.numerics.digits import add_double, add_product, carry, clear
-from collide.numerics.vec3 import Vec3, column_at, divide, dot, norm, rotate_back, scale, sub
+from collide.numerics.vec3 import Vec3, column_at, divide, dot, neg, norm, rotate_back, scale, sub
 from collide.support.support_tree_query import extreme_vertex, rings_of
 
 
@@ -72,7 +72,7 @@ def _climb(exact, body, posed, n, g, slack, sign):
     −1 where all neighbours are level: a vertex within a face, which may be a face on the far side.
     """
     coords, padded = posed.coords, posed.padded
-    best, _, _, _ = extreme_vertex(posed.tree, -g.x, -g.y, -g.z)
+    best = extreme_vertex(posed.tree, neg(g)).id
     starts, ring, _ = rings_of(posed.tree)
     while True:
         better = best

@@ -43,26 +43,24 @@ def inlined_difference_point(pair, points, ids, k, d, coarse, list_a, list_b):
     e = rotate_back(pair.poses, A.pose_at, d)
     f = rotate_back(pair.poses, B.pose_at, neg(d))
     if A.tree != 0 and B.tree != 0 and not coarse:
-        ia, ax, ay, az, list_a, ib, bx, by, bz, list_b = two_extreme_vertices(
-            A.tree, list_a, e.x, e.y, e.z, B.tree, list_b, f.x, f.y, f.z
-        )
+        a, b = two_extreme_vertices(A.tree, list_a, e, B.tree, list_b, f)
     else:
-        ia, ax, ay, az, list_a = _support(pair, A, coarse, list_a, e)
-        ib, bx, by, bz, list_b = _support(pair, B, coarse, list_b, f)
-    ids[2 * k] = ia
-    ids[2 * k + 1] = ib
-    _put_point_of(pair, A, points, POINT * k + POINT_OF_A, Vec3(ax, ay, az))
-    _put_point_of(pair, B, points, POINT * k + POINT_OF_B, Vec3(bx, by, bz))
+        a = _support(pair, A, coarse, list_a, e)
+        b = _support(pair, B, coarse, list_b, f)
+    ids[2 * k] = a.id
+    ids[2 * k + 1] = b.id
+    _put_point_of(pair, A, points, POINT * k + POINT_OF_A, a.point)
+    _put_point_of(pair, B, points, POINT * k + POINT_OF_B, b.point)
     _put_difference(pair, points, k)
-    return list_a, list_b
+    return a.list_id, b.list_id
 
 
 @kernel(inline=True)
-def _support(pair, body, coarse, listed, g):
+def _support(pair, body, coarse, list_id, g):
     """`support` of one body in a direction of its own frame."""
     coarse_at = body.coarse_at if coarse else 0
     return support(
-        body.kind, body.coords, body.n, body.padded, pair.numbers, body.params_at, body.tree, coarse_at, listed, g.x, g.y, g.z
+        body.kind, body.coords, body.n, body.padded, pair.numbers, body.params_at, body.tree, coarse_at, list_id, g
     )
 
 
@@ -117,7 +115,7 @@ def _settled(pair, body, vertex, d):
     if body.tree == 0:
         return vertex
     g = rotate_back(pair.poses, body.pose_at, d)
-    return settled_vertex(body.coords, body.n, body.padded, body.tree, vertex, g.x, g.y, g.z)
+    return settled_vertex(body.coords, body.n, body.padded, body.tree, vertex, g)
 
 
 @kernel(inline=True)

@@ -19,7 +19,7 @@ from collide.narrowphase.gap.hull_descent import MAX_NEIGHBOURS, descend, lowest
 from collide.numerics import double_double as dd
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS, exact_sign_of_dot
 from collide.support.build_support_tree import build_support_tree
-from collide.support.lazy_support_tree import PlantedTree
+from collide.support.lazy_support_tree import LazySupportTree
 
 EYE = np.eye(4)
 TILTS = (0.0, 1e-17, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9)
@@ -276,7 +276,7 @@ def test_the_lowest_of_level_vertices(turned):
     for n in (400, 2048, 8192, 32768):
         Q = rotation(rng) if turned else np.eye(3)
         points = np.ascontiguousarray(prism(n) @ Q.T)
-        tree = PlantedTree(points).tree
+        tree = LazySupportTree(points).tree
         looked = []
         for g in directions(Q, rng):
             for first in rng.integers(n // 2, size=8).tolist():
@@ -324,7 +324,7 @@ def test_a_vertex_in_the_middle_of_a_facet_is_left_open():
 def test_products_that_vanish_are_left_open():
     points = prism(400)
     points[200:, :2] *= 1.0 - 2.0**-30
-    tree, out, terms = PlantedTree(points).tree, np.zeros(2), np.zeros(PRODUCT_TERMS)
+    tree, out, terms = LazySupportTree(points).tree, np.zeros(2), np.zeros(PRODUCT_TERMS)
     for g in (
         [0.0, 0.0, 1e-290, 0.0, 1e-300, 0.0],
         [0.0, 0.0, 1e-310, 0.0, 0.0, 0.0],
