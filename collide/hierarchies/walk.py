@@ -43,7 +43,7 @@ from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import POINT
-from collide.narrowphase.posed_pair import coordinates_of, posed_pair, size_and_slop
+from collide.narrowphase.posed_pair import posed_pair, size_and_slop
 from collide.numerics.vec3 import cross, divide, dot, neg, put_vec3, rotate, rotate_back, sub, vec3_at
 
 #: Status of a row. LOST: an invariant was lost, or a star is too large. OPEN_…: the walk's answer is not proven in spite of
@@ -195,13 +195,11 @@ def walk_poses(
     ints = view_i64(ints_at, 2 * INTS)
     numbers = view_f64(numbers_at, 2 * NUMBERS)
     poses = view_f64(poses_at, 2 * n * POSE)
-    at_p, length_p = coordinates_of(ints, 0)
-    at_r, length_r = coordinates_of(ints, 1)
     trace = view_f64(trace_at, TRACE * TRACED_ROUNDS if trace_at != 0 else 0)
     points = view_f64(doubles_at + 8 * STEP_DOUBLES, POINT)
     ids = view_i64(integers_at + 8 * STEP_INTEGERS, 4)
     for k in range(n):
-        pair = posed_pair(ints, numbers, poses, view_f64(at_p, length_p), view_f64(at_r, length_r), 0, 2 * k, 1, 2 * k + 1)
+        pair = posed_pair(ints, numbers, poses, 0, 2 * k, 1, 2 * k + 1)
         proof = Proof(pair, ball, points, ids)
         size, slop, _ = size_and_slop(numbers, poses, 0, 2 * k, 1, 2 * k + 1)
         error = ERROR * size + slop

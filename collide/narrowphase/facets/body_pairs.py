@@ -1,9 +1,10 @@
 """Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
 
-Kernels answer whole batches (`surface_pairs.py`). Completed here, pose by pose, is what a row may still lack: depths,
-the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the surfaces' distance less
-the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation that is proven to part the
-bodies (`separating_translation.py`); how much shorter another may be is not known, so the bracket reaches up to 0.
+Kernels answer whole batches (`surface_pairs.py`, `surface_gaps.py`). Completed here, pose by pose, is what a row may
+still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
+surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
+that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so the
+bracket reaches up to 0.
 """
 
 from __future__ import annotations
@@ -31,21 +32,23 @@ from collide.narrowphase.facets.facet_queries import (
     workspace,
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.narrowphase.facets.surface_pairs import (
-    APART,
+from collide.narrowphase.facets.surface_gaps import (
     CORES_MEET,
     FARTHEST,
     NEARLY_TOUCH,
-    NO_POSE,
     PROMISE,
     RADII_MEET,
-    RADIUS_A,
-    RADIUS_B,
     ROW_NO_POSE,
     TOO_FAR,
-    cull_poses,
     gap_poses,
     gap_single,
+)
+from collide.narrowphase.facets.surface_pairs import (
+    APART,
+    NO_POSE,
+    RADIUS_A,
+    RADIUS_B,
+    cull_poses,
     meet_poses,
     meet_single,
 )
