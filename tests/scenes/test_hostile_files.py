@@ -42,26 +42,17 @@ def own_cache(tmp_path, monkeypatch):
 def doubling(levels: int, entry: str, first: str = "[x]") -> str:
     """Anchors a0, a1, ... of which each repeats the last ten times."""
     lines = [f"a0: &a0 {first}"]
-    return (
-        "\n".join(
-            lines + [f"a{k + 1}: &a{k + 1} {entry.format(', '.join([f'*a{k}'] * 10), k=k)}" for k in range(levels)]
-        )
-        + "\n"
-    )
+    return "\n".join(lines + [f"a{k + 1}: &a{k + 1} {entry.format(', '.join([f'*a{k}'] * 10), k=k)}" for k in range(levels)]) + "\n"
 
 
 # --- depth ------------------------------------------------------------------------------------------
 
 DEEP = {
-    "lists": "[" * 100_000,
-    "flow mappings": "{a: " * 50_000,
-    "json": '{"a": ' * 50_000,
-    "block lists": "- " * 50_000,
-    "compounds": "collide: 1\nbodies: [{name: a, shape: " + "{compound: [{shape: " * 20_000 + "{sphere: {radius: "
-    "1}}" + "}]}" * 20_000 + "}]",
+    "lists": "[" * 100_000, "flow mappings": "{a: " * 50_000, "json": '{"a": ' * 50_000, "block lists": "- " * 50_000,
+    "compounds": "collide: 1\nbodies: [{name: a, shape: " + "{compound: [{shape: " * 20_000 + "{sphere: {radius: 1}}" + "}]}" * 20_000 + "}]",
     "block mappings": "".join(" " * k + "a:\n" for k in range(300)),
     "a tag on each": "!!seq [" * 50_000,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", DEEP)
@@ -101,14 +92,11 @@ def test_the_deepest_compound_is_read_and_one_more_is_not(tmp_path, suffix):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (doubling(9, "[{}]") + "collide: 1\nname: [*a9]\n", "aliases repeat more than 1,000,000 nodes: write the file "
-                                                            "without them"),
-        (doubling(9, "[{}]") + "collide: 1\nbodies: [{name: b, shape: {hull: {points: *a9}}}]\n", "aliases repeat more "
-                                                                                                  "than 1,000,000"),
+        (doubling(9, "[{}]") + "collide: 1\nname: [*a9]\n", "aliases repeat more than 1,000,000 nodes: write the file without them"),
+        (doubling(9, "[{}]") + "collide: 1\nbodies: [{name: b, shape: {hull: {points: *a9}}}]\n", "aliases repeat more than 1,000,000"),
         (doubling(9, "{{<<: [{}], y{k}: 1}}", "{x: 1}"), "line 7.*aliases repeat more than 1,000,000"),
         ("a: &a [*a]", "line 1, column 8: the alias \\*a stands inside what it repeats"),
-        ("collide: 1\nbodies: [{name: a, shape: &s {compound: [{shape: *s}]}}]", "the alias \\*s stands inside what it "
-                                                                                 "repeats"),
+        ("collide: 1\nbodies: [{name: a, shape: &s {compound: [{shape: *s}]}}]", "the alias \\*s stands inside what it repeats"),
         ("&a [&b {c: *a}]", "the alias \\*a stands inside"),
     ],
 )
@@ -136,15 +124,8 @@ def test_what_is_counted_is_what_a_walk_meets(tmp_path):
     for _ in range(200):
         lines, names = [], []
         for k in range(rng.randrange(1, 8)):
-            entries = [
-                f"*{rng.choice(names)}" if names and rng.random() < 0.6 else str(rng.randrange(9))
-                for _ in range(rng.randrange(5))
-            ]
-            inner = (
-                f"[{', '.join(entries)}]"
-                if rng.random() < 0.5
-                else "{" + ", ".join(f"k{j}: {e}" for j, e in enumerate(entries)) + "}"
-            )
+            entries = [f"*{rng.choice(names)}" if names and rng.random() < 0.6 else str(rng.randrange(9)) for _ in range(rng.randrange(5))]
+            inner = f"[{', '.join(entries)}]" if rng.random() < 0.5 else "{" + ", ".join(f"k{j}: {e}" for j, e in enumerate(entries)) + "}"
             lines.append(f"n{k}: &n{k} {inner}")
             names.append(f"n{k}")
 
@@ -172,21 +153,17 @@ def test_what_is_counted_is_what_a_walk_meets(tmp_path):
 
 def test_includes_that_multiply_are_refused(tmp_path, monkeypatch):
     read = []
-    monkeypatch.setattr(
-        "collide.scenes.loaders.scene_yaml.read_text", lambda file: read.append(file) or file.read_text()
-    )
+    monkeypatch.setattr("collide.scenes.loaders.scene_yaml.read_text", lambda file: read.append(file) or file.read_text())
     for k in range(8):
         (tmp_path / f"s{k}.json").write_text(json.dumps({"collide": 1, "include": [f"s{k + 1}.json"] * 8}))
     (tmp_path / "s8.json").write_text(json.dumps({"collide": 1}))
-    with pytest.raises(SceneError, match=r"with this the scene includes more than 1,000 files, repeats counted: put "
-                                         r"their bodies in one file"):
+    with pytest.raises(SceneError, match=r"with this the scene includes more than 1,000 files, repeats counted: put their bodies in one file"):
         load(tmp_path / "s0.json")
     assert len(read) == 1001
     monkeypatch.setattr("collide.scenes.loaders.scene_yaml.LARGEST_TEXT", 100)
     (tmp_path / "s8.json").write_text(json.dumps({"collide": 1, "about": "x" * 50}))
     (tmp_path / "s7.json").write_text(json.dumps({"collide": 1, "include": ["s8.json"] * 2}))
-    with pytest.raises(SceneError, match=r"s7\.json: include\[1\]: with this the scene includes more than 100 "
-                                         r"characters"):
+    with pytest.raises(SceneError, match=r"s7\.json: include\[1\]: with this the scene includes more than 100 characters"):
         load(tmp_path / "s7.json")
 
 
@@ -212,24 +189,18 @@ def test_pipes_and_devices_are_no_files(tmp_path, name):
         asking = threading.Thread(target=ask, args=(place,), daemon=True)
         asking.start()
         asking.join(60)
-        expected = "unknown format" if name == "a" else (
-            f"{name}: is {kind}, not a file: write what it gives to a "
-            "file first"
-        )
+        expected = "unknown format" if name == "a" else f"{name}: is {kind}, not a file: write what it gives to a file first"
         assert not asking.is_alive() and expected in said[-1]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
 def test_pipes_in_every_place_where_a_file_is_named(tmp_path):
     os.mkfifo(tmp_path / "pipe.stl")
-    (tmp_path / "r.urdf").write_text('<robot name="r"><link name="a"><collision><geometry><mesh '
-    'filename="pipe.stl"/></geometry></collision></link></robot>')
+    (tmp_path / "r.urdf").write_text('<robot name="r"><link name="a"><collision><geometry><mesh filename="pipe.stl"/></geometry></collision></link></robot>')
     (tmp_path / "s.json").write_text(json.dumps({"collide": 1, "include": ["pipe.stl"]}))
     for ask in (
-        lambda: load(tmp_path / "r.urdf"), lambda: load(tmp_path / "s.json"),
-        lambda: load("workcell", state=tmp_path / "pipe.stl"),
-        lambda: Robot.load(tmp_path / "pipe.stl"), lambda: read_state(tmp_path / "pipe.stl"),
-        lambda: Robot.load(tmp_path / "r.urdf", srdf=tmp_path / "pipe.stl"),
+        lambda: load(tmp_path / "r.urdf"), lambda: load(tmp_path / "s.json"), lambda: load("workcell", state=tmp_path / "pipe.stl"),
+        lambda: Robot.load(tmp_path / "pipe.stl"), lambda: read_state(tmp_path / "pipe.stl"), lambda: Robot.load(tmp_path / "r.urdf", srdf=tmp_path / "pipe.stl"),
     ):  # fmt: skip
         with pytest.raises(CollideError, match="pipe"):
             ask()
@@ -241,14 +212,10 @@ def test_packed_files_stop_at_the_limit(tmp_path, monkeypatch):
     unpacked = []
     honest = gzip.GzipFile.read
     monkeypatch.setattr(gzip.GzipFile, "read", lambda self, size: unpacked.append(size) or honest(self, size))
-    with pytest.raises(SceneError, match=r"unpacks to more than 10 MiB, the most that is read of a mesh: make it "
-                                         r"coarser, or cut it into parts"):
+    with pytest.raises(SceneError, match=r"unpacks to more than 10 MiB, the most that is read of a mesh: make it coarser, or cut it into parts"):
         triangles.read_meshes(tmp_path / "bomb.stl.gz")
     assert len(unpacked) == 11 and set(unpacked) == {files._PIECE}
-    for damage, message in (
-        (slice(0, -9), "is not a gzip file that can be unpacked"),
-        (slice(3, None), "is not a gzip file that can be unpacked"),
-    ):
+    for damage, message in ((slice(0, -9), "is not a gzip file that can be unpacked"), (slice(3, None), "is not a gzip file that can be unpacked")):
         (tmp_path / "a.obj.gz").write_bytes(gzip.compress(b"v 0 0 0\n" * 1000)[damage])
         with pytest.raises(SceneError, match=message):
             triangles.read_meshes(tmp_path / "a.obj.gz")
@@ -261,8 +228,7 @@ def test_large_files_are_refused_unread(tmp_path):
         file.truncate(files.LARGEST_TEXT + 1)
     with pytest.raises(SceneError, match=r"large\.stl: is larger than 512 MiB, the most that is read of a mesh"):
         load(tmp_path / "large.stl")
-    with pytest.raises(SceneError, match=r"large\.yaml: is larger than 256 MiB, the most that is read of a "
-                                         r"description"):
+    with pytest.raises(SceneError, match=r"large\.yaml: is larger than 256 MiB, the most that is read of a description"):
         load(tmp_path / "large.yaml")
 
 
@@ -274,8 +240,7 @@ def test_large_files_are_refused_unread(tmp_path):
     [
         ("a: " + "9" * 5000, "line 1, column 4: '9999.*cannot be read as int"),
         ('{"a": ' + "9" * 5000 + "}", "the integer 9999.* has 5000 digits"),
-        # seconds to hours, if digits are tried in every way
-        ("a: " + "9" * 2**20, "line 1, column 4: '9999.*cannot be read as int"),
+        ("a: " + "9" * 2**20, "line 1, column 4: '9999.*cannot be read as int"),  # seconds to hours, if digits are tried in every way
         ("a: 2001-99-99", "line 1, column 4: '2001-99-99' cannot be read as timestamp"),
         ("a: !!int x", "line 1, column 4: 'x' cannot be read as int"),
         ("a: !!set [1]", "a tag does not fit what stands there"),
@@ -308,8 +273,7 @@ def test_numbers_and_names_that_are_none(tmp_path, shape, message):
 
 def test_addresses_that_are_none_in_includes_and_robots(tmp_path):
     (tmp_path / "s.json").write_text(json.dumps({"collide": 1, "include": ["file://[::1/x.json"]}))
-    (tmp_path / "r.urdf").write_text('<robot name="r"><link name="a"><collision><geometry><mesh '
-    'filename="file://[::1/x.stl"/></geometry></collision></link></robot>')
+    (tmp_path / "r.urdf").write_text('<robot name="r"><link name="a"><collision><geometry><mesh filename="file://[::1/x.stl"/></geometry></collision></link></robot>')
     for name, place in (("s.json", r"include\[0\]"), ("r.urdf", 'link "a"')):
         with pytest.raises(SceneError, match=rf"{name}: {place}: 'file://\[::1/x.* is no file:// name"):
             load(tmp_path / name)
@@ -334,15 +298,11 @@ MEGABYTE = "n" * 2**20
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("a.urdf", f'<robot name="r"><link name="{MEGABYTE}"><collision><geometry><box '
-                   f'size="{"1 " * 2**19}"/></geometry></collision></link></robot>'),
+        ("a.urdf", f'<robot name="r"><link name="{MEGABYTE}"><collision><geometry><box size="{"1 " * 2**19}"/></geometry></collision></link></robot>'),
         ("a.urdf", f'<robot name="r"><link name="{MEGABYTE}"/><link name="{MEGABYTE}"/></robot>'),
-        ("a.urdf", f'<robot name="r"><link name="a"/><joint name="{MEGABYTE}" type="{MEGABYTE}"><parent '
-                   f'link="a"/><child link="{MEGABYTE}"/></joint></robot>'),
-        ("a.urdf", '<robot name="r"><link name="a"><collision><geometry><mesh '
-                   f'filename="{MEGABYTE}"/></geometry></collision></link></robot>'),
-        ("a.urdf", '<robot name="r"><link '
-                   f'name="a"><collision><geometry><{MEGABYTE}/></geometry></collision></link></robot>'),
+        ("a.urdf", f'<robot name="r"><link name="a"/><joint name="{MEGABYTE}" type="{MEGABYTE}"><parent link="a"/><child link="{MEGABYTE}"/></joint></robot>'),
+        ("a.urdf", f'<robot name="r"><link name="a"><collision><geometry><mesh filename="{MEGABYTE}"/></geometry></collision></link></robot>'),
+        ("a.urdf", f'<robot name="r"><link name="a"><collision><geometry><{MEGABYTE}/></geometry></collision></link></robot>'),
         ("a.urdf", '<robot name="r">' + "".join(f'<link name="link_{k}"/>' for k in range(50_000)) + "</robot>"),
         ("a.xml", f"<{MEGABYTE}/>"),
         ("a.json", json.dumps({"collide": 1, MEGABYTE: 1})),
@@ -385,23 +345,16 @@ def test_values_are_cut_and_never_written_out_whole():
 def test_poses_that_leave_the_range_name_the_link_and_the_file(tmp_path):
     up = '<origin xyz="0 0 9e49"/>'
     (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"/><link name="b"/><link name="far"><collision><geometry><sphere '
-        'radius="1"/></geometry></collision></link>'
+        '<robot name="r"><link name="a"/><link name="b"/><link name="far"><collision><geometry><sphere radius="1"/></geometry></collision></link>'
         f'<joint name="j" type="fixed"><parent link="a"/><child link="b"/>{up}</joint>'
         f'<joint name="k" type="fixed"><parent link="b"/><child link="far"/>{up}</joint></robot>'
     )
-    with pytest.raises(InvalidPose, match=r'r\.urdf: robot r: link "far" stands at .* within 1e\+50; look at the '
-                                          r'origin of joint "k"'):
+    with pytest.raises(InvalidPose, match=r'r\.urdf: robot r: link "far" stands at .* within 1e\+50; look at the origin of joint "k"'):
         load(tmp_path / "r.urdf")
     off = [[1, 9e-5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     links = [{"name": "a"}, {"name": "b"}, {"name": "c", "collision": [{"shape": BALL}]}]
-    joints = [
-        {"name": n, "type": "fixed", "parent": p, "child": c, "origin": {"matrix": off}}
-        for n, p, c in (("j", "a", "b"), ("k", "b", "c"))
-    ]
-    (tmp_path / "s.json").write_text(
-        json.dumps({"collide": 1, "robots": [{"robot": {"name": "r", "links": links, "joints": joints}}]})
-    )
+    joints = [{"name": n, "type": "fixed", "parent": p, "child": c, "origin": {"matrix": off}} for n, p, c in (("j", "a", "b"), ("k", "b", "c"))]
+    (tmp_path / "s.json").write_text(json.dumps({"collide": 1, "robots": [{"robot": {"name": "r", "links": links, "joints": joints}}]}))
     with pytest.raises(InvalidPose, match=r's\.json: robot r: the pose of "c", on link "c", is not a rotation'):
         load(tmp_path / "s.json")
 
@@ -412,8 +365,7 @@ def test_a_mimic_of_huge_multiplier_is_told(tmp_path):
     (tmp_path / "r.urdf").write_text(
         f'<robot name="r"><link name="a"/><link name="b">{ball}</link><link name="c">{ball}</link>'
         f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{limits}</joint>'
-        f'<joint name="k" type="revolute"><parent link="b"/><child link="c"/>{limits}<mimic joint="j" '
-        'multiplier="1e308"/></joint></robot>'
+        f'<joint name="k" type="revolute"><parent link="b"/><child link="c"/>{limits}<mimic joint="j" multiplier="1e308"/></joint></robot>'
     )
     with pytest.raises(InvalidPose, match=r'r\.urdf: robot r: link "c" stands at .*joint "k", which follows j'):
         load(tmp_path / "r.urdf", state={"j": 5.0})
@@ -425,143 +377,54 @@ def test_a_mimic_of_huge_multiplier_is_told(tmp_path):
 
 URDF = (
     '<robot name="r"><link name="a"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
-    '<link name="b"><collision><origin xyz="0 0 1" rpy="0 0 1"/><geometry><mesh filename="t.obj" scale="1 1 '
-    '1"/></geometry></collision></link>'
-    '<link name="c"/><joint name="j" type="revolute"><origin xyz="0 0 1" rpy="0 0 1"/><axis xyz="0 0 1"/><parent '
-    'link="a"/><child link="b"/>'
-    '<limit lower="-1" upper="1"/></joint><joint name="k" type="revolute"><parent link="b"/><child link="c"/><limit '
-    'lower="-1" upper="1"/>'
+    '<link name="b"><collision><origin xyz="0 0 1" rpy="0 0 1"/><geometry><mesh filename="t.obj" scale="1 1 1"/></geometry></collision></link>'
+    '<link name="c"/><joint name="j" type="revolute"><origin xyz="0 0 1" rpy="0 0 1"/><axis xyz="0 0 1"/><parent link="a"/><child link="b"/>'
+    '<limit lower="-1" upper="1"/></joint><joint name="k" type="revolute"><parent link="b"/><child link="c"/><limit lower="-1" upper="1"/>'
     '<mimic joint="j" multiplier="2" offset="0.1"/></joint></robot>'
 )
 SCENE = {
-    "collide": 1,
-    "name": "n",
-    "about": "x",
-    "units": "m",
-    "include": ["i.json"],
+    "collide": 1, "name": "n", "about": "x", "units": "m", "include": ["i.json"],
     "robots": [
-        {
-            "urdf": "r.urdf",
-            "name": "left",
-            "prefix": "l_",
-            "pose": {"xyz": [0, 5, 0], "rpy": [0, 0, 1]},
-            "state": {"j": 0.5},
-            "base": "fixed",
-            "meshes": "hull",
-            "srdf": False,
-        },
-        {
-            "robot": {
-                "name": "arm",
-                "links": [
-                    {"name": "base", "collision": [{"shape": BALL, "pose": {"quat_wxyz": [1, 0, 0, 0]}}]},
-                    {"name": "hand"},
-                ],
-                "joints": [
-                    {
-                        "name": "s",
-                        "type": "prismatic",
-                        "parent": "base",
-                        "child": "hand",
-                        "origin": {"xyz": [0, 0, 1]},
-                        "axis": [1, 0, 0],
-                        "limits": [0, 2],
-                        "mimic": {"joint": "x", "multiplier": 1, "offset": 0},
-                    }
-                ],
-                "allow": [["base", "hand", "why"]],
-                "states": {"out": {"s": 1.0}},
-            },
-            "state": "out",
-        },
+        {"urdf": "r.urdf", "name": "left", "prefix": "l_", "pose": {"xyz": [0, 5, 0], "rpy": [0, 0, 1]}, "state": {"j": 0.5},
+         "base": "fixed", "meshes": "hull", "srdf": False},
+        {"robot": {
+            "name": "arm", "links": [{"name": "base", "collision": [{"shape": BALL, "pose": {"quat_wxyz": [1, 0, 0, 0]}}]}, {"name": "hand"}],
+            "joints": [{"name": "s", "type": "prismatic", "parent": "base", "child": "hand", "origin": {"xyz": [0, 0, 1]}, "axis": [1, 0, 0],
+                        "limits": [0, 2], "mimic": {"joint": "x", "multiplier": 1, "offset": 0}}],
+            "allow": [["base", "hand", "why"]], "states": {"out": {"s": 1.0}},
+        }, "state": "out"},
     ],
     "bodies": [
-        {
-            "name": "a",
-            "shape": {"box": {"size": [1, 1, 1]}},
-            "static": True,
-            "group": 1,
-            "mask": 3,
-            "pose": {"matrix": np.eye(4).tolist()},
-        },
+        {"name": "a", "shape": {"box": {"size": [1, 1, 1]}}, "static": True, "group": 1, "mask": 3, "pose": {"matrix": np.eye(4).tolist()}},
         {"name": "m", "shape": {"mesh": {"file": "t.obj", "scale": [1, 1, 2], "as": "hull"}}},
-        {
-            "name": "c",
-            "shape": {
-                "compound": [{"shape": {"capsule": {"radius": 1, "length": 1}}, "pose": {"rpy_deg": [0, 90, 0]}}]
-            },
-        },
+        {"name": "c", "shape": {"compound": [{"shape": {"capsule": {"radius": 1, "length": 1}}, "pose": {"rpy_deg": [0, 90, 0]}}]}},
         {"name": "h", "shape": {"hull": {"points": [[0, 0, 0], [1, 0, 0]], "radius": 1}}},
-        {
-            "name": "p",
-            "shape": {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}},
-        },
+        {"name": "p", "shape": {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}}},
     ],
-    "allow": [["a", "m", "r"]],
-    "states": {"st": {"l_j": 0.1}},
-}
+    "allow": [["a", "m", "r"]], "states": {"st": {"l_j": 0.1}},
+}  # fmt: skip
 PLANNING = {
-    "name": "x",
-    "robot_model_name": "r",
+    "name": "x", "robot_model_name": "r",
     "robot_state": {
         "joint_state": {"name": ["j"], "position": [0.1]},
-        "multi_dof_joint_state": {
-            "joint_names": ["v"],
-            "transforms": [{"translation": {"x": 0, "y": 0, "z": 0}, "rotation": {"w": 1}}],
-        },
-        "attached_collision_objects": [
-            {
-                "link_name": "b",
-                "touch_links": ["a"],
-                "object": {
-                    "id": "held",
-                    "pose": {"position": [0, 0, 1]},
-                    "primitives": [{"type": 1, "dimensions": [1, 1, 1]}],
-                    "primitive_poses": [{"position": [0, 0, 0]}],
-                },
-            }
-        ],
+        "multi_dof_joint_state": {"joint_names": ["v"], "transforms": [{"translation": {"x": 0, "y": 0, "z": 0}, "rotation": {"w": 1}}]},
+        "attached_collision_objects": [{"link_name": "b", "touch_links": ["a"], "object": {
+            "id": "held", "pose": {"position": [0, 0, 1]}, "primitives": [{"type": 1, "dimensions": [1, 1, 1]}], "primitive_poses": [{"position": [0, 0, 0]}],
+        }}],
     },
-    "fixed_frame_transforms": [
-        {
-            "header": {"frame_id": "world"},
-            "child_frame_id": "f",
-            "transform": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]},
-        }
-    ],
-    "allowed_collision_matrix": {
-        "entry_names": ["a", "b"],
-        "entry_values": [[True, False], {"enabled": [False, True]}],
-        "default_entry_names": ["a"],
-        "default_entry_values": [True],
-    },
+    "fixed_frame_transforms": [{"header": {"frame_id": "world"}, "child_frame_id": "f", "transform": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}],
+    "allowed_collision_matrix": {"entry_names": ["a", "b"], "entry_values": [[True, False], {"enabled": [False, True]}],
+                                 "default_entry_names": ["a"], "default_entry_values": [True]},
     "link_padding": [{"link_name": "a", "padding": 0.1}],
-    "world": {
-        "octomap": {"octomap": {"data": [1]}},
-        "collision_objects": [
-            {
-                "id": "o",
-                "header": {"frame_id": "f"},
-                "operation": 0,
-                "pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": [0, 0, 0, 1]},
-                "meshes": [
-                    {
-                        "vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1}, {"y": 1}],
-                        "triangles": [{"vertex_indices": [0, 1, 2]}],
-                    }
-                ],
-                "mesh_poses": [{}],
-                "planes": [{"coef": [0, 0, 1, 0]}],
-                "plane_poses": [{}],
-                "primitives": [{"type": "sphere", "dimensions": [1]}],
-            }
-        ],
-    },
-}
+    "world": {"octomap": {"octomap": {"data": [1]}}, "collision_objects": [{
+        "id": "o", "header": {"frame_id": "f"}, "operation": 0, "pose": {"position": {"x": 1, "y": 0, "z": 0}, "orientation": [0, 0, 0, 1]},
+        "meshes": [{"vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1}, {"y": 1}], "triangles": [{"vertex_indices": [0, 1, 2]}]}], "mesh_poses": [{}],
+        "planes": [{"coef": [0, 0, 1, 0]}], "plane_poses": [{}], "primitives": [{"type": "sphere", "dimensions": [1]}],
+    }]},
+}  # fmt: skip
 STATE = {"joint_state": {"name": ["j"], "position": [0.5]}}
 JUNK = [
-    None, True, 0, -1, 1.5, 1e60, float("nan"), 10**60, "", "x", "1", [], [1], [[]], ["x"], {}, {"x": 1}, [None], [{}],
-    {"a": {"b": [1]}},
+    None, True, 0, -1, 1.5, 1e60, float("nan"), 10**60, "", "x", "1", [], [1], [[]], ["x"], {}, {"x": 1}, [None], [{}], {"a": {"b": [1]}},
     [[1, 2, 3]], "\0", [True],
 ]  # fmt: skip
 
@@ -597,9 +460,7 @@ def test_junk_in_every_place_of_a_document(beside, kind):
     def ask(data) -> str:
         (beside / "s.json").write_text(json.dumps(data))
         try:
-            load(beside / "r.urdf", state=beside / "s.json") if kind == "state" else load(
-                beside / "s.json", robot=beside / "r.urdf"
-            ).world()
+            load(beside / "r.urdf", state=beside / "s.json") if kind == "state" else load(beside / "s.json", robot=beside / "r.urdf").world()
         except CollideError as error:
             assert len(str(error)) < 5000
             return "refused"
@@ -617,26 +478,7 @@ def test_junk_in_every_place_of_a_document(beside, kind):
 
 
 def test_junk_in_every_attribute_of_a_urdf(beside):
-    junk = (
-        "",
-        "x",
-        "nan",
-        "1e308",
-        "-1e308",
-        "1e400",
-        "0",
-        "-1",
-        "1 2",
-        "1 2 3",
-        "0 0 0",
-        "1e60 0 0",
-        "a",
-        "b",
-        "j",
-        "\u0661",
-        "9" * 5000,
-        "1_0",
-    )
+    junk = ("", "x", "nan", "1e308", "-1e308", "1e400", "0", "-1", "1 2", "1 2 3", "0 0 0", "1e60 0 0", "a", "b", "j", "\u0661", "9" * 5000, "1_0")
     outcomes = Counter()
     for found in re.finditer(r'="([^"]*)"', URDF):
         for value in junk:
@@ -714,8 +556,7 @@ def urdf_chain(n: int) -> str:
     ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
     links = "".join(f'<link name="l{k}">{ball}</link>' for k in range(n))
     limits = '<limit lower="-1" upper="1"/>'
-    joints = "".join(f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child '
-    f'link="l{k + 1}"/>{limits}</joint>' for k in range(n - 1))
+    joints = "".join(f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>{limits}</joint>' for k in range(n - 1))
     return f'<robot name="r">{links}{joints}</robot>'
 
 
@@ -727,8 +568,7 @@ def gltf_chain(n: int) -> str:
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes,
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "buffers": [{"byteLength": 36, "uri": f"data:;base64,{data}"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": f"data:;base64,{data}"}],
     })  # fmt: skip
 
 
@@ -739,8 +579,7 @@ LONG = {
     }),
     "equal objects.obj": lambda n: "".join(f"o part{k}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n" for k in range(n)),
     "chain.urdf": urdf_chain, "chain.gltf": gltf_chain,
-    "pieces.stl": lambda n: "".join(f"solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {k}\nvertex 1 0 0\nvertex 0 "
-    "1 0\nendloop\nendfacet\nendsolid\n" for k in range(n)),
+    "pieces.stl": lambda n: "".join(f"solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {k}\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n" for k in range(n)),
 }  # fmt: skip
 
 
@@ -790,9 +629,7 @@ def test_locality_reads_as_safely_as_scenes(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(files, "LARGEST_MESH", 2 * files._PIECE)
     (tmp_path / "bomb.stl.gz").write_bytes(gzip.compress(bytes(9 * files._PIECE)))
     (tmp_path / "cut.stl").write_bytes(bytes(80) + b"\5\0\0\0" + bytes(120))
-    for name, message in (("bomb.stl.gz", "unpacks to more than 2 MiB"), ("cut.stl", "says 5 facets, but the file "
-                                                                                     "holds 2.4"), ("gone.ply",
-                                                                                     "no such file")):
+    for name, message in (("bomb.stl.gz", "unpacks to more than 2 MiB"), ("cut.stl", "says 5 facets, but the file holds 2.4"), ("gone.ply", "no such file")):
         assert main(["locality", str(tmp_path / name)]) == 2 and message in capsys.readouterr().err
 
 

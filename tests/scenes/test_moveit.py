@@ -42,21 +42,14 @@ def test_motion_bench_maker(family):
         start, goal = scene.with_state("start"), scene.with_state("goal")
         (robot,) = scene.robots.values()
         assert scene.state == start.state != goal.state
-        assert all(
-            scene.states["goal"][joint] == pytest.approx(goal.state[joint])
-            for joint in robot.joint_names
-            if joint in scene.states["goal"]
-        )
+        assert all(scene.states["goal"][joint] == pytest.approx(goal.state[joint]) for joint in robot.joint_names if joint in scene.states["goal"])
         assert not any("no value given" in note for note in start.notes)
         obstacles = [body for body in scene.bodies if body.owner is None]
         assert len(obstacles) > 3 and all(body.static for body in obstacles)
         names = {body.name for body in scene.bodies}
         assert all(a in names and b in names for a, b, _ in scene.allowed)
         reasons = {reason for _, _, reason in scene.allowed}
-        assert {reason for reason in reasons if not reason.startswith("SRDF: ")} <= {
-            "allowed by the scene",
-            "rigidly joined",
-        }
+        assert {reason for reason in reasons if not reason.startswith("SRDF: ")} <= {"allowed by the scene", "rigidly joined"}
         for name, there in (("start", start), ("goal", goal)):
             hits = there.world().collisions().names
             assert set(hits) <= STAND_INS_MEET.get(f"{family.name}/{file.stem}/{name}", set())
@@ -75,9 +68,7 @@ def planning_scene(tmp_path):
     def make(objects=(), request=None, options=None, **keys):
         (tmp_path / "work").mkdir(exist_ok=True)
         file = tmp_path / "work" / "scene0001.yaml"
-        file.write_text(
-            json.dumps({"robot_model_name": "crane", "world": {"collision_objects": list(objects)}, **keys})
-        )
+        file.write_text(json.dumps({"robot_model_name": "crane", "world": {"collision_objects": list(objects)}, **keys}))
         if request is not None:
             (tmp_path / "work" / "request0001.yaml").write_text(json.dumps(request))
         return load(file, **(options or {}))
@@ -92,54 +83,28 @@ def thing(name="thing", **keys):
 def test_objects(planning_scene):
     scene = planning_scene(
         [
-            thing(
-                "box",
-                primitives=[{"type": "box", "dimensions": [1, 2, 3]}],
-                primitive_poses=[{"position": [1, 0, 0], "orientation": [0, 0, 0, 0]}],
-            ),
-            thing(
-                "can",
-                primitives=[{"type": 3, "dimensions": [0.4, 0.1]}],
-                primitive_poses=[
-                    {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 1, "w": 0}}
-                ],
-            ),
+            thing("box", primitives=[{"type": "box", "dimensions": [1, 2, 3]}], primitive_poses=[{"position": [1, 0, 0], "orientation": [0, 0, 0, 0]}]),
+            thing("can", primitives=[{"type": 3, "dimensions": [0.4, 0.1]}], primitive_poses=[{"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 1, "w": 0}}]),
             thing("cone", primitives=[{"type": "cone", "dimensions": [0.4, 0.1]}]),
-            thing(
-                "two",
-                primitives=[{"type": "sphere", "dimensions": [1]}] * 2,
-                primitive_poses=[{"position": [0, 0, 0]}, {"position": [1, 0, 0]}],
-            ),
-            thing(
-                "mesh", meshes=[{"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]], "triangles": [[0, 1, 2]]}]
-            ),
+            thing("two", primitives=[{"type": "sphere", "dimensions": [1]}] * 2, primitive_poses=[{"position": [0, 0, 0]}, {"position": [1, 0, 0]}]),
+            thing("mesh", meshes=[{"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]], "triangles": [[0, 1, 2]]}]),
             thing("floor", planes=[{"coef": [0, 0, 1, 0.5]}]),
             thing("gone", operation=1),
         ]
     )
     shapes = {body.name: body.shape for body in scene.bodies}
     assert shapes["box"] == Box((1, 2, 3)) and shapes["can"] == Cylinder(0.1, 0.4) and shapes["cone"] == Cone(0.1, 0.4)
-    assert (
-        isinstance(shapes["two"], Compound) and shapes["floor"] == Halfspace((0, 0, 1), -0.5) and "gone" not in shapes
-    )
+    assert isinstance(shapes["two"], Compound) and shapes["floor"] == Halfspace((0, 0, 1), -0.5) and "gone" not in shapes
     assert isinstance(shapes["mesh"], Mesh) and not shapes["mesh"].solid and scene.body("mesh").approximation is None
-    np.testing.assert_allclose(
-        scene.body("can").X_WB, [[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-15
-    )
+    np.testing.assert_allclose(scene.body("can").X_WB, [[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-15)
 
 
 def test_pose_of_the_object_comes_before_that_of_its_parts(planning_scene):
     quarter = [0, 0, np.sqrt(0.5), np.sqrt(0.5)]
-    scene = planning_scene(
-        [
-            thing(
-                "box",
-                pose={"position": [1, 0, 0], "orientation": quarter},
-                primitives=[{"type": "sphere", "dimensions": [1]}],
-                primitive_poses=[{"position": [2, 0, 0], "orientation": [0, 0, 0, 1]}],
-            )
-        ]
-    )
+    scene = planning_scene([
+        thing("box", pose={"position": [1, 0, 0], "orientation": quarter}, primitives=[{"type": "sphere", "dimensions": [1]}],
+              primitive_poses=[{"position": [2, 0, 0], "orientation": [0, 0, 0, 1]}])
+    ])
     np.testing.assert_allclose(scene.body("box").X_WB[:3, 3], (1, 2, 0), atol=1e-15)
 
 
@@ -152,8 +117,7 @@ def test_frames(planning_scene):
         fixed_frame_transforms=fixed, robot_state=state,
     )
     assert scene.body("a").X_WB[:3, 3].tolist() == [5, 0, 1] and scene.body("b").X_WB[:3, 3].tolist() == [0, 0, 1.5]
-    with pytest.raises(SceneError, match=r"collision_objects\[0\] \"a\".header.frame_id: unknown frame 'attic'; known "
-                                         r"are world, base"):
+    with pytest.raises(SceneError, match=r"collision_objects\[0\] \"a\".header.frame_id: unknown frame 'attic'; known are world, base"):
         planning_scene([thing("a", header={"frame_id": "attic"}, **ball)])
 
 
@@ -161,17 +125,11 @@ def test_states(planning_scene):
     scene = planning_scene(
         robot_state={
             "joint_state": {"name": ["lift", "swing"], "position": [0.25, 1.0]},
-            "multi_dof_joint_state": {
-                "joint_names": ["world"],
-                "transforms": [{"translation": [0, 0, 7], "rotation": [0, 0, 0, 1]}],
-            },
+            "multi_dof_joint_state": {"joint_names": ["world"], "transforms": [{"translation": [0, 0, 7], "rotation": [0, 0, 0, 1]}]},
         },
         request={
             "start_state": {"joint_state": {"name": ["lift"], "position": [0.5]}},
-            "goal_constraints": [
-                {"joint_constraints": [{"joint_name": "lift", "position": 3}]},
-                {"joint_constraints": [{"joint_name": "swing", "position": 2}]},
-            ],
+            "goal_constraints": [{"joint_constraints": [{"joint_name": "lift", "position": 3}]}, {"joint_constraints": [{"joint_name": "swing", "position": 2}]}],
         },
     )
     assert scene.states["start"] == {"lift": 0.5, "swing": 1.0}
@@ -186,25 +144,19 @@ def test_states(planning_scene):
 def test_matrix(planning_scene):
     ball = {"primitives": [{"type": "sphere", "dimensions": [1]}]}
     matrix = {
-        "entry_names": ["base", "boom", "a"],
-        "entry_values": [[False, False, True], [False, False, False], [True, False, False]],
+        "entry_names": ["base", "boom", "a"], "entry_values": [[False, False, True], [False, False, False], [True, False, False]],
         "default_entry_names": ["b", "hook"], "default_entry_values": [True, False],
     }
     scene = planning_scene([thing("a", **ball), thing("b", **ball)], allowed_collision_matrix=matrix)
     assert set(scene.allowed) == {
-        ("base", "a", "allowed by the scene"), ("base", "b", "allowed by the scene"),
-        ("boom", "b", "allowed by the scene"),
+        ("base", "a", "allowed by the scene"), ("base", "b", "allowed by the scene"), ("boom", "b", "allowed by the scene"),
         ("tip", "b", "allowed by the scene"), ("a", "b", "allowed by the scene"), ("hook", "tip", "rigidly joined"),
         ("boom", "tip", "adjacent links"),  # the matrix does not name tip
     }
     # of links that the matrix does not name, the robot's own pairs hold
     del matrix["default_entry_names"], matrix["default_entry_values"]
     scene = planning_scene(allowed_collision_matrix=matrix)
-    assert ("boom", "hook", "adjacent links") in scene.allowed and (
-        "base",
-        "boom",
-        "adjacent links",
-    ) not in scene.allowed
+    assert ("boom", "hook", "adjacent links") in scene.allowed and ("base", "boom", "adjacent links") not in scene.allowed
     assert "does not name hook, tip" in scene.notes[-1]
     # without a matrix they all do
     assert ("base", "boom", "adjacent links") in planning_scene().allowed
@@ -212,18 +164,10 @@ def test_matrix(planning_scene):
 
 def test_attached_objects_move_with_their_link(planning_scene):
     grasped = {
-        "link_name": "hook",
-        "touch_links": ["tip"],
-        "object": thing(
-            "load", primitives=[{"type": "box", "dimensions": [1, 1, 1]}], primitive_poses=[{"position": [0, 0, -1]}]
-        ),
+        "link_name": "hook", "touch_links": ["tip"],
+        "object": thing("load", primitives=[{"type": "box", "dimensions": [1, 1, 1]}], primitive_poses=[{"position": [0, 0, -1]}]),
     }
-    scene = planning_scene(
-        robot_state={
-            "joint_state": {"name": ["lift", "swing"], "position": [0.5, 0]},
-            "attached_collision_objects": [grasped],
-        }
-    )
+    scene = planning_scene(robot_state={"joint_state": {"name": ["lift", "swing"], "position": [0.5, 0]}, "attached_collision_objects": [grasped]})
     load_body = scene.body("load")
     assert load_body.owner == "crane" and not load_body.static and load_body.X_WB[2, 3] == -0.5
     assert ("load", "hook", "attached to the link") in scene.allowed
@@ -244,22 +188,16 @@ def test_robot_not_found_names_the_option(planning_scene, tmp_path):
 @pytest.mark.parametrize(
     ("objects", "keys", "message"),
     [
-        ([thing(primitives=[{"type": "torus", "dimensions": [1]}])], {}, r'"thing".primitives\[0\].type: unknown '
-                                                                         r'primitive \'torus\''),
-        ([thing(primitives=[{"type": "box", "dimensions": [1, 1]}])], {}, r"dimensions: must be 3 numbers, got \[1, "
-                                                                          r"1\]"),
-        ([thing(primitives=[{"type": "box", "dimensions": [1, 1, -1]}])], {}, r'primitives\[0\]: Box: size.z must be > '
-                                                                              r'0'),
+        ([thing(primitives=[{"type": "torus", "dimensions": [1]}])], {}, r'"thing".primitives\[0\].type: unknown primitive \'torus\''),
+        ([thing(primitives=[{"type": "box", "dimensions": [1, 1]}])], {}, r"dimensions: must be 3 numbers, got \[1, 1\]"),
+        ([thing(primitives=[{"type": "box", "dimensions": [1, 1, -1]}])], {}, r'primitives\[0\]: Box: size.z must be > 0'),
         ([thing(primitives=[{"type": "sphere", "dimensions": [float("nan")]}])], {}, "must be finite"),
         ([thing()], {}, '"thing": has no primitives, meshes or planes'),
         ([{}], {}, r"collision_objects\[0\]: 'id' is missing"),
         ([thing(primitives=[{"type": "sphere", "dimensions": [1]}])] * 2, {}, 'a body named "thing" exists already'),
-        ([], {"robot_state": {"joint_state": {"name": ["a"], "position": [1]}}}, "none of the joints a is known; robot "
-                                                                                 "crane has lift, swing"),
-        ([], {"robot_state": {"joint_state": {"name": ["lift"], "position": []}}}, "one value for each of the 1 "
-                                                                                   "joints"),
-        ([], {"robot_state": {"joint_state": {"name": ["lift"], "position": [float("nan")]}}}, "finite number, got "
-                                                                                               "nan"),
+        ([], {"robot_state": {"joint_state": {"name": ["a"], "position": [1]}}}, "none of the joints a is known; robot crane has lift, swing"),
+        ([], {"robot_state": {"joint_state": {"name": ["lift"], "position": []}}}, "one value for each of the 1 joints"),
+        ([], {"robot_state": {"joint_state": {"name": ["lift"], "position": [float("nan")]}}}, "finite number, got nan"),
         ([], {"allowed_collision_matrix": {"entry_names": ["a", "b"], "entry_values": [[True]]}}, "2 rows of 2 values"),
         ([], {"robot_state": {"attached_collision_objects": [{"link_name": "nose", "object": thing()}]}}, "unknown link 'nose'"),
     ],
