@@ -33,7 +33,8 @@ def poses_of(seed: object, n: int) -> np.ndarray:
 def test_every_way_of_naming_bodies_moves_the_same_ones(removed):
     X = poses_of("naming", 5)
     ids = [1, 18, 7, 2, 5]
-    named = [[1, 18, 7, 2, 5], np.array(ids), np.array(ids, dtype=np.uint16), tuple(ids), [1, "ball 18", 7, "ball 2", np.int8(5)]]
+    mixed = [1, "ball 18", 7, "ball 2", np.int8(5)]
+    named = [[1, 18, 7, 2, 5], np.array(ids), np.array(ids, dtype=np.uint16), tuple(ids), mixed]
     for names in named:
         bodies = bodies_of(20)
         for identity in removed:
@@ -53,7 +54,8 @@ def test_every_way_of_naming_bodies_moves_the_same_ones(removed):
     ("names", "error"),
     [
         ([1, 20], UnknownBody), ([1, -1], UnknownBody), ([1, True], UnknownBody), ([1, 1.0], UnknownBody),
-        (np.array([1, 2**40]), UnknownBody), ([1, 10**30], UnknownBody), (np.array([1, 2**64 - 1], dtype=np.uint64), UnknownBody),
+        (np.array([1, 2**40]), UnknownBody), ([1, 10**30], UnknownBody),
+        (np.array([1, 2**64 - 1], dtype=np.uint64), UnknownBody),
         ([1, "nobody"], UnknownBody), ([1], InvalidPose), ([], InvalidPose), ([1, 2, 3], InvalidPose),
     ],
 )  # fmt: skip
