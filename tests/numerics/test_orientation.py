@@ -113,9 +113,8 @@ def test_sides_are_exact(kind):
             if axis < 0:
                 assert cloud.side(1, 2, 0, 3) == true and cloud.side(1, 0, 3, 2) == true
         seen[true] += 1
-    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= (20 if kind in ("lattice", "of all sizes", "denormal", "coplanar") else 0), (
-        seen
-    )
+    flat = 20 if kind in ("lattice", "of all sizes", "denormal", "coplanar") else 0
+    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= flat, seen
 
 
 def test_stages_agree_and_are_needed():
