@@ -51,7 +51,7 @@ ROOMS = {
         "mesh",
         "shapes",
     },
-    "broadphase": {"errors", "kernels", "lowering", "support"},
+    "broadphase": {"errors", "kernels", "numerics", "lowering", "support"},
     "narrowphase": {
         "errors",
         "kernels",
