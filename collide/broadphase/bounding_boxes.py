@@ -17,6 +17,7 @@ from collide.lowering.shape_table import (
     PADDED,
     PARAMS,
     POSE,
+    POSE_SLOP,
     RADIUS,
     REACH,
     SLOP,
@@ -32,28 +33,27 @@ _OUTWARD = 32 * 2.0**-53
 
 
 @kernel
-def _proven(kind, coordinates, n, m, params, at, tree, g):
-    """The point of `support`, of a support tree the vertex that is farthest for certain."""
-    k, point, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, g)
-    return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, n, m, tree, k, g))
+def _farthest_point(kind, coordinates, n, m, params, at, tree, g):
+    """The core point farthest in direction g (`support`); with a support tree, that of the proven vertex."""
+    vertex, point, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, g)
+    return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, n, m, tree, vertex, g))
 
 
 @kernel
 def _bound(ints, numbers, poses, coordinates, s, p, axis):
-    """(low, high) of one posed convex set along a world axis."""
+    """(low, high) of shape s at pose row p along a world axis [m], rounded outwards."""
     at = NUMBERS * s
+    row = vec3_at(poses, POSE * p + 3 * axis)  # of the rotation: the axis in the shape's frame
+    t = poses[POSE * p + 9 + axis]
     kind = ints[INTS * s + KIND]
-    r = vec3_at(poses, POSE * p + 3 * axis)
     n = ints[INTS * s + COUNT]
     m = ints[INTS * s + PADDED]
-    t = poses[POSE * p + 9 + axis]
     tree = ints[INTS * s + TREE]
-    high = dot(_proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, r), r) + t
-    low = dot(_proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, neg(r)), r) + t
-    row = math.sqrt(dot(r, r))
+    high = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, row), row) + t
+    low = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, neg(row)), row) + t
     radius = numbers[at + RADIUS]
-    out = radius + numbers[at + SLOP] + poses[POSE * p + 12]
-    out += _OUTWARD * (row * numbers[at + REACH] + abs(t) + radius)
+    out = radius + numbers[at + SLOP] + poses[POSE * p + POSE_SLOP]
+    out += _OUTWARD * (math.sqrt(dot(row, row)) * numbers[at + REACH] + abs(t) + radius)
     return low - out, high + out
 
 
