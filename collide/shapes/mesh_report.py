@@ -11,8 +11,8 @@ from collide.lazy_modules import lazy_module
 if TYPE_CHECKING:
     from collide.mesh.mesh_survey import Survey
 
-topology_flags = lazy_module("collide.mesh.mesh_topology")
-survey_flags = lazy_module("collide.mesh.mesh_survey")
+topology = lazy_module("collide.mesh.mesh_topology")
+flags = lazy_module("collide.mesh.mesh_survey")
 
 #: Facet numbers shown of each defect; `Defect.facets` has them all.
 _MAX_LISTED = 6
@@ -80,21 +80,21 @@ def find_defects(survey: Survey) -> tuple[Defect, ...]:
     nothing = bool(len(survey.signs)) and not (survey.signs > 0).any()
     kinds = [
         (
-            topology_flags.DOUBLED,
+            topology.DOUBLED,
             not survey.closed,
             "duplicate facets",
             "the same corners as an earlier facet, the same way round",
         ),
-        (topology_flags.OPEN, True, "open edges", "an edge has no other facet"),
-        (topology_flags.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
-        (topology_flags.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),
-        (topology_flags.ONE_SIDED, True, "one-sided", "where the surface closes to a band with one side"),
-        (survey_flags.INSIDE_OUT, True, "inside out", "parts that run clockwise seen from outside, and are no cavities"),
-        (survey_flags.EMPTY, nothing, "encloses nothing", "parts without volume"),
-        (topology_flags.BACK_TO_BACK, False, "back-to-back facets", "the same corners as another facet, the other way round"),
-        (topology_flags.SEVERAL, False, "non-manifold edges", "four or more meet at an edge"),
-        (topology_flags.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
-        (survey_flags.NO_AREA, False, "no area", "corners on one line"),
+        (topology.OPEN, True, "open edges", "an edge has no other facet"),
+        (topology.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
+        (topology.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),
+        (topology.ONE_SIDED, True, "one-sided", "where the surface closes to a band with one side"),
+        (flags.INSIDE_OUT, True, "inside out", "parts that run clockwise seen from outside, and are no cavities"),
+        (flags.EMPTY, nothing, "encloses nothing", "parts without volume"),
+        (topology.BACK_TO_BACK, False, "back-to-back facets", "the same corners as another facet, the other way round"),
+        (topology.SEVERAL, False, "non-manifold edges", "four or more meet at an edge"),
+        (topology.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
+        (flags.NO_AREA, False, "no area", "corners on one line"),
     ]
     defects = [
         Defect(name, np.flatnonzero(survey.flags & bit), spoils, meaning)
