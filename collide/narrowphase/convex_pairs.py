@@ -63,17 +63,17 @@ def answer_pairs(
         )  # fmt: skip
         has_portals = n_small > 0
     clear_queue(work.queue_integers_at)
-    for turn in range(n_pairs if boolean else n_pairs + KINDS):
-        kind = turn - n_pairs
-        if has_portals and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
+    for step in range(n_pairs if boolean else n_pairs + KINDS):
+        kind = step - n_pairs
+        if has_portals and step < n_pairs and view_u8(rows_at + ROW * step, ROW)[HOW] != UNDECIDED:
             continue
-        if turn < n_pairs:
-            ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1])
-            kind = _answer(ordered, query, view_row(rows_at + ROW * turn), turn, has_portals, work)
-        if kind >= 0 and n_queued[kind] >= (n_together if turn < n_pairs else 1):
+        if step < n_pairs:
+            ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * step], pairs[2 * step + 1])
+            kind = _answer(ordered, query, view_row(rows_at + ROW * step), step, has_portals, work)
+        if kind >= 0 and n_queued[kind] >= (n_together if step < n_pairs else 1):
             refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, work.queue_at, work.queue_integers_at)
-        if stop_at_hit and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HIT] == 1:
-            return turn + 1
+        if stop_at_hit and step < n_pairs and view_u8(rows_at + ROW * step, ROW)[HIT] == 1:
+            return step + 1
     return n_pairs
 
 

@@ -160,3 +160,60 @@ def weighted_sum(points, weights, n, first):
     for k in range(n):
         total = add(total, scale(weights[k], vec3_at(points, POINT * k + first)))
     return total
+
+
+@kernel(inline=True)
+def repeated(ids, n, at_a, at_b, at_c, at_d):
+    """Whether point D is one of the n others (curved cores have no ids and never repeat)."""
+    i = ids[2 * at_d]
+    j = ids[2 * at_d + 1]
+    if i < 0 or j < 0:
+        return False
+    if ids[2 * at_a] == i and ids[2 * at_a + 1] == j:
+        return True
+    if n > 1 and ids[2 * at_b] == i and ids[2 * at_b + 1] == j:
+        return True
+    return n > 2 and ids[2 * at_c] == i and ids[2 * at_c + 1] == j
+
+
+@kernel(cold=True)
+def bring_to_front(points, ids, n, at_a, at_b, at_c, at_d):
+    """Bring the n points A, B, C to the front, and D behind them; returns where all of them stand then."""
+    if at_a != 0:
+        _exchange_points(points, ids, 0, at_a)
+        at_b = at_a if at_b == 0 else at_b
+        at_c = at_a if at_c == 0 else at_c
+        at_d = at_a if at_d == 0 else at_d
+    if n > 1 and at_b != 1:
+        _exchange_points(points, ids, 1, at_b)
+        at_c = at_b if at_c == 1 else at_c
+        at_d = at_b if at_d == 1 else at_d
+    if n > 2 and at_c != 2:
+        _exchange_points(points, ids, 2, at_c)
+        at_d = at_c if at_d == 2 else at_d
+    if at_d != n:
+        _exchange_points(points, ids, n, at_d)
+    return 0, 1 if n > 1 else 2, 2 if n > 2 else 3, n
+
+
+@kernel(inline=True)
+def _exchange_points(points, ids, k, j):
+    for i in range(POINT):
+        points[POINT * k + i], points[POINT * j + i] = points[POINT * j + i], points[POINT * k + i]
+    for i in range(2):
+        ids[2 * k + i], ids[2 * j + i] = ids[2 * j + i], ids[2 * k + i]
+
+
+@kernel(inline=True)
+def drop_unused(points, ids, weights, n):
+    """Keep the points with a positive weight; returns their number."""
+    n_kept = 0
+    for k in range(n):
+        if weights[k] > 0.0:
+            if n_kept != k:
+                copy_point(points, ids, k, n_kept)
+                weights[n_kept] = weights[k]
+            n_kept += 1
+    for k in range(n_kept, 4):
+        weights[k] = 0.0
+    return n_kept

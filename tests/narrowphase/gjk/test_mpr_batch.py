@@ -16,7 +16,7 @@ import collide
 from collide.kernels import address_of, entry
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.gjk import mpr_batch as small_hulls
-from collide.narrowphase.gjk.mpr import ROUNDS
+from collide.narrowphase.gjk.mpr import MAX_ITERATIONS
 from collide.results import HOW, PAIR_DTYPE, flipped
 
 #: Gaps and depths to ask about, in metres, of bodies about one metre long.
@@ -69,7 +69,7 @@ def rows_of(cases: list[Case], limit: float = 0.0, boolean: bool = True) -> np.n
     poses = pose_table(X, np.tile(np.eye(4), (len(X), 1, 1)), np.array([p.reach for p in packed]))
     shape_of, pairs = np.arange(len(packed)), np.arange(len(packed)).reshape(-1, 2)
     rows = np.zeros(len(cases), dtype=PAIR_DTYPE)
-    doubles, integers = np.zeros(small_hulls.DOUBLES), np.zeros(small_hulls.NOTES, dtype=np.int64)
+    doubles, integers = np.zeros(small_hulls.DOUBLES), np.zeros(small_hulls.TICKETS, dtype=np.int64)
     buffers = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
     _answer(*buffers, len(pairs), boolean, limit, address_of(rows), address_of(doubles), address_of(integers))
     return rows
@@ -98,7 +98,7 @@ def test_what_portals_decide_is_right_and_proven():
     assert not decided(rows[gaps == 0.0]).any()
     assert naive.share(decided(rows[gaps > 1e-9])) > 0.95
     assert 0.3 < naive.share(rows["hit"][decided(rows)]) < 0.7
-    assert (rows["iterations"][decided(rows)] <= ROUNDS).all()
+    assert (rows["iterations"][decided(rows)] <= MAX_ITERATIONS).all()
 
 
 def test_batches_answer_as_single_calls_and_exact_arithmetic_do():
