@@ -2,48 +2,75 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.shape_table import POSE_TERMS, ShapeTable, pose_table
+from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
+from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
+from collide.narrowphase.facets.surface_pairs import APART, OPEN
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
+from collide.shapes.shape import Shape
+from collide.world_bodies import Roster
+
+#: Booleans about meshes that stop at the first hit ask so many pairs of the same two shapes at first, then twice as
+#: many.
+_FIRST_CHUNK = 8
+
+
+class Answer(NamedTuple):
+    """Rows of a query, a and b positions of bodies.
+
+    convex_pairs : pairs of convex parts answered.   body_pairs : of bodies.   mesh_pairs : of these, those with a mesh.
+    """
+
+    rows: np.ndarray
+    convex_pairs: int
+    body_pairs: int
+    mesh_pairs: int
 
 
 class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
-    ids : (n,) int32 of the bodies.   static, group, mask : (n,) int64.   allowed : {(i, j): reason}, i < j.
+    roster : the bodies.   X_WBs : (n, 4, 4) their poses, copied.   allowed : {(i, j): reason}, i < j, positions.
     """
 
-    def __init__(self, bodies, allowed: dict):
-        self.allowed = allowed
-        self.ids = np.array([body.id for body in bodies], dtype=np.int32)
-        self.static = np.array([body.static for body in bodies], dtype=np.int64)
-        self.group = np.array([body.group for body in bodies], dtype=np.int64)
-        self.mask = np.array([body.mask for body in bodies], dtype=np.int64)
-        self._keys = np.sort(np.array([i * len(bodies) + j for i, j in allowed], dtype=np.int64))
-        self._shapes = [body.shape for body in bodies]
-        self._meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
-        self._any_meshed = bool(self._meshed.any())
+    def __init__(self, roster: Roster, X_WBs: np.ndarray, allowed: dict[tuple[int, int], str]):
+        self.roster, self.X_WBs, self.allowed = roster, X_WBs.copy(), allowed
+        n = len(roster.ids)
+        self._allowed_keys = np.sort(np.array([i * n + j for i, j in allowed], dtype=np.int64))
+        self._shape_of, self._shapes = _distinct_shapes(roster.shapes)
+        is_meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
+        self._meshed = is_meshed[self._shape_of]
+        self._any_meshed = bool(is_meshed.any())
+        self._lay_out_parts()
+        self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
+        self._part_boxes = boxes_of(self._table, self._poses.rows, self._row_of)
+        self._tree = BoxTree(self._body_boxes()) if n else None
+
+    def _lay_out_parts(self) -> None:
+        """Parts of all bodies, one body after another: those of its shape."""
         parts = [shape.bounding_parts() for shape in self._shapes]
-        self._parts = [[packed for packed, _ in own] for own in parts]
-        self._counts = counts = np.array([len(own) for own in parts], dtype=np.int64)
+        row_of, self._table = _table_of([packed for of_shape in parts for packed, _ in of_shape])
+        X_SP = np.array([X for of_shape in parts for _, X in of_shape]).reshape(-1, 4, 4)
+        reach = np.array([packed.reach for of_shape in parts for packed, _ in of_shape])
+        n_parts = np.array([len(of_shape) for of_shape in parts], dtype=np.int64)
+        first = np.cumsum(n_parts) - n_parts
+        self._counts = counts = n_parts[self._shape_of]
         self._all_of_one_part = bool((counts == 1).all())
         self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        self._body_of = np.repeat(np.arange(len(bodies)), counts)
-        self._X_BP = np.array([X for own in parts for _, X in own]).reshape(-1, 4, 4)
-        flat = [packed for own in self._parts for packed in own]
-        self._reach = np.array([packed.reach for packed in flat])
-        self._shape_of, self._table = _distinct(flat)
-        self._X_WBs = np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4)
-        self._poses = pose_table(self._X_WBs[self._body_of], self._X_BP, self._reach)
-        self._part_boxes = boxes_of(self._table, self._poses.rows, self._shape_of)
-        self._tree = BoxTree(self._body_boxes()) if len(bodies) else None
+        self._body_of = np.repeat(np.arange(len(counts)), counts)
+        which = _runs(first[self._shape_of], counts)
+        self._row_of, self._X_BP, self._reach = row_of[which], X_SP[which], reach[which]
+        self._has_pose = has_own_pose(X_SP)[which]
 
     def _body_boxes(self) -> np.ndarray:
         """(n, 6) boxes around the parts of each body."""
@@ -54,92 +81,120 @@ class PackedWorld:
         return np.hstack([low, np.maximum.reduceat(self._part_boxes[:, 3:], starts)])
 
     def move(self, bodies: np.ndarray, X_WBs: np.ndarray) -> None:
-        """Take new poses (k, 4, 4) of bodies (k,), by their positions, and refit the tree. What stays is not looked at."""
-        self._X_WBs[bodies] = X_WBs
-        parts = bodies
-        if not self._all_of_one_part:
-            parts = np.concatenate([np.arange(self._first[b], self._first[b + 1]) for b in bodies.tolist()])
-        moved = pose_table(self._X_WBs[self._body_of[parts]], self._X_BP[parts], self._reach[parts])
+        """Take new poses (k, 4, 4) of bodies (k,), by position, and refit the tree. Others' boxes are not made
+        again.
+        """
+        self.X_WBs[bodies] = X_WBs
+        parts = bodies if self._all_of_one_part else self._parts_of(bodies)
+        X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
+        moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
         before = self._poses.rows[parts, POSE_TERMS]
-        own = before >= 0.0
-        if np.array_equal(own, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
-            if own.any():
-                self._poses.terms[before[own].astype(np.int64)] = moved.terms
-                moved.rows[own, POSE_TERMS] = before[own]
+        has_terms = before >= 0.0
+        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
+            if has_terms.any():
+                self._poses.terms[before[has_terms].astype(np.int64)] = moved.terms
+                moved.rows[has_terms, POSE_TERMS] = before[has_terms]
             self._poses.rows[parts] = moved.rows
         else:
-            self._poses = pose_table(self._X_WBs[self._body_of], self._X_BP, self._reach)
-        self._part_boxes[parts] = boxes_of(self._table, moved.rows, self._shape_of[parts])
+            self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
+        self._part_boxes[parts] = boxes_of(self._table, moved.rows, self._row_of[parts])
         assert self._tree is not None
         self._tree.refit(self._body_boxes())
 
+    def _parts_of(self, bodies: np.ndarray) -> np.ndarray:
+        """Parts of bodies, one body after another."""
+        return _runs(self._first[bodies], self._counts[bodies])
+
     def candidates(self, margin: float) -> np.ndarray:
-        """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin."""
+        """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m]."""
         if self._tree is None:
             return np.empty((0, 2), dtype=np.int64)
-        pairs = self._tree.pairs(margin, self.static, self.group, self.mask)
-        if not len(self._keys):
+        pairs = self._tree.pairs(margin, self.roster.static, self.roster.group, self.roster.mask)
+        allowed = self._allowed_keys
+        if not len(allowed):
             return pairs
-        keys = pairs[:, 0] * len(self.static) + pairs[:, 1]
-        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
-        return pairs[self._keys[at] != keys]
+        keys = pairs[:, 0] * len(self.roster.ids) + pairs[:, 1]
+        at = np.minimum(np.searchsorted(allowed, keys), len(allowed) - 1)
+        return pairs[allowed[at] != keys]
 
-    def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
-        """(rows, convex pairs answered, body pairs answered, of them with a mesh); fields a and b are positions.
+    def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
+        """Rows of candidates (k, 2).
 
+        limit : [m], as of `collide.distance`.   stop_at_hit : rows after the first hit may be missing.
         boolean : rows tell no more than ``hit``, ``how`` and ``iterations``, in no order.
         """
         if not self._any_meshed:
-            return *self._convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit), 0
+            return self._answer_convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
         meshed = self._meshed[candidates].any(axis=1)
-        rows, convex_pairs, answered = self._convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
-        found = []
-        for a, b in candidates[meshed].tolist() if not (stop_at_hit and rows["hit"].any()) else ():
-            found.append(self._mesh_row(a, b, limit, boolean))
-            if stop_at_hit and found[-1]["hit"]:
+        convex = self._answer_convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
+        if stop_at_hit and convex.rows["hit"].any():
+            return convex
+        of_meshes = self._answer_meshes(candidates[meshed], limit, boolean, stop_at_hit)
+        rows = np.concatenate([convex.rows, of_meshes])
+        if not boolean:
+            rows = rows[np.lexsort((rows["b"], rows["a"]))]
+        return Answer(rows, convex.convex_pairs, convex.body_pairs + len(of_meshes), len(of_meshes))
+
+    # --- pairs with a mesh ----------------------------------------------------------------------
+
+    def _answer_meshes(self, pairs: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> np.ndarray:
+        """Rows of pairs of bodies with a mesh: those of the same two shapes are one batch."""
+        answered = [np.zeros(0, dtype=PAIR_DTYPE)]
+        for batch in _batches(pairs, self._shape_of, len(self._shapes), _FIRST_CHUNK if stop_at_hit else len(pairs)):
+            answered.append(self._mesh_rows(batch, limit, boolean))
+            if stop_at_hit and answered[-1]["hit"].any():
                 break
-        rows = np.concatenate([rows, *found])
-        return rows if boolean else rows[np.lexsort((rows["b"], rows["a"]))], convex_pairs, answered + len(found), len(found)
+        return np.concatenate(answered)
+
+    def _mesh_rows(self, pairs: np.ndarray, limit: float, boolean: bool) -> np.ndarray:
+        """Rows of pairs (k, 2) of bodies of the same two shapes. Raises UnsupportedQuery."""
+        a, b = pairs.T
+        A, B = self._shapes[self._shape_of[a[0]]], self._shapes[self._shape_of[b[0]]]
+        if boolean:
+            rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+            states = pair_states(A, B, self.X_WBs[a], self.X_WBs[b])
+            rows["hit"], rows["how"] = states != APART, np.where(states == OPEN, UNDECIDED, EXACT)
+        else:
+            rows = rows_within(A, B, self.X_WBs[a], self.X_WBs[b], limit)
+        rows["a"], rows["b"] = a, b
+        return rows
 
     def refused(self, candidates: np.ndarray, limit: float) -> list[tuple[int, int, str]]:
         """(position, position, reason) of candidates for which `answer` raises UnsupportedQuery: pairs with a mesh."""
-        found = []
-        for a, b in candidates[self._meshed[candidates].any(axis=1)].tolist():
+        refused = []
+        for pairs in _batches(candidates[self._meshed[candidates].any(axis=1)], self._shape_of, len(self._shapes)):
             try:
-                self._mesh_row(a, b, limit, False)
+                self._mesh_rows(pairs, limit, False)
+            except UnsupportedQuery:
+                refused += self._refused_of_batch(pairs, limit)
+        return sorted(refused)
+
+    def _refused_of_batch(self, pairs: np.ndarray, limit: float) -> list[tuple[int, int, str]]:
+        refused = []
+        for pair in pairs:
+            try:
+                self._mesh_rows(pair[None], limit, False)
             except UnsupportedQuery as error:
-                found.append((a, b, str(error)))
-        return found
+                refused.append((int(pair[0]), int(pair[1]), str(error)))
+        return refused
 
-    def _mesh_row(self, a: int, b: int, limit: float, boolean: bool) -> np.ndarray:
-        from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
-        from collide.narrowphase.facets.surface_pairs import APART, OPEN
+    # --- convex bodies and unions of convex parts -----------------------------------------------
 
-        A, B, X_WA, X_WB = self._shapes[a], self._shapes[b], self._X_WBs[a], self._X_WBs[b]
-        if boolean:
-            row = np.zeros(1, dtype=PAIR_DTYPE)
-            state = pair_states(A, B, X_WA[None], X_WB[None])[0]
-            row["hit"], row["how"] = state != APART, UNDECIDED if state == OPEN else EXACT
-        else:
-            row = rows_within(A, B, X_WA[None], X_WB[None], limit)
-        row["a"], row["b"] = a, b
-        return row
-
-    def _convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool):
-        """(rows, convex pairs answered, body pairs answered) of bodies made of convex parts."""
+    def _answer_convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
         pairs, owner = self._part_pairs(candidates, limit)
         rows = run_pairs(
-            self._table, self._poses, self._shape_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
+            self._table, self._poses, self._row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
         )
         pairs, owner = pairs[: len(rows)], owner[: len(rows)]
+        starts = np.flatnonzero(np.diff(owner, prepend=-1))
         if boolean:
-            return rows, len(rows), int(np.count_nonzero(owner[1:] != owner[:-1])) + min(len(owner), 1)
+            return Answer(rows, len(rows), len(starts), 0)
         rows["a"], rows["b"] = candidates[owner, 0], candidates[owner, 1]
         rows["part_a"] = pairs[:, 0] - self._first[rows["a"]]
         rows["part_b"] = pairs[:, 1] - self._first[rows["b"]]
-        starts = np.flatnonzero(np.diff(owner, prepend=-1))
         spans = np.hstack([self._spans(rows["a"][starts]), self._spans(rows["b"][starts])])
-        return combine(rows, starts, spans, self._table, self._poses, self._shape_of), len(rows), len(starts)
+        of_bodies = combine(rows, starts, spans, self._table, self._poses, self._row_of)
+        return Answer(of_bodies, len(rows), len(starts), 0)
 
     def _spans(self, bodies: np.ndarray) -> np.ndarray:
         """(k, 2): first part and number of parts of bodies."""
@@ -152,74 +207,102 @@ class PackedWorld:
         """
         if self._all_of_one_part:
             return candidates, np.arange(len(candidates))
-        counts = self._counts
-        many = counts[candidates[:, 0]] * counts[candidates[:, 1]]
-        owner = np.repeat(np.arange(len(candidates)), many)
-        within = np.arange(len(owner)) - np.repeat(np.cumsum(many) - many, many)
-        width = counts[candidates[owner, 1]]
-        i = self._first[candidates[owner, 0]] + within // np.maximum(width, 1)
-        j = self._first[candidates[owner, 1]] + within % np.maximum(width, 1)
+        a, b = candidates.T
+        n_pairs = self._counts[a] * self._counts[b]
+        owner = np.repeat(np.arange(len(candidates)), n_pairs)
+        within = _runs(np.zeros_like(n_pairs), n_pairs)
+        width = self._counts[b[owner]]
+        i = self._first[a[owner]] + within // np.maximum(width, 1)
+        j = self._first[b[owner]] + within % np.maximum(width, 1)
         low, high = self._part_boxes[:, :3], self._part_boxes[:, 3:]
         near = ((low[i] - margin <= high[j]) & (low[j] - margin <= high[i])).all(axis=1)
-        first_near = np.flatnonzero(np.diff(owner, prepend=-1))
-        missed = np.ones(len(candidates), dtype=bool)
-        missed[owner[near]] = False
-        near[first_near[missed]] = True
+        first_of_each = np.flatnonzero(np.diff(owner, prepend=-1))
+        is_empty = np.ones(len(candidates), dtype=bool)
+        is_empty[owner[near]] = False
+        near[first_of_each[is_empty]] = True
         return np.stack([i[near], j[near]], axis=1), owner[near]
 
-    def against(self, shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
-        """Rows of one outside shape against all bodies near it; b is a position, a is 0."""
-        own = shape.bounding_parts()
-        packed = [part for part, _ in own]
+    # --- an outside shape -----------------------------------------------------------------------
+
+    def against(self, shape: Shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
+        """Rows of one outside shape at a pose (4, 4) against all bodies near it; b is a position, a is 0."""
+        parts = shape.bounding_parts()
+        packed = [part for part, _ in parts]
         reach = np.array([part.reach for part in packed])
-        poses = pose_table(np.repeat(X_WS[None], len(own), axis=0), np.array([X for _, X in own]), reach)
-        boxes = boxes_of(ShapeTable(packed), poses.rows, np.arange(len(own)))
+        poses = pose_table(np.repeat(X_WS[None], len(parts), axis=0), np.array([X for _, X in parts]), reach)
+        boxes = boxes_of(ShapeTable(packed), poses.rows, np.arange(len(parts)))
         box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
         bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
         meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
         if not meshed.any():
             return self._convex_against(packed, poses, bodies, limit)
-        from collide.narrowphase.facets.mesh_pairs import rows_within
-
         rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
-        for b in bodies[meshed].tolist():
-            rows.append(rows_within(shape, self._shapes[b], X_WS[None], self._X_WBs[b][None], limit))
-            rows[-1]["b"] = b
-        found = np.concatenate(rows)
-        return found[np.argsort(found["b"], kind="stable")]
+        pairs = np.repeat(bodies[meshed][:, None], 2, axis=1)
+        for batch in _batches(pairs, self._shape_of, len(self._shapes)):
+            b = batch[:, 0]
+            rows.append(rows_within(shape, self._shapes[self._shape_of[b[0]]], X_WS[None], self.X_WBs[b], limit))
+            rows[-1]["a"], rows[-1]["b"] = 0, b
+        answered = np.concatenate(rows)
+        return answered[np.argsort(answered["b"], kind="stable")]
 
-    def _convex_against(self, packed: list[PackedConvex], poses, bodies: np.ndarray, limit: float) -> np.ndarray:
+    def _convex_against(
+        self, packed: list[PackedConvex], poses: PoseTable, bodies: np.ndarray, limit: float
+    ) -> np.ndarray:
         """What `against` gives, of parts and bodies that are convex or made of convex parts."""
         if not len(bodies):
             return np.zeros(0, dtype=PAIR_DTYPE)
-        own = packed
-        others = np.concatenate([np.arange(self._first[b], self._first[b + 1]) for b in bodies])
+        n_own = len(packed)
+        body_parts = self._parts_of(bodies)
         table = ShapeTable([*packed, *self._table.packed])
-        shape_of = np.concatenate([np.arange(len(own)), self._shape_of + len(own)])
+        row_of = np.concatenate([np.arange(n_own), self._row_of + n_own])
         pairs = np.stack(
-            [np.tile(np.arange(len(own)), len(others)), np.repeat(others + len(own), len(own))], axis=1
+            [np.tile(np.arange(n_own), len(body_parts)), np.repeat(body_parts + n_own, n_own)], axis=1
         )
         poses = poses.followed_by(self._poses)
-        rows = run_pairs(table, poses, shape_of, pairs, boolean=False, limit=limit)
-        rows["b"] = self._body_of[pairs[:, 1] - len(own)]
+        rows = run_pairs(table, poses, row_of, pairs, boolean=False, limit=limit)
+        rows["b"] = self._body_of[pairs[:, 1] - n_own]
         rows["part_a"] = pairs[:, 0]
-        rows["part_b"] = pairs[:, 1] - len(own) - self._first[rows["b"]]
+        rows["part_b"] = pairs[:, 1] - n_own - self._first[rows["b"]]
         starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
-        theirs = self._spans(bodies)
-        theirs[:, 0] += len(own)
-        spans = np.hstack([np.tile([0, len(own)], (len(starts), 1)), theirs])
-        return combine(rows, starts, spans, table, poses, shape_of)
+        spans = self._spans(bodies)
+        spans[:, 0] += n_own
+        spans = np.hstack([np.tile([0, n_own], (len(starts), 1)), spans])
+        return combine(rows, starts, spans, table, poses, row_of)
 
 
-def _distinct(flat: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:
-    """A table row for each distinct convex set, and the row of every part."""
+def _distinct_shapes(shapes: Sequence[Shape]) -> tuple[np.ndarray, list[Shape]]:
+    """((n,) number of each body's shape among the distinct ones, these by first appearance)."""
+    distinct = {id(shape): shape for shape in shapes}
+    number_of = {key: number for number, key in enumerate(distinct)}
+    numbers = np.fromiter((number_of[id(shape)] for shape in shapes), dtype=np.int64, count=len(shapes))
+    return numbers, list(distinct.values())
+
+
+def _table_of(packed: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:
+    """The table row of every convex set, and the table: a row for each distinct one."""
     rows: dict[tuple[bytes, float], int] = {}
-    kept: list[PackedConvex] = []
-    shape_of = np.empty(len(flat), dtype=np.int64)
-    for k, packed in enumerate(flat):
-        key = packed.content, packed.slop
+    distinct: list[PackedConvex] = []
+    row_of = np.empty(len(packed), dtype=np.int64)
+    for k, part in enumerate(packed):
+        key = part.content, part.slop
         if key not in rows:
-            rows[key] = len(kept)
-            kept.append(packed)
-        shape_of[k] = rows[key]
-    return shape_of, ShapeTable(kept)
+            rows[key] = len(distinct)
+            distinct.append(part)
+        row_of[k] = rows[key]
+    return row_of, ShapeTable(distinct)
+
+
+def _runs(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Numbers starts[k], …, starts[k] + counts[k] − 1, one run after another."""
+    return np.repeat(starts - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
+
+
+def _batches(pairs: np.ndarray, shape_of: np.ndarray, n_shapes: int, chunk: int = 1 << 60) -> Iterator[np.ndarray]:
+    """Pairs (k, 2) of bodies in batches of the same two shapes; of each at most ``chunk`` first, then twice as many."""
+    keys = shape_of[pairs[:, 0]] * n_shapes + shape_of[pairs[:, 1]]
+    order = np.argsort(keys, kind="stable")
+    for same in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
+        size = max(chunk, 1)
+        while len(same):
+            yield pairs[same[:size]]
+            same, size = same[size:], 2 * size

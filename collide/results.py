@@ -9,7 +9,7 @@ normal          float64 (3,) unit vector nhat_AB_W: moving B by −distance·nor
 point_a         float64 (3,) witness point p_WAa of A
 point_b         float64 (3,) witness point p_WBb of B
 a, b            int32        ids of the bodies, a < b; 0 and 1 for a pair query
-part_a, part_b  int32        which convex part (or facet, of a mesh) of A and of B is meant; 0 where a body is one convex set
+part_a, part_b  int32        which convex part (of a mesh, which facet) of A and of B is meant; 0 for one convex set
 vertices_a      int32 (4,)   ids of the core vertices of A that span the deciding feature: apart, the features nearest
                              each other; together, a simplex of A ⊖ B around the origin. −1 for curved cores
 vertices_b      int32 (4,)   of B; pair by pair with vertices_a
@@ -124,7 +124,7 @@ FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()
 
 
 def flipped(rows: np.ndarray) -> np.ndarray:
-    """Rows of `PAIR_DTYPE` (n,) with A and B exchanged: ids, parts, points and vertices swapped, normals negated, exactly."""
+    """Rows of `PAIR_DTYPE` (n,) with A and B exchanged, exactly: fields of A and of B swapped, normals negated."""
     swapped = rows.copy()
     for of_a, of_b in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("vertices_a", "vertices_b")):
         swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
@@ -150,8 +150,8 @@ class PairResult(Generic[Form]):
     Parameters
     ----------
     rows : (N,) `PAIR_DTYPE`, the structured array itself.
-    is_single : whether the query was about a single pair of poses. Then attributes are scalars and (3,) arrays, and ``how``
-        is a `How`; of batches they are arrays with a leading N, and ``r[k]`` is the result of row k.
+    is_single : whether the query was about a single pair of poses. Then attributes are scalars and (3,) arrays, and
+        ``how`` is a `How`; of batches they are arrays with a leading N, and ``r[k]`` is the result of row k.
     question : (A, B, X_WA, X_WB) as asked: shapes, or sequences of them, and poses with a leading N or 1.
     certify : what makes certificates of it, `collide.certify`.
     """
@@ -256,9 +256,16 @@ def _row_number(k, count: int) -> int:
 class WorldResult:
     """Rows of a World query, sorted by (a, b), with the bodies as they stood.
 
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows; ``rows`` is the
-    structured array (n,) of `PAIR_DTYPE` itself. ``names`` resolves the ids; ``pair(k)`` is row k as a `PairResult`, with
-    its certificate.
+    Parameters
+    ----------
+    rows : (n,) `PAIR_DTYPE`, a and b the ids of bodies.
+    bodies : {id: body as it stood}, with ``name``, ``shape`` and ``X_WB`` (4, 4).
+    certify : what makes certificates of a row, `collide.certify`.
+
+    Notes
+    -----
+    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names``
+    resolves the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
     """
 
     __slots__ = ("_bodies", "_certify", "rows")
@@ -267,7 +274,20 @@ class WorldResult:
         self.rows, self._bodies, self._certify = rows, bodies, certify
 
     def pair(self, k: int) -> PairResult[Single]:
-        """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate. Raises IndexError."""
+        """Row k as the result of a pair query: ``collide.verify(*r.question, r)`` checks its certificate.
+
+        Parameters
+        ----------
+        k : its number; negative ones count from the end.
+
+        Returns
+        -------
+        PairResult : of the bodies as they stood.
+
+        Raises
+        ------
+        IndexError, InvalidArgument
+        """
         row = self.rows[_row_number(k, len(self.rows))]
         a, b = self._bodies[int(row["a"])], self._bodies[int(row["b"])]
         return PairResult(row.reshape(1), True, (a.shape, b.shape, a.X_WB[None], b.X_WB[None]), self._certify)

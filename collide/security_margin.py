@@ -1,8 +1,8 @@
 """Booleans with a security margin: whether two bodies come within a distance of each other.
 
-The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its last
-digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is. What is
-left open, next to curved surfaces, meshes and unions, counts as within.
+The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its
+last digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is.
+What is left open, next to curved surfaces, meshes and unions, counts as within.
 """
 
 from __future__ import annotations
@@ -57,12 +57,13 @@ def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
 def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     """Two shapes that meet exactly where A and B are within the margin; None where they are not to be had.
 
-    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space stays.
+    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
+    stays.
     """
     if not (is_plain(A) and is_plain(B)):
         return None
     packed = [shape.parts()[0][0] for shape in (A, B)]
-    swept = [p.kind == POINTS and p.slop == 0.0 for p in packed]
+    is_swept_points = [p.kind == POINTS and p.slop == 0.0 for p in packed]
     total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
     first = float(total)
     if first > total:
@@ -70,10 +71,10 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     rest = float(total - Fraction(first))
     if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
         return None
-    if all(swept):
+    if all(is_swept_points):
         return ConvexHull(packed[0].points, radius=first), ConvexHull(packed[1].points, radius=rest)
-    if rest == 0.0 and swept[0] and packed[1].kind == HALFSPACE:
+    if rest == 0.0 and is_swept_points[0] and packed[1].kind == HALFSPACE:
         return ConvexHull(packed[0].points, radius=first), B
-    if rest == 0.0 and swept[1] and packed[0].kind == HALFSPACE:
+    if rest == 0.0 and is_swept_points[1] and packed[0].kind == HALFSPACE:
         return A, ConvexHull(packed[1].points, radius=first)
     return None

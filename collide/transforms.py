@@ -197,7 +197,8 @@ def _check_rotations(X: np.ndarray, name: str) -> None:
     _refuse(np.linalg.det(R) <= 0, X, name, "mirrors (determinant ≤ 0): a rigid pose must not")
 
 
-#: So far from a rotation a matrix may be that is accepted without the check by `_check_rotations`, which rounds otherwise.
+#: So far from a rotation a matrix may be that is accepted without the check by `_check_rotations`, which rounds
+#: otherwise.
 _SURE = 0.5 * ROTATION_TOLERANCE
 #: Poses checked together: their entries stay in the cache.
 _TOGETHER = 1024

@@ -5,10 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 python -m pip install --quiet --disable-pip-version-check -e ".[demo,peers,plots,dev]"
 ruff check .
-mypy_target=$(mktemp -d)
-trap 'rm -rf "$mypy_target"' EXIT
-cp -r collide "$mypy_target/" && cp -r adapters scenes "$mypy_target/collide/" # as they are installed
-MYPYPATH="$mypy_target" mypy -p collide
+bash tests/types.sh
 tests=(python -m pytest -n auto --maxprocesses 4 --dist loadfile)
 status=0
 "${tests[@]}" "$@" || status=$?

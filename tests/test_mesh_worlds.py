@@ -11,6 +11,7 @@ from surfaces import torus
 
 import collide
 from collide.packed_world import PackedWorld
+from collide.world_bodies import WorldBodies
 
 EYE = np.eye(4)
 
@@ -112,9 +113,9 @@ def test_an_open_sign_is_counted_as_such():
 
 
 def boxes_of(shape, X):
-    body = collide.World()
-    body.add(shape, X)
-    return PackedWorld([body.body(0)], {})._part_boxes
+    bodies = WorldBodies()
+    bodies.add(shape, X, None, False, 1, 1)
+    return PackedWorld(bodies.roster(), bodies.poses(), {})._part_boxes
 
 
 def test_boxes_of_posed_meshes_hold_them_and_are_tight():

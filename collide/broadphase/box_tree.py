@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from collide.kernels import address_of, entry, view_f64, view_i64
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Bits of a Morton code along each axis.
 _BITS = 16
@@ -30,67 +30,63 @@ class BoxTree:
     def __init__(self, boxes: np.ndarray):
         finite = np.isfinite(boxes).all(axis=1)
         self.boxes = boxes
-        self.endless = np.flatnonzero(~finite)
-        within = np.flatnonzero(finite)
-        self.order = within[_sorted_order(boxes[within])] if len(within) else within
-        self.leaves = 1 << max(0, (len(within) - 1).bit_length())
+        self.unbounded = np.flatnonzero(~finite)
+        bounded = np.flatnonzero(finite)
+        self.order = bounded[_sorted_order(boxes[bounded])] if len(bounded) else bounded
+        self.leaves = 1 << max(0, (len(bounded) - 1).bit_length())
         self.nodes = np.empty((2 * self.leaves, 6))
         self._fit()
 
     def refit(self, boxes: np.ndarray) -> None:
         """Take moved boxes without sorting anew; answers stay right, only speed drifts."""
-        if len(boxes) != len(self.boxes) or not np.array_equal(
-            np.flatnonzero(~np.isfinite(boxes).all(axis=1)), self.endless
-        ):
+        if len(boxes) != len(self.boxes):
             raise ValueError("refit needs the same bodies; build a new tree")
         self.boxes = boxes
         self._fit()
 
     def _fit(self) -> None:
-        self.nodes[:, :3], self.nodes[:, 3:] = math.inf, -math.inf
-        self.nodes[self.leaves : self.leaves + len(self.order)] = self.boxes[self.order]
-        level = self.leaves
-        while level > 1:
-            children = self.nodes[level : 2 * level].reshape(-1, 2, 6)
-            level //= 2
-            self.nodes[level : 2 * level, :3] = children[:, :, :3].min(axis=1)
-            self.nodes[level : 2 * level, 3:] = children[:, :, 3:].max(axis=1)
+        boxes = self.boxes = np.ascontiguousarray(self.boxes)
+        is_bounded = fit_nodes(
+            address_of(boxes), len(boxes), address_of(self.order), len(self.order), address_of(self.nodes), self.leaves
+        )
+        if not is_bounded or np.isfinite(boxes[self.unbounded]).all(axis=1).any():
+            raise ValueError("refit needs the same bodies, bounded and unbounded ones; build a new tree")
 
     def pairs(self, margin: float, static: np.ndarray, group: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis.
 
         Pairs of static bodies, and pairs whose groups and masks exclude each other, are left out.
         """
-        found = self._search(self.boxes[self.order], margin, True, static, group, mask)
-        if len(self.endless):
-            found = np.concatenate([found, _with_endless(self.endless, len(self.boxes), static, group, mask)])
-        found = np.sort(found, axis=1)
-        return found[np.lexsort((found[:, 1], found[:, 0]))]
+        pairs = self._search(self.boxes[self.order], margin, True, static, group, mask)
+        if len(self.unbounded):
+            pairs = np.concatenate([pairs, _with_unbounded(self.unbounded, len(self.boxes), static, group, mask)])
+        pairs = np.sort(pairs, axis=1)
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
     def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
         """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
         everything = np.zeros(len(self.boxes), dtype=np.int64)
-        found = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
-        return np.sort(np.concatenate([found[:, 1], self.endless]))
+        pairs = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
+        return np.sort(np.concatenate([pairs[:, 1], self.unbounded]))
 
     def _search(self, queries, margin, among_themselves, static, group, mask) -> np.ndarray:
         queries = np.ascontiguousarray(queries)
         capacity = 64 + 8 * len(queries)
         while True:
-            found = np.empty((capacity, 2), dtype=np.int64)
+            pairs = np.empty((capacity, 2), dtype=np.int64)
             count = meeting_boxes(
                 address_of(queries), len(queries), address_of(self.nodes), self.leaves, address_of(self.order),
                 len(self.order), margin, among_themselves, address_of(static), address_of(group), address_of(mask),
-                address_of(found), capacity,
+                address_of(pairs), capacity,
             )  # fmt: skip
             if count <= capacity:
-                return found[:count]
+                return pairs[:count]
             capacity = count
 
 
 def validate_box_tree(tree: BoxTree) -> None:
     """Check every property the traversal relies on; raises AssertionError naming the node."""
-    assert sorted([*tree.order, *tree.endless]) == list(range(len(tree.boxes))), "a body is missing or doubled"
+    assert sorted([*tree.order, *tree.unbounded]) == list(range(len(tree.boxes))), "a body is missing or doubled"
     for node in range(1, tree.leaves):
         for child in (2 * node, 2 * node + 1):
             low, high = tree.nodes[child, :3], tree.nodes[child, 3:]
@@ -116,23 +112,59 @@ def _sorted_order(boxes: np.ndarray) -> np.ndarray:
     return np.lexsort((code, -size_class))
 
 
-def _with_endless(endless, n, static, group, mask) -> np.ndarray:
-    i = np.repeat(endless, n)
-    j = np.tile(np.arange(n), len(endless))
-    is_endless = np.zeros(n, dtype=bool)
-    is_endless[endless] = True
-    keep = (i != j) & ~(is_endless[j] & (j < i))
+def _with_unbounded(unbounded, n, static, group, mask) -> np.ndarray:
+    i = np.repeat(unbounded, n)
+    j = np.tile(np.arange(n), len(unbounded))
+    is_unbounded = np.zeros(n, dtype=bool)
+    is_unbounded[unbounded] = True
+    keep = (i != j) & ~(is_unbounded[j] & (j < i))
     keep &= ~((static[i] != 0) & (static[j] != 0))
     keep &= ((group[i] & mask[j]) != 0) & ((group[j] & mask[i]) != 0)
     return np.stack([i[keep], j[keep]], axis=1)
 
 
-@entry(
-    "int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)"
-)
+@kernel(inline=True)
+def _next_subtree(node):
+    """The next subtree to the right: sibling of the node's nearest ancestor that is a left child; 0 at the end."""
+    while node & 1:
+        node >>= 1
+    return node + 1 if node > 0 else 0
+
+
+@entry("boolean(int64, int64, int64, int64, int64, int64)")
+def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
+    """Write all nodes of a tree; False where the box of a leaf is not finite.
+
+    boxes : 6·n_boxes doubles, low x, y, z, high x, y, z.   order : the body of each leaf.   nodes : 12·leaves doubles
+        out.
+    """
+    boxes = view_f64(boxes_at, 6 * n_boxes)
+    order = view_i64(order_at, n_order)
+    nodes = view_f64(nodes_at, 12 * leaves)
+    is_bounded = True
+    for leaf in range(leaves):
+        at = 6 * (leaves + leaf)
+        for axis in range(3):
+            nodes[at + axis] = math.inf
+            nodes[at + 3 + axis] = -math.inf
+        if leaf < n_order:
+            for k in range(6):
+                value = boxes[6 * order[leaf] + k]
+                nodes[at + k] = value
+                is_bounded = is_bounded and -math.inf < value < math.inf
+    for node in range(leaves - 1, 0, -1):
+        at = 6 * node
+        child = 12 * node
+        for axis in range(3):
+            nodes[at + axis] = min(nodes[child + axis], nodes[child + 6 + axis])
+            nodes[at + 3 + axis] = max(nodes[child + 3 + axis], nodes[child + 9 + axis])
+    return is_bounded
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)")
 def meeting_boxes(
     queries_at, n_queries, nodes_at, leaves, order_at, n_order, margin, among_themselves, static_at, group_at, mask_at,
-    found_at, capacity,
+    pairs_at, capacity,
 ):  # fmt: skip
     """Pairs (query, body) of boxes within ``margin`` along every axis; returns how many there are.
 
@@ -142,7 +174,7 @@ def meeting_boxes(
     queries = view_f64(queries_at, 6 * n_queries)
     nodes = view_f64(nodes_at, 12 * leaves)
     order = view_i64(order_at, n_order)
-    found = view_i64(found_at, 2 * capacity)
+    pairs = view_i64(pairs_at, 2 * capacity)
     n_bodies = 0
     for k in range(n_order):
         n_bodies = max(n_bodies, order[k] + 1)
@@ -157,11 +189,9 @@ def meeting_boxes(
         high0 = queries[6 * k + 3] + margin
         high1 = queries[6 * k + 4] + margin
         high2 = queries[6 * k + 5] + margin
-        # Depth first without a stack: down to the left while boxes meet, else on to the next
-        # subtree to the right, which is the sibling of the nearest ancestor that is a left child.
-        node = 1
-        last = leaves + k if among_themselves else 0
-        first = 1
+        # Depth first without a stack: down to the left while boxes meet, else on to the next subtree to the right.
+        # Among themselves, it begins to the right of the query's own leaf.
+        node = _next_subtree(leaves + k) if among_themselves else 1
         while node > 0:
             at = 6 * node
             meets = (
@@ -169,12 +199,6 @@ def meeting_boxes(
                 and nodes[at + 1] <= high1 and nodes[at + 4] >= low1
                 and nodes[at + 2] <= high2 and nodes[at + 5] >= low2
             )  # fmt: skip
-            if meets and among_themselves:
-                # The last leaf under the node must come after the query's own.
-                first = node
-                while first < leaves:
-                    first = 2 * first + 1
-                meets = first > last
             if meets and node < leaves:
                 node = 2 * node
                 continue
@@ -189,10 +213,8 @@ def meeting_boxes(
                     )  # fmt: skip
                 if tested:
                     if count < capacity:
-                        found[2 * count] = i
-                        found[2 * count + 1] = j
+                        pairs[2 * count] = i
+                        pairs[2 * count + 1] = j
                     count += 1
-            while node & 1:
-                node >>= 1
-            node = node + 1 if node > 0 else 0
+            node = _next_subtree(node)
     return count

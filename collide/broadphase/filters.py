@@ -25,9 +25,9 @@ def count_skipped(static: np.ndarray, group: np.ndarray, mask: np.ndarray, allow
         for b in range(a, len(classes)):
             verdict[a, b] = why = _excluded(classes[a], classes[b])
             if why:
-                many = sizes[a] * (sizes[a] - 1) // 2 if a == b else sizes[a] * sizes[b]
-                if many:
-                    skipped[why] = skipped.get(why, 0) + int(many)
+                n_pairs = sizes[a] * (sizes[a] - 1) // 2 if a == b else sizes[a] * sizes[b]
+                if n_pairs:
+                    skipped[why] = skipped.get(why, 0) + int(n_pairs)
     for (i, j), reason in allowed.items():
         a, b = sorted((int(inverse[i]), int(inverse[j])))
         if not verdict[a, b]:

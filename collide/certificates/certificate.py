@@ -3,21 +3,24 @@
 A certificate names vertices and carries no rounded number. Write D for the difference points a_i − b_j of its
 vertex pairs, r_A and r_B for the radii swept over the bodies:
 
-apart     v, the point of hull(D) nearest the origin (one to four pairs), is a separating axis: v·(a − b) > (r_A + r_B)|v|
-          for all vertices a of A and b of B.
+apart     v, the point of hull(D) nearest the origin (one to four pairs), is a separating axis:
+          v·(a − b) > (r_A + r_B)|v| for all vertices a of A and b of B.
 together  hull(D) (one to four pairs) comes within r_A + r_B of the origin. Of a half-space and a body: a vertex named
           lies within the body's radius of the half-space, or in it.
-inside    one vertex named, −1 standing for the other body, lies in that body, a solid mesh: its winding number there is positive.
+inside    one vertex named, −1 standing for the other body, lies in that body, a solid mesh: the winding number of
+          its facets around the vertex is positive.
 
 Unions of convex parts: together, one certificate names the two parts that meet; apart, there is one for each pair of
 parts. Pairs with a mesh have one certificate: together, of two facets that come within r_A + r_B of each other, whose
 corners are the vertices named (a convex shape is taken whole, its facet is 0); apart, an axis between the convex hulls.
 
-Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; results whose sign is open or that are beyond
-the query's max_distance; meshes apart whose hull meets the other body (it would take an axis for every pair of facets).
+Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; results whose sign is open or that are
+beyond the query's max_distance; meshes apart whose hull meets the other body (it would take an axis for every pair of
+facets).
 
 Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as handed in, the corners of a `Box` by sign
-(−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its ``vertices``.
+(−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its
+``vertices``.
 """
 
 from __future__ import annotations
@@ -56,7 +59,7 @@ class CertificateRefused(CollideError):
 
 
 def read_certificates(values) -> list[Certificate]:
-    """Certificates from what may come from a file, with Python integers. Raises CertificateRefused where it has not their form."""
+    """Certificates of Python integers from what may come from a file. Raises CertificateRefused for another form."""
     try:
         return [
             Certificate(kind, index(i), index(j), tuple((index(p), index(q)) for p, q in pairs))

@@ -21,15 +21,15 @@ def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hi
     for i, j in pairs:
         if not (0 <= i < len(A) and 0 <= j < len(B)):
             return f"there is no vertex pair {i}, {j}"
-    P, Q, grid = common_vertices(A, B)
+    points_a, points_b, grid = common_vertices(A, B)
     radius = (A.radius + B.radius) / Fraction(2) ** grid  # in units of the grid, as all that follows
-    v, scale, _ = nearest_to_origin([minus(P[i], Q[j]) for i, j in pairs])
+    v, scale, _ = nearest_to_origin([minus(points_a[i], points_b[j]) for i, j in pairs])
     square = inner(v, v)
     if hit:
         return None if square <= radius**2 * scale**2 else "the points named do not come within the radii of the origin"
     if square == 0:
         return "the points named contain the origin, so they give no axis"
-    along_a, along_b = [inner(v, p) for p in P], [inner(v, q) for q in Q]
+    along_a, along_b = [inner(v, p) for p in points_a], [inner(v, q) for q in points_b]
     gap = min(along_a) - max(along_b)
     if gap > 0 and gap**2 > radius**2 * square:
         return None
@@ -38,7 +38,10 @@ def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hi
 
 
 def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
-    """The same where one part is a half-space {x : n·x ≤ offset}: a vertex p reaches it where n·p − offset ≤ radius·|n|."""
+    """The same where one part is a half-space {x : n·x ≤ offset}.
+
+    A vertex p reaches it where n·p − offset ≤ radius·|n|.
+    """
     if A.kind == B.kind:
         return "two half-spaces have no certificate"
     halfspace, body = (A, B) if A.kind == HALFSPACE else (B, A)

@@ -34,15 +34,16 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
     Returns
     -------
     A tuple of `Certificate`, one for each pair of parts that the proof takes; None where the pair has none (curved
-    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of these for batches.
+    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of these for
+    batches.
 
     Raises
     ------
     InvalidArgument : shapes, results or numbers of poses that do not belong together.
     InvalidPose : poses that are no (4, 4) matrices of finite numbers.
 
-    The vertices that decided in doubles are tried first, O(vertices) integer operations; where they prove nothing exactly,
-    Gilbert's, Johnson's and Keerthi's algorithm goes on from them in integers.
+    The vertices that decided in doubles are tried first, O(vertices) integer operations; where they prove nothing
+    exactly, Gilbert's, Johnson's and Keerthi's algorithm goes on from them in integers.
     """
     shapes_a, shapes_b = (S if isinstance(S, Sequence) else [S] for S in (A, B))
     check_question("certify", shapes_a, shapes_b, r)
@@ -100,8 +101,8 @@ def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair
 
 
 def _search(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair] = ((0, 0),)) -> list[VertexPair]:
-    P, Q, _ = common_vertices(A, B)
-    return nearest_vertex_pairs(P, Q, pairs)
+    points_a, points_b, _ = common_vertices(A, B)
+    return nearest_vertex_pairs(points_a, points_b, pairs)
 
 
 # --- pairs with a mesh --------------------------------------------------------------------------

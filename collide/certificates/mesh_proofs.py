@@ -75,7 +75,10 @@ class ProofBody:
 
 
 def flaw_of_mesh_certificates(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim: str) -> str | None:
-    """Why certificates do not prove that two shapes, a mesh among them, are "together" or "apart"; None where they do."""
+    """Why certificates do not prove a claim, "together" or "apart", of two shapes, a mesh among them.
+
+    None where they do.
+    """
     body_a, body_b = ProofBody(A, X_WA), ProofBody(B, X_WB)
     if not (body_a.has_certificates and body_b.has_certificates):
         return "these shapes have no certificates"
@@ -92,7 +95,8 @@ def flaw_of_mesh_certificates(A, B, X_WA, X_WB, certificates: Sequence[Certifica
         if not 0 <= facet < body.n_facets:
             return f"{name} has no facet {facet}"
     if HALFSPACE in (body_a.kind, body_b.kind):
-        return flaw_of_plane_proof(body_a.part(), body_b.part(), _index_pairs(body_a, body_b, pairs), hit=kind == TOGETHER)
+        indices = _index_pairs(body_a, body_b, pairs)
+        return flaw_of_plane_proof(body_a.part(), body_b.part(), indices, hit=kind == TOGETHER)
     if kind == APART:
         return _flaw_of_axis(body_a, body_b, pairs)
     return _flaw_of_facets(body_a, body_b, facet_a, facet_b, pairs)

@@ -1,4 +1,4 @@
-"""The point of a hull of integer points nearest the origin, exactly: Johnson's subalgorithm by definition, and GJK on it."""
+"""The point of a hull of integer points nearest the origin: Johnson's subalgorithm by definition, and GJK on it."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ def nearest_to_origin(points: Sequence[Point]) -> NearestPoint:
     raise AssertionError("some subset holds the nearest point")
 
 
-def nearest_vertex_pairs(P: list[Point], Q: list[Point], pairs: Sequence[VertexPair]) -> list[VertexPair]:
-    """Index pairs (i, j) whose points P_i − Q_j span the simplex of P ⊖ Q nearest the origin: GJK in integers.
+def nearest_vertex_pairs(A: list[Point], B: list[Point], pairs: Sequence[VertexPair]) -> list[VertexPair]:
+    """Index pairs (i, j) whose points A_i − B_j span the simplex of A ⊖ B nearest the origin: GJK in integers.
 
     pairs : where the search begins; of more than four the first four.
     """
     simplex = list(dict.fromkeys(pairs))[:4]
     while True:
-        v, scale, carrier = nearest_to_origin([minus(P[i], Q[j]) for i, j in simplex])
+        v, scale, carrier = nearest_to_origin([minus(A[i], B[j]) for i, j in simplex])
         simplex = [simplex[k] for k in carrier]
         if not any(v):
             return simplex
-        i = min(range(len(P)), key=lambda k: inner(v, P[k]))
-        j = max(range(len(Q)), key=lambda k: inner(v, Q[k]))
-        if inner(v, minus(P[i], Q[j])) * scale >= inner(v, v):
+        i = min(range(len(A)), key=lambda k: inner(v, A[k]))
+        j = max(range(len(B)), key=lambda k: inner(v, B[k]))
+        if inner(v, minus(A[i], B[j])) * scale >= inner(v, v):
             return simplex
         simplex.append((i, j))
 
 
 def _weights(points: Sequence[Point]) -> list[int] | None:
-    """Integer weights of the point of the affine hull nearest the origin; None where the points are affinely dependent."""
+    """Integer weights of the point of the affine hull nearest the origin; None for affinely dependent points."""
     base, edges = points[0], [minus(p, points[0]) for p in points[1:]]
     gram = [[inner(e, f) for f in edges] for e in edges]
     right = [-inner(e, base) for e in edges]

@@ -20,12 +20,12 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     Parameters
     ----------
     A, B : shapes of the question.
-    X_WA, X_WB : (4, 4) their poses in the world W [m]. Every entry is taken as an exact number; whether the matrices are
-        rotations is not asked.
+    X_WA, X_WB : (4, 4) their poses in the world W [m]. Every entry is taken as an exact number; whether the matrices
+        are rotations is not asked.
     r : `PairResult` of `collide.distance`, or what `collide.walk` returns, at one pair of poses (``r[k]`` of a batch).
         Of it ``r.hit`` is proven, and ``r.certificate`` read.
-    certificate : rows of (kind, part_a, part_b, pairs) to be checked instead of ``r.certificate``, for example read from
-        a JSON file.
+    certificate : rows of (kind, part_a, part_b, pairs) to be checked instead of ``r.certificate``, for example read
+        from a JSON file.
 
     Returns
     -------
@@ -47,8 +47,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     certificate = r.certificate if certificate is None else certificate
     if certificate is None:
         raise InvalidArgument(
-            "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which one is "
-            "a mesh whose hull meets the other)"
+            "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which "
+            "one is a mesh whose hull meets the other)"
         )
     certificates = read_certificates(certificate)
     claim = TOGETHER if bool(np.all(r.hit)) else APART

@@ -11,10 +11,10 @@ normal          (3,) unit vector nhat_AB_W, one for all contacts of a patch
 point_a,point_b (3,) a point of A's surface and one of B's [m]: point_b − point_a = distance · normal
 distance        signed, along the normal [m]: the gap there, or minus the overlap
 lower, upper    lower ≤ true value ≤ upper: how far these two facets are apart along the normal, there, with
-                normal, poses and shapes as given, against rounding [m]; of "way out" that of `distance`
+                normal, poses and shapes as handed in, against rounding [m]; of "translation" those of `distance`
 apart           of overlaps: moving B by this length along the normal is proven to clear the patch's facets of
                 each other, or the bodies where they are convex, but for touching [m]; inf where no such length
-                was found, 0 of gaps
+                is known, 0 of gaps
 =============== ===================================================================================
 
 Rows of a patch stand together, the deepest first.
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int32]
 
-#: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch tells how the bodies overlap,
-#: and the row is the answer of `distance`: a translation that parts the bodies, and no place.
-KINDS = ("gap", "overlap", "way out")
-GAP, OVERLAP, WAY_OUT = range(3)
+#: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch describes the overlap, and the
+#: row is the answer of `distance`: a translation that separates the bodies, and no place.
+KINDS = ("gap", "overlap", "translation")
+GAP, OVERLAP, TRANSLATION = range(3)
 
 CONTACT_DTYPE = np.dtype(
     [
@@ -57,11 +57,11 @@ def no_rows() -> np.ndarray:
     return np.zeros(0, dtype=CONTACT_DTYPE)
 
 
-def turned_round(rows: np.ndarray) -> np.ndarray:
-    """The same contacts with the bodies' roles exchanged."""
+def flipped_contacts(rows: np.ndarray) -> np.ndarray:
+    """The same contacts with A and B exchanged."""
     swapped = rows.copy()
-    for one, other in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("facet_a", "facet_b")):
-        swapped[one], swapped[other] = rows[other], rows[one]
+    for of_a, of_b in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("facet_a", "facet_b")):
+        swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
     swapped["normal"] = 0.0 - rows["normal"]
     return swapped
 
@@ -70,8 +70,12 @@ def _middles(rows: np.ndarray) -> np.ndarray:
     return 0.5 * rows["point_a"] + 0.5 * rows["point_b"]
 
 
-class Finished(NamedTuple):
-    """Contacts of one patch before they are rows: (k, 3) points of the world and what goes with them."""
+class PatchContacts(NamedTuple):
+    """Contacts of one patch before they are rows.
+
+    normal : (3,).   point_a, point_b : (k, 3) in W [m].   distance, error : (k,), along the normal, and its bound [m].
+    facets : (k, 2) of A and of B.   kind : index into `KINDS`.   apart : as in the rows [m].
+    """
 
     normal: np.ndarray
     point_a: np.ndarray
@@ -83,7 +87,7 @@ class Finished(NamedTuple):
     apart: float
 
 
-def rows_of(patches: list[Finished]) -> np.ndarray:
+def rows_of(patches: list[PatchContacts]) -> np.ndarray:
     """The rows of some patches, numbered in this order."""
     out = np.zeros(sum(len(patch.distance) for patch in patches), dtype=CONTACT_DTYPE)
     begin = 0
@@ -146,11 +150,17 @@ class WorldContacts:
 
 
 class Contacts:
-    """Contacts of one pair of bodies, or of many: the fields of `CONTACT_DTYPE` as columns.
+    """Contact manifolds of one pair of bodies, or of a batch: the fields of `CONTACT_DTYPE` as columns.
 
-    ``rows`` is the structured array of all contacts, pair after pair (pose after pose, of two shapes); those of pair k are
-    ``rows[starts[k]:starts[k + 1]]``, and ``result[k]`` is a result of them alone. ``len(result)`` is the number of
-    contacts; that of poses is ``len(starts) − 1``. Iterating gives the rows.
+    Parameters
+    ----------
+    rows : (k,) `CONTACT_DTYPE`, all contacts, pair after pair, and in each patch after patch, the deepest first.
+    starts : (N + 1,) int64: the contacts of pair k are ``rows[starts[k]:starts[k + 1]]``.
+
+    Notes
+    -----
+    ``result[k]`` is a result of pair k alone. ``len(result)`` is the number of contacts; that of pairs is
+    ``len(starts) − 1``. Iterating gives the rows.
     """
 
     __slots__ = ("rows", "starts")
@@ -212,7 +222,9 @@ class Contacts:
         """The contacts of pose k."""
         poses = len(self.starts) - 1
         if isinstance(k, bool) or not isinstance(k, (int, np.integer)):
-            raise InvalidArgument(f"contacts of a pose are named by its number, got {k!r}; rows[…] takes fields and slices")
+            raise InvalidArgument(
+                f"contacts of a pose are named by its number, got {k!r}; rows[…] takes fields and slices"
+            )
         if not -poses <= k < poses:
             raise IndexError(f"there are poses 0 … {poses - 1}, not {k}" if poses else "there are no poses")
         begin, end = self.starts[k % poses], self.starts[k % poses + 1]

@@ -1,7 +1,7 @@
-"""Contacts of two convex sets: the faces that support the normal of their distance, laid over each other.
+"""Contacts of two convex sets: the faces that support the normal of their distance, clipped against each other.
 
-The nearest points, or those of the least way out, are one contact. Where both bodies have a face across that normal, or
-nearly, the corners of what these faces overlap in, seen along the normal, are the others.
+The witness points of `distance` are one contact. Where both bodies have a face across its normal, or nearly, the
+corners of the polygon in which these faces overlap, seen along the normal, are the others.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 
 from collide.batches import answer_batch
-from collide.contact.contact_facets import Pairs, Side, lengths_of, normals_of, turned
+from collide.contact.contact_facets import Pairs, Side, lengths_of, normals_of, rotated
 from collide.contact.contact_points import Points, across, points_along
-from collide.contact.contact_rows import GAP, OVERLAP, Finished, no_rows, rows_of, turned_round
-from collide.contact.reduce_manifold import chosen
+from collide.contact.contact_rows import GAP, OVERLAP, PatchContacts, flipped_contacts, no_rows, rows_of
+from collide.contact.reduce_manifold import reduce_manifold
 from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import body_of, hull_of
@@ -34,47 +34,51 @@ _U = 2.0**-53
 _ERRORS = 64.0
 
 
-def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     """Rows for two shapes that are one convex set each, at single poses (4, 4). Raises UnsupportedQuery."""
-    one, other = A.parts()[0][0], B.parts()[0][0]
-    if HALFSPACE in (one.kind, other.kind) and one.kind != other.kind:
-        if one.kind == HALFSPACE:
-            return against_plane(A, B, X_WA, X_WB, margin, most)
-        return turned_round(against_plane(B, A, X_WB, X_WA, margin, most))
-    if other.content < one.content or (other.content == one.content and X_WA[:3].tolist() > X_WB[:3].tolist()):
-        return turned_round(_ordered(B, A, other, one, X_WB, X_WA, margin, most))
-    return _ordered(A, B, one, other, X_WA, X_WB, margin, most)
+    packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
+    if HALFSPACE in (packed_a.kind, packed_b.kind) and packed_a.kind != packed_b.kind:
+        if packed_a.kind == HALFSPACE:
+            return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
+        return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
+    if (packed_b.content, X_WB[:3].tolist()) < (packed_a.content, X_WA[:3].tolist()):
+        return flipped_contacts(_ordered(B, A, packed_b, packed_a, X_WB, X_WA, margin, max_contacts))
+    return _ordered(A, B, packed_a, packed_b, X_WA, X_WB, margin, max_contacts)
 
 
-def _ordered(A: Shape, B: Shape, one: PackedConvex, other: PackedConvex, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+def _ordered(
+    A: Shape, B: Shape, packed_a: PackedConvex, packed_b: PackedConvex, X_WA, X_WB, margin: float, max_contacts: int
+) -> np.ndarray:
     row = _answer(A, B, X_WA, X_WB, margin)
     if row is None:
         return no_rows()
     n = row["normal"].copy()
-    error = _error(one, X_WA, other, X_WB)
+    error = _error(packed_a, X_WA, packed_b, X_WB)
     origin = X_WA[:3, 3]
-    radius = one.radius + other.radius
-    a = _support(one, X_WA[:3, :3], np.zeros(3), n, error)
-    b = _support(other, X_WB[:3, :3], X_WB[:3, 3] - origin, -n, error)
-    points = _nearest(row, one, other, n, origin)
+    radius = packed_a.radius + packed_b.radius
+    a = _support(packed_a, X_WA[:3, :3], np.zeros(3), n, error)
+    b = _support(packed_b, X_WB[:3, :3], X_WB[:3, 3] - origin, -n, error)
+    points = _nearest(row, packed_a, packed_b, n, origin)
     facets = np.array([[-1, -1]])
     if len(a[0]) and len(b[0]):
         pairs = _product(a, b)
-        found = points_along(pairs, n, True, True, error)
-        found = found.take((found.gap - radius <= margin + found.error) & (found.gap - radius >= row["lower"] - _ERRORS * error))
-        points, facets = _joined(points, found, facets, pairs.near.facets[found.pair], error)
+        overlap_corners = points_along(pairs, n, True, True, error)
+        gap = overlap_corners.gap - radius
+        is_near = (gap <= margin + overlap_corners.error) & (gap >= row["lower"] - _ERRORS * error)
+        overlap_corners = overlap_corners.take(is_near)
+        points, facets = _with_nearest(points, overlap_corners, facets, pairs.near.facets[overlap_corners.pair], error)
     flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
     size = float((flat.max(axis=0) - flat.min(axis=0)).max())
-    kept = chosen(flat, points.gap, points.error, most, max(_ERRORS * error, _EQUAL * size))
-    points, facets = points.take(kept), facets[kept]
+    selected = reduce_manifold(flat, points.gap, points.error, max_contacts, max(_ERRORS * error, _EQUAL * size))
+    points, facets = points.take(selected), facets[selected]
     distance = points.gap - radius
-    middle = 0.5 * (points.a + points.b) + 0.5 * (one.radius - other.radius) * n + origin
+    middle = 0.5 * (points.a + points.b) + 0.5 * (packed_a.radius - packed_b.radius) * n + origin
     half = 0.5 * distance[:, None] * n
-    bound = points.error + 8.0 * error + one.slop + other.slop
-    return rows_of([Finished(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+    bound = points.error + 8.0 * error + packed_a.slop + packed_b.slop
+    return rows_of([PatchContacts(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
 
 
-def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> np.ndarray:
+def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     """Rows for a half-space A and anything but one: corners of B within the margin of the plane, or below it."""
     body = hull_of(body_of(B)) if B.meshed else B
     packed = body.parts()[0][0]
@@ -89,34 +93,37 @@ def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, most: int) -> n
     points = _nearest(row, A.parts()[0][0], packed, n, origin)
     if packed.kind == POINTS:
         corners, numbers = _corners_of(B, packed)
-        low = turned(X_WB[:3, :3], corners) + shift
+        low = rotated(X_WB[:3, :3], corners) + shift
     else:
-        found, _ = _support(packed, X_WB[:3, :3], shift, -n, error)
-        low = found.reshape(-1, 3)
+        triangles, _ = _support(packed, X_WB[:3, :3], shift, -n, error)
+        low = triangles.reshape(-1, 3)
         numbers = np.full(len(low), -1)
     gap = (low * n).sum(axis=1)
     near = gap - packed.radius <= margin + 32.0 * error
     low, gap = low[near], gap[near]
     slack = float(row["upper"] - row["lower"]) + 32.0 * error
-    more = Points(np.arange(len(gap)), low - gap[:, None] * n, low, gap, np.full(len(gap), slack))
-    points, facets = _joined(points, more, facets, np.stack([np.full(len(gap), -1), numbers[near]], axis=1), error)
+    corners_of_faces = Points(np.arange(len(gap)), low - gap[:, None] * n, low, gap, np.full(len(gap), slack))
+    corner_facets = np.stack([np.full(len(gap), -1), numbers[near]], axis=1)
+    points, facets = _with_nearest(points, corners_of_faces, facets, corner_facets, error)
     flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
     size = float((flat.max(axis=0) - flat.min(axis=0)).max())
-    kept = chosen(flat, points.gap, points.error, most, max(_ERRORS * error, _EQUAL * size))
-    points, facets = points.take(kept), facets[kept]
+    selected = reduce_manifold(flat, points.gap, points.error, max_contacts, max(_ERRORS * error, _EQUAL * size))
+    points, facets = points.take(selected), facets[selected]
     distance = points.gap - packed.radius
     middle = 0.5 * (points.a + points.b) - 0.5 * packed.radius * n + origin
     half = 0.5 * distance[:, None] * n
     bound = points.error + 8.0 * error + packed.slop
-    return rows_of([Finished(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+    return rows_of([PatchContacts(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
 
 
-def _joined(nearest: Points, more: Points, facets: np.ndarray, others: np.ndarray, error: float) -> tuple[Points, np.ndarray]:
+def _with_nearest(
+    nearest: Points, corners_of_faces: Points, facets: np.ndarray, others: np.ndarray, error: float
+) -> tuple[Points, np.ndarray]:
     """The corners of faces; and the nearest points, with their facets, where no corner is as near."""
     known = nearest.gap[0] + nearest.error[0] + _ERRORS * error
-    if len(more.gap) and (more.gap - more.error).min() <= known:
-        return more, others
-    return Points(*(np.concatenate(both) for both in zip(nearest, more))), np.concatenate([facets, others])
+    if len(corners_of_faces.gap) and (corners_of_faces.gap - corners_of_faces.error).min() <= known:
+        return corners_of_faces, others
+    return Points(*(np.concatenate(both) for both in zip(nearest, corners_of_faces))), np.concatenate([facets, others])
 
 
 def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
@@ -124,8 +131,8 @@ def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
     row = answer_batch(A, B, X_WA[None], X_WB[None], Question(False, margin))[0]
     if np.isneginf(row["distance"]):
         raise UnsupportedQuery(
-            f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the way out; "
-            "collide() still answers"
+            f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the "
+            "way out; collide() still answers"
         )
     if row["beyond"] or row["lower"] > margin:
         return None
@@ -140,19 +147,21 @@ def _apart(row) -> float:
     return max(0.0, -float(row["lower"])) if row["hit"] else 0.0
 
 
-def _nearest(row, one: PackedConvex, other: PackedConvex, n, origin) -> Points:
+def _nearest(row, packed_a: PackedConvex, packed_b: PackedConvex, n, origin) -> Points:
     """The points of `distance`, moved back to the cores."""
-    gap = np.array([float(row["distance"]) + one.radius + other.radius])
-    a = (row["point_a"] - one.radius * n - origin)[None]
+    gap = np.array([float(row["distance"]) + packed_a.radius + packed_b.radius])
+    a = (row["point_a"] - packed_a.radius * n - origin)[None]
     bracket = max(row["upper"] - row["distance"], row["distance"] - row["lower"])
     return Points(np.array([-1]), a, a + gap[:, None] * n, gap, np.array([float(bracket)]))
 
 
-def _error(one: PackedConvex, X_WA, other: PackedConvex, X_WB) -> float:
+def _error(packed_a: PackedConvex, X_WA, packed_b: PackedConvex, X_WB) -> float:
     """Bound of the error of a coordinate seen from A's origin."""
-    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in ((one, X_WA), (other, X_WB)))
-    if HALFSPACE in (one.kind, other.kind):
-        reach += sum(abs(float(p.params[3])) / max(1e-300, float(lengths_of(p.params[:3]))) for p in (one, other) if p.kind == HALFSPACE)
+    both = packed_a, packed_b
+    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in zip(both, (X_WA, X_WB)))
+    if HALFSPACE in (packed_a.kind, packed_b.kind):
+        planes = (p.params for p in both if p.kind == HALFSPACE)
+        reach += sum(abs(float(plane[3])) / max(1e-300, float(lengths_of(plane[:3]))) for plane in planes)
     return 8.0 * _U * reach
 
 
@@ -164,8 +173,8 @@ def _product(a, b) -> Pairs:
         Side(ids[k], corners[k], normals_of(corners)[k], np.zeros((len(k), 3), dtype=np.int64))
         for corners, ids, k in ((corners_a, ids_a, i), (corners_b, ids_b, j))
     ]
-    none = np.zeros(len(i))
-    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), none > 0.0, none, none, np.zeros((len(i), 3)), np.zeros((len(i), 3)))
+    zeros, points = np.zeros(len(i)), np.zeros((len(i), 3))
+    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), zeros > 0.0, zeros, zeros, points, points)
     return Pairs(near, *sides)
 
 
@@ -175,14 +184,14 @@ def _support(packed: PackedConvex, R, shift, n, error: float) -> tuple[np.ndarra
     Of curved faces a polygon within them; none where the body has but a point there.
     """
     if packed.kind == POINTS:
-        corners, ids = _hull_support(packed, turned(R, packed.points) + shift, n, error)
+        corners, ids = _hull_support(packed, rotated(R, packed.points) + shift, n, error)
     else:
         local = (R * n[:, None]).sum(axis=0)
         points = _round_support(packed, local / lengths_of(local))
         corners = np.array([[points[0], points[k], points[k + 1]] for k in range(1, len(points) - 1)]).reshape(-1, 3, 3)
         if len(points) == 2:
             corners = points[[0, 1, 1]][None]
-        corners = turned(R, corners) + shift
+        corners = rotated(R, corners) + shift
         ids = np.full(len(corners), -1)
     return corners, ids
 
@@ -208,17 +217,17 @@ def _hull_support(packed: PackedConvex, points: np.ndarray, n, error: float) -> 
     return np.stack([some[0], far, far])[None], np.array([-1])
 
 
-_kept: dict[bytes, np.ndarray] = {}
-_MOST_KEPT = 512
+_hull_facets: dict[bytes, np.ndarray] = {}
+_MAX_HULLS = 512
 
 
 def _facets(content: bytes, packed: PackedConvex) -> np.ndarray:
     """(f, 3) facets of the hull of the points, of flat ones from both sides; kept for shapes asked about lately."""
-    if content not in _kept:
-        while len(_kept) >= _MOST_KEPT:
-            _kept.pop(next(iter(_kept)), None)
-        _kept[content] = convex_hull(packed.points).facets
-    return _kept[content]
+    if content not in _hull_facets:
+        while len(_hull_facets) >= _MAX_HULLS:
+            _hull_facets.pop(next(iter(_hull_facets)), None)
+        _hull_facets[content] = convex_hull(packed.points).facets
+    return _hull_facets[content]
 
 
 def _corners_of(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarray]:
@@ -235,7 +244,9 @@ def _corners_of(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndar
 
 
 def _round_support(packed: PackedConvex, n: np.ndarray) -> np.ndarray:
-    """Points of a curved body's face or line that supports the unit vector n, in its own frame; none of an ellipsoid."""
+    """Points of a curved body's face or line that supports the unit vector n, in its own frame; none of an
+    ellipsoid.
+    """
     aside = math.hypot(n[0], n[1])
     x, y = (n[0] / aside, n[1] / aside) if aside > _EQUAL else (1.0, 0.0)
     radius, half = float(packed.params[0]), float(packed.params[1])
@@ -251,9 +262,9 @@ def _round_support(packed: PackedConvex, n: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=2)
-def _circle(many: int) -> np.ndarray:
-    turn = 2.0 * np.pi * np.arange(many) / many
-    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
+def _circle(n: int) -> np.ndarray:
+    angles = 2.0 * np.pi * np.arange(n) / n
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def _disc(x: float, y: float, radius: float, z: float) -> np.ndarray:

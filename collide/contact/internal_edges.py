@@ -1,10 +1,10 @@
-"""Which pairs of facets hang together, and which nearest points are local ones: what keeps inner edges from showing."""
+"""Which pairs of facets are connected, and whose nearest points are local minima: no contacts at internal edges."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from collide.contact.contact_facets import Pairs, Side, Topology, crossed, facing, lengths_of, turned
+from collide.contact.contact_facets import Pairs, Side, Topology, cross, facing, lengths_of, rotated
 from collide.lowering.facet_bodies import Body
 
 #: Sines of angles that count as none.
@@ -14,24 +14,26 @@ _ON = 2.0**-30
 
 
 class Links:
-    """Pairs that share a corner on both sides, or a facet on one and a corner on the other."""
+    """Connections of pairs of facets: two pairs share a corner on both bodies, or a facet on one, a corner on the
+    other.
+    """
 
-    def __init__(self, pairs: Pairs, many_b: int):
-        keys = pairs.a.ids[:, :, None] * many_b + pairs.b.ids[:, None, :]
+    def __init__(self, pairs: Pairs, n_corners_b: int):
+        keys = pairs.a.ids[:, :, None] * n_corners_b + pairs.b.ids[:, None, :]
         _, self._keys = np.unique(keys.reshape(-1), return_inverse=True)
         self._keys = self._keys.reshape(-1, 9)
-        self._many = int(self._keys.max()) + 1 if len(keys) else 0
+        self._n_keys = int(self._keys.max()) + 1 if len(keys) else 0
 
     def reached(self, seeds: np.ndarray, among: np.ndarray) -> np.ndarray:
-        """(k,) bool: the seeds, and what of ``among`` hangs together with them, step by step."""
-        found = seeds.copy()
-        lit = np.zeros(self._many, dtype=bool)
-        fresh = found
-        while fresh.any():
-            lit[self._keys[fresh]] = True
-            fresh = among & ~found & lit[self._keys].any(axis=1)
-            found |= fresh
-        return found
+        """(k,) bool: the seeds (k,), and the pairs of ``among`` (k,) that are connected with them by such pairs."""
+        pairs_reached = seeds.copy()
+        is_reached = np.zeros(self._n_keys, dtype=bool)
+        new_pairs = pairs_reached
+        while new_pairs.any():
+            is_reached[self._keys[new_pairs]] = True
+            new_pairs = among & ~pairs_reached & is_reached[self._keys].any(axis=1)
+            pairs_reached |= new_pairs
+        return pairs_reached
 
 
 def local_minima(pairs: Pairs, u: np.ndarray, slack: np.ndarray, A: Body, B: Body, topologies, poses) -> np.ndarray:
@@ -54,14 +56,15 @@ def _leaves(side: Side, point, u, slack, topology: Topology, body: Body, R, shif
     pair = np.repeat(rows, end - begin)
     within = np.arange(len(pair)) - np.repeat(np.cumsum(end - begin) - (end - begin), end - begin)
     facet = topology.fans[begin[pair] + within]
-    own = np.where(held, side.ids, -1)[pair]
-    has = (own[:, :, None] == topology.corners[facet][:, None, :]).any(axis=2) | (own < 0)
+    feature_ids = np.where(held, side.ids, -1)[pair]
+    has = (feature_ids[:, :, None] == topology.corners[facet][:, None, :]).any(axis=2) | (feature_ids < 0)
     around = has.all(axis=1)
     pair, facet = pair[around], facet[around]
-    corners = turned(R, body.tree.triangles[topology.place[facet]].reshape(-1, 3, 3)) + shift
+    corners = rotated(R, body.tree.triangles[topology.place[facet]].reshape(-1, 3, 3)) + shift
     away = corners - point[pair][:, None]
     rise = (away * u[pair][:, None]).sum(axis=2)
-    steep = (rise > slack[pair][:, None] * lengths_of(away) + _ON * lengths_of(corners[:, 1] - corners[:, 0])[:, None]).any(axis=1)
+    least = slack[pair][:, None] * lengths_of(away) + _ON * lengths_of(corners[:, 1] - corners[:, 0])[:, None]
+    steep = (rise > least).any(axis=1)
     good = np.ones(len(point), dtype=bool)
     good[pair[steep]] = False
     if topology.solid:
@@ -71,20 +74,20 @@ def _leaves(side: Side, point, u, slack, topology: Topology, body: Body, R, shif
     return good
 
 
-def _weighted(corners: np.ndarray, point: np.ndarray, many: np.ndarray) -> np.ndarray:
+def _weighted(corners: np.ndarray, point: np.ndarray, n_held: np.ndarray) -> np.ndarray:
     """Normals, times the angle at the point where that is a corner.
 
     J. A. Bærentzen, H. Aanæs, "Signed distance computation using the angle weighted pseudonormal" (2005).
     """
-    n = crossed(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    n = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = lengths_of(n)
     n = np.where((lengths > 0.0)[:, None], n / np.where(lengths > 0.0, lengths, 1.0)[:, None], 0.0)
     away = corners - point[:, None]
     at = np.argmin(lengths_of(away), axis=1)
     rows = np.arange(len(at))
     p, q = corners[rows, (at + 1) % 3] - corners[rows, at], corners[rows, (at + 2) % 3] - corners[rows, at]
-    angle = np.arctan2(lengths_of(crossed(p, q)), (p * q).sum(axis=1))
-    return n * np.where(many == 1, angle, 1.0)[:, None]
+    angle = np.arctan2(lengths_of(cross(p, q)), (p * q).sum(axis=1))
+    return n * np.where(n_held == 1, angle, 1.0)[:, None]
 
 
 def _feature(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -110,13 +113,13 @@ def _feature(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 def snapped(pairs: Pairs, k: int, u: np.ndarray, slack: float, A: Body, B: Body) -> np.ndarray:
     """The normal of a facet of pair k, or the cross product of two of its edges, where u is that but for rounding."""
-    one, other = pairs.a.normals[k], pairs.b.normals[k]
+    normal_a, normal_b = pairs.a.normals[k], pairs.b.normals[k]
     edges = [T[[1, 2, 0]] - T for T in (pairs.a.corners[k], pairs.b.corners[k])]
-    crosses = crossed(edges[0][:, None], edges[1][None]).reshape(-1, 3)
+    crosses = cross(edges[0][:, None], edges[1][None]).reshape(-1, 3)
     lengths = lengths_of(crosses)
-    clear = lengths > FLAT * (lengths_of(edges[0])[:, None] * lengths_of(edges[1])[None]).ravel()
-    guesses = np.concatenate([[one, other], crosses[clear] / lengths[clear][:, None]])
-    off = lengths_of(crossed(guesses, u))
+    well_conditioned = lengths > FLAT * (lengths_of(edges[0])[:, None] * lengths_of(edges[1])[None]).ravel()
+    guesses = np.concatenate([[normal_a, normal_b], crosses[well_conditioned] / lengths[well_conditioned][:, None]])
+    off = lengths_of(cross(guesses, u))
     off[~guesses.any(axis=1)] = np.inf
     for group in (slice(0, 2), slice(2, None)):  # faces first
         if len(off[group]) and off[group].min() <= slack:

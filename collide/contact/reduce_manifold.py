@@ -1,4 +1,4 @@
-"""A few points that stand for all of a patch: the deepest, and those that span the greatest area."""
+"""Manifold reduction: of a patch's points the deepest, and those that span the greatest area."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ import numpy as np
 _STEEP, _LOWEST = 2.0, 512
 
 
-def chosen(flat: np.ndarray, gap: np.ndarray, error: np.ndarray, most: int, tolerance: float) -> list[int]:
-    """Numbers of the points kept, the one of least gap first, then around the patch.
+def reduce_manifold(
+    flat: np.ndarray, gap: np.ndarray, error: np.ndarray, max_points: int, tolerance: float
+) -> list[int]:
+    """Indices of at most ``max_points`` points, the one of least gap first, then around the patch.
 
     flat : (k, 2) places in the plane across the normal.   gap, error : (k,).   tolerance : lengths below it are
     rounding [m].
-    Corners of the convex hull are kept, and the point of least gap where no corner is as deep; of more than ``most``
-    of them those that span the greatest area, taken one by one. Equal input gives equal output. O(k log k).
+    Corners of the convex hull are kept, and the point of least gap where no corner is as deep; of more than
+    ``max_points`` of them those that span the greatest area, taken one by one. Equal input gives equal output. O(k log
+    k).
     """
     order = np.lexsort((flat[:, 1], flat[:, 0], gap))
     corners = _open_hull(flat, gap, order[:_LOWEST], tolerance)
@@ -24,23 +27,23 @@ def chosen(flat: np.ndarray, gap: np.ndarray, error: np.ndarray, most: int, tole
     if as_deep:
         deepest = min(as_deep, key=lambda k: (np.round(gap[k] / max(tolerance, 1e-300)), *flat[k]))
         at = corners.index(deepest)
-        kept = corners[at:] + corners[:at]
+        selected = corners[at:] + corners[:at]
     else:
-        kept = [deepest, *corners]
-    return kept if len(kept) <= most else _widest(flat, kept, most)
+        selected = [deepest, *corners]
+    return selected if len(selected) <= max_points else _widest(flat, selected, max_points)
 
 
 def _open_hull(flat: np.ndarray, gap: np.ndarray, lowest: np.ndarray, tolerance: float) -> list[int]:
     """Corners of the hull of what is on no wall: that rises steeply from one of the lowest points."""
-    left = np.arange(len(gap))
+    remaining = np.arange(len(gap))
     while True:
-        corners = left[_hull(flat[left], gap[left], tolerance)]
+        corners = remaining[_hull(flat[remaining], gap[remaining], tolerance)]
         rise = gap[corners][:, None] - gap[lowest][None]
         aside = np.sqrt(np.square(flat[corners][:, None] - flat[lowest][None]).sum(axis=2))
         steep = (rise > _STEEP * aside + tolerance).any(axis=1)
         if not steep.any():
             return corners.tolist()
-        left = np.setdiff1d(left, corners[steep])
+        remaining = np.setdiff1d(remaining, corners[steep])
 
 
 def _hull(flat: np.ndarray, gap: np.ndarray, tolerance: float) -> list[int]:
@@ -77,20 +80,20 @@ def _hull(flat: np.ndarray, gap: np.ndarray, tolerance: float) -> list[int]:
     return lower[:-1] + upper[:-1] if len(lower) + len(upper) > 4 else [distinct[0], distinct[-1]]
 
 
-def _widest(flat: np.ndarray, kept: list[int], most: int) -> list[int]:
+def _widest(flat: np.ndarray, selected: list[int], max_points: int) -> list[int]:
     """The first, the farthest from it, then those that add most area, in the order given."""
     x, y = flat[:, 0].tolist(), flat[:, 1].tolist()
     taken = [0]
-    while len(taken) < most:
+    while len(taken) < max_points:
         best, at = -1.0, -1
-        for k in range(len(kept)):
+        for k in range(len(selected)):
             if k in taken:
                 continue
-            value = _added(x, y, [kept[i] for i in sorted(taken)], kept[k])
+            value = _added(x, y, [selected[i] for i in sorted(taken)], selected[k])
             if value > best:
                 best, at = value, k
         taken.append(at)
-    return [kept[i] for i in sorted(taken)]
+    return [selected[i] for i in sorted(taken)]
 
 
 def _added(x, y, ring: list[int], k: int) -> float:

@@ -99,10 +99,13 @@ class PoseTable(NamedTuple):
         return [sum(map(Fraction, entry), Fraction(0)) for entry in terms.tolist()]
 
 
-def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTable:
+def pose_table(
+    X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray, has_pose: np.ndarray | None = None
+) -> PoseTable:
     """Poses of k parts in the world.
 
     X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
+    has_pose : (k,) whether X_BP is not the identity, where that is known.
 
     A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
     the origin. Elsewhere the product is written out, so that a batch rounds as a single pose does.
@@ -113,10 +116,10 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     rows[:, 9:12] = p_WB
     rows[:, POSE_SLOP] = 0.0
     rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
-    identity = np.eye(4)
-    own = (X_BP != identity).any(axis=(1, 2))
+    own = has_own_pose(X_BP) if has_pose is None else has_pose
     if not own.any():
         return PoseTable(rows, NO_TERMS)
+    identity = np.eye(4)
     unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
     rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
     own = np.flatnonzero(own & ~unmoved)
@@ -132,6 +135,11 @@ def pose_table(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> PoseTab
     rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
     terms, rounded = terms[exact], rows[own[exact], :12]
     return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
+
+
+def has_own_pose(X_BP: np.ndarray) -> np.ndarray:
+    """(k,) bool: poses (k, 4, 4) that are not the identity."""
+    return (X_BP != np.eye(4)).any(axis=(1, 2))
 
 
 def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Whether points belong to a shape: `contains`, decided without rounding.
 
 Points are single-point hulls: what the engine proves about a shape and such a hull holds for the point. What it leaves
-open, next to curved surfaces and in nested unions, is decided in fractions by the shape's definition (`inside_by_definition.py`).
+open, next to curved surfaces and in nested unions, the shape's definition decides in fractions
+(`inside_by_definition.py`).
 """
 
 from __future__ import annotations
@@ -20,19 +21,19 @@ from collide.mesh.shell_volumes import without_area
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
-from collide.numerics.exact_points import cross, inner, integers, minus, on_one_grid, placed
-from collide.results import UNDECIDED as LEFT_OPEN
+from collide.numerics.exact_points import minus, on_one_grid, placed
+from collide.results import UNDECIDED as SIGN_OPEN
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
+from collide.surface_queries.checked_arguments import matched_count, refuse_rows, vectors
+from collide.surface_queries.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.surface_queries.inside_by_definition import holds
-from collide.surface_queries.raycast import as_it_is, matched_count, raycast, vectors
+from collide.surface_queries.raycast import raycast
 from collide.transforms import LARGEST, poses_as_given
 
 #: The facets without area of meshes that have been asked.
 _thin: WeakKeyDictionary[MeshTree, MeshTree | None] = WeakKeyDictionary()
-#: Directions tried where every segment of the kernel passes an edge.
-_DIRECTIONS = np.array([[89.0, 233, 610], [-1597, 377, 987], [144, -2584, 55], [-34, 21, -4181], [6765, -8, 13], [-3, -5, 10946]])
 
 
 def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
@@ -40,31 +41,40 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
 
     Parameters
     ----------
-    shape : a `Mesh` (a solid holds its facets and what they wind around; a surface its facets alone), or any other shape.
-    X_WA : (4, 4) pose of the shape, or (N, 4, 4), one a point.
-    points_W : (3,) or (N, 3) [m], within 1e50.
+    shape : a `Mesh` (a solid holds its facets and what they wind around; a surface its facets alone), or any other
+        shape.
+    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), one a point.
+    points_W : (3,) or (N, 3) in W [m], within 1e50.
+    check_poses : refuse matrices that are no rotation.
 
     Returns
     -------
-    bool for a single point at a single pose, bool[N] otherwise; the same one by one or in batches. About 1 µs a point for
-    solids, O(log n) for well-shaped ones.
+    bool for a single point at a single pose, bool[N] otherwise; the same one by one or in batches.
 
-    Raises InvalidPose; InvalidArgument for points that are not finite or beyond 1e50, or counts that do not match.
+    Raises
+    ------
+    InvalidArgument : points that are not finite or beyond 1e50, lengths of batches that do not match.
+    InvalidPose : matrices that are no pose.
+    UnsupportedQuery : next to the surface of a shape that has no definition in fractions.
+
+    Notes
+    -----
+    About 1 µs a point for solids, O(log n) for well-shaped ones: hierarchical winding numbers along segments. What
+    rounding leaves open is decided in integers.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}")
-    points, one = vectors("contains", "points_W", points_W)
-    beyond = np.abs(points).max(axis=1) > LARGEST
-    if beyond.any():
-        k = int(np.argmax(beyond))
-        raise InvalidArgument(f"contains: points_W[{k}] exceeds {LARGEST:g}, got {points[k].tolist()}")
+        raise InvalidArgument(
+            f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
+        )
+    points, single_point = vectors("contains", "points_W", points_W)
+    refuse_rows("contains", "points_W", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
     X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
     n = matched_count("contains", X_WA=len(X_WA), points_W=len(points))
     points = np.ascontiguousarray(np.broadcast_to(points, (n, 3)))
     if n == 0:
         return np.zeros(0, dtype=bool)
     answer = _in_mesh(shape, X_WA, points) if isinstance(shape, Mesh) else _in_convex(shape, X_WA, points)
-    return bool(answer[0]) if one and single_pose else answer
+    return bool(answer[0]) if single_point and single_pose else answer
 
 
 def _at(points: np.ndarray) -> np.ndarray:
@@ -97,8 +107,9 @@ def _in_mesh(mesh: Mesh, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
     answer = where != OUTSIDE
     thin = thin_facets(mesh, body.tree)
     if thin is not None:  # points on facets without area count, too
-        left = np.flatnonzero(~answer)
-        answer[left] = surfaces_meet(thin, _point_tree(), _some(X_WA, left), _at(points[left])) if len(left) else False
+        rest = np.flatnonzero(~answer)
+        if len(rest):
+            answer[rest] = surfaces_meet(thin, _point_tree(), _some(X_WA, rest), _at(points[rest]))
     return answer
 
 
@@ -117,22 +128,18 @@ def thin_facets(mesh: Mesh, tree: MeshTree) -> MeshTree | None:
 
 def winds_around(mesh: Mesh, X_WA: np.ndarray, point: np.ndarray) -> bool:
     """Whether a solid's facets wind around a point that is on none of them, along rays that pass no edge."""
-    tree = body_of(mesh).tree
-    place = np.empty(len(tree.ids), dtype=np.int64)
-    place[tree.ids] = np.arange(len(place))
-    for ray in _DIRECTIONS:
-        direction = tuple(integers(ray)[0])
-        met = raycast(mesh, X_WA, point[None], ray[None], all_hits=True, check_poses=False)
-        passed, clear = 0, True
+    corners = FacetCorners(body_of(mesh).tree)
+    for direction in RAY_DIRECTIONS:
+        met = raycast(mesh, X_WA, point[None], np.array([direction], dtype=float), all_hits=True, check_poses=False)
+        crossings = []
         for facet in met.facet.tolist():
-            ((origin,), corners), _ = on_one_grid(as_it_is(point), placed(X_WA, tree.triangles[place[facet]].reshape(3, 3)))
-            a, b, c = (minus(corner, origin) for corner in corners)
-            sides = [inner(direction, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))]
-            clear = clear and 0 not in sides
-            passed += 1 if sides[0] > 0 else -1
-        if clear:
-            return passed > 0
-    raise UnsupportedQuery(f"contains: every ray tried from {point.tolist()} passes an edge of the mesh; please report it")
+            ((origin,), triangle), _ = on_one_grid(exact_point(point), placed(X_WA, corners[facet]))
+            crossings.append(ray_crossing(direction, *(minus(corner, origin) for corner in triangle)))
+        if None not in crossings:
+            return sum(crossings) > 0
+    raise UnsupportedQuery(
+        f"contains: every ray tried from {point.tolist()} passes an edge of the mesh; please report it"
+    )
 
 
 # --- convex shapes, and unions ------------------------------------------------------------------
@@ -143,6 +150,6 @@ _POINT = ConvexHull(np.zeros((1, 3)))
 def _in_convex(shape: Shape, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
     rows = answer_batch(shape, _POINT, X_WA, _at(points), Question(False, 0.0, depths=False))
     answer = rows["hit"].copy()
-    for k in np.flatnonzero(answer & (rows["how"] == LEFT_OPEN)).tolist():
+    for k in np.flatnonzero(answer & (rows["how"] == SIGN_OPEN)).tolist():
         answer[k] = holds(shape, [_pose(X_WA, k)], points[k])
     return answer

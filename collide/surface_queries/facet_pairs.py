@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidArgument
-from collide.lowering.facet_bodies import Body, facet_body
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, self_hits
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-from collide.surface_queries.raycast import matched_count
-from collide.transforms import as_poses
+from collide.surface_queries.checked_arguments import two_bodies
 
 
 class FacetPairs(NamedTuple):
@@ -56,46 +54,55 @@ def facet_pairs(A: Shape, B: Shape, X_WA, X_WB, *, first: bool = False, check_po
     ----------
     A, B : shapes of which one at least is a `Mesh`. A `Box` or a `ConvexHull` without a radius takes part with the
         triangles of its hull, numbered as in the facets of distances.
-    X_WA, X_WB : (4, 4) poses, or batches (N, 4, 4); a single one goes with every pose of the other's batch.
-    first : only one pair a pose, where there is any: the same one every time, found several times faster.
+    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single one goes with every pose of the other's
+        batch.
+    first : only one pair a pose, where there is any: the same one every time, several times faster.
+    check_poses : refuse matrices that are no rotation.
 
     Returns
     -------
-    FacetPairs. Facets are closed: touching in a point is meeting. A body wholly inside a solid has no pairs with it, though
-    `collide` is True. Swapped arguments give the same pairs, swapped; ``first`` may give another one.
+    FacetPairs. Facets are closed: touching in a point is meeting. A body wholly inside a solid has no pairs with it,
+    though `collide` is True. Swapped arguments give the same pairs, swapped; ``first`` may give another one.
 
-    O(n log n) pairs of boxes for local meshes (Erickson, theorem 3.6; counted in docs/locality.md), n² for any others at worst.
-    Raises InvalidPose; InvalidArgument; UnsupportedQuery for shapes without facets, by name.
+    Raises
+    ------
+    InvalidArgument : no mesh among the shapes, lengths of batches that do not match.
+    InvalidPose : matrices that are no pose.
+    UnsupportedQuery : shapes without facets, by name.
+
+    Notes
+    -----
+    O(n log n) pairs of boxes for local meshes (J. Erickson, "Local polyhedra and geometric graphs" (2005), theorem 3.6;
+    counted in docs/locality.md), n² for any others at worst.
     """
-    one, other, X_WA, X_WB = two_bodies("facet_pairs", A, B, X_WA, X_WB, check_poses)
-    return FacetPairs(*(first_hits if first else all_hits)(one.tree, other.tree, X_WA, X_WB))
-
-
-def two_bodies(caller: str, A, B, X_WA, X_WB, check: bool) -> tuple[Body, Body, np.ndarray, np.ndarray]:
-    """(body, body, poses, poses) of a question about the facets of two shapes; a single pair of poses stays single."""
-    one, other = facet_body(A, caller), facet_body(B, caller)
-    if not (A.meshed or B.meshed):
-        raise InvalidArgument(
-            f"{caller}: {type(A).__name__} and {type(B).__name__}: one of them at least must be a Mesh; "
-            "Mesh(*...) of a hull's vertices and facets is one"
-        )
-    X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    n = matched_count(caller, X_WA=len(X_WA), X_WB=len(X_WB))
-    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    return one, other, X_WA, X_WB
+    body_a, body_b, X_WA, X_WB = two_bodies("facet_pairs", A, B, X_WA, X_WB, check_poses)
+    return FacetPairs(*(first_hits if first else all_hits)(body_a.tree, body_b.tree, X_WA, X_WB))
 
 
 def self_collisions(mesh: Mesh) -> SelfCollisions:
     """Pairs of facets of one mesh that share more than the corners and edges they have in common, decided exactly.
 
-    mesh : corners are the same where their coordinates are, as everywhere; facet numbers are rows of ``mesh.faces``.
+    Parameters
+    ----------
+    mesh : corners are the same where their coordinates are, as everywhere.
 
-    Facets without a common corner must not meet at all. With one, neither may reach across the side opposite to it of the
-    other. With two, they must not be folded flat onto each other. With three they are one facet twice: duplicates and
-    back-to-back facets are pairs. A mesh without any is embedded, as simulators and booleans of solids want it.
+    Returns
+    -------
+    SelfCollisions : facet numbers are rows of ``mesh.faces``. A mesh without any pair is embedded, as simulators and
+    booleans of solids want it.
 
-    25 ms for 69,451 facets of a scan, O(n log n) for local meshes without any. Raises InvalidArgument for anything but a Mesh.
+    Raises
+    ------
+    InvalidArgument : anything but a Mesh.
+
+    Notes
+    -----
+    Facets without a common corner must not meet at all. With one, neither may reach across the side opposite to it of
+    the other. With two, they must not be folded flat onto each other. With three they are one facet twice: duplicates
+    and back-to-back facets are pairs. 25 ms for 69,451 facets of a scan, O(n log n) for local meshes without any.
     """
     if not isinstance(mesh, Mesh):
-        raise InvalidArgument(f"self_collisions takes a Mesh, got {type(mesh).__name__}: convex shapes do not cross themselves")
+        raise InvalidArgument(
+            f"self_collisions takes a Mesh, got {type(mesh).__name__}: convex shapes do not cross themselves"
+        )
     return SelfCollisions(*self_hits(mesh.tree))

@@ -1,7 +1,8 @@
 """Whether a point belongs to a shape, by the shape's definition, in fractions: no rounding, and no kernel decides.
 
-For the few points that `contains` finds left open: next to curved surfaces, and on those of parts whose poses were multiplied
-out. ``poses`` lead from the world inwards; a point is seen from the last frame by inverting each matrix exactly.
+For the few points that the engine leaves open: next to curved surfaces, and on those of parts whose poses were
+multiplied and rounded. ``poses`` lead from the world inwards; each matrix is inverted exactly to see a point from the
+last frame.
 """
 
 from __future__ import annotations
@@ -17,11 +18,10 @@ from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Cone, Cylinder, Ellipsoid, Halfspace
 from collide.shapes.shape import Shape
+from collide.surface_queries.facet_geometry import RAY_DIRECTIONS, ray_crossing
 
-#: A facet this much farther than it may be, in units of the largest number around, is not looked at in fractions.
-_CLEAR = 1e-9
-#: Directions of rays tried, where one passes an edge.
-_DIRECTIONS = ((89, 233, 610), (-1597, 377, 987), (144, -2584, 55), (-34, 21, -4181), (6765, -8, 13), (-3, -5, 10946))
+#: A facet this much farther than it may be, in units of the largest coordinate, is not looked at in fractions.
+_SLACK = 1e-9
 
 _Point = tuple[Fraction, Fraction, Fraction]
 
@@ -43,7 +43,8 @@ def holds(shape: Shape, poses: list[np.ndarray], point: np.ndarray) -> bool:
     if isinstance(shape, Halfspace):
         return inner(_fractions(shape.normal), local) <= Fraction(shape.offset)
     if isinstance(shape, HPolytope):
-        return all(inner(_fractions(n), local) <= Fraction(offset) for n, offset in zip(shape.normals, shape.offsets.tolist()))
+        planes = zip(shape.normals, shape.offsets.tolist())
+        return all(inner(_fractions(n), local) <= Fraction(offset) for n, offset in planes)
     if has_facets(shape):
         return _in_facets(shape, poses, world, local)
     raise UnsupportedQuery(f"contains: rounding leaves open whether {point.tolist()} is in a {type(shape).__name__}")
@@ -61,7 +62,7 @@ def _in_facets(shape: Shape, poses: list[np.ndarray], world: _Point, local: _Poi
     size = np.abs(placed).max() + np.abs(here).max() + sum(np.abs(X[:3, 3]).max() for X in poses)
     away = np.maximum(placed.min(axis=1) - here, here - placed.max(axis=1)).max(axis=1)
     square = Fraction(body.radius) ** 2
-    for k in np.flatnonzero(away <= body.radius + _CLEAR * size).tolist():
+    for k in np.flatnonzero(away <= body.radius + _SLACK * size).tolist():
         if _square_from_facet(world, *(_moved(_fractions(corner), poses) for corner in corners[k])) <= square:
             return True
     return body.solid and _winds_around(corners, local)
@@ -70,24 +71,15 @@ def _in_facets(shape: Shape, poses: list[np.ndarray], world: _Point, local: _Poi
 def _winds_around(corners: np.ndarray, point: _Point) -> bool:
     """Whether facets (m, 3, 3) wind around a point on none of them, in their own frame."""
     away = corners - np.array([float(v) for v in point])
-    for direction in _DIRECTIONS:
+    for direction in RAY_DIRECTIONS:
         d = np.array(direction, dtype=float)
         sides = np.stack([(np.cross(away[:, i], away[:, (i + 1) % 3]) * d).sum(axis=1) for i in range(3)])
-        slack = _CLEAR * np.abs(d).max() * (np.square(np.abs(away).max(axis=(1, 2))) + np.square(np.abs(corners).max()))
+        slack = _SLACK * np.abs(d).max() * (np.square(np.abs(away).max(axis=(1, 2))) + np.square(np.abs(corners).max()))
         missed = (sides > slack).any(axis=0) & (sides < -slack).any(axis=0)
-        passed, clear = 0, True
-        for k in np.flatnonzero(~missed).tolist():
-            a, b, c = (minus(_fractions(corner), point) for corner in corners[k])
-            told = [inner(direction, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))]
-            if max(told) > 0 > min(told):
-                continue
-            if 0 in told:  # through an edge or a corner, or along the facet
-                clear = False
-                break
-            if inner(a, cross(b, c)) * told[0] > 0:  # ahead of the point, not behind it
-                passed += 1 if told[0] > 0 else -1
-        if clear:
-            return passed > 0
+        near = np.flatnonzero(~missed).tolist()
+        crossings = [ray_crossing(direction, *(minus(_fractions(p), point) for p in corners[k])) for k in near]
+        if None not in crossings:
+            return sum(crossings) > 0
     raise UnsupportedQuery("contains: every ray tried passes an edge of the facets; please report it")
 
 

@@ -1,9 +1,9 @@
 """The overlay of two surfaces: pairs of facets that meet, and what each pair shares.
 
-J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3: transferring fields between meshes of one domain
-begins with the pairs of elements that overlap. Pairs are found by the exact walk. What a pair shares is a point, a segment,
-or, of facets in one plane, a polygon: which of them is told by signs that doubles are sure of, and otherwise by clipping one
-facet with the other in integers.
+J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3: transferring fields between meshes of one
+domain begins with the pairs of elements that overlap. Pairs are found by the exact walk. What a pair shares is a point,
+a segment, or, of facets in one plane, a polygon: signs that doubles prove tell which, and otherwise
+clipping one facet with the other in integers.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.lowering.facet_bodies import Body
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.numerics.exact_points import Point, cross, inner, minus, on_one_grid, placed, rounded
 from collide.shapes.shape import Shape
-from collide.surface_queries.facet_pairs import two_bodies
+from collide.surface_queries.checked_arguments import two_bodies
+from collide.surface_queries.facet_geometry import FacetCorners
 
 #: What a pair of facets shares.
 POINT, SEGMENT, POLYGON = 1, 2, 3
@@ -53,78 +53,83 @@ def overlay(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> Over
 
     Parameters
     ----------
-    A, B : shapes of which one at least is a `Mesh`; a `Box` or a `ConvexHull` without a radius takes part with the triangles
-        of its hull.
-    X_WA, X_WB : (4, 4) poses, or batches (N, 4, 4); a single one goes with every pose of the other's batch.
+    A, B : shapes of which one at least is a `Mesh`; a `Box` or a `ConvexHull` without a radius takes part with the
+        triangles of its hull.
+    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single one goes with every pose of the other's
+        batch.
+    check_poses : refuse matrices that are no rotation.
 
     Returns
     -------
-    Overlay. Pairs and kinds are exact; coordinates are rounded, with the bound there. Lengths and areas of pieces worked
-    out in integers are good to 4 units in the last place; others to what the bound of their ends allows. Facets that only
-    touch are part of it: neighbours of a common edge of two triangulations share segments of no area. Swapped arguments give
-    the same pieces, their polygons run the other way round where the facets face each other.
+    Overlay. Pairs and kinds are exact; coordinates are rounded, with the bound there. Lengths and areas of pieces
+    worked out in integers are good to 4 units in the last place; others to what the bound of their ends allows. Facets
+    that only touch are part of it: neighbours of a common edge of two triangulations share segments of no area. Swapped
+    arguments give the same pieces; their polygons run the other way round where the facets face each other.
 
-    For the transfer of fields between two triangulations of one surface take the polygons: their areas add up to
-    that of the common part. They are polygons only where facets lie in one plane exactly, as given.
+    Raises
+    ------
+    InvalidArgument : no mesh among the shapes, lengths of batches that do not match.
+    InvalidPose : matrices that are no pose.
+    UnsupportedQuery : shapes without facets, by name.
 
-    As `facet_pairs`, and then 1 µs a pair that crosses clearly and some 0.2 ms for any other.
-    Raises InvalidPose; InvalidArgument; UnsupportedQuery for shapes without facets, by name.
+    Notes
+    -----
+    For the transfer of fields between two triangulations of one surface take the polygons: their areas add up to that
+    of the common part (J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3). They are polygons only
+    where facets lie in one plane exactly, as handed in. Costs what `facet_pairs` does, 1 µs a pair that crosses
+    clearly, and some 0.2 ms for any other.
     """
-    one, other, X_WA, X_WB = two_bodies("overlay", A, B, X_WA, X_WB, check_poses)
-    found = all_hits(one.tree, other.tree, X_WA, X_WB)
-    pose = np.repeat(np.arange(len(X_WA)), np.diff(found.starts))
-    own, theirs = _corners_of(one, found.pairs[:, 0]), _corners_of(other, found.pairs[:, 1])
-    ends, sure = _crossing_segments(own, theirs, X_WA[pose], X_WB[pose])
-    kind = np.where(sure, SEGMENT, 0).astype(np.int8)
-    counts = np.where(sure, 2, 0)
-    size = np.where(sure, np.sqrt(np.square(ends[:, 1] - ends[:, 0]).sum(axis=1)), 0.0)
-    settled = {}
-    for k in np.flatnonzero(~sure).tolist():
-        (P, Q), grid = on_one_grid(placed(X_WA[pose[k]], own[k]), placed(X_WB[pose[k]], theirs[k]))
-        settled[k], size[k] = _rounded_piece(common_piece(P, Q), grid)
-        counts[k] = len(settled[k])
+    body_a, body_b, X_WA, X_WB = two_bodies("overlay", A, B, X_WA, X_WB, check_poses)
+    hits = all_hits(body_a.tree, body_b.tree, X_WA, X_WB)
+    pose = np.repeat(np.arange(len(X_WA)), np.diff(hits.starts))
+    facets_a, facets_b = FacetCorners(body_a.tree)[hits.pairs[:, 0]], FacetCorners(body_b.tree)[hits.pairs[:, 1]]
+    ends, proven = _crossing_segments(facets_a, facets_b, X_WA[pose], X_WB[pose])
+    kind = np.where(proven, SEGMENT, 0).astype(np.int8)
+    counts = np.where(proven, 2, 0)
+    size = np.where(proven, np.sqrt(np.square(ends[:, 1] - ends[:, 0]).sum(axis=1)), 0.0)
+    exact_pieces = {}
+    for k in np.flatnonzero(~proven).tolist():
+        (a, b), grid = on_one_grid(placed(X_WA[pose[k]], facets_a[k]), placed(X_WB[pose[k]], facets_b[k]))
+        exact_pieces[k], size[k] = _rounded_piece(common_piece(a, b), grid)
+        counts[k] = len(exact_pieces[k])
         kind[k] = min(counts[k], POLYGON)
     starts = np.concatenate([[0], np.cumsum(counts)])
     corners = np.zeros((starts[-1], 3))
-    clear = starts[:-1][sure]
-    corners[clear], corners[clear + 1] = ends[sure, 0], ends[sure, 1]
-    for k, piece in settled.items():
+    segments = starts[:-1][proven]
+    corners[segments], corners[segments + 1] = ends[proven, 0], ends[proven, 1]
+    for k, piece in exact_pieces.items():
         corners[starts[k] : starts[k + 1]] = piece
-    return Overlay(found.pairs, found.starts.copy(), kind, corners, starts, size)
+    return Overlay(hits.pairs, hits.starts.copy(), kind, corners, starts, size)
 
 
-def _corners_of(body: Body, facets: np.ndarray) -> np.ndarray:
-    """(k, 3, 3) corners of facets in the body's frame."""
-    place = np.empty(len(body.tree.ids), dtype=np.int64)
-    place[body.tree.ids] = np.arange(len(place))
-    return body.tree.triangles[place[facets]].reshape(-1, 3, 3)
+# --- pairs that doubles settle ------------------------------------------------------------------
 
 
-# --- pairs that doubles are sure of -------------------------------------------------------------
-
-
-def _crossing_segments(P, Q, X, Y) -> tuple[np.ndarray, np.ndarray]:
-    """((k, 2, 3) ends of the common segments in W, (k,) bool whether they are sure and within the bound)."""
+def _crossing_segments(A: np.ndarray, B: np.ndarray, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
+    """Of facets A and B (k, 3, 3): ((k, 2, 3) ends of the common segments in W, (k,) bool: proven and within the
+    bound).
+    """
     with np.errstate(all="ignore"):
-        return _crossings(P, Q, X, Y)
+        return _crossings(A, B, X_WA, X_WB)
 
 
-def _crossings(P, Q, X, Y) -> tuple[np.ndarray, np.ndarray]:
-    P, error_p = _in_world(P, X)
-    Q, error_q = _in_world(Q, Y)
-    error = np.maximum(error_p, error_q)  # (k,) of every coordinate
-    largest = np.maximum(np.abs(P).max(axis=(1, 2)), np.abs(Q).max(axis=(1, 2)))
-    n, sides_q, limit_q = _sides(P, Q, error)
-    m, sides_p, limit_p = _sides(Q, P, error)
-    sure = (np.abs(sides_q) > limit_q[:, None]).all(axis=1) & (np.abs(sides_p) > limit_p[:, None]).all(axis=1)
-    sure &= (np.abs(np.sign(sides_q).sum(axis=1)) == 1) & (np.abs(np.sign(sides_p).sum(axis=1)) == 1)
-    on_p, error_on_p = _on_line(P, sides_p, limit_p, error)
-    on_q, error_on_q = _on_line(Q, sides_q, limit_q, error)
-    off = np.maximum(error_on_p, error_on_q)
+def _crossings(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
+    A, error_a = _in_world(A, X_WA)
+    B, error_b = _in_world(B, X_WB)
+    error = np.maximum(error_a, error_b)  # (k,) of every coordinate
+    largest = np.maximum(np.abs(A).max(axis=(1, 2)), np.abs(B).max(axis=(1, 2)))
+    n, sides_b, limit_b = _sides(A, B, error)
+    m, sides_a, limit_a = _sides(B, A, error)
+    proven = (np.abs(sides_b) > limit_b[:, None]).all(axis=1) & (np.abs(sides_a) > limit_a[:, None]).all(axis=1)
+    proven &= (np.abs(np.sign(sides_b).sum(axis=1)) == 1) & (np.abs(np.sign(sides_a).sum(axis=1)) == 1)
+    on_a, error_on_a = _on_line(A, sides_a, limit_a, error)
+    on_b, error_on_b = _on_line(B, sides_b, limit_b, error)
+    off = np.maximum(error_on_a, error_on_b)
     along = np.cross(n, m)
     along /= np.abs(along).max(axis=1, keepdims=True)
-    # Heights along a direction near that of the common line: off by 6 times the points' error, all differences included.
-    points = np.concatenate([on_p, on_q], axis=1)
+    # Heights along a direction near that of the common line: off by 6 times the points' error, all differences
+    # included.
+    points = np.concatenate([on_a, on_b], axis=1)
     points = points - points[:, :1]
     heights = (points * along[:, None]).sum(axis=2)
     # How far apart points are that are one by their heights: no farther than 2½ times that, where the longer of both
@@ -132,16 +137,16 @@ def _crossings(P, Q, X, Y) -> tuple[np.ndarray, np.ndarray]:
     lengths = np.abs(points[:, 1::2] - points[:, ::2]).max(axis=2)
     rises = np.abs(heights[:, 1::2] - heights[:, ::2])
     steep = ((rises >= 0.5 * lengths) & (lengths > 64.0 * off[:, None])).any(axis=1)
-    low_p, high_p = _in_order(on_p, heights[:, :2])
-    low_q, high_q = _in_order(on_q, heights[:, 2:])
+    low_a, high_a = _in_order(on_a, heights[:, :2])
+    low_b, high_b = _in_order(on_b, heights[:, 2:])
     h = np.sort(heights[:, :2], axis=1), np.sort(heights[:, 2:], axis=1)
-    start = np.where((h[0][:, 0] > h[1][:, 0])[:, None], low_p, low_q)
-    end = np.where((h[0][:, 1] < h[1][:, 1])[:, None], high_p, high_q)
+    start = np.where((h[0][:, 0] > h[1][:, 0])[:, None], low_a, low_b)
+    end = np.where((h[0][:, 1] < h[1][:, 1])[:, None], high_a, high_b)
     overlap = np.minimum(h[0][:, 1], h[1][:, 1]) - np.maximum(h[0][:, 0], h[1][:, 0])
     slack = 16.0 * off + 64.0 * _U * largest
-    sure &= steep & (overlap > slack)
-    sure &= 16.0 * off <= _PROMISE * largest
-    return np.stack([start, end], axis=1), sure
+    proven &= steep & (overlap > slack)
+    proven &= 16.0 * off <= _PROMISE * largest
+    return np.stack([start, end], axis=1), proven
 
 
 def _in_world(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -155,8 +160,9 @@ def _in_world(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _sides(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(normals of T, heights of points (k, 3, 3) over T's plane times the normal's length, bounds of their errors).
 
-    As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals by
-    4Lf + 2f² + 3uL², heights by 3 D times that, 3·(2L² + …)·(2E + 2uD), and 4u of the terms: below 40 L D f' with the larger of both f.
+    As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
+    by 4Lf + 2f² + 3uL², heights by 3 D times that, 3·(2L² + …)·(2E + 2uD), and 4u of the terms: below 40 L D f' with
+    the larger of both f.
     """
     u, v = T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]
     n = np.cross(u, v)
@@ -171,15 +177,16 @@ def _sides(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.nda
 def _on_line(T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """((k, 2, 3) where the two sides of T from its lonely corner cross the other's plane, (k,) bound of their errors).
 
-    A point a + (b − a) s / (s − t) is off by |b − a| · δ(s / (s − t)) ≤ |b − a| · 2 δ / (|s − t| − 2δ), and by E and rounding.
+    A point a + (b − a) s / (s − t) is off by |b − a| · δ(s / (s − t)) ≤ |b − a| · 2 δ / (|s − t| − 2δ), and by E and
+    rounding.
     """
     rows = np.arange(len(T))
     signs = np.sign(sides)
     lonely = np.argmax(signs == -np.sign(signs.sum(axis=1))[:, None], axis=1)
     a, s = T[rows, lonely], sides[rows, lonely]
     points, bound = [], np.zeros(len(T))
-    for turn in (1, 2):
-        b, t = T[rows, (lonely + turn) % 3], sides[rows, (lonely + turn) % 3]
+    for step in (1, 2):
+        b, t = T[rows, (lonely + step) % 3], sides[rows, (lonely + step) % 3]
         edge = b - a
         share = s / (s - t)
         points.append(a + edge * share[:, None])
@@ -203,17 +210,17 @@ _Rational = tuple[int, int, int, int]
 _Side = tuple[Point, int]
 
 
-def common_piece(P: list[Point], Q: list[Point]) -> list[_Rational]:
-    """What two closed triangles share: no point, one, two ends, or the corners of a polygon in order, P's way round.
+def common_piece(A: list[Point], B: list[Point]) -> list[_Rational]:
+    """What two closed triangles share: no point, one, two ends, or the corners of a polygon in order, A's way round.
 
-    P is cut by the half-spaces whose common part Q is; where only Q has an area, Q by those of P.
+    A is cut by the half-spaces whose common part B is; where only B has an area, B by those of A.
     """
-    if cross(minus(P[1], P[0]), minus(P[2], P[0])) == (0, 0, 0) != cross(minus(Q[1], Q[0]), minus(Q[2], Q[0])):
-        P, Q = Q, P
-    piece = _distinct([(*p, 1) for p in P])
-    if len(piece) == 3 and cross(minus(P[1], P[0]), minus(P[2], P[0])) == (0, 0, 0):
+    if cross(minus(A[1], A[0]), minus(A[2], A[0])) == (0, 0, 0) != cross(minus(B[1], B[0]), minus(B[2], B[0])):
+        A, B = B, A
+    piece = _distinct([(*p, 1) for p in A])
+    if len(piece) == 3 and cross(minus(A[1], A[0]), minus(A[2], A[0])) == (0, 0, 0):
         piece = _ends(piece)
-    for side in _half_spaces(Q):
+    for side in _half_spaces(B):
         piece = _cut(piece, side)
     return _without_flat_corners(piece)
 
@@ -222,7 +229,7 @@ def _half_spaces(T: list[Point]) -> list[_Side]:
     """Those whose common part a triangle is, with or without an area."""
     n = cross(minus(T[1], T[0]), minus(T[2], T[0]))
     if n != (0, 0, 0):
-        sides = [(n, T[0]), (_turned(n), T[0])]
+        sides = [(n, T[0]), (_negated(n), T[0])]
         sides += [(cross(minus(T[(k + 1) % 3], T[k]), n), T[k]) for k in range(3)]
     else:
         ends = _ends([(*p, 1) for p in T])
@@ -230,13 +237,13 @@ def _half_spaces(T: list[Point]) -> list[_Side]:
         e = minus(b, a)
         axes: list[Point] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
         flats = [cross(e, axis) for axis in axes] if e != (0, 0, 0) else axes
-        sides = [(normal, a) for flat in flats if flat != (0, 0, 0) for normal in (flat, _turned(flat))]
+        sides = [(normal, a) for flat in flats if flat != (0, 0, 0) for normal in (flat, _negated(flat))]
         if e != (0, 0, 0):
-            sides += [(e, b), (_turned(e), a)]
+            sides += [(e, b), (_negated(e), a)]
     return [(normal, inner(normal, through)) for normal, through in sides]
 
 
-def _turned(n: Point) -> Point:
+def _negated(n: Point) -> Point:
     return -n[0], -n[1], -n[2]
 
 
@@ -246,15 +253,15 @@ def _cut(piece: list[_Rational], side: _Side) -> list[_Rational]:
     heights = [nx * x + ny * y + nz * z - offset * w for x, y, z, w in piece]
     if max(heights, default=0) <= 0:
         return piece
-    kept: list[_Rational] = []
+    remaining: list[_Rational] = []
     for k, (p, s) in enumerate(zip(piece, heights)):
         if s <= 0:
-            kept.append(p)
+            remaining.append(p)
         q, t = piece[(k + 1) % len(piece)], heights[(k + 1) % len(piece)]
         if s * t < 0:
             # Both heights are over their own w: weights |t| and |s| of the homogeneous points meet at height 0.
-            kept.append(_reduced(*(abs(t) * x + abs(s) * y for x, y in zip(p, q))))
-    return _distinct(kept)
+            remaining.append(_reduced(*(abs(t) * x + abs(s) * y for x, y in zip(p, q))))
+    return _distinct(remaining)
 
 
 def _reduced(x: int, y: int, z: int, w: int) -> _Rational:
@@ -263,10 +270,7 @@ def _reduced(x: int, y: int, z: int, w: int) -> _Rational:
 
 
 def _distinct(piece: list[_Rational]) -> list[_Rational]:
-    found: dict[_Rational, None] = {}
-    for p in piece:
-        found[_reduced(*p)] = None
-    return list(found)
+    return list(dict.fromkeys(_reduced(*p) for p in piece))
 
 
 def _ends(piece: list[_Rational]) -> list[_Rational]:

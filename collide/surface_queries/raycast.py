@@ -1,7 +1,7 @@
 """Rays against the facets of posed meshes and convex polytopes: `raycast`.
 
-Whether a ray meets a facet is decided exactly, on the numbers given. Distances come out of the walk as proven brackets;
-where they overlap, are wide, or reach across a limit, Python integers settle order and value.
+Whether a ray meets a facet is decided exactly, on the numbers handed in. The traversal gives distances as proven
+brackets; where these overlap, are wide, or reach across the limit, Python integers settle order and value.
 """
 
 from __future__ import annotations
@@ -13,33 +13,22 @@ from typing import NamedTuple
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import Body, facet_body
-from collide.narrowphase.facets import ray_surface as rays
+from collide.narrowphase.facets import ray_surface as layout
 from collide.narrowphase.facets.facet_queries import facets_on_rays
-from collide.numerics.exact_points import (
-    Point,
-    cross,
-    enters,
-    integers,
-    leading_digits,
-    minus,
-    on_one_grid,
-    placed,
-    rounded,
-)
+from collide.numerics.exact_points import enters, integers, on_one_grid, placed, rounded
 from collide.shapes.shape import Shape
+from collide.surface_queries.checked_arguments import matched_count, refuse_rows, vectors
+from collide.surface_queries.facet_geometry import FacetCorners, exact_point, facet_normals
 from collide.transforms import LARGEST, poses_as_given
 
-#: Brackets wider than this, in units of the way to beyond the body, are worked out exactly.
-_WIDE = 2.0**-40
-#: Directions' largest components stay within these; others that are not 0 within a factor of the largest.
+#: Brackets wider than this, in units of the length of the ray up to beyond the body, are worked out exactly.
+_MAX_WIDTH = 2.0**-40
+#: The largest component of a direction stays within these; its others are 0 or at least this part of the largest.
 _DIRECTIONS = (1e-100, 1e100)
-_RATIO = 2.0**-500
-#: Limits below this, in the same units, may have lost digits: what is within is worked out exactly.
-_LEAST = 1e-290
-#: Doubled areas of facets, their longest edge 1 along some axis: smaller ones are worked out exactly.
-_THIN = 2.0**-24
+_MIN_RATIO = 2.0**-500
+#: Limits below this, in the same units, may have lost digits: facets within them are worked out exactly.
+_MIN_LIMIT = 1e-290
 
 
 class RayHits(NamedTuple):
@@ -83,37 +72,46 @@ def raycast(
 
     Parameters
     ----------
-    shape : a `Mesh`, solid or surface; or a `Box`, `ConvexHull` without a radius or bounded `HPolytope`, by the triangles
-        of its hull.
-    X_WA : (4, 4) pose of the shape, or (N, 4, 4), one a ray.
-    origins_W, directions_W : (3,) or (N, 3) [m]; directions need not be unit vectors.
-    max_distance : t up to which facets count, in units of the direction's length; ≥ 0.
+    shape : a `Mesh`, solid or surface; or a `Box`, `ConvexHull` without a radius or bounded `HPolytope`, by the
+        triangles of its hull.
+    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), one a ray.
+    origins_W : (3,) or (N, 3) where rays begin, in W [m], within 1e50.
+    directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single pose, origin or direction goes with
+        every one of the others.
+    max_distance : [lengths of the direction], ≥ 0: t up to which facets count.
     all_hits : report every facet that a ray meets, not only the first.
+    check_poses : refuse matrices that are no rotation.
 
     Returns
     -------
-    RayHits. Facets are closed sets: a ray through a common edge or corner meets all facets there, one that begins on a facet
-    meets it at 0, one that runs along in a facet's plane meets it where it enters it. From inside a solid a ray meets
-    the wall on its way out; `contains` tells what is inside.
+    RayHits. Facets are closed sets: a ray through a common edge or corner meets all facets there, one that begins on a
+    facet meets it at 0, one that runs in a facet's plane meets it where it enters it. From inside a solid a ray meets
+    the wall on its way out; `contains` says what is inside. The same bits one by one or in batches.
 
+    Raises
+    ------
+    InvalidArgument : numbers that are not finite, directions of length 0 or with components that differ by more than
+        2^500, lengths of batches that do not match.
+    InvalidPose : matrices that are no pose.
+    UnsupportedQuery : shapes without facets, by name.
+
+    Notes
+    -----
     1.5 to 2.5 µs a ray through meshes of 2,000 to 200,000 facets, in batches; about O(log n) for well-shaped ones. Rays
-    that doubles leave open (through edges, along facets) take some 0.1 ms a facet. The same bits one by one or in batches.
-
-    Raises InvalidPose; InvalidArgument for numbers that are not finite, directions of length 0, counts that do not match;
-    UnsupportedQuery for shapes without facets.
+    that doubles leave open (through edges, along facets) take some 0.1 ms a facet.
     """
     body = facet_body(shape, "raycast")
     limit = checks.limit("raycast: max_distance", max_distance, "")
-    X_WA, given, exponents, single = _asked(body, X_WA, origins_W, directions_W, limit, check_poses)
-    n = len(given)
-    hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], given, not all_hits)
-    found = _Found(body, X_WA, given, exponents, hits, limit)
-    found.settle(all_hits)
-    ray, facet, t = found.kept()
+    X_WA, rays, exponents, single = _checked_rays(body, X_WA, origins_W, directions_W, limit, check_poses)
+    n = len(rays)
+    hits, _ = facets_on_rays(body.tree, X_WA if len(X_WA) != 1 else X_WA[0], rays, not all_hits)
+    met = _MetFacets(body, X_WA, rays, exponents, hits, limit)
+    met.settle(all_hits)
+    ray, facet, t = met.answers()
     if all_hits:
         starts = np.concatenate([[0], np.cumsum(np.bincount(ray, minlength=n))])
-        return _told(found, ray, facet, t, np.diff(starts) > 0, starts)
-    rows = _told(found, ray, facet, t, np.ones(len(ray), dtype=bool), None)
+        return _as_hits(met, ray, facet, t, np.diff(starts) > 0, starts)
+    rows = _as_hits(met, ray, facet, t, np.ones(len(ray), dtype=bool), None)
     full = _nothing(n)
     for into, values in zip(full[:7], rows[:7]):
         into[ray] = values
@@ -121,85 +119,68 @@ def raycast(
 
 
 def _nothing(n: int) -> RayHits:
-    t, lower, upper = np.full((3, n), np.inf)
-    return RayHits(np.zeros(n, dtype=bool), t, lower, upper, np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, -1, dtype=np.int64))
+    """Of rays that meet no facet."""
+    hit, (t, lower, upper), facet = np.zeros(n, dtype=bool), np.full((3, n), np.inf), np.full(n, -1, dtype=np.int64)
+    return RayHits(hit, t, lower, upper, np.zeros((n, 3)), np.zeros((n, 3)), facet)
 
 
 # --- the question -------------------------------------------------------------------------------
 
 
-def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
-    """((n, 3) finite float64, whether a single one was given)."""
-    array = checks.array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
-    if array.ndim not in (1, 2) or array.shape[-1] != 3:
-        raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {array.shape}")
-    rows = np.ascontiguousarray(array.reshape(-1, 3))
-    _refuse(caller, name, rows, ~np.isfinite(rows).all(axis=1), "has entries that are not finite")
-    return rows, array.ndim == 1
-
-
-def _refuse(caller: str, name: str, rows: np.ndarray, bad, complaint: str) -> None:
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise InvalidArgument(f"{caller}: {name}[{k}] {complaint}, got {rows[k].tolist()}")
-
-
-def matched_count(caller: str, **counts: int) -> int:
-    """How many a batch has: all counts alike, or 1. Raises InvalidArgument."""
-    n = max(counts.values()) if min(counts.values()) else 0
-    if any(count not in (1, n) for count in counts.values()):
-        told = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise InvalidArgument(f"{caller}: lengths do not match: {told}; batches must be equally long, or a single one")
-    return n
-
-
-def _asked(body: Body, X_WA, origins_W, directions_W, limit: float, check: bool):
-    """(poses, rays as kernels take them, exponents of the directions, whether single)."""
-    X_WA, single = poses_as_given(X_WA, "X_WA", check=check)
-    origins, one = vectors("raycast", "origins_W", origins_W)
-    directions, other = vectors("raycast", "directions_W", directions_W)
-    _refuse("raycast", "origins_W", origins, np.abs(origins).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+def _checked_rays(body: Body, X_WA, origins_W, directions_W, limit: float, check: bool):
+    """(poses, rays (n, RAY) as kernels take them, exponents of the directions' lengths, whether single)."""
+    X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check)
+    origins, single_origin = vectors("raycast", "origins_W", origins_W)
+    directions, single_direction = vectors("raycast", "directions_W", directions_W)
+    refuse_rows("raycast", "origins_W", origins, np.abs(origins).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
     sizes = np.abs(directions).max(axis=1)
-    _refuse("raycast", "directions_W", directions, sizes == 0.0, "has length 0: a ray needs a direction")
+    refuse_rows("raycast", "directions_W", directions, sizes == 0.0, "has length 0: a ray needs a direction")
     low, high = _DIRECTIONS
-    _refuse("raycast", "directions_W", directions, (sizes < low) | (sizes > high), f"has no component within [{low:g}, {high:g}]")
+    complaint = f"has no component within [{low:g}, {high:g}]"
+    refuse_rows("raycast", "directions_W", directions, (sizes < low) | (sizes > high), complaint)
     n = matched_count("raycast", X_WA=len(X_WA), origins_W=len(origins), directions_W=len(directions))
     exponents = np.frexp(sizes)[1].astype(np.int64)
     directions = np.ldexp(directions, -exponents[:, None])
-    thin = (directions != 0.0) & (np.abs(directions) < _RATIO)
-    _refuse("raycast", "directions_W", directions, thin.any(axis=1), "has components that differ by more than 2^500; make them 0")
-    given = np.empty((n, rays.RAY))
-    given[:, :3], given[:, 3:6] = origins, directions
+    thin = (directions != 0.0) & (np.abs(directions) < _MIN_RATIO)
+    complaint = "has components that differ by more than 2^500; make them 0"
+    refuse_rows("raycast", "directions_W", directions, thin.any(axis=1), complaint)
+    rays = np.empty((n, layout.RAY))
+    rays[:, :3], rays[:, 3:6] = origins, directions
     # Beyond the ball around the body, wherever the ray begins.
     centre = X_WA[:, :3, 3] + (X_WA[:, :3, :3] * body.centre).sum(axis=2)
     stretch = np.abs(X_WA[:, :3, :3]).sum(axis=(1, 2))
-    away = np.abs(given[:, :3] - centre).sum(axis=1) + stretch * body.reach + 1e-100
-    given[:, 6] = np.ldexp(1.0, np.frexp(away)[1] + 2)
+    away = np.abs(rays[:, :3] - centre).sum(axis=1) + stretch * body.reach + 1e-100
+    rays[:, 6] = np.ldexp(1.0, np.frexp(away)[1] + 2)
     exponents = np.ascontiguousarray(np.broadcast_to(exponents, (n,)))
     with np.errstate(over="ignore"):
-        given[:, 7] = np.maximum(np.ldexp(limit, exponents) / given[:, 6], _LEAST)
-    return X_WA, given, exponents, single and one and other
+        rays[:, 7] = np.maximum(np.ldexp(limit, exponents) / rays[:, 6], _MIN_LIMIT)
+    return X_WA, rays, exponents, single_pose and single_origin and single_direction
 
 
 # --- order and values ---------------------------------------------------------------------------
 
 
-class _Found:
-    """Facets met, their brackets, and exact values where these were needed."""
+class _MetFacets:
+    """Facets that rays meet, brackets of where, and exact values where these were needed.
 
-    def __init__(self, body: Body, X_WA, given, exponents, hits: np.ndarray, limit: float):
-        self.body, self.X_WA, self.given, self.exponents, self.limit = body, X_WA, given, exponents, limit
-        self.ray, self.facet = (hits[:, k].astype(np.int64) for k in (rays.RAY_OF, rays.FACET_OF))
-        self.narrow = (hits[:, rays.OPEN] == 0.0) & (hits[:, rays.UPPER] - hits[:, rays.LOWER] <= _WIDE)
-        self.narrow &= (hits[:, rays.UPPER] <= given[self.ray, 7]) & (given[self.ray, 7] > _LEAST)
-        unit = given[self.ray, 6:7]
-        self.t = np.ldexp(hits[:, [rays.VALUE, rays.LOWER, rays.UPPER]] * unit, -exponents[self.ray, None])
+    t : (m, 3) distance, lower, upper of each, in units of the direction's length.   order : of the rows that `settle`
+    puts ray by ray.   keep : (m,) bool, rows that are answers.
+    """
+
+    def __init__(self, body: Body, X_WA, rays, exponents, hits: np.ndarray, limit: float):
+        self.body, self.X_WA, self.rays, self.exponents, self.limit = body, X_WA, rays, exponents, limit
+        self.ray, self.facet = (hits[:, k].astype(np.int64) for k in (layout.RAY_OF, layout.FACET_OF))
+        self.narrow = (hits[:, layout.OPEN] == 0.0) & (hits[:, layout.UPPER] - hits[:, layout.LOWER] <= _MAX_WIDTH)
+        self.narrow &= (hits[:, layout.UPPER] <= rays[self.ray, 7]) & (rays[self.ray, 7] > _MIN_LIMIT)
+        unit = rays[self.ray, 6:7]
+        self.t = np.ldexp(hits[:, [layout.VALUE, layout.LOWER, layout.UPPER]] * unit, -exponents[self.ray, None])
         self.keep = np.ones(len(hits), dtype=bool)
-        self.place = np.empty(len(body.tree.ids), dtype=np.int64)
-        self.place[body.tree.ids] = np.arange(len(self.place))
+        self.corners = FacetCorners(body.tree)
 
     def settle(self, every: bool) -> None:
-        """Put the hits of each ray in order, exactly; keep the first only, or every one."""
+        """Put the hits of each ray in order, exactly, and drop those beyond the limit; keep the first only, or every
+        one.
+        """
         if not every and self.narrow.all() and (self.ray[1:] > self.ray[:-1]).all():
             self.order = np.arange(len(self.ray))
             return
@@ -217,35 +198,30 @@ class _Found:
             begin, end = np.searchsorted(ray, [k, k + 1])
             order[begin:end] = self._in_order(order[begin:end])
         if not every:
-            kept = order[self.keep[order]]
-            later = np.concatenate([[False], self.ray[kept][1:] == self.ray[kept][:-1]]) if len(kept) else np.zeros(0, dtype=bool)
-            self.keep[kept[later]] = False
+            remaining = order[self.keep[order]]
+            is_later = np.diff(self.ray[remaining], prepend=-1) == 0
+            self.keep[remaining[is_later]] = False
 
     def _in_order(self, rows: np.ndarray) -> list[int]:
         """The hits of one ray by their exact t, then by facet; those beyond the limit are dropped."""
         k = int(self.ray[rows[0]])
         X = self.X_WA[k if len(self.X_WA) > 1 else 0]
-        direction, direction_at = integers(self.given[k, 3:6])
+        direction, direction_at = integers(self.rays[k, 3:6])
         exponent = int(self.exponents[k])
         values = {}
         for row in rows.tolist():
-            corners = self.body.tree.triangles[self.place[self.facet[row]]].reshape(3, 3)
-            ((origin,), triangle), grid = on_one_grid(as_it_is(self.given[k, :3]), placed(X, corners))
+            corners = placed(X, self.corners[self.facet[row]])
+            ((origin,), triangle), grid = on_one_grid(exact_point(self.rays[k, :3]), corners)
             t = enters(triangle, origin, (direction[0], direction[1], direction[2]))
             values[row] = t * Fraction(2) ** (grid - direction_at - exponent)
             self.t[row] = rounded(values[row])
             self.keep[row] = values[row] <= self.limit
         return sorted(rows.tolist(), key=lambda row: (values[row], int(self.facet[row])))
 
-    def kept(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(ray, facet, t) of the hits that are kept, in order."""
         rows = self.order[self.keep[self.order]]
         return self.ray[rows], self.facet[rows], self.t[rows]
-
-
-def as_it_is(point: np.ndarray) -> tuple[list[Point], int]:
-    """A point of the world as `placed` gives points."""
-    (x, y, z), grid = integers(point)
-    return [(x, y, z)], grid
 
 
 def _running_ends(ray: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -261,25 +237,8 @@ def _running_ends(ray: np.ndarray, upper: np.ndarray) -> np.ndarray:
     return ends
 
 
-def _told(found: _Found, ray, facet, t, hit, starts) -> RayHits:
-    points = found.given[ray, :3] + t[:, :1] * np.ldexp(found.given[ray, 3:6], found.exponents[ray, None])
-    X = found.X_WA[ray] if len(found.X_WA) > 1 else found.X_WA
-    corners = found.body.tree.triangles[found.place[facet]].reshape(-1, 3, 3)
-    return RayHits(hit, t[:, 0], t[:, 1], t[:, 2], points, facet_normals(X, corners), facet, starts)
-
-
-def facet_normals(X: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """(k, 3) unit normals in W of facets (k, 3, 3) under poses (k, 4, 4) or (1, 4, 4); 0 of those without area, exactly."""
-    c = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    u, v = c[1] - c[0], c[2] - c[0]  # a row an axis: quicker by far than rows of three
-    sizes = np.maximum(np.abs(u).max(axis=0), np.abs(v).max(axis=0))
-    sizes[sizes == 0.0] = 1.0
-    u, v = ([X[:, i, 0] * w[0] + X[:, i, 1] * w[1] + X[:, i, 2] * w[2] for i in range(3)] for w in (u / sizes, v / sizes))
-    n = np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], axis=1)
-    lengths = np.sqrt(n[:, 0] * n[:, 0] + n[:, 1] * n[:, 1] + n[:, 2] * n[:, 2])
-    for k in np.flatnonzero(~(lengths > _THIN)).tolist():
-        (p, q, r), _ = placed(X[k if len(X) > 1 else 0], corners[k])
-        n[k] = leading_digits(cross(minus(q, p), minus(r, p)))
-        lengths[k] = np.sqrt(np.square(n[k]).sum())
-    lengths = lengths[:, None]
-    return np.where(lengths > 0.0, n / np.where(lengths > 0.0, lengths, 1.0), 0.0) + 0.0
+def _as_hits(met: _MetFacets, ray, facet, t, hit, starts) -> RayHits:
+    points = met.rays[ray, :3] + t[:, :1] * np.ldexp(met.rays[ray, 3:6], met.exponents[ray, None])
+    X = met.X_WA[ray] if len(met.X_WA) > 1 else met.X_WA
+    normals = facet_normals(X, met.corners[facet])
+    return RayHits(hit, t[:, 0], t[:, 1], t[:, 2], points, normals, facet, starts)

@@ -8,7 +8,7 @@ from contact_scenes import table, world_corners
 from mesh_shapes import box
 
 import collide
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, WAY_OUT
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, TRANSLATION
 
 EYE = np.eye(4)
 
@@ -187,9 +187,9 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
         collide.contacts(sheet, sheet, EYE, collide.pose((0, 0, 1e-3)), margin=5.0)
     flat = collide.contacts(sheet, sheet, EYE, EYE)
     near(flat.point_a, [(x, y, 0) for x in (-1, 1) for y in (-1, 1)])
-    monkeypatch.setattr("collide.contact.contact_facets.MOST_PAIRS", 100)
+    monkeypatch.setattr("collide.contact.contact_facets.MAX_PAIRS", 100)
     c = collide.contacts(sheet, sheet, EYE, EYE)
-    assert len(c) == 1 and c.kind[0] == WAY_OUT and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
+    assert len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
     cubes = collide.Mesh(*box()), collide.Mesh(*box((-0.5,) * 3, (0.5,) * 3))
     assert len(collide.contacts(*cubes, EYE, collide.pose((0, 0, 1.5)))) == 4
 
@@ -203,6 +203,6 @@ def test_curved_shapes_against_meshes_have_one_row(shape, height):
     c, swapped = (collide.contacts(*asked, margin=0.1) for asked in ((top, shape, np.eye(4), place), (shape, top, place, np.eye(4))))
     assert len(c) == len(swapped) == (r.distance <= 0.1)
     if len(c):
-        assert c.kind[0] == (WAY_OUT if r.hit else GAP) and c.distance[0] == r.distance and c.lower[0] == r.lower
+        assert c.kind[0] == (TRANSLATION if r.hit else GAP) and c.distance[0] == r.distance and c.lower[0] == r.lower
         assert c.upper[0] == r.upper and np.array_equal(c.normal[0], r.normal) and c.facet_b[0] == -1 and c.facet_a[0] >= 0
         assert np.array_equal(swapped.normal[0], -c.normal[0]) and swapped.facet_a[0] == -1

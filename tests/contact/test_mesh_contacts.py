@@ -10,7 +10,7 @@ from mesh_shapes import block_ring, box
 from naive_triangles import facet_pairs
 
 import collide
-from collide.contact.contact_rows import GAP, OVERLAP, WAY_OUT
+from collide.contact.contact_rows import GAP, OVERLAP, TRANSLATION
 
 EYE = np.eye(4)
 BOX = box((-0.5, -0.375, -0.25), (0.5, 0.375, 0.25))
@@ -185,7 +185,7 @@ def test_deep_inside_there_is_no_patch():
     solid, small = collide.Mesh(*box()), collide.Box((0.25, 0.25, 0.25))
     X_WB = collide.pose((0.1, 0.2, 0.5))
     c, r = collide.contacts(solid, small, EYE, X_WB), collide.distance(solid, small, EYE, X_WB)
-    assert len(c) == 1 and c.kind[0] == WAY_OUT and c.distance[0] == r.distance and c.lower[0] == r.lower
+    assert len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == r.distance and c.lower[0] == r.lower
     assert np.array_equal(c.normal[0], r.normal) and c.apart[0] == -r.lower and c.upper[0] == 0.0
     crossing = collide.contacts(solid, collide.Mesh(*box()), EYE, collide.pose((0.1, 0.05, 0.07)))
     assert len(crossing) and crossing.distance.min() < -1.0

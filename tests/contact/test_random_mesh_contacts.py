@@ -22,7 +22,7 @@ from mesh_shapes import block_ring, box
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
 
 import collide
-from collide.contact.contact_rows import WAY_OUT
+from collide.contact.contact_rows import TRANSLATION
 
 POINT, LINE = np.zeros((1, 3)), np.array([[0, 0, -0.25], [0, 0, 0.25]])
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -136,7 +136,7 @@ def judge(family, seed, seen) -> None:
     else:
         assert not len(c), where
     for row in c:
-        if row["kind"] == WAY_OUT:
+        if row["kind"] == TRANSLATION:
             assert row["distance"] == r.distance and (row["normal"] == r.normal).all(), where
             continue
         try:
@@ -147,12 +147,12 @@ def judge(family, seed, seen) -> None:
         own = c.rows[c.patch == patch]
         assert (own["normal"] == own["normal"][0]).all() and (own["apart"] == own["apart"][0]).all(), where
         assert own["distance"][0] <= own["distance"].min() + 1e-12 and len(own) <= 8, where
-        if A[3] + B[3] == 0.0 and 0 < own["apart"][0] < np.inf and own["kind"][0] != WAY_OUT:
+        if A[3] + B[3] == 0.0 and 0 < own["apart"][0] < np.inf and own["kind"][0] != TRANSLATION:
             assert clear_of_each_other(own, A, B, X_WA, X_WB), f"{where}, patch {patch}"
             seen["parted"] += 1
     seen["hit" if hit else "gap" if len(c) else "far"] += 1
     seen["rows"] += len(c)
-    seen["way out"] += int((c.kind == WAY_OUT).any())
+    seen["way out"] += int((c.kind == TRANSLATION).any())
     flipped = collide.contacts(B[0], A[0], X_WB, X_WA, margin=margin)
     if A[0] != B[0] or not np.array_equal(X_WA, X_WB):
         assert np.array_equal(flipped.point_a, c.point_b) and np.array_equal(flipped.normal, -c.normal), where

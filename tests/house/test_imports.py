@@ -66,10 +66,11 @@ ROOMS = {
         "errors", "kernels", "transforms", "numerics", "hull", "support", "mesh", "shapes", "lowering", "narrowphase", "results",
         "certificates", "batches", "pair_arguments",
     },
-    "packed_world": {"errors", "lowering", "broadphase", "narrowphase", "results", "threads"},
+    "world_bodies": {"errors", "argument_checks", "transforms", "shapes"},
+    "packed_world": {"errors", "shapes", "lowering", "broadphase", "narrowphase", "results", "world_bodies"},
     "world": {
         "errors", "argument_checks", "log", "transforms", "shapes", "broadphase", "results", "certificates", "contact",
-        "security_margin", "packed_world",
+        "security_margin", "packed_world", "world_bodies",
     },
     "robot": {"errors", "transforms", "shapes"},
     "reports": {"errors", "results", "shapes", "cache_folder", "kernels", ""},

@@ -231,10 +231,6 @@ def test_installed_wheel_imports_from_itself(wheel, tmp_path):
 # --- the checkout -------------------------------------------------------------------------------
 
 
-def _pages() -> list[Path]:
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "benchmarks").glob("*.md"))]
-
-
 def test_version_is_the_same_everywhere():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     assert f'version = "{collide.__version__}"' in text
@@ -244,32 +240,6 @@ def test_every_folder_with_modules_is_a_package():
     for folder in FOLDERS:
         for file in (ROOT / folder).rglob("*.py"):
             assert (file.parent / "__init__.py").is_file(), f"{file.parent.name} has modules and no __init__.py"
-
-
-def test_links_between_pages_lead_somewhere():
-    for page in _pages():
-        for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
-            if "://" not in link and not link.startswith("mailto:"):
-                assert (page.parent / link).exists(), f"{page.name} links to {link}"
-
-
-def test_files_that_pages_name_exist():
-    """``examples/01_two_shapes.py``, ``bash tests/run.sh``, ``collide/narrowphase/bounds.py``: as code, so as files."""
-    named = re.compile(r"(?:\.ci|adapters|benchmarks|collide|docs|examples|scenes|tests)/[\w./-]*\w")
-    for page in _pages():
-        for code in re.findall(r"`[^`]+`|```.*?```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
-            for path in named.findall(code):
-                places = [ROOT / path, *(ROOT / folder / path for folder in FOLDERS)]
-                assert any(place.exists() for place in places), f"{page.name} names {path}"
-
-
-def test_commands_that_pages_show_exist():
-    from collide.cli_arguments import parser
-
-    (commands,) = (set(action.choices) for action in parser()._actions if action.dest == "command")
-    for page in _pages():
-        for word in re.findall(r"^(?:\$ )?collide ([a-z]+)\b", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
-            assert word in commands, f"{page.name} shows `collide {word}`"
 
 
 def test_continuous_integration_calls_the_test_command():
