@@ -60,7 +60,7 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
 
     radius : sum of the radii.   error : of a bound.   curved : a core is no polytope.   n_start : as of `gjk`.
     """
-    pair, size = ordered.pair, ordered.size
+    pair = ordered.pair
     points, weights, ids = work.points, work.weights, work.ids
     exact_numbers = ordered.exact_numbers and not curved
     run = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)
