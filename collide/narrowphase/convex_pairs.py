@@ -19,7 +19,7 @@ from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import halfspace_convex
 from collide.narrowphase.halfspace_halfspace import halfspace_halfspace
 from collide.narrowphase.pair_query import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
-from collide.narrowphase.posed_pair import ordered_pair
+from collide.narrowphase.posed_pair import Tables, ordered_pair
 from collide.narrowphase.rows import COUNT, HIT, HOW, ROW, VERTICES_A, VERTICES_B, clear_vertices, view_row
 from collide.results import REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
@@ -57,10 +57,10 @@ def answer_pairs(
     n_together = 1 if stop_at_hit else LANES
     has_portals = False
     if not depths and not stop_at_hit:
+        tables = Tables(ints_at, numbers_at, poses_at, shape_of_at)
         n_small = answer_small_hulls(
-            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, work.queue_at,
-            work.queue_integers_at,
-        )  # fmt: skip
+            tables, pairs_at, n_pairs, boolean, limit, rows_at, work.queue_at, work.queue_integers_at
+        )
         has_portals = n_small > 0
     clear_queue(work.queue_integers_at)
     for step in range(n_pairs if boolean else n_pairs + KINDS):

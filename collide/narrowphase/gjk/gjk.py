@@ -17,14 +17,15 @@ from collide.narrowphase.gjk.grown_simplex import INSIDE, NOT_FOUND, nearest_wit
 from collide.narrowphase.gjk.minkowski_difference import (
     AXIS,
     NEAREST_POINT,
+    Places,
     bring_to_front,
     difference_point,
     drop_unused,
     has_trees,
     height,
     inlined_difference_point,
+    is_repeated,
     point_at,
-    repeated,
     settle_point,
 )
 from collide.narrowphase.gjk.simplex import across_simplex, faces_in_sight, nearest_of_all
@@ -96,7 +97,7 @@ def _search(pair, points, ids, weights, n_start, limits):
     n, coarse = first_simplex(pair, points, ids, weights, n_start, start)
     # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     # It is loaded so once more, below: through a kernel for both, gaps at n = 512 took 2 to 4 % longer.
-    at_a, at_b, at_c, at_d = 0, 1, 2, 3
+    places = Places(n, 0, 1, 2, 3)
     A, B, C = point_at(points, 0), point_at(points, 1), point_at(points, 2)
     wa, wb, wc = weights[0], weights[1], weights[2]
     v = vec3_at(weights, NEAREST_POINT)
@@ -113,41 +114,39 @@ def _search(pair, points, ids, weights, n_start, limits):
             break
         if boolean and length + error <= radius:
             break
-        new = _next_point(pair, points, ids, n, at_a, at_b, at_c, at_d, v, square, asked, limits, used == max_iterations)
+        new = _next_point(pair, points, ids, places, v, square, asked, limits, used == max_iterations)
         asked = new.asked
         lower = max(lower, new.proven)
         if lower - error - radius > limit:
             status = APART
             break
-        if length - new.bound <= 0.125 * error or new.is_repeated:
+        if length - new.bound <= 0.125 * error or new.repeated:
             break
-        D = point_at(points, at_d)
-        nearest, closer = nearest_with_newest(n, A, B, C, D, error, 0.125 * error * length)
+        D = point_at(points, places.d)
+        nearest, closer = nearest_with_newest(places.n, A, B, C, D, error, 0.125 * error * length)
         if nearest.n_kept == INSIDE:
             status = ENCLOSED
             clearance = nearest.w0
             break
         if nearest.n_kept == NOT_FOUND:
-            at_a, at_b, at_c, at_d = bring_to_front(points, ids, n, at_a, at_b, at_c, at_d)
+            places = bring_to_front(points, ids, places)
             faces = 15
-            if n == 3:
+            if places.n == 3:
                 faces, clearance = faces_in_sight(points, error)
                 if faces == 0:
                     status = ENCLOSED
                     break
-            closer = nearest_of_all(points, n + 1, weights, faces)
+            closer = nearest_of_all(points, places.n + 1, weights, faces)
             if closer < square:
-                n = drop_unused(points, ids, weights, n + 1)
-                at_a, at_b, at_c, at_d = 0, 1, 2, 3
+                places = Places(drop_unused(points, ids, weights, places.n + 1), 0, 1, 2, 3)
                 A, B, C = point_at(points, 0), point_at(points, 1), point_at(points, 2)
                 wa, wb, wc = weights[0], weights[1], weights[2]
                 v = vec3_at(weights, NEAREST_POINT)
         elif closer < square:
-            n = nearest.n_kept
             rotation = nearest.rotation
             A, B, C = D, select(rotation, A, B, C), select(rotation, B, C, A)
-            at_first, at_second = select(rotation, at_a, at_b, at_c), select(rotation, at_b, at_c, at_a)
-            at_a, at_b, at_c, at_d = at_d, at_first, at_second, 6 - at_d - at_first - at_second
+            b, c = select(rotation, places.a, places.b, places.c), select(rotation, places.b, places.c, places.a)
+            places = Places(nearest.n_kept, places.d, b, c, 6 - places.d - b - c)
             wa, wb, wc = nearest.w0, nearest.w1, nearest.w2
             v = nearest.v
         if not closer < square:
@@ -156,22 +155,22 @@ def _search(pair, points, ids, weights, n_start, limits):
                 asked = _Asked(False, False, asked.list_a, asked.list_b, Vec3(0.0, 0.0, 0.0))
                 continue
             if has_trees(pair):
-                settle_point(pair, points, ids, at_d, neg(v))
-                lower = max(lower, height(points, at_d, v) / length)
+                settle_point(pair, points, ids, places.d, neg(v))
+                lower = max(lower, height(points, places.d, v) / length)
             break
         square = closer
     if status == ENCLOSED:
         return GjkResult(ENCLOSED, 4, lower, clearance, used)
     if not (boolean and status == APART):  # of a miss nothing else is wanted
-        bring_to_front(points, ids, n, at_a, at_b, at_c, at_d)
+        bring_to_front(points, ids, places)
     weights[0] = wa
-    weights[1] = wb if n > 1 else 0.0
-    weights[2] = wc if n > 2 else 0.0
+    weights[1] = wb if places.n > 1 else 0.0
+    weights[2] = wc if places.n > 2 else 0.0
     weights[3] = 0.0
     put_vec3(weights, NEAREST_POINT, v)
     length = norm(v)
     put_vec3(weights, AXIS, scale(1.0 / length if length > 0.0 else 0.0, v))
-    return GjkResult(status, n, lower, 0.0, used)
+    return GjkResult(status, places.n, lower, 0.0, used)
 
 
 class _Asked(NamedTuple):
@@ -192,20 +191,20 @@ class _Asked(NamedTuple):
 class _NextPoint(NamedTuple):
     """bound : value of the plane through point D across v.   proven : the same where it is proven, else −∞.
 
-    is_repeated : whether D is one of the other points.
+    repeated : whether D is one of the other points.
     """
 
     asked: _Asked
     bound: float
     proven: float
-    is_repeated: bool
+    repeated: bool
 
 
 @kernel(inline=True)
-def _next_point(pair, points, ids, n, at_a, at_b, at_c, at_d, v, square, asked, limits, is_last):
+def _next_point(pair, points, ids, places, v, square, asked, limits, is_last):
     """Point D becomes the farthest one against v; coarse hulls and single lists are asked first, if they may do.
 
-    at_a … at_d : where the points stand, of which n are there.   square : |v|².   is_last : no iteration follows.
+    square : |v|².   is_last : no iteration follows.
     """
     coarse, list_a, list_b, u = asked.coarse, asked.list_a, asked.list_b, asked.u
     error, limit = limits.error, limits.limit
@@ -217,24 +216,24 @@ def _next_point(pair, points, ids, n, at_a, at_b, at_c, at_d, v, square, asked, 
             list_a = list_b = -1
             u = v
     partial = coarse or list_a >= 0 or list_b >= 0
-    list_a, list_b = inlined_difference_point(pair, points, ids, at_d, neg(v), coarse, list_a, list_b)
-    bound = height(points, at_d, v) / length
-    is_repeated = repeated(ids, n, at_a, at_b, at_c, at_d)
-    if partial and _needs_farthest(coarse, length, bound, is_repeated, limits):
+    list_a, list_b = inlined_difference_point(pair, points, ids, places.d, neg(v), coarse, list_a, list_b)
+    bound = height(points, places.d, v) / length
+    repeated = is_repeated(ids, places)
+    if partial and _needs_farthest(coarse, length, bound, repeated, limits):
         partial = coarse = False
         u = v
-        list_a, list_b = difference_point(pair, points, ids, at_d, neg(v))
-        bound = height(points, at_d, v) / length
-        is_repeated = repeated(ids, n, at_a, at_b, at_c, at_d)
+        list_a, list_b = difference_point(pair, points, ids, places.d, neg(v))
+        bound = height(points, places.d, v) / length
+        repeated = is_repeated(ids, places)
     proven = -math.inf
-    if trees and (bound - error - limits.radius > limit or length - bound <= 0.125 * error or is_repeated or is_last):
-        settle_point(pair, points, ids, at_d, neg(v))
-        bound = height(points, at_d, v) / length
-        is_repeated = repeated(ids, n, at_a, at_b, at_c, at_d)
+    if trees and (bound - error - limits.radius > limit or length - bound <= 0.125 * error or repeated or is_last):
+        settle_point(pair, points, ids, places.d, neg(v))
+        bound = height(points, places.d, v) / length
+        repeated = is_repeated(ids, places)
         proven = bound
     elif not trees and not coarse:
         proven = bound
-    return _NextPoint(_Asked(coarse, partial, list_a, list_b, u), bound, proven, is_repeated)
+    return _NextPoint(_Asked(coarse, partial, list_a, list_b, u), bound, proven, repeated)
 
 
 @kernel(inline=True)
@@ -251,9 +250,9 @@ def _same_lists_cosine(pair):
 
 
 @kernel(inline=True)
-def _needs_farthest(coarse, length, bound, is_repeated, limits):
+def _needs_farthest(coarse, length, bound, repeated, limits):
     """Whether a point of coarse hulls, or of lists alone, makes no progress: the farthest of all is to be asked for."""
-    if is_repeated:
+    if repeated:
         return True
     if coarse:
         return bound > 0.0

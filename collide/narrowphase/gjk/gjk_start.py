@@ -10,15 +10,16 @@ from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.gjk.minkowski_difference import (
     AXIS,
     NEAREST_POINT,
+    Places,
     difference_point,
     drop_unused,
     has_trees,
     height,
     inlined_difference_point,
+    is_repeated,
     listed_difference_point,
     place_vertices,
     point_at,
-    repeated,
     settle_point,
 )
 from collide.narrowphase.gjk.simplex import nearest_of_all
@@ -203,9 +204,9 @@ def _surround(pair, points, ids, weights, d, plane, tangent, list_a, list_b):
     sideways = scale(0.75**0.5, cross(d, u))
     d = sub(d, scale(0.5, u))
     listed_difference_point(pair, points, ids, 1, add(d, sideways), list_a, list_b)
-    n = 1 if repeated(ids, 1, 0, 0, 0, 1) else 2
+    n = 1 if is_repeated(ids, Places(1, 0, 0, 0, 1)) else 2
     listed_difference_point(pair, points, ids, n, sub(d, sideways), list_a, list_b)
-    if not repeated(ids, n, 0, 1, 1, n):
+    if not is_repeated(ids, Places(n, 0, 1, 1, n)):
         n += 1
     nearest_of_all(points, n, weights, 15)
     return drop_unused(points, ids, weights, n)

@@ -66,14 +66,12 @@ class _Lanes(NamedTuple):
 
 
 @kernel
-def answer_small_hulls(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, doubles_at, integers_at
-):
+def answer_small_hulls(tables, pairs_at, n_pairs, boolean, limit, rows_at, doubles_at, integers_at):
     """Answer rows of two small hulls, as far as that goes without depths, and leave the others open.
 
     A gap's row that is left open names three pairs of vertices to begin with, in the order worked on (`in_order`).
-    Returns how many rows were tried.   Arguments as in `answer_pairs`.   doubles, integers : workspace, DOUBLES and
-    TICKETS of it.
+    Returns how many rows were tried.   tables : `Tables`; other arguments as in `answer_pairs`.   doubles, integers :
+    workspace, DOUBLES and TICKETS of it.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     block_at = (doubles_at + 8 * (LANES - 1)) // (8 * LANES) * (8 * LANES)
@@ -82,17 +80,17 @@ def answer_small_hulls(
     for k in range(n_pairs):
         pa = pairs[2 * k]
         pb = pairs[2 * k + 1]
-        shape_of = view_i64(shape_of_at, max(pa, pb) + 1)
+        shape_of = view_i64(tables.shape_of_at, max(pa, pb) + 1)
         sa = shape_of[pa]
         sb = shape_of[pb]
-        ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
+        ints = view_i64(tables.ints_at, INTS * (max(sa, sb) + 1))
         row_at = rows_at + ROW * k
         if not (_is_small(ints, sa) and _is_small(ints, sb)) or (boolean and _has_axis(row_at)):
             continue
-        numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
+        numbers = view_f64(tables.numbers_at, NUMBERS * (max(sa, sb) + 1))
         if numbers[NUMBERS * sa + RADIUS] + numbers[NUMBERS * sb + RADIUS] > 0.0:
             continue  # portals bound no distance: they cannot prove cores nearer than the radii
-        poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
+        poses = view_f64(tables.poses_at, POSE * (max(pa, pb) + 1))
         size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
         if not _SMALLEST < size < _LARGEST:
             continue
@@ -104,8 +102,8 @@ def answer_small_hulls(
         if not boolean:
             sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
         n_padded = max(n_padded, ints[INTS * sa + PADDED], ints[INTS * sb + PADDED])
-        _put_body(lanes, n_queued, mpr.COUNT_A, _AT_VERTICES_A, _AT_POSE_A, ints, sa, poses_at + 8 * POSE * pa)
-        _put_body(lanes, n_queued, mpr.COUNT_B, _AT_VERTICES_B, _AT_POSE_B, ints, sb, poses_at + 8 * POSE * pb)
+        _put_body(lanes, n_queued, mpr.COUNT_A, _AT_VERTICES_A, _AT_POSE_A, ints, sa, tables.poses_at + 8 * POSE * pa)
+        _put_body(lanes, n_queued, mpr.COUNT_B, _AT_VERTICES_B, _AT_POSE_B, ints, sb, tables.poses_at + 8 * POSE * pb)
         lanes.values[LANES * mpr.ERROR_OF + n_queued] = error
         lanes.tickets[_ROWS + n_queued] = k
         lanes.tickets[_FLIP + n_queued] = 1 if flip else 0

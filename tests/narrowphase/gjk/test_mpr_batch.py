@@ -17,6 +17,7 @@ from collide.kernels import address_of, entry
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.gjk import mpr_batch as small_hulls
 from collide.narrowphase.gjk.mpr import MAX_ITERATIONS
+from collide.narrowphase.posed_pair import Tables
 from collide.results import HOW, PAIR_DTYPE, flipped
 
 #: Gaps and depths to ask about, in metres, of bodies about one metre long.
@@ -25,9 +26,8 @@ GAPS = (0.3, 0.02, 1e-4, 1e-9, 1e-13, 1e-16, -1e-16, -1e-13, -1e-9, -1e-4, -0.02
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64)")
 def _answer(ints, numbers, poses, shape_of, pairs, n, boolean, limit, rows, doubles, integers):
-    return small_hulls.answer_small_hulls(
-        ints, numbers, poses, shape_of, pairs, n, boolean, limit, rows, doubles, integers
-    )
+    tables = Tables(ints, numbers, poses, shape_of)
+    return small_hulls.answer_small_hulls(tables, pairs, n, boolean, limit, rows, doubles, integers)
 
 
 def small_shape(rng) -> collide.Shape:
