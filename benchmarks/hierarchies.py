@@ -27,7 +27,8 @@ import hierarchy_families as families
 
 import collide
 from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.hierarchies.hierarchy_distance import PackedHierarchy, hierarchy_distance
+from collide.hierarchies.hierarchy_distance import hierarchy_distance
+from collide.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.hierarchies.polar_hull import polar_of_hull
 from collide.hull.exact_hull import convex_hull
 

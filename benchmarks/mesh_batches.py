@@ -1,12 +1,11 @@
 """Batches of mesh pairs beside coal's loop: what a call and a pose cost, from 1 pose to 12,000.
 
-    python benchmarks/mesh_batches.py            # about a minute; prints a table, and writes results/mesh_batches_*.csv
+    python benchmarks/mesh_batches.py            # some minutes; prints a table and writes results/mesh_batches_*.csv
     python benchmarks/mesh_batches.py --quick    # fewer repeats, no file
 
-A torus of 2304 facets against itself, against a box and against a sphere; poses far apart (none within the limit),
-mixed (half of them touch or nearly do) or near. Asked are booleans, and gaps no farther than a limit of a hundredth of
-the size. coal (OBBRSS) is asked in a loop over transforms and requests made beforehand. Both take turns; compared are
-medians.
+A torus of 2304 facets against itself, a box and a sphere; poses far apart (none within the limit), mixed or near (some
+overlap, some are a little apart). Asked are booleans, and gaps no farther than a limit of a hundredth of the size.
+coal (OBBRSS) is asked in a loop over transforms and requests made beforehand. Both take turns; compared are medians.
 """
 
 from __future__ import annotations
@@ -105,16 +104,16 @@ def medians(repeats: int, *asks) -> list[float]:
 def main() -> None:
     quick = "--quick" in sys.argv
     mesh = torus()
-    others = {"torus": mesh, "box": collide.Box((1, 1, 1)), "sphere": collide.Sphere(0.6)}
+    partners = {"torus": mesh, "box": collide.Box((1, 1, 1)), "sphere": collide.Sphere(0.6)}
     rows = []
     print("  ".join(f"{name:>17}" for name in HEADER))
-    for name, B in others.items():
+    for name, partner in partners.items():
         for kind, spread in SPREADS.items():
             for n in SIZES:
                 rng = np.random.default_rng(n)
                 X_WA, X_WB = poses(rng, n, (0.0, 0.0)), poses(rng, n, spread)
-                peer = Coal(mesh, B, X_WA, X_WB)
-                pair = mesh, B, X_WA, X_WB
+                peer = Coal(mesh, partner, X_WA, X_WB)
+                pair = mesh, partner, X_WA, X_WB
                 questions = {
                     "boolean": partial(collide.collide, *pair),
                     "distance": partial(collide.distance, *pair, max_distance=LIMIT, signed=False),

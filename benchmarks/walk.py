@@ -108,7 +108,7 @@ def measured(kind: str, n: int) -> dict:
     prepared = time.perf_counter() - started
     truth = collide.collide(A, B, X_WA, X_WB)
     assert (result.hit == truth).all(), f"{kind} {n}: the walk and the default disagree"
-    axes = result.rows["axis"] * np.where(result.exchanged, -1.0, 1.0) * (result.rows["said"] == APART)[:, None]
+    axes = result.rows["axis"] * np.where(result.exchanged, -1.0, 1.0) * (result.rows["status"] == APART)[:, None]
     packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
     names = "default", "walk", "walk_kernel", "early_kernel", "default_with_axes"
     seconds = dict.fromkeys(names, 0.0)
@@ -134,7 +134,7 @@ def measured(kind: str, n: int) -> dict:
             seconds[name] += fastest[name]
     rows = result.rows
     per = 1e6 / POSES
-    ladder_p, ladder_q = A._walk.ladder, B._walk.polar.ladder
+    hierarchy_p, hierarchy_q = A._walk.hierarchy, B._walk.polar.hierarchy
     return {
         "kind": kind, "asked": n, "n": len(A.hull.vertices), "m": len(B.hull.vertices),
         "facets_of_r": len(B._walk.polar.starts) - 1,
@@ -143,7 +143,7 @@ def measured(kind: str, n: int) -> dict:
         "tests_mean": rows["tests"].mean(), "tests_most": int(rows["tests"].max()),
         "games_mean": rows["games"].mean(), "pivots_mean": rows["pivots"].mean(),
         "proven": result.walked.mean(), "prepare_ms": prepared * 1e3,
-        "bytes_a_vertex_p": ladder_p.bytes / n, "bytes_a_vertex_q": ladder_q.bytes / n,
+        "bytes_a_vertex_p": hierarchy_p.bytes / n, "bytes_a_vertex_q": hierarchy_q.bytes / n,
         **{f"{name}_us": taken * per for name, taken in seconds.items()},
     }  # fmt: skip
 

@@ -59,7 +59,7 @@ def tidy(axes, points, title):
 def levels() -> None:
     """Six levels of a bounded hierarchy, the body itself first."""
     A = collide.ConvexHull(ball(400, 1))
-    hierarchy = walk_body(A).ladder.hierarchy
+    hierarchy = walk_body(A).hierarchy.hierarchy
     levels_drawn = np.unique(np.linspace(0, hierarchy.depth - 1, 6).astype(int))
     figure = pyplot.figure(figsize=(11, 2.2), layout="constrained")
     for k, level in enumerate(levels_drawn.tolist()):
@@ -75,7 +75,7 @@ def polar() -> None:
     points = ball(24, 4, (1.0, 0.9, 0.8))
     R = collide.ConvexHull(points)
     side = walk_body(R).polar
-    Q = side.ladder.hierarchy
+    Q = side.hierarchy.hierarchy
     figure = pyplot.figure(figsize=(9, 4), layout="constrained")
     axes = figure.add_subplot(1, 2, 1, projection="3d")
     draw_body(axes, points, R.hull.facets, GREY, 0.9)
@@ -113,7 +113,7 @@ def query():
 def rounds() -> None:
     """The rounds of one query: where it stands in both hierarchies, and how far its plane is from deciding."""
     A, B, X, result = query()
-    primal, Q = A._walk.ladder.hierarchy, B._walk.polar.ladder.hierarchy
+    primal, Q = A._walk.hierarchy.hierarchy, B._walk.polar.hierarchy.hierarchy
     offset = X[:3, 3] - B._walk.polar.origin
     figure, (path, margins) = pyplot.subplots(1, 2, figsize=(11, 4), layout="constrained")
     i, j = [r.level_p for r in result.trace], [r.level_q for r in result.trace]
@@ -150,7 +150,7 @@ def rounds() -> None:
 def bodies() -> None:
     """The same query in the primal space: the levels of P met, and the planes of the separation invariant."""
     A, B, X, result = query()
-    primal = A._walk.ladder.hierarchy
+    primal = A._walk.hierarchy.hierarchy
     offset = X[:3, 3] - B._walk.polar.origin
     steps_of = [r for r in result.trace if r.invariant == "separation"]
     steps = [steps_of[k] for k in np.unique(np.linspace(0, len(steps_of) - 1, 3).astype(int))]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
@@ -16,7 +19,7 @@ from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
 from collide.narrowphase.facets.mesh_pairs import pair_states, rows_within
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
-from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
+from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.world_bodies import Roster
 
@@ -85,12 +88,14 @@ class PackedWorld:
         again.
         """
         self.X_WBs[bodies] = X_WBs
-        parts = bodies if self._all_of_one_part else self._parts_of(bodies)
+        parts: np.ndarray | slice = bodies if self._all_of_one_part else self._parts_of(bodies)
+        if len(bodies) == len(self.roster.ids):
+            parts = slice(None)  # all of them: nothing is gathered
         X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
         moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
-        before = self._poses.rows[parts, POSE_TERMS]
+        before = self._poses.rows[parts, POSE_TERMS].copy()
         has_terms = before >= 0.0
-        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # the exact terms of products keep their places
+        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # exact terms of products keep their places
             if has_terms.any():
                 self._poses.terms[before[has_terms].astype(np.int64)] = moved.terms
                 moved.rows[has_terms, POSE_TERMS] = before[has_terms]
@@ -268,6 +273,37 @@ class PackedWorld:
         spans[:, 0] += n_own
         spans = np.hstack([np.tile([0, n_own], (len(starts), 1)), spans])
         return combine(rows, starts, spans, table, poses, row_of)
+
+
+@dataclass(frozen=True)
+class QueryRecord:
+    """What `World.stats` of a query are made of, when they are asked for."""
+
+    packed: PackedWorld
+    n_candidates: int
+    hit: np.ndarray
+    how: np.ndarray
+    iterations: np.ndarray
+    convex_pairs: int
+    body_pairs: int
+    mesh_pairs: int
+    seconds: dict
+
+    def stats(self) -> dict:
+        """As `World.stats` says."""
+        roster = self.packed.roster
+        n = len(roster.ids)
+        skipped = count_skipped(roster.static, roster.group, roster.mask, self.packed.allowed)
+        pairs = n * (n - 1) // 2
+        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
+        return {
+            "bodies": n, "static": int(roster.static.sum()), "pairs": pairs, "skipped": skipped,
+            "narrowphase": self.body_pairs, "convex_pairs": self.convex_pairs, "mesh_pairs": self.mesh_pairs,
+            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
+            "how": dict(Counter(HOW[how] for how in self.how)),
+            "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
+            "epa_iterations": int((self.iterations >> 16).sum()), "seconds": self.seconds,
+        }  # fmt: skip
 
 
 def _distinct_shapes(shapes: Sequence[Shape]) -> tuple[np.ndarray, list[Shape]]:

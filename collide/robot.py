@@ -13,9 +13,8 @@ axes across its normal, ``NAME/yaw`` [rad]); six for a floating joint (``NAME/x`
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -23,48 +22,23 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
+from collide.joint_motions import floating_motion, planar_motion, product, rotation, translation
+from collide.kinematic_tree import (
+    COLUMNS,
+    Joint,
+    broken_mimics,
+    broken_note,
+    checked_joint,
+    indices_of,
+    resolve_mimics,
+    rigid_clusters,
+    tree_of,
+)
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
 #: Module and function that read robots from files: found when first needed, since the engine imports no loader.
 _LOADER = ("collide.scenes.loaders.urdf", "load_robot")
-#: Columns of ``q`` by joint type.
-COLUMNS = {
-    "revolute": ("",),
-    "continuous": ("",),
-    "prismatic": ("",),
-    "planar": ("/x", "/y", "/yaw"),
-    "floating": ("/x", "/y", "/z", "/roll", "/pitch", "/yaw"),
-    "fixed": (),
-}
-
-
-class Mimic(NamedTuple):
-    """A joint that follows another: value = multiplier · value(joint) + offset."""
-
-    joint: str
-    multiplier: float = 1.0
-    offset: float = 0.0
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One joint of the tree.
-
-    X_PJ : (4, 4) pose of the joint frame in the parent link.
-    axis : (3,) in the joint frame; any length but zero, normalised when the robot is made.
-    lower, upper : limits [rad] or [m]; infinite where there are none.
-    """
-
-    name: str
-    type: str
-    parent: str
-    child: str
-    X_PJ: np.ndarray = field(default_factory=lambda: np.eye(4))
-    axis: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
-    lower: float = -math.inf
-    upper: float = math.inf
-    mimic: Mimic | None = None
 
 
 class LinkShape(NamedTuple):
@@ -139,26 +113,26 @@ class Robot:
     ):
         self.name = name
         self.links = tuple(links)
-        self._index = _indices("link", self.links)
+        self._index = indices_of("link", self.links)
         self.sources = list(sources)
         self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
-        checked = [_checked_joint(joint, self._index) for joint in joints]
-        _indices("joint", [joint.name for joint in checked])
-        broken = _broken_mimics(checked)
+        checked = [checked_joint(joint, self._index) for joint in joints]
+        indices_of("joint", [joint.name for joint in checked])
+        broken = broken_mimics(checked)
         self.joints = tuple(replace(joint, mimic=None) if joint.name in broken else joint for joint in checked)
-        self.root, self._order = _tree(self.links, self.joints)
-        self._drivers = _resolve_mimics(self.joints)
+        self.root, self._order = tree_of(self.links, self.joints)
+        self._drivers = resolve_mimics(self.joints)
         self._set_columns()
         self.geometry = {link: tuple(elements) for link, elements in (geometry or {}).items() if elements}
         for link in self.geometry:
             if link not in self._index:
                 raise SceneError(f"unknown link; the robot has {listing(self.links)}", element=f'link "{cut(link)}"')
-        self.rigid_clusters = _clusters(self.links, self.joints)
+        self.rigid_clusters = rigid_clusters(self.links, self.joints)
         self.base_links = next(cluster for cluster in self.rigid_clusters if self.root in cluster)
         self.semantic_pairs = None if semantic_pairs is None else tuple(semantic_pairs)
         self.states = {label: dict(values) for label, values in (states or {}).items()}
         file = Path(self.sources[0]).name if self.sources else f"robot {cut(name)}"
-        self.notes = [*notes, *(f"{file}: {_about_broken(joint, why)}" for joint, why in broken.items())]
+        self.notes = [*notes, *(f"{file}: {broken_note(joint, why)}" for joint, why in broken.items())]
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
@@ -368,9 +342,9 @@ class Robot:
         X_WLs[:, self._index[self.root]] = np.eye(4) if X_WR is None else as_poses(X_WR, "X_WR")[0]
         with np.errstate(over="ignore", invalid="ignore"):  # looked at below
             for joint in self._order:
-                X_WJ = _product(X_WLs[:, self._index[joint.parent]], joint.X_PJ[None])
+                X_WJ = product(X_WLs[:, self._index[joint.parent]], joint.X_PJ[None])
                 X_JL = self._motion(joint, q)
-                X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else _product(X_WJ, X_JL)
+                X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else product(X_WJ, X_JL)
             within = np.abs(X_WLs[:, :, :3]) <= LARGEST
         if not within.all():
             self._refuse_pose(X_WLs, within, q)
@@ -413,14 +387,14 @@ class Robot:
         if joint.type == "fixed":
             return None
         if joint.type == "floating":
-            return _floating(q[:, self._columns[joint.name] :][:, :6])
+            return floating_motion(q[:, self._columns[joint.name] :][:, :6])
         if joint.type == "planar":
-            return _planar(joint.axis, q[:, self._columns[joint.name] :][:, :3])
+            return planar_motion(joint.axis, q[:, self._columns[joint.name] :][:, :3])
         driver, multiplier, offset = self._drivers[joint.name]
         value = q[:, self._columns[driver]] * multiplier + offset
         if joint.type == "prismatic":
-            return _translation(value[:, None] * joint.axis)
-        return _rotation(joint.axis, value)
+            return translation(value[:, None] * joint.axis)
+        return rotation(joint.axis, value)
 
     # --- pairs -----------------------------------------------------------------------------------
 
@@ -495,180 +469,6 @@ class Robot:
         )
 
 
-# --- the tree -----------------------------------------------------------------------------------
-
-
-def _indices(kind: str, names: Sequence[str]) -> dict[str, int]:
-    index: dict[str, int] = {}
-    for k, name in enumerate(names):
-        if name in index:
-            raise SceneError(
-                f"the name is used twice ({kind}s {index[name]} and {k}): rename one", element=f'{kind} "{cut(name)}"'
-            )
-        index[name] = k
-    return index
-
-
-def _checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
-    element = f'joint "{cut(joint.name)}"'
-    if joint.type not in COLUMNS:
-        raise SceneError(f'unknown type "{cut(joint.type)}"; known are {", ".join(COLUMNS)}', element=element)
-    for role, link in (("parent", joint.parent), ("child", joint.child)):
-        if link not in links:
-            raise SceneError(f'its {role} is link "{cut(link)}", which the robot does not have', element=element)
-    X_PJ = as_poses(joint.X_PJ, f"{element} origin")[0]
-    axis = np.asarray(joint.axis, dtype=np.float64)
-    if axis.shape != (3,) or not np.isfinite(axis).all():
-        raise SceneError(f"axis must be 3 finite numbers, got {joint.axis!r}", element=element)
-    largest = float(np.abs(axis).max())
-    axis = axis / largest if largest > 1e100 else axis  # the square of its length must be a number
-    length = math.sqrt(float(axis @ axis))
-    if joint.type in ("revolute", "continuous", "prismatic", "planar"):
-        if not length > 1e-9:
-            raise SceneError(f"axis {axis.tolist()} has length 0 and names no direction", element=element)
-        # An axis such as (0, 0, 1) must stay as it is, bit by bit.
-        axis = axis if length == 1.0 else axis / length
-    if math.isnan(joint.lower) or math.isnan(joint.upper):
-        raise SceneError(f"limits must be numbers, got [{joint.lower}, {joint.upper}]", element=element)
-    # A fixed joint follows nothing, whatever its file says.
-    return replace(joint, X_PJ=X_PJ, axis=axis, mimic=None if joint.type == "fixed" else joint.mimic)
-
-
-def _tree(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Joint]]:
-    """The root link and the joints sorted so that parents come before children."""
-    if not links:
-        raise SceneError("the robot has no links")
-    above: dict[str, Joint] = {}
-    for joint in joints:
-        if joint.child in above:
-            raise SceneError(
-                f'link "{cut(joint.child)}" has two parents: it is also the child of joint '
-                f'"{cut(above[joint.child].name)}"',
-                element=f'joint "{cut(joint.name)}"',
-            )
-        above[joint.child] = joint
-    _refuse_cycles(links, above)
-    roots = [link for link in links if link not in above]
-    if len(roots) > 1:
-        raise SceneError(
-            f"{len(roots)} links have no parent ({listing(roots)}): a robot is one tree; join them to one root"
-        )
-    below: dict[str, list[Joint]] = {}
-    for joint in joints:
-        below.setdefault(joint.parent, []).append(joint)
-    order: list[Joint] = []
-    waiting = deque([roots[0]])
-    while waiting:
-        children = below.get(waiting.popleft(), [])
-        order.extend(children)
-        waiting.extend(joint.child for joint in children)
-    return roots[0], order
-
-
-def _refuse_cycles(links: Sequence[str], above: Mapping[str, Joint]) -> None:
-    rooted: set[str] = set()
-    for link in links:
-        path: dict[str, None] = {}  # in order, and found at once
-        here = link
-        while here in above and here not in rooted and here not in path:
-            path[here] = None
-            here = above[here].parent
-        if here in path:
-            upwards = list(path)
-            cycle = [*upwards[upwards.index(here) :][::-1], upwards[-1]]
-            raise SceneError(
-                f"the joints make a cycle, {_chain(cycle)}: a robot is a tree",
-                element=f'joint "{cut(above[here].name)}"',
-            )
-        rooted.update(path)
-
-
-def _chain(names: Sequence[str]) -> str:
-    return " -> ".join(map(cut, names if len(names) <= 12 else [*names[:6], "...", *names[-6:]]))
-
-
-def _broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
-    """Joint -> why it cannot follow another: there is none of that name, or they follow each other in a circle."""
-    single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
-    broken: dict[str, str] = {}
-    for joint in joints:
-        if joint.mimic is None:
-            continue
-        if not (math.isfinite(joint.mimic.multiplier) and math.isfinite(joint.mimic.offset)):
-            what = f"multiplier {joint.mimic.multiplier} and offset {joint.mimic.offset} must be finite"
-            raise SceneError(what, element=f'joint "{cut(joint.name)}" mimic')
-        if joint.name not in single:
-            broken[joint.name] = f"a {joint.type} joint has no single value that could follow another"
-        elif joint.mimic.joint not in single:
-            broken[joint.name] = (
-                f'it mimics joint "{cut(joint.mimic.joint)}", which does not exist or has no single value'
-            )
-    ended: set[str] = set()  # joints whose chain was followed to its end
-    for name in single:
-        chain: dict[str, int] = {}
-        here: str | None = name
-        while here is not None and here not in ended and here not in chain:
-            chain[here] = len(chain)
-            mimic = single[here].mimic
-            here = mimic.joint if mimic is not None and here not in broken else None
-        if here in chain:
-            circle = list(chain)[chain[here] :]
-            broken.update(
-                {member: f"joints mimic each other in a circle, {_chain([*circle, circle[0]])}" for member in circle}
-            )
-        ended.update(chain)
-    return broken
-
-
-def _about_broken(name: str, why: str) -> str:
-    return (
-        f'joint "{cut(name)}": {why}; it was taken as a joint of its own, which stands at 0 or the limit nearest '
-        'to it unless a value is given'
-    )
-
-
-def _resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
-    """Joint of one coordinate -> (the joint that drives it, multiplier, offset), chains followed to their end."""
-    single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
-    drivers: dict[str, tuple[str, float, float]] = {}
-    for name in single:
-        chain = [name]
-        while chain[-1] not in drivers and (mimic := single[chain[-1]].mimic) is not None:
-            chain.append(mimic.joint)
-        drivers.setdefault(chain[-1], (chain[-1], 1.0, 0.0))
-        for here in reversed(chain[:-1]):
-            mimic = single[here].mimic
-            assert mimic is not None
-            driver, multiplier, offset = drivers[mimic.joint]
-            composed = mimic.multiplier * multiplier, mimic.multiplier * offset + mimic.offset
-            if not all(map(math.isfinite, composed)):
-                what = (
-                    f'along the chain to joint "{cut(driver)}" its multiplier becomes {composed[0]:g} and its '
-                    f'offset {composed[1]:g}'
-                )
-                raise SceneError(f"{what}: both must be finite", element=f'joint "{cut(here)}" mimic')
-            drivers[here] = (driver, *composed)
-    return drivers
-
-
-def _clusters(links: Sequence[str], joints: Sequence[Joint]) -> tuple[tuple[str, ...], ...]:
-    """Links welded together by fixed joints, each cluster and all clusters in the order of the links."""
-    leader = {link: link for link in links}
-
-    def find(link: str) -> str:
-        while leader[link] != link:
-            leader[link] = link = leader[leader[link]]
-        return link
-
-    for joint in joints:
-        if joint.type == "fixed":
-            leader[find(joint.child)] = find(joint.parent)
-    members: dict[str, list[str]] = {}
-    for link in links:
-        members.setdefault(find(link), []).append(link)
-    return tuple(tuple(cluster) for cluster in members.values())
-
-
 def _joint_value(name: str, value) -> float:
     try:
         number = float(value)
@@ -677,64 +477,3 @@ def _joint_value(name: str, value) -> float:
     if isinstance(value, bool) or not math.isfinite(number):
         raise InvalidArgument(f"joint {cut(str(name))}: the value must be a finite number, got {brief(value)}")
     return number
-
-
-# --- motions ------------------------------------------------------------------------------------
-
-
-def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """A @ B for (N, 4, 4) poses, every entry by the same three products and sums in any batch.
-
-    A matrix product from a library may round differently by the size of the batch.
-    """
-    R = A[:, :3, 0:1] * B[:, 0:1, :] + A[:, :3, 1:2] * B[:, 1:2, :] + A[:, :3, 2:3] * B[:, 2:3, :]
-    out = np.empty((R.shape[0], 4, 4))
-    out[:, :3] = R
-    out[:, :3, 3] += A[:, :3, 3]
-    out[:, 3] = (0.0, 0.0, 0.0, 1.0)
-    return out
-
-
-def _translation(p: np.ndarray) -> np.ndarray:
-    X = np.zeros((len(p), 4, 4))
-    X[:, (0, 1, 2, 3), (0, 1, 2, 3)] = 1.0
-    X[:, :3, 3] = p
-    return X
-
-
-def _rotation(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """(N, 4, 4) rotations by ``angle`` (N,) about a unit ``axis`` (3,): Rodrigues' formula.
-
-    The diagonal is a² + cos·(1 − a²), so that turning about a coordinate axis leaves exact 0 and 1.
-    """
-    x, y, z = axis
-    s, c = np.sin(angle), np.cos(angle)
-    t = 1.0 - c
-    X = np.zeros((len(angle), 4, 4))
-    X[:, 0, 0], X[:, 1, 1], X[:, 2, 2] = (a * a + c * (1.0 - a * a) for a in (x, y, z))
-    X[:, 0, 1], X[:, 1, 0] = x * y * t - z * s, x * y * t + z * s
-    X[:, 0, 2], X[:, 2, 0] = x * z * t + y * s, x * z * t - y * s
-    X[:, 1, 2], X[:, 2, 1] = y * z * t - x * s, y * z * t + x * s
-    X[:, 3, 3] = 1.0
-    return X
-
-
-def _planar(normal: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A shift within the plane across ``normal``, then a turn about it."""
-    # The first in-plane axis is the coordinate axis farthest from the normal, made orthogonal to
-    # it: for normal z the two are x and y themselves.
-    first = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = first - (first @ normal) * normal
-    first /= math.sqrt(float(first @ first))
-    second = np.cross(normal, first)
-    X = _rotation(normal, values[:, 2])
-    X[:, :3, 3] = values[:, 0:1] * first + values[:, 1:2] * second
-    return X
-
-
-def _floating(values: np.ndarray) -> np.ndarray:
-    """x, y, z, roll, pitch, yaw: the turns about fixed x, y, z axes, as URDF has them."""
-    roll, pitch, yaw = (_rotation(axis, values[:, 3 + k]) for k, axis in enumerate(np.eye(3)))
-    X = _product(yaw, _product(pitch, roll))
-    X[:, :3, 3] = values[:, :3]
-    return X

@@ -5,21 +5,18 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.broadphase.filters import CULLED, count_skipped
 from collide.certificates.make_certificate import certify
 from collide.contact.contact_query import check_margin, check_max_contacts, contact_rows
 from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.log import log_duration
-from collide.packed_world import PackedWorld
-from collide.results import HOW, UNDECIDED, WorldResult
+from collide.packed_world import PackedWorld, QueryRecord
+from collide.results import WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
@@ -49,7 +46,7 @@ class World:
         self._allowed: dict[tuple[int, int], str] = {}
         self._packed: PackedWorld | None = None
         self._stats: dict = {}
-        self._last_query: _Query | None = None
+        self._last_query: QueryRecord | None = None
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along: bodies, names and what is allowed. The rest is made again."""
@@ -289,11 +286,10 @@ class World:
         of_pairs = [no_rows()]
         for i, j in packed.candidates(margin).tolist():
             try:
-                rows = contact_rows(shapes[i], shapes[j], X_WBs[i], X_WBs[j], margin, max_contacts)
+                of_pairs.append(contact_rows(shapes[i], shapes[j], X_WBs[i], X_WBs[j], margin, max_contacts))
             except UnsupportedQuery as error:
                 raise UnsupportedQuery(f'"{names[i]}" and "{names[j]}": {error}') from None
-            rows["a"], rows["b"] = i, j
-            of_pairs.append(rows)
+            of_pairs[-1]["a"], of_pairs[-1]["b"] = i, j
         rows = np.concatenate(of_pairs)
         return WorldContacts(rows, self._to_ids(rows))
 
@@ -379,7 +375,7 @@ class World:
         answer = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=boolean)
         ended = time.perf_counter()
         rows = answer.rows
-        self._last_query = _Query(
+        self._last_query = QueryRecord(
             packed, len(candidates), rows["hit"].copy(), rows["how"].copy(), rows["iterations"].copy(),
             answer.convex_pairs, answer.body_pairs, answer.mesh_pairs,
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
@@ -409,37 +405,6 @@ class World:
         elif len(moved):
             self._packed.move(moved, self._bodies.poses()[moved])
         return self._packed
-
-
-@dataclass(frozen=True)
-class _Query:
-    """What `World.stats` of a query are made of, when they are asked for."""
-
-    packed: PackedWorld
-    n_candidates: int
-    hit: np.ndarray
-    how: np.ndarray
-    iterations: np.ndarray
-    convex_pairs: int
-    body_pairs: int
-    mesh_pairs: int
-    seconds: dict
-
-    def stats(self) -> dict:
-        """As `World.stats` says."""
-        roster = self.packed.roster
-        n = len(roster.ids)
-        skipped = count_skipped(roster.static, roster.group, roster.mask, self.packed.allowed)
-        pairs = n * (n - 1) // 2
-        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
-        return {
-            "bodies": n, "static": int(roster.static.sum()), "pairs": pairs, "skipped": skipped,
-            "narrowphase": self.body_pairs, "convex_pairs": self.convex_pairs, "mesh_pairs": self.mesh_pairs,
-            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
-            "how": dict(Counter(HOW[how] for how in self.how)),
-            "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
-            "epa_iterations": int((self.iterations >> 16).sum()), "seconds": self.seconds,
-        }  # fmt: skip
 
 
 def _within(rows: np.ndarray, limit: float) -> np.ndarray:

@@ -99,7 +99,7 @@ static void look(const struct collide_kernels *kernels, struct arena *arena, con
     if (arena->failed) return;
     weld(kernels, arena, vertices, n, faces, surface);
     if (arena->failed) return;
-    kernels->look_at_facets(address_of(surface->corners), surface->many, n, address_of(flags), address_of(surface->shells),
+    kernels->classify_facets(address_of(surface->corners), surface->many, n, address_of(flags), address_of(surface->shells),
                             address_of(counts), address_of(room));
     surface->n_shells = counts[m[M_SHELLS]];
     closed = counts[m[M_EDGES]] > 0;

@@ -1,5 +1,5 @@
-"""Oracles and families are importable by name from any test, for tests are no package; tests that need kernels of another
-kind than this process has are skipped."""
+"""Oracles and families are importable by name from any test, for tests are no package; tests that need kernels of
+another kind than this process has are skipped."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from collide.kernels import library
-from collide.kernels.mode import COMPILED, JUST_IN_TIME, MODE, WHY
+from collide.kernels.mode import COMPILED, JUST_IN_TIME, MODE, PLAIN_PYTHON, WHY
 
 HERE = Path(__file__).resolve().parent
 #: Every module below this folder that is no test. They have one name each, for all their folders are on the path.
@@ -19,8 +19,18 @@ sys.path += sorted({str(file.parent) for file in HELPERS})
 #: Marks of tests, the mode of kernels in which each is skipped, and how to run it then.
 SKIPPED = {
     "own_kernels": (COMPILED, "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"),
-    "plain_kernels": (JUST_IN_TIME, "calls kernels as plain Python: NUMBA_DISABLE_JIT=1 python -m pytest -m plain_kernels"),
+    "plain_kernels": (
+        JUST_IN_TIME,
+        "calls kernels as plain Python: NUMBA_DISABLE_JIT=1 python -m pytest -m plain_kernels",
+    ),
 }
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Machine code divides by zero and overflows without a word; as Python, with numpy's numbers, kernels are
+    warned."""
+    if PLAIN_PYTHON:
+        config.addinivalue_line("filterwarnings", "ignore::RuntimeWarning")
 
 
 def pytest_report_header() -> str:

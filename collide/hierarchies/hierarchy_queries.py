@@ -1,7 +1,7 @@
-"""The walk of Barba and Langerman, and distances along hierarchies, from Python: who plays which part, what stays open.
+"""The walk of Barba and Langerman, and distances along hierarchies, from Python: arguments in, answers out.
 
 Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one. Where neither
-has, the default narrowphase answers. What the walk cannot prove clear of rounding it hands over to the default
+has, the default narrowphase answers. What the walk cannot prove in spite of rounding it hands over to the default
 narrowphase too, which settles it exactly.
 """
 
@@ -44,7 +44,7 @@ class Walks:
 
     def __init__(self, question, hit, rows, exchanged, depths, trace):
         self._question, self.hit, self.rows, self.exchanged, self.trace = question, hit, rows, exchanged, trace
-        self.walked = rows["said"] >= APART
+        self.walked = rows["status"] >= APART
         self.depth_p, self.depth_q = depths
 
     def __len__(self) -> int:
@@ -54,7 +54,7 @@ class Walks:
     def certificate(self):
         """Of a single pose, plain data that proves the boolean: vertex pairs, as `distance` has them.
 
-        Found from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, found)``
+        Made from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, walks)``
         checks it against all vertices. The plane or the point in ``rows`` proves the answer too, in doubles.
         """
         if len(self) != 1:
@@ -63,9 +63,9 @@ class Walks:
         row, hit = self.rows[0], bool(self.hit[0])
         size_a, size_b = len(walk_body(A).points), len(walk_body(B).points)
         size_p = size_b if self.exchanged else size_a
-        own = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
-        corners = dict.fromkeys(row["corners"].tolist()) if row["said"] in (MEETING, OPEN_MEETING) else (0,)
-        pairs = [(c, own) if self.exchanged else (own, c) for c in corners]
+        vertex = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
+        corners = dict.fromkeys(row["corners"].tolist()) if row["status"] in (MEETING, OPEN_MEETING) else (0,)
+        pairs = [(c, vertex) if self.exchanged else (vertex, c) for c in corners]
         return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> 
     for shape in (A, B):
         walk_body(shape)
     X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    return walk_poses(A, B, X_WA, X_WB, lambda left: ask_default(left, True, 0.0), trace=trace)
+    return walk_poses(A, B, X_WA, X_WB, lambda ids: ask_default(ids, True, 0.0), trace=trace)
 
 
 def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
@@ -130,7 +130,7 @@ def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> Pa
     for shape in (A, B):
         walk_body(shape, "dobkin-kirkpatrick")
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
-    rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda left: ask_default(left, False, math.inf, signed))
+    rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda ids: ask_default(ids, False, math.inf, signed))
     close(rows, depths=signed)
     return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
 
@@ -155,27 +155,26 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
 
     answer_open : called with the numbers of the poses that the walk leaves open; gives their booleans.
     """
-    first, second = walk_body(A), walk_body(B)
+    body_a, body_b = walk_body(A), walk_body(B)
     n = number_of_poses(X_WA, X_WB)
-    exchanged = second.polar is None
-    if exchanged and first.polar is None:
+    exchanged = body_b.polar is None
+    if exchanged and body_a.polar is None:
         rows, depths = no_walks(n), (0, 0)
         rounds: tuple[TracedRound, ...] = ()
     else:
-        P, R = (B, A) if exchanged else (A, B)
-        X_WP, X_WR = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
-        body_p, body_r = walk_body(P), walk_body(R)
+        sides = (A, body_a, X_WA), (B, body_b, X_WB)
+        (P, body_p, X_WP), (R, body_r, X_WR) = reversed(sides) if exchanged else sides
         rows, rounds = run_walks(
             body_p, body_r, P.parts()[0][0], R.parts()[0][0], np.broadcast_to(X_WP, (n, 4, 4)),
             np.broadcast_to(X_WR, (n, 4, 4)), trace=trace,
         )  # fmt: skip
-        depths = body_p.ladder.depth, body_r.depth_of_polar
-    hit = rows["said"] == MEETING
-    found = Walks((A, B, X_WA, X_WB), hit, rows, exchanged, depths, rounds)
-    if not found.walked.all():
-        left = np.flatnonzero(~found.walked)
-        hit[left] = answer_open(left)
-    return found
+        depths = body_p.hierarchy.depth, body_r.depth_of_polar
+    hit = rows["status"] == MEETING
+    walks = Walks((A, B, X_WA, X_WB), hit, rows, exchanged, depths, rounds)
+    if not walks.walked.all():
+        open_ids = np.flatnonzero(~walks.walked)
+        hit[open_ids] = answer_open(open_ids)
+    return walks
 
 
 def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_open) -> np.ndarray:
@@ -184,54 +183,56 @@ def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     Arguments as in `walk_poses`; ``answer_open`` gives whole rows, for pairs that overlap and bodies without interior.
     ``iterations`` counts small problems.
     """
-    first, second = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
+    body_a, body_b = (walk_body(shape, "dobkin-kirkpatrick") for shape in (A, B))
     n = number_of_poses(X_WA, X_WB)
     rows = np.zeros(n, dtype=PAIR_DTYPE)
-    found = np.zeros(n, dtype=bool)
+    settled = np.zeros(n, dtype=bool)
     X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
-    if first.solid and second.solid:
+    if body_a.has_interior and body_b.has_interior:
         for k in range(n):
-            found[k] = _propose(first, second, X_WA[k], X_WB[k], rows[k : k + 1])
-    if found.any():
+            settled[k] = _propose(body_a, body_b, X_WA[k], X_WB[k], rows[k : k + 1])
+    if settled.any():
+        ids = np.flatnonzero(settled)
+        proposed = rows[ids]
         packed = [shape.parts()[0][0] for shape in (A, B)]
-        poses = pose_table(np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n))
-        chosen = np.flatnonzero(found)
-        proposed = rows[chosen]
-        settle_proposals(
-            ShapeTable(packed), poses, np.repeat(np.arange(2), n), np.stack([chosen, n + chosen], axis=1), proposed
+        poses = pose_table(
+            np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n)
         )
-        rows[chosen] = proposed
-        found[chosen] = ~proposed["hit"]
-    left = np.flatnonzero(~found)
-    if len(left):
-        rows[left] = answer_open(left)
+        settle_proposals(
+            ShapeTable(packed), poses, np.repeat(np.arange(2), n), np.stack([ids, n + ids], axis=1), proposed
+        )
+        rows[ids] = proposed
+        settled[ids] = ~proposed["hit"]
+    open_ids = np.flatnonzero(~settled)
+    if len(open_ids):
+        rows[open_ids] = answer_open(open_ids)
     return rows
 
 
-#: Sizes of bodies, and longest ways between them, whose sixth powers doubles hold: the small problems form such products.
+#: Sizes of bodies, and translations between them, whose sixth powers doubles hold: the small problems form such products.
 _SMALLEST, _LARGEST = 1e-40, 1e40
 
 
-def _is_ordinary(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray) -> bool:
-    """Whether the descent can work with these sizes; it has no room for overflow, which the default has."""
-    sizes = [np.abs(body.points).max() for body in (first, second)]
+def _is_ordinary(A: WalkBody, B: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray) -> bool:
+    """Whether the descent can work with these sizes: unlike the default it does not scale its numbers."""
+    sizes = [np.abs(body.points).max() for body in (A, B)]
     reach = max(np.abs(X).max() for X in (X_WA, X_WB))
     return all(_SMALLEST < size < _LARGEST for size in sizes) and bool(reach < _LARGEST)
 
 
-def _propose(first: WalkBody, second: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
-    """Enter the nearest vertices of a pair into a row; False where the bodies overlap as far as doubles tell."""
-    if not _is_ordinary(first, second, X_WA, X_WB):
+def _propose(A: WalkBody, B: WalkBody, X_WA: np.ndarray, X_WB: np.ndarray, row: np.ndarray) -> bool:
+    """Enter the nearest vertices of a pair into a row; False where the bodies overlap, as computed in doubles."""
+    if not _is_ordinary(A, B, X_WA, X_WB):
         return False
     try:
         X_AB = np.linalg.inv(X_WA) @ X_WB
     except np.linalg.LinAlgError:  # unchecked poses may be singular
         return False
-    nearest = hierarchy_distance(first.packed, second.packed, X_AB[:3, :3], X_AB[:3, 3])
+    nearest = hierarchy_distance(A.hierarchy, B.hierarchy, X_AB[:3, :3], X_AB[:3, 3])
     used = nearest.vertices[:, 0] >= 0
     ids = nearest.vertices[used]
-    known = (ids[:, 0] < len(first.points)).all() and (ids[:, 1] < len(second.points)).all()
-    if not 0.0 < nearest.distance < np.inf or not known:
+    are_vertices = (ids[:, 0] < len(A.points)).all() and (ids[:, 1] < len(B.points)).all()
+    if not 0.0 < nearest.distance < np.inf or not are_vertices:
         return False
     row["distance"] = nearest.distance
     for name, point in (("point_a", nearest.point_a), ("point_b", nearest.point_b)):

@@ -2,39 +2,40 @@
 
 The value of min over x ∈ CH(P*) of max over z ∈ CH(Q*) of ⟨x, z⟩ is at most 1 exactly where some x of CH(P*) has
 ⟨x, q⟩ ≤ 1 for all q ∈ Q*, that is, where CH(P*) and ρ0(Q*) meet; it is more exactly where some z of CH(Q*) has
-⟨p, z⟩ > 1 for all p ∈ P*, that is, where the plane ρ(z) parts them. So one small linear program answers both
+⟨p, z⟩ > 1 for all p ∈ P*, that is, where the plane ρ(z) separates them. So one small linear program answers both
 questions of a round of the walk, with the witness of either: Theorem 3.7 is its duality.
 
-Solved by the simplex method on the condensed tableau (A. W. Tucker's), all in doubles: what it says is a proposal.
+Solved by the simplex method on the condensed tableau (A. W. Tucker's), all in doubles: its outcome is a proposal.
 """
 
 from __future__ import annotations
 
 from collide.kernels import kernel
+from collide.numerics.vec3 import dot, vec3_at
 
-#: Most points of P* or of Q*.
-MOST = 130
+#: P* and Q* have at most so many points.
+MAX_POINTS = 130
 #: Doubles of workspace: the tableau, with a row and a column to spare.
-TABLEAU = (MOST + 1) * (MOST + 1)
+TABLEAU = (MAX_POINTS + 1) * (MAX_POINTS + 1)
 #: Integers of workspace: what stands in rows and columns.
-LABELS = 2 * MOST
-#: Pivots before the game is given up as lost.
+LABELS = 2 * MAX_POINTS
+#: Pivots before the game is given up.
 _PIVOTS = 200
 #: A column counts as improving when its price is below this; prices are of the order of one.
-_SLIGHT = 1e-13
+_MIN_PRICE = 1e-13
 
 #: An x as deep in ρ0(Q*) as this is taken as it is; nearer to its boundary the best one is looked for.
 DEEP = 0.4
 
-#: What the game says: its value is at most 1, is more, or it could not be solved.
-MEET, PART, LOST = range(3)
+#: Outcomes of a game: its value is at most 1, is more, or it could not be solved.
+MEET, APART, UNSOLVED = range(3)
 
 
 @kernel
 def solve_game(P, n, Q, m, table, labels, x_weights, z_weights):
-    """(MEET, PART or LOST, pivots, tests); weights of an x for MEET, of a z for PART.
+    """(MEET, APART or UNSOLVED, pivots, tests); weights of an x for MEET, of a z for APART.
 
-    P, Q : three doubles a point, n and m of them.   x_weights, z_weights : room for n and m doubles.
+    P, Q : three doubles a point, n and m of them.   x_weights, z_weights : n and m doubles, out.
     The x of MEET need not be the best one, see DEEP.
     """
     width = n + 1
@@ -45,7 +46,7 @@ def solve_game(P, n, Q, m, table, labels, x_weights, z_weights):
     for a in range(n):
         top = -1e300
         for b in range(m):
-            value = P[3 * a] * Q[3 * b] + P[3 * a + 1] * Q[3 * b + 1] + P[3 * a + 2] * Q[3 * b + 2]
+            value = dot(vec3_at(P, 3 * a), vec3_at(Q, 3 * b))
             table[b * width + a] = value
             low = min(low, value)
             top = max(top, value)
@@ -66,9 +67,9 @@ def solve_game(P, n, Q, m, table, labels, x_weights, z_weights):
     for pivots in range(1, _PIVOTS + 1):
         row = _leaving(table, n, m, column, labels)
         if row < 0:
-            return LOST, pivots, n * m
+            return UNSOLVED, pivots, n * m
         _pivot(table, n, m, row, column)
-        labels[row], labels[MOST + column] = labels[MOST + column], labels[row]
+        labels[row], labels[MAX_POINTS + column] = labels[MAX_POINTS + column], labels[row]
         total = table[m * width + n]
         if 1.0 - shift * total <= DEEP * total:  # 1 / total − shift ≤ DEEP
             break
@@ -76,7 +77,7 @@ def solve_game(P, n, Q, m, table, labels, x_weights, z_weights):
         if column < 0:
             break
     else:
-        return LOST, _PIVOTS, n * m
+        return UNSOLVED, _PIVOTS, n * m
     if 1.0 - shift * total <= total:
         _read_x(table, n, m, labels, x_weights)
         return MEET, pivots, n * m
@@ -84,15 +85,15 @@ def solve_game(P, n, Q, m, table, labels, x_weights, z_weights):
     for b in range(m):
         z_weights[b] = 0.0
     for a in range(n):
-        if labels[MOST + a] >= n:
+        if labels[MAX_POINTS + a] >= n:
             price = max(table[m * width + a], 0.0)
-            z_weights[labels[MOST + a] - n] = price
+            z_weights[labels[MAX_POINTS + a] - n] = price
             total += price
     if not total > 0.0:
-        return LOST, pivots, n * m
+        return UNSOLVED, pivots, n * m
     for b in range(m):
         z_weights[b] /= total
-    return PART, pivots, n * m
+    return APART, pivots, n * m
 
 
 @kernel
@@ -118,7 +119,7 @@ def _fill(table, n, m, shift, labels):
         labels[b] = n + b
     for a in range(n):
         table[m * width + a] = -1.0
-        labels[MOST + a] = a
+        labels[MAX_POINTS + a] = a
     table[m * width + n] = 0.0
 
 
@@ -126,7 +127,7 @@ def _fill(table, n, m, shift, labels):
 def _entering(table, n, m):
     """The column with the lowest price, −1 where none improves."""
     best = -1
-    least = -_SLIGHT
+    least = -_MIN_PRICE
     for a in range(n):
         price = table[m * (n + 1) + a]
         if price < least:

@@ -40,7 +40,7 @@ class TracedRound(NamedTuple):
 
 
 def no_walks(n: int) -> np.ndarray:
-    """Rows that say nothing."""
+    """Rows of walks that were not begun: LOST, all counts 0."""
     return np.zeros(n, dtype=WALK_DTYPE)
 
 
@@ -70,7 +70,7 @@ def run_walks(
     laid_out = pose_table(poses, np.broadcast_to(np.eye(4), poses.shape), np.zeros(2 * n))
     rounds = np.zeros((TRACED_ROUNDS, TRACE)) if trace else None
     walk_poses(
-        body_p.ladder.address, polar.ladder.address, polar.address, *table.addresses,
+        body_p.hierarchy.address, polar.hierarchy.address, polar.address, *table.addresses,
         address_of(laid_out.rows), n, early, address_of(rows), 0 if rounds is None else address_of(rounds),
         *_of_thread.addresses,
     )  # fmt: skip

@@ -23,44 +23,44 @@ def validate_rounds(body_p: WalkBody, body_r: WalkBody, X_WP, X_WR, rounds: tupl
     polar = body_r.polar
     assert polar is not None, "the body that plays R has a polar"
     R, offset = _relative_pose(X_WP, X_WR, polar.origin)
-    P, Q = body_p.ladder.hierarchy, polar.ladder.hierarchy
-    top_p, top_q = body_p.ladder.depth, polar.ladder.depth
+    P, Q = body_p.hierarchy.hierarchy, polar.hierarchy.hierarchy
+    top_p, top_q = body_p.hierarchy.depth, polar.hierarchy.depth
     assert rounds and rounds[0].space == "base" and (rounds[0].level_p, rounds[0].level_q) == (top_p, top_q)
     for number, round_ in enumerate(rounds):
         if round_.invariant == "none":
             assert number == len(rounds) - 1, f"round {number}: the walk went on without an invariant"
             return
-        own_p, own_q = _vertices(P, round_.level_p), _vertices(Q, round_.level_q)
-        points_p = _moved(P.points[own_p], R, offset)
-        points_q = Q.points[own_q]
+        ids_p, ids_q = _vertices(P, round_.level_p), _vertices(Q, round_.level_q)
+        points_p = _moved(P.points[ids_p], R, offset)
+        points_q = Q.points[ids_q]
         # Heights are products of points of P, before and after the motion, with points of Q.
-        reach = max(np.abs(P.points[own_p]).max(), np.abs(offset).max())
+        reach = max(np.abs(P.points[ids_p]).max(), np.abs(offset).max())
         rounding = _SLACK + 1e-14 * float(reach * np.abs(points_q).max())
         where = f"round {number} at levels {round_.level_p}, {round_.level_q}"
         if round_.invariant == "separation":
             heights = points_p @ round_.z
             slack = rounding + _SLACK * np.abs(heights).max()
             assert heights.min() > 1 - slack, f"{where}: P_i is not beyond the plane of z: {heights.min()!r}"
-            own = heights[np.flatnonzero(own_p == round_.vertex_p)]
-            assert len(own) == 1 and own[0] <= heights.min() + slack, f"{where}: the plane is not tangent at its vertex"
+            tangent = heights[np.flatnonzero(ids_p == round_.vertex_p)]
+            assert len(tangent) == 1 and tangent[0] <= heights.min() + slack, f"{where}: the plane is not tangent at its vertex"
             _assert_inside(Q, round_.level_q, round_.z, f"{where}: z is not in Q_j")
         else:
             x = _moved(round_.x[None], R, offset)[0]
             heights = points_q @ x
             slack = rounding + _SLACK * np.abs(heights).max()
             assert heights.max() < 1 + slack, f"{where}: Q_j is not inside the plane of x: {heights.max()!r}"
-            own = heights[np.flatnonzero(own_q == round_.vertex_q)]
-            assert len(own) == 1 and own[0] >= heights.max() - slack, f"{where}: the plane is not tangent at its vertex"
+            tangent = heights[np.flatnonzero(ids_q == round_.vertex_q)]
+            assert len(tangent) == 1 and tangent[0] >= heights.max() - slack, f"{where}: the plane is not tangent at its vertex"
             _assert_inside(P, round_.level_p, round_.x, f"{where}: x is not in P_i")
         if round_.level_p < top_p:
-            others = points_p[own_p != round_.p_star] @ round_.z_star
-            assert len(others) == len(own_p) - 1 and (others > 1 - rounding - _SLACK * np.abs(others).max()).all(), (
+            others = points_p[ids_p != round_.p_star] @ round_.z_star
+            assert len(others) == len(ids_p) - 1 and (others > 1 - rounding - _SLACK * np.abs(others).max()).all(), (
                 f"{where}: the star invariant fails in the primal space"
             )
         if round_.level_q < top_q:
             x = _moved(round_.x_star[None], R, offset)[0]
-            others = points_q[own_q != round_.q_star] @ x
-            assert len(others) == len(own_q) - 1 and (others < 1 + rounding + _SLACK * np.abs(others).max()).all(), (
+            others = points_q[ids_q != round_.q_star] @ x
+            assert len(others) == len(ids_q) - 1 and (others < 1 + rounding + _SLACK * np.abs(others).max()).all(), (
                 f"{where}: the star invariant fails in the polar space"
             )
         if number:

@@ -1,6 +1,6 @@
-"""What the walk keeps of a polytope, made when a query first needs it: P's hierarchy, and R's polar with its own.
+"""What the walk keeps of a polytope, built when a query first needs it: its hierarchy, and its polar with a hierarchy.
 
-Barba and Langerman, section 5, "Preprocessing". The origin of the polar is a point inside R, chosen in R's own frame,
+Barba and Langerman, section 5, "Preprocessing". The origin of the polar is a point inside R, fixed in R's own frame,
 so that a motion of R changes nothing.
 """
 
@@ -15,8 +15,7 @@ import numpy as np
 
 from collide.hierarchies.flat_hierarchy import flat_hierarchy
 from collide.hierarchies.hierarchy import build_hierarchy
-from collide.hierarchies.hierarchy_distance import PackedHierarchy
-from collide.hierarchies.packed_hierarchy import Ladder
+from collide.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.hierarchies.polar_hull import polar_of_hull
 from collide.hierarchies.true_facets import Cloud, label_patches, twins_of
 from collide.hull.exact_hull import Hull, convex_hull
@@ -24,15 +23,17 @@ from collide.kernels import address_of
 
 
 class WalkBody:
-    """points : (n, 3) of a polytope, in its own frame.   hull : theirs, where it is known already."""
+    """A polytope, with structures built when first asked for: each costs O(n log n) once.
+
+    points : (n, 3) of a polytope, in its own frame.   hull : theirs, where it is known already.
+    """
 
     def __init__(self, points: np.ndarray, hull: Hull | None = None):
         self.points = np.ascontiguousarray(points, dtype=np.float64)
         self._hull = hull
-        self._ladder: Ladder | None = None
+        self._hierarchy: PackedHierarchy | None = None
         self._polar: PolarSide | None = None
-        self._packed: PackedHierarchy | None = None
-        self._hopeless = False
+        self._too_thin = False
 
     @property
     def hull(self) -> Hull:
@@ -41,59 +42,50 @@ class WalkBody:
         return self._hull
 
     @property
-    def solid(self) -> bool:
-        """Whether the body has an interior, and can play R."""
+    def has_interior(self) -> bool:
+        """Whether the body can play R."""
         return self.hull.dimension == 3
 
     @property
-    def ladder(self) -> Ladder:
-        """For the part of P."""
-        if self._ladder is None:
-            with _building():
-                if self._ladder is None:
-                    make = build_hierarchy if self.solid else flat_hierarchy
-                    self._ladder = Ladder(make(self.points, self.hull))
-        return self._ladder
-
-    @property
-    def packed(self) -> PackedHierarchy:
-        """The hierarchy as distances go down it; for solids."""
-        if self._packed is None:
-            with _building():
-                if self._packed is None:
-                    self._packed = PackedHierarchy(build_hierarchy(self.points, self.hull))
-        return self._packed
+    def hierarchy(self) -> PackedHierarchy:
+        """For the part of P, and for distances."""
+        if self._hierarchy is None:
+            with _build_lock():
+                if self._hierarchy is None:
+                    build = build_hierarchy if self.has_interior else flat_hierarchy
+                    self._hierarchy = PackedHierarchy(build(self.points, self.hull))
+        return self._hierarchy
 
     @property
     def polar(self) -> PolarSide | None:
         """For the part of R; None where the body has no interior, or one too thin for a polar in doubles."""
-        if self._polar is None and self.solid and not self._hopeless:
-            with _building():
-                if self._polar is None and not self._hopeless:
+        if self._polar is None and self.has_interior and not self._too_thin:
+            with _build_lock():
+                if self._polar is None and not self._too_thin:
                     try:
                         self._polar = PolarSide(self.points, self.hull)
                     except ValueError:
-                        self._hopeless = True
+                        self._too_thin = True
         return self._polar
 
     @property
     def depth_of_polar(self) -> int:
         """Levels of the hierarchy of the polar; 0 where there is none."""
-        return self.polar.ladder.depth if self.polar is not None else 0
+        return self.polar.hierarchy.depth if self.polar is not None else 0
 
 
 class PolarSide:
     """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
 
-    ladder : of Q = ρ0(R − origin).   origin : (3,), inside R.   radius : of a ball about it that R holds, proven;
-    0 where rounding leaves none, and then nothing is proven by it.   starts, triangles : the facets of R for which
-    vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
+    body : the `PolarBody` of R.   hierarchy : of Q = ρ0(R − origin), packed.   origin : (3,), inside R.
+    radius : of a ball about it that R holds, proven [m]; 0 where rounding leaves none, and then nothing is proven by it.
+    starts, triangles : the facets of R for which vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
     """
 
     def __init__(self, points: np.ndarray, hull: Hull):
         polar = polar_of_hull(points, hull)
         self.body = polar
-        self.ladder = Ladder(polar.hierarchy)
+        self.hierarchy = PackedHierarchy(polar.hierarchy)
         self.origin = np.asarray(polar.origin, dtype=np.float64)
         facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
         self.radius = _inner_radius(points, facets, self.origin)
@@ -112,7 +104,7 @@ class PolarSide:
 
     @property
     def address(self) -> int:
-        """Of what `walk_proof.py` reads."""
+        """Address of the ball and the facets, as `walk_proof.ball_at` reads them."""
         return address_of(self._ball)
 
 
@@ -120,9 +112,9 @@ def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """The number of each triangle's true facet, as `PolarBody` counts them."""
     cloud, twins = Cloud(points), twins_of(facets)
     patch = np.empty(len(facets), dtype=np.int32)
-    waiting = np.empty(len(facets), dtype=np.int32)
+    stack = np.empty(len(facets), dtype=np.int32)
     label_patches(
-        *cloud.addresses, address_of(facets), address_of(twins), len(facets), address_of(patch), address_of(waiting)
+        *cloud.addresses, address_of(facets), address_of(twins), len(facets), address_of(patch), address_of(stack)
     )
     return patch
 
@@ -130,8 +122,8 @@ def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 #: Rounding of a distance to a facet's plane, in units of the largest coordinate: some twenty operations, and
 #: a thin triangle's normal is as good as its shortest height is long.
 _ROUNDING = 64 * 2.0**-53
-#: So many facets, those that doubles tell least of, are measured in fractions, some 20 µs each.
-_MOST_EXACT = 20_000
+#: At most so many facets, those of the largest error bounds first, are measured in fractions, some 20 µs each.
+_MAX_EXACT_FACETS = 20_000
 
 
 def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) -> float:
@@ -147,12 +139,12 @@ def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) ->
     areas = spans[3] * spans[4] + (spans[0] + spans[1] + spans[2]) * (spans[3] + spans[4])
     with np.errstate(divide="ignore", invalid="ignore"):
         bound = (volume - 4 * _ROUNDING * largest * areas) / (length + _ROUNDING * largest * (spans[3] + spans[4]))
-        loose = ~(bound > 0.99 * volume / length)
+        inexact = ~(bound > 0.99 * volume / length)
     bound[np.isnan(bound)] = -np.inf
-    least = float(bound[~loose].min(initial=np.inf))
-    order = np.flatnonzero(loose)[np.argsort(bound[loose], kind="stable")]
+    least = float(bound[~inexact].min(initial=np.inf))
+    order = np.flatnonzero(inexact)[np.argsort(bound[inexact], kind="stable")]
     for count, k in enumerate(order.tolist()):
-        if bound[k] >= least or count == _MOST_EXACT:  # the others are farther away, or too many
+        if bound[k] >= least or count == _MAX_EXACT_FACETS:  # the others are farther away, or too many
             least = min(least, float(bound[k]))
             break
         least = min(least, _exact_distance(points[facets[k]], origin))
@@ -173,7 +165,7 @@ def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
 _lock = threading.RLock()
 
 
-def _building() -> threading.RLock:  # type: ignore[valid-type]
+def _build_lock() -> threading.RLock:  # type: ignore[valid-type]
     """Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds."""
     return _lock
 

@@ -82,8 +82,22 @@ class UnionParts:
             digest.update((part.X + 0.0).tobytes())
         return digest.digest()
 
+    @cached_property
+    def ball(self) -> np.ndarray | None:
+        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of half-spaces."""
+        if self.unbounded:
+            return None
+        at = self._X_BP[:, :3, 3]
+        centre = 0.5 * (at.min(axis=0) + at.max(axis=0))
+        across = np.sqrt(np.square(at - centre).sum(axis=1))
+        reach = np.array([packed.reach + packed.radius + packed.slop for packed in self._bounds])
+        stretch = np.array([np.linalg.norm(X[:3, :3], 2) for X in self._X_BP])  # 1 but for what poses of items are off rotations
+        size = np.abs(at).max() + np.abs(centre).max()
+        radius = float((across + stretch * reach).max()) * _UP + 2.0**-40 * size
+        return np.array([*centre, 0.0, 0.0, 0.0, radius])
+
     @property
-    def endless(self) -> bool:
+    def unbounded(self) -> bool:
         """Whether a half-space is among the parts."""
         return any(packed.kind == HALFSPACE for packed in self._bounds)
 

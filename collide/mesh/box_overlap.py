@@ -1,9 +1,9 @@
-"""One box against the eight of a node: the innermost step of every walk over mesh trees.
+"""One box against the eight of a node: the innermost step of every traversal of mesh trees.
 
 The axes are the three of each frame (S. Gottschalk's other nine cost more than they cull) and, where distances are
-asked, the line between the centres and one direction given, that of the nearest points so far. Floats round
-here; whoever fills the probe enlarges its half lengths by a bound of that, so that nothing is parted that meets, and
-no bound is above the distance. Sums go from left to right, so compiled and plain code say the same.
+computed, the line between the centres and the direction of the nearest points so far. Floats round here; whoever
+fills the probe enlarges its half lengths by a bound of that, so that no boxes that meet are culled, and no bound is
+above the distance. Sums go from left to right, so compiled and plain code give the same bits.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ PROBE = 17
 #: A triangle as probe has three half-spaces more that hold it, one an edge: the outward direction in the node's frame
 #: (3) and how far its origin is out (1), less rounding.
 PRISM = PROBE + 12
-#: For distances, from 12 on: what gaps along the axes of the node's frame (3), of the probe's (3) and of any line in it (1)
-#: are worth, at least; a direction in the node's frame (3) and its gap from the probe to the node's middle (1).
+#: For distances, from 12 on: the least lengths in the world of a gap of 1 along the axes of the node's frame (3), of the
+#: probe's (3) and along any line in it (1); a direction in the node's frame (3) and its gap from the probe to the
+#: node's middle (1).
 NEAR_PROBE = 23
 
 
@@ -113,10 +114,10 @@ if not WITH_NUMBA:
 else:
     from collide.kernels.vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
 
-#: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis parts box k of the node whose
-#: first float is ``boxes[at]`` from the probe's box. Views of float32. `boxes_meeting_prism` looks at PRISM floats.
-#: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0 where no axis
-#: parts), then eight squared lengths of lines between centres, in units of the probe's tree.
+#: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
+#: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.
+#: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0 where
+#: no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",

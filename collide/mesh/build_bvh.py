@@ -1,12 +1,12 @@
-"""Building the tree that mesh queries walk: binned surface-area splits, eight boxes to a node.
+"""Building the tree that mesh queries traverse: binned surface-area splits, eight boxes to a node.
 
 I. Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007), for the splits. A node is filled
 by splitting the largest of its boxes until it has eight, so no binary tree is made and folded. O(n log n) for
-meshes whose facets do not all lie at one place; ranges that bins cannot part are halved, which bounds the depth.
+meshes whose facets do not all lie at one place; ranges that bins cannot split are halved, which bounds the depth.
 
-What lost, on teapot, bunny, a dragon of 203,000 facets and env/rob (tight boxes, eight wide, two facets a leaf): parting
-ranges at the middle of the graded tree's control cubes looked at 10 to 20 % more boxes and built up to 25 % faster;
-with outliers packed in ranges of their own it looked at as many again and built no faster.
+What was slower, on teapot, bunny, a dragon of 203,000 facets and env/rob (tight boxes, eight wide, two facets a leaf):
+splitting ranges at the middle of the graded tree's control cubes visited 10 to 20 % more boxes and built up to 25 %
+faster; with outliers packed in ranges of their own it visited as many again and built no faster.
 
 Boxes stand in floats relative to the mesh's middle, rounded outwards: each coordinate is moved by more than one
 unit in the last place before it is rounded to nearest.
@@ -15,24 +15,25 @@ unit in the last place before it is rounded to nearest.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f32, view_f64, view_i32, view_i64
-from collide.mesh.bvh import MOST_FACETS, NODE, NOTHING, WIDTH, MeshTree, leaf_link
+from collide.mesh.bvh import MAX_FACETS, NODE, NOTHING, WIDTH, MeshTree, leaf_link
 
 #: Triangles of a leaf, at most.
 LEAF = 2
 #: Bins along the longest axis of a range's centres: as many as triangles, within these.
-BINS, _FEWEST_BINS = 16, 4
+BINS, _MIN_BINS = 16, 4
 #: Below so many levels of splits ranges are halved by number, whatever the bins say.
 _DEEPEST_SPLIT = 96
 #: Doubles of a slot's row: its box, the box of its triangles' centres (doubled), low then high.
 _ROW = 12
-#: Words of 32 bits a triangle while the tree is built: its box, its number, its padding.
+#: Words of 32 bits a triangle while the tree is built: its box, its number, padding.
 _RECORD = 8
 #: What makes a rounded float an outward one: over half a unit of float, relative, and something for 0.
-_OUTWARD, _LEAST = 2.0**-22, 2.0**-120
+_OUTWARD, _SMALLEST = 2.0**-22, 2.0**-120
 
 
 def build_mesh_tree(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
@@ -45,7 +46,7 @@ def build_mesh_tree(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise ValueError("mesh tree: vertices must be (n, 3) and faces (m, 3)")
     m = len(faces)
-    if not 0 < m <= MOST_FACETS or faces.min() < 0 or faces.max() >= len(vertices):
+    if not 0 < m <= MAX_FACETS or faces.min() < 0 or faces.max() >= len(vertices):
         raise ValueError("mesh tree: there must be faces, and their numbers must be those of vertices")
     nodes = np.empty((max(2, m), NODE), dtype=np.int32)
     triangles = np.empty((m, 9))
@@ -69,34 +70,49 @@ _RIGHT_AT = _BINS_AT + 7 * BINS
 _WORK = _RIGHT_AT + BINS
 
 
-@entry(
-    "void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
-)
+class _Build(NamedTuple):
+    """What a tree is built with.
+
+    floats, pairs : the triangles' records as floats, and as pairs of words.   boxes, links : the nodes.
+    work : rows and bins, as above.   stack : ranges that become nodes, three words each: node, first, last and level.
+    """
+
+    floats: np.ndarray
+    pairs: np.ndarray
+    boxes: np.ndarray
+    links: np.ndarray
+    work: np.ndarray
+    stack: np.ndarray
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def fill_tree(
     vertices_at, n, faces_at, m, records_at, nodes_at, n_nodes, triangles_at, ids_at, numbers_at, work_at, stack_at,
     n_stack, counts_at,
 ):  # fmt: skip
-    """Nodes, triangles in the order of the leaves, and their numbers; counts become nodes used and depth."""
+    """Nodes, triangles in the order of the leaves, and their numbers; counts become nodes used and depth.
+
+    Arguments are flat: it is called from C too.
+    """
     vertices = view_f64(vertices_at, 3 * n)
     faces = view_i64(faces_at, 3 * m)
-    floats = view_f32(records_at, _RECORD * m)
     words = view_i32(records_at, _RECORD * m)
-    pairs = view_i64(records_at, _RECORD // 2 * m)
-    boxes = view_f32(nodes_at, NODE * n_nodes)
-    links = view_i32(nodes_at, NODE * n_nodes)
-    work = view_f64(work_at, _WORK)
     stack = view_i64(stack_at, n_stack)
     counts = view_i64(counts_at, 2)
-    _load(vertices, faces, m, floats, words, view_f64(numbers_at, 4))
-    _measure(floats, 0, m, work, 0)
-    _clear_node(boxes, links, 0)
-    _set_box(boxes, 0, 0, work, 0)
+    build = _Build(
+        view_f32(records_at, _RECORD * m), view_i64(records_at, _RECORD // 2 * m), view_f32(nodes_at, NODE * n_nodes),
+        view_i32(nodes_at, NODE * n_nodes), view_f64(work_at, _WORK), stack,
+    )  # fmt: skip
+    _load(vertices, faces, m, build.floats, words, view_f64(numbers_at, 4))
+    _measure(build.floats, 0, m, build.work, 0)
+    _clear_node(build, 0)
+    _set_box(build, 0, 0)
     used = 1
     depth = 1
     if m <= LEAF:
-        links[6 * WIDTH] = leaf_link(0, m)
+        build.links[6 * WIDTH] = leaf_link(0, m)
     else:
-        links[6 * WIDTH] = 1
+        build.links[6 * WIDTH] = 1
         used = 2
         stack[0] = 1
         stack[1] = 0
@@ -109,7 +125,7 @@ def fill_tree(
             last = stack[3 * top + 2] & 0xFFFFFFFF
             level = stack[3 * top + 2] >> 32
             depth = max(depth, level)
-            top, used = _fill_node(floats, pairs, boxes, links, work, stack, node, first, last, level, top, used)
+            top, used = _fill_node(build, node, first, last, level, top, used)
     counts[0] = used
     counts[1] = depth
     triangles = view_f64(triangles_at, 9 * m)
@@ -153,8 +169,8 @@ def _load(vertices, faces, m, floats, words, numbers):
             z = vertices[c + axis]
             low = (min(x, y, z) - numbers[axis]) * scale
             high = (max(x, y, z) - numbers[axis]) * scale
-            floats[_RECORD * i + axis] = np.float32(low - (abs(low) * _OUTWARD + _LEAST))
-            floats[_RECORD * i + 3 + axis] = np.float32(high + (abs(high) * _OUTWARD + _LEAST))
+            floats[_RECORD * i + axis] = np.float32(low - (abs(low) * _OUTWARD + _SMALLEST))
+            floats[_RECORD * i + 3 + axis] = np.float32(high + (abs(high) * _OUTWARD + _SMALLEST))
         words[_RECORD * i + 6] = i
 
 
@@ -202,67 +218,71 @@ def _measure(floats, first, last, work, slot):
 
 
 @kernel
-def _clear_node(boxes, links, node):
+def _clear_node(build, node):
     for k in range(3 * WIDTH):
-        boxes[NODE * node + k] = np.float32(0.0)
-        boxes[NODE * node + 3 * WIDTH + k] = np.float32(NOTHING)
+        build.boxes[NODE * node + k] = np.float32(0.0)
+        build.boxes[NODE * node + 3 * WIDTH + k] = np.float32(NOTHING)
     for k in range(WIDTH):
-        links[NODE * node + 6 * WIDTH + k] = 0
+        build.links[NODE * node + 6 * WIDTH + k] = 0
 
 
 @kernel
-def _set_box(boxes, node, slot, work, row):
+def _set_box(build, node, slot):
+    """A slot's box from its row, rounded outwards."""
     for axis in range(3):
-        low = work[_ROW * row + axis]
-        high = work[_ROW * row + 3 + axis]
+        low = build.work[_ROW * slot + axis]
+        high = build.work[_ROW * slot + 3 + axis]
         middle = np.float32(0.5 * (low + high))
         half = max(high - float(middle), float(middle) - low)
-        boxes[NODE * node + WIDTH * axis + slot] = middle
-        boxes[NODE * node + WIDTH * (3 + axis) + slot] = np.float32(half + (half * _OUTWARD + _LEAST))
+        build.boxes[NODE * node + WIDTH * axis + slot] = middle
+        build.boxes[NODE * node + WIDTH * (3 + axis) + slot] = np.float32(half + (half * _OUTWARD + _SMALLEST))
 
 
 @kernel
-def _fill_node(floats, pairs, boxes, links, work, stack, node, first, last, level, top, used):
-    """Split a range into up to eight, the largest first; those that are no leaves become nodes on the stack."""
+def _fill_node(build, node, first, last, level, top, used):
+    """Split a range into up to eight, the largest first; those that are no leaves become nodes on the stack.
+
+    Returns the stack's height and the nodes used.
+    """
+    links, stack = build.links, build.stack
     # Ranges of the slots stand behind the stack's top, three words a slot: first, last, splits that led there.
     at = 3 * top
     stack[at] = first
     stack[at + 1] = last
     stack[at + 2] = level
-    _measure(floats, first, last, work, 0)
+    _measure(build.floats, first, last, build.work, 0)
     n = 1
     while n < WIDTH:
         best = -1
         largest = -1.0
         for slot in range(n):
             if stack[at + 3 * slot + 1] - stack[at + 3 * slot] > LEAF:
-                area = _area(work, _ROW * slot)
+                area = _area(build.work, _ROW * slot)
                 if area > largest:
                     largest = area
                     best = slot
         if best < 0:
             break
-        middle = _split(floats, pairs, stack[at + 3 * best], stack[at + 3 * best + 1], level, work, best, n)
+        middle = _split(build, stack[at + 3 * best], stack[at + 3 * best + 1], level, best, n)
         stack[at + 3 * n] = middle
         stack[at + 3 * n + 1] = stack[at + 3 * best + 1]
         stack[at + 3 * best + 1] = middle
         n += 1
-    _clear_node(boxes, links, node)
-    kept = top
+    _clear_node(build, node)
     for slot in range(n):
         begin = stack[at + 3 * slot]
         end = stack[at + 3 * slot + 1]
-        _set_box(boxes, node, slot, work, slot)
+        _set_box(build, node, slot)
         if end - begin <= LEAF:
             links[NODE * node + 6 * WIDTH + slot] = leaf_link(begin, end - begin)
         else:
             links[NODE * node + 6 * WIDTH + slot] = used
-            stack[3 * kept] = used
-            stack[3 * kept + 1] = begin
-            stack[3 * kept + 2] = end | ((level + 1) << 32)
-            kept += 1
+            stack[3 * top] = used
+            stack[3 * top + 1] = begin
+            stack[3 * top + 2] = end | ((level + 1) << 32)
+            top += 1
             used += 1
-    return kept, used
+    return top, used
 
 
 @kernel
@@ -274,8 +294,12 @@ def _area(work, at):
 
 
 @kernel
-def _split(floats, pairs, first, last, level, work, row, new):
-    """Part a range where bins promise least area times number; its rows become those of the parts."""
+def _split(build, first, last, level, row, new):
+    """Split a range where the sum of area times number of both parts is least, by bins; where the second part begins.
+
+    row, new : of the range, which become those of the parts.
+    """
+    floats, pairs, work = build.floats, build.pairs, build.work
     at = _ROW * row
     axis = 0
     for k in range(1, 3):
@@ -286,7 +310,7 @@ def _split(floats, pairs, first, last, level, work, row, new):
     cut = -1
     scale = 0.0
     if extent > 0.0 and level < _DEEPEST_SPLIT:
-        bins = min(BINS, max(_FEWEST_BINS, last - first))
+        bins = min(BINS, max(_MIN_BINS, last - first))
         scale = bins * (1.0 - 1e-6) / extent
         cut = _best_cut(floats, first, last, work, axis, origin, scale, bins)
     if cut < 0:
@@ -303,9 +327,7 @@ def _split(floats, pairs, first, last, level, work, row, new):
                 for word in range(_RECORD // 2):
                     i = _RECORD // 2 * middle + word
                     j = _RECORD // 2 * end + word
-                    keep = pairs[i]
-                    pairs[i] = pairs[j]
-                    pairs[j] = keep
+                    pairs[i], pairs[j] = pairs[j], pairs[i]
     _measure(floats, first, middle, work, row)
     _measure(floats, middle, last, work, new)
     return middle
@@ -339,11 +361,11 @@ def _best_cut(floats, first, last, work, axis, origin, scale, bins):
         work[at + 6] = max(work[at + 6], high2)
     # From the right: area times number of all bins from b on.
     row = _ROW * WIDTH
-    count = _open(work, row)
+    count = _start_box(work, row)
     for b in range(bins - 1, 0, -1):
         count = _grow(work, row, b, count)
         work[_RIGHT_AT + b] = count * _area(work, row) if count > 0.0 else -1.0
-    count = _open(work, row)
+    count = _start_box(work, row)
     best = math.inf
     cut = -1
     for b in range(bins - 1):
@@ -358,7 +380,7 @@ def _best_cut(floats, first, last, work, axis, origin, scale, bins):
 
 
 @kernel
-def _open(work, row):
+def _start_box(work, row):
     for k in range(3):
         work[row + k] = math.inf
         work[row + 3 + k] = -math.inf

@@ -28,10 +28,10 @@ NODE = 7 * WIDTH
 SLAB = 5 * WIDTH
 #: Half length of a slot that is not used.
 NOTHING = -1e30
-#: Most triangles of a leaf: what three bits of a link can tell.
-FULLEST_LEAF = 7
-#: Most facets of a mesh: a leaf's link holds its first triangle in 28 bits.
-MOST_FACETS = 1 << 28
+#: Triangles of a leaf at most: three bits of a link hold their number.
+MAX_LEAF = 7
+#: Facets of a mesh at most: a leaf's link holds its first triangle in 28 bits.
+MAX_FACETS = 1 << 28
 
 # Header that kernels read: integers, and the address of the numbers.
 NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT = range(9)
@@ -86,8 +86,8 @@ class MeshTree:
             self._content = digest.digest()
         return self._content
 
-    def ask_slabs(self, make) -> None:
-        """Have the slabs that distances need (`slabs.make_slabs`), made at most once."""
+    def need_slabs(self, make) -> None:
+        """Make the slabs that distances need (``make``: `bvh_slabs.make_slabs`) unless they are there."""
         if self._slabs is None:
             with _making():
                 if self._slabs is None:
@@ -102,7 +102,7 @@ class MeshTree:
         return sum(part.nbytes for part in parts if part is not None)
 
     def boxes(self) -> tuple[np.ndarray, np.ndarray]:
-        """(centres, halves), both (k, 8, 3) float64, in the tree's units."""
+        """(centres, half lengths), both (k, 8, 3) float64, in the tree's units."""
         floats = self.nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
         return floats[:, :3].transpose(0, 2, 1), floats[:, 3:].transpose(0, 2, 1)
 
@@ -123,12 +123,12 @@ class MeshTree:
         """Everything that a kernel relies on to stay inside the arrays and to come to an end."""
         m = len(self.ids)
         _require(self.nodes.ndim == 2 and self.nodes.shape[1] == NODE and len(self.nodes) > 0, "nodes of another shape")
-        _require(self.triangles.shape == (m, 9) and 0 < m <= MOST_FACETS, "triangles of another shape")
+        _require(self.triangles.shape == (m, 9) and 0 < m <= MAX_FACETS, "triangles of another shape")
         _require(self.centre.shape == (3,) and np.isfinite(self.centre).all(), "a centre that is none")
         links, used = self.links(), self.used()
         leaves = leaf_runs(links[used & (links < 0)])
         first, count = leaves
-        _require((count >= 1).all() and (count <= FULLEST_LEAF).all(), "a leaf without triangles")
+        _require((count >= 1).all() and (count <= MAX_LEAF).all(), "a leaf without triangles")
         order = np.argsort(first)
         ends = (first + count)[order]
         _require(first[order][0] == 0 and ends[-1] == m, "leaves that do not cover the triangles")

@@ -22,11 +22,15 @@ from collide.mesh.bvh import (
     SLAB,
     WIDTH,
     MeshTree,
+    float_column_at,
+    link_of,
     open_tree,
 )
+from collide.mesh.triangle import normal_of, triangle_at
+from collide.numerics.vec3 import Vec3, add, divide, dot, max_abs, put_vec3, sub, vec3_at
 
 #: As in `build_bvh.py`: outward rounding to floats.
-_OUTWARD, _LEAST = 2.0**-22, 2.0**-120
+_OUTWARD, _SMALLEST = 2.0**-22, 2.0**-120
 
 
 def make_slabs(tree: MeshTree) -> np.ndarray:
@@ -43,90 +47,63 @@ def make_slabs(tree: MeshTree) -> np.ndarray:
 @entry("void(int64, int64, int64)")
 def fill_slabs(header_at, slabs_at, work_at):
     """work : 5 doubles a node: the sum of its facets' normals, and the first and last of its facets."""
-    header, numbers, boxes, links, triangles, _ = open_tree(header_at)
-    n = header[N_NODES]
+    tree = open_tree(header_at)
+    n = tree.header[N_NODES]
     slabs = view_f32(slabs_at, SLAB * n)
     work = view_f64(work_at, 5 * n)
-    scale = math.ldexp(1.0, int(-header[EXPONENT]))
     for node in range(n - 1, -1, -1):
-        for k in range(3):
-            work[5 * node + k] = 0.0
+        total = Vec3(0.0, 0.0, 0.0)
         work[5 * node + 3] = math.inf
         work[5 * node + 4] = -math.inf
         for slot in range(WIDTH):
-            if boxes[NODE * node + 3 * WIDTH + slot] < 0.5 * NOTHING:
+            if tree.boxes[NODE * node + 3 * WIDTH + slot] < 0.5 * NOTHING:
                 continue
-            link = int(links[NODE * node + 6 * WIDTH + slot])
-            x, y, z, first, last = _below(triangles, work, link)
-            work[5 * node] += x
-            work[5 * node + 1] += y
-            work[5 * node + 2] += z
+            normal, first, last = _normals_below(tree.triangles, work, link_of(tree.links, WIDTH * node + slot))
+            total = add(total, normal)
             work[5 * node + 3] = min(work[5 * node + 3], float(first))
             work[5 * node + 4] = max(work[5 * node + 4], float(last))
-            _set_slab(triangles, numbers, scale, first, last, x, y, z, slabs, SLAB * node + slot)
+            _set_slab(tree, first, last, normal, slabs, SLAB * node + slot)
+        put_vec3(work, 5 * node, total)
 
 
 @kernel
-def _below(triangles, work, link):
-    """(x, y, z, first, last): the sum of the normals of the facets behind a link, and which they are."""
+def _normals_below(triangles, work, link):
+    """(sum of the normals of the facets behind a link, the first of them, the last)."""
     if link >= 0:
         at = 5 * link
-        return work[at], work[at + 1], work[at + 2], int(work[at + 3]), int(work[at + 4])
+        return vec3_at(work, at), int(work[at + 3]), int(work[at + 4])
     first = ~link >> 3
     last = first + (~link & 7)
-    sx = 0.0
-    sy = 0.0
-    sz = 0.0
+    total = Vec3(0.0, 0.0, 0.0)
     for i in range(first, last):
-        a = 9 * i
-        ux = triangles[a + 3] - triangles[a]
-        uy = triangles[a + 4] - triangles[a + 1]
-        uz = triangles[a + 5] - triangles[a + 2]
-        vx = triangles[a + 6] - triangles[a]
-        vy = triangles[a + 7] - triangles[a + 1]
-        vz = triangles[a + 8] - triangles[a + 2]
-        sx += uy * vz - uz * vy
-        sy += uz * vx - ux * vz
-        sz += ux * vy - uy * vx
-    return sx, sy, sz, first, last
+        total = add(total, normal_of(triangle_at(triangles, 9 * i)))
+    return total, first, last
 
 
 @kernel
-def _set_slab(triangles, numbers, scale, first, last, x, y, z, slabs, at):
-    """The slab across (x, y, z) around a run of facets."""
-    size = max(abs(x), abs(y), abs(z))
+def _set_slab(tree, first, last, normal, slabs, at):
+    """The slab across a direction around a run of facets."""
+    size = max_abs(normal)
     if not size > 1e-280:
-        x = 1.0
-        y = 0.0
-        z = 0.0
+        normal = Vec3(1.0, 0.0, 0.0)
         size = 1.0
-    x /= size
-    y /= size
-    z /= size
-    length = math.sqrt(x * x + y * y + z * z)
-    nx = np.float32(x / length)
-    ny = np.float32(y / length)
-    nz = np.float32(z / length)
-    x = float(nx)
-    y = float(ny)
-    z = float(nz)
+    normal = divide(normal, size)
+    normal = divide(normal, math.sqrt(dot(normal, normal)))
+    slabs[at] = np.float32(normal.x)
+    slabs[at + WIDTH] = np.float32(normal.y)
+    slabs[at + 2 * WIDTH] = np.float32(normal.z)
+    n = float_column_at(slabs, at)
     low = math.inf
     high = -math.inf
-    for k in range(3 * first, 3 * last):
-        height = (
-            x * (triangles[3 * k] - numbers[CENTRE])
-            + y * (triangles[3 * k + 1] - numbers[CENTRE + 1])
-            + z * (triangles[3 * k + 2] - numbers[CENTRE + 2])
-        )
+    for k in range(9 * first, 9 * last, 3):
+        height = dot(n, sub(vec3_at(tree.triangles, k), vec3_at(tree.numbers, CENTRE)))
         low = min(low, height)
         high = max(high, height)
+    scale = math.ldexp(1.0, int(-tree.header[EXPONENT]))
     low *= scale
     high *= scale
     middle = np.float32(0.5 * (low + high))
     half = max(high - float(middle), float(middle) - low)
-    slabs[at] = nx
-    slabs[at + WIDTH] = ny
-    slabs[at + 2 * WIDTH] = nz
     slabs[at + 3 * WIDTH] = middle
     # Heights are good to 8u of the box's size, at most 4 units.
-    slabs[at + 4 * WIDTH] = np.float32(half + (half * _OUTWARD + _LEAST + 2.0**-48))
+    slabs[at + 4 * WIDTH] = np.float32(half + (half * _OUTWARD + _SMALLEST + 2.0**-48))

@@ -13,9 +13,9 @@ from fractions import Fraction
 import numpy as np
 
 #: Facets times vertices looked at before it is left open; some 0.2 s.
-MOST = 20_000_000
+MAX_SIGNS = 20_000_000
 #: Signs worked out in integers before it is left open; some 0.2 s.
-MOST_EXACT = 100_000
+MAX_EXACT_SIGNS = 100_000
 _CHUNK = 1 << 18
 #: Of the permanent; Shewchuk's (7 + 56 ε) ε, with room for the rounding of the permanent itself.
 _ERROR = 1e-15
@@ -25,11 +25,11 @@ def is_own_hull(vertices: np.ndarray, faces: np.ndarray) -> bool:
     """Whether every facet (m, 3) of a solid has all vertices (n, 3), finite, on its inner side or in its plane.
 
     Facets without area say nothing. True is proven; False may also mean that the mesh is too large for this to be
-    looked at (`MOST`, `MOST_EXACT`). O(m n), and most meshes that are not convex show it at once.
+    looked at (`MAX_SIGNS`, `MAX_EXACT_SIGNS`). O(m n), and most meshes that are not convex show it at once.
     """
     used, ids = np.unique(faces, return_inverse=True)
     points, facets = vertices[used], ids.reshape(-1, 3)
-    if len(points) * len(facets) > MOST:
+    if len(points) * len(facets) > MAX_SIGNS:
         return False
     # One power of two for all: the largest coordinate near 1, nothing rounded but what is far too small to matter.
     points = np.ldexp(points, -int(np.frexp(np.abs(points).max())[1]))
@@ -42,7 +42,7 @@ def is_own_hull(vertices: np.ndarray, faces: np.ndarray) -> bool:
         for f, v in np.argwhere(det >= -bound).tolist():
             if v not in facets[begin + f] and exact.is_beyond(begin + f, v):
                 return False
-        if exact.count > MOST_EXACT:
+        if exact.count > MAX_EXACT_SIGNS:
             return False
     return True
 

@@ -1,4 +1,4 @@
-"""Everything that is asked of a triangle surface before it may stand for a body, in one pass."""
+"""What a triangle surface must be before it may stand for a body: welding, topology, volumes, in one pass."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from collide.mesh.shell_nesting import inside_out
 from collide.mesh.shell_volumes import Shells, shell_volumes, without_area
 from collide.mesh.weld import weld
 
-# Further bits of what is said of a facet; the first ones stand in `topology`.
+# Further flags of a facet; the first ones stand in `mesh_topology.py`.
 NO_AREA = 1 << 16     # its corners lie on one line, or two of them are one point
 INSIDE_OUT = 1 << 17  # its shell has a negative volume and is no cavity
 EMPTY = 1 << 18       # its shell encloses nothing
 
-#: The bits after which an inside cannot be told.
+#: Flags of surfaces that have no inside.
 NOT_CLOSED = OPEN | UNBALANCED | TURNED | ONE_SIDED
 
 
 class Survey(NamedTuple):
-    """What was found out about n vertices and f facets.
+    """The surface of n vertices and f facets.
 
     corners : (f, 3) int32, the faces with equal points named by the first of them; the faces
         themselves where no two vertices are equal.
-    flags : (f,) int32, bits of `topology` and of this module.
+    flags : (f,) int32, bits of `mesh_topology.py` and of this module.
     shells : (f,) int32, parts that close by themselves, numbered by their first facets; −1 for
         facets with two equal corners. Parts that touch along edges or at vertices only stay apart.
     volumes, signs : (shells,) float64 [m³] and int8; empty unless the surface is closed. Signs are exact.
@@ -41,7 +41,7 @@ class Survey(NamedTuple):
     shells: np.ndarray
     volumes: np.ndarray
     signs: np.ndarray
-    many_shells: int
+    n_shells: int
     edges: int
     open_edges: int
     pinches: int
@@ -60,7 +60,7 @@ class Survey(NamedTuple):
 
 
 def survey_surface(vertices: np.ndarray, faces: np.ndarray) -> Survey:
-    """Look at a surface; nothing is refused, everything is flagged.
+    """Survey a surface; nothing is refused, everything is flagged.
 
     vertices : (n, 3) finite float64.   faces : (f, 3) int32 within 0 … n − 1, f ≥ 1.
     About 0.4 µs a facet; facets and shells on which doubles cannot decide cost microseconds each.
@@ -68,26 +68,27 @@ def survey_surface(vertices: np.ndarray, faces: np.ndarray) -> Survey:
     first = weld(vertices)
     welded = int((first != np.arange(len(first))).sum())
     corners = np.ascontiguousarray(first[faces]) if welded else faces
-    many, n = len(faces), len(vertices)
-    flags, shells = np.empty(many, dtype=np.int32), np.empty(many, dtype=np.int32)
+    n, n_vertices = len(faces), len(vertices)
+    flags, shells = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     counts = np.empty(COUNTS, dtype=np.int64)
-    room = np.empty(12 * many + 4 * n + 1, dtype=np.int32)
-    topology.look_at_facets(
-        address_of(corners), many, n, address_of(flags), address_of(shells), address_of(counts), address_of(room)
-    )
+    workspace = np.empty(12 * n + 4 * n_vertices + 1, dtype=np.int32)
+    topology.classify_facets(
+        address_of(corners), n, n_vertices, address_of(flags), address_of(shells), address_of(counts),
+        address_of(workspace),
+    )  # fmt: skip
     flags[without_area(vertices, corners)] |= NO_AREA
-    found = Survey(
+    survey = Survey(
         corners, flags, shells, np.zeros(0), np.zeros(0, dtype=np.int8), int(counts[topology.SHELLS]),
         int(counts[topology.EDGES]), int(counts[topology.OPEN_EDGES]), int(counts[topology.PINCHES]),
         int(counts[topology.USED]), welded,
     )  # fmt: skip
-    return _with_volumes(vertices, found) if found.closed else found
+    return _with_volumes(vertices, survey) if survey.closed else survey
 
 
-def _with_volumes(vertices: np.ndarray, found: Survey) -> Survey:
-    parts = Shells(found.corners, found.shells, found.many_shells)
+def _with_volumes(vertices: np.ndarray, survey: Survey) -> Survey:
+    parts = Shells(survey.corners, survey.shells, survey.n_shells)
     volumes, signs = shell_volumes(vertices, parts)
     wrong = inside_out(vertices, parts, signs)
     of_shell = np.where(wrong, INSIDE_OUT, 0) | np.where(signs == 0, EMPTY, 0)
-    found.flags[:] |= np.where(found.shells >= 0, of_shell[found.shells], 0).astype(np.int32)
-    return found._replace(volumes=volumes, signs=signs)
+    survey.flags[:] |= np.where(survey.shells >= 0, of_shell[survey.shells], 0).astype(np.int32)
+    return survey._replace(volumes=volumes, signs=signs)

@@ -12,13 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+from collide.numerics.vec3 import Vec3, dot, sub, vec3_at
 
 #: Points a leaf holds at most.
 _LEAF = 8
-#: Points asked in one call, so that a long run can be watched and stopped.
+#: Points of one call, so that a long run can be watched and stopped.
 CHUNK = 1 << 15
-#: The most neighbours that may be asked for.
-MOST = 32
+#: Neighbours of a point at most.
+MAX_NEIGHBOURS = 32
 
 
 class PointTree:
@@ -37,8 +38,8 @@ class PointTree:
     def nearest(self, k: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """For all points, in chunks: their numbers (m,), and the squared distances (m, k) to their k nearest
         others, ascending; infinite where there are not as many. Each point counts once for every row it has."""
-        if not 1 <= k <= MOST:
-            raise ValueError(f"k must lie within 1 … {MOST}, got {k}")
+        if not 1 <= k <= MAX_NEIGHBOURS:
+            raise ValueError(f"k must lie within 1 … {MAX_NEIGHBOURS}, got {k}")
         n = len(self.points)
         for first in range(0, n, CHUNK):
             last = min(first + CHUNK, n)
@@ -90,13 +91,13 @@ def _split_at(points, order, low, high, middle, axis):
 @kernel
 def _fit_box(points, low, high, boxes, node):
     for k in range(3):
-        least = points[3 * low + k]
-        most = least
+        smallest = points[3 * low + k]
+        largest = smallest
         for i in range(low + 1, high):
-            least = min(least, points[3 * i + k])
-            most = max(most, points[3 * i + k])
-        boxes[6 * node + k] = least
-        boxes[6 * node + 3 + k] = most
+            smallest = min(smallest, points[3 * i + k])
+            largest = max(largest, points[3 * i + k])
+        boxes[6 * node + k] = smallest
+        boxes[6 * node + 3 + k] = largest
 
 
 @entry("void(int64, int64, int64, int64, int64)")
@@ -112,31 +113,33 @@ def build_tree(points_at, order_at, n, levels, boxes_at):
             node = (1 << level) + i
             _fit_box(points, low, high, boxes, node)
             if level < levels:
-                axis = 0
-                for k in range(1, 3):
-                    if boxes[6 * node + 3 + k] - boxes[6 * node + k] > boxes[6 * node + 3 + axis] - boxes[6 * node + axis]:
-                        axis = k
+                axis = _longest_axis(boxes, 6 * node)
                 _split_at(points, order, low, high, (n * (2 * i + 1)) >> (level + 1), axis)
 
 
 @kernel
-def _square_to_box(boxes, node, x, y, z):
-    at = 6 * node
-    dx = max(max(boxes[at] - x, x - boxes[at + 3]), 0.0)
-    dy = max(max(boxes[at + 1] - y, y - boxes[at + 4]), 0.0)
-    dz = max(max(boxes[at + 2] - z, z - boxes[at + 5]), 0.0)
-    return dx * dx + dy * dy + dz * dz
+def _longest_axis(boxes, at):
+    size = sub(vec3_at(boxes, at + 3), vec3_at(boxes, at))
+    axis = 1 if size.y > size.x else 0
+    return 2 if size.z > (size.y if axis == 1 else size.x) else axis
 
 
 @kernel
-def _look_at_leaf(points, low, high, own, x, y, z, squares, at, k):
-    """Put the leaf's points into the k nearest, ascending."""
+def _square_to_box(boxes, node, x):
+    """Squared distance of a point from the box of a node."""
+    low = sub(vec3_at(boxes, 6 * node), x)
+    high = sub(x, vec3_at(boxes, 6 * node + 3))
+    d = Vec3(max(max(low.x, high.x), 0.0), max(max(low.y, high.y), 0.0), max(max(low.z, high.z), 0.0))
+    return dot(d, d)
+
+
+@kernel
+def _insert_leaf(points, low, high, point, x, squares, at, k):
+    """Put points low … high − 1 but for point, which is x, into the k nearest, ascending."""
     for i in range(low, high):
-        if i != own:
-            dx = points[3 * i] - x
-            dy = points[3 * i + 1] - y
-            dz = points[3 * i + 2] - z
-            square = dx * dx + dy * dy + dz * dz
+        if i != point:
+            d = sub(vec3_at(points, 3 * i), x)
+            square = dot(d, d)
             if square < squares[at + k - 1]:
                 j = at + k - 1
                 while j > at and squares[j - 1] > square:
@@ -151,27 +154,25 @@ def nearest_squares(points_at, n, levels, boxes_at, first, last, k, squares_at):
     points = view_f64(points_at, 3 * n)
     boxes = view_f64(boxes_at, 12 << levels)
     squares = view_f64(squares_at, k * (last - first))
-    for own in range(first, last):
-        at = k * (own - first)
+    for point in range(first, last):
+        at = k * (point - first)
         for j in range(k):
             squares[at + j] = np.inf
-        x = points[3 * own]
-        y = points[3 * own + 1]
-        z = points[3 * own + 2]
+        x = vec3_at(points, 3 * point)
         # Depth first, the nearer child first: level by level the path is the bits of `node`, and a bit of
-        # `done` says whether the sibling of the node there has been seen to.
+        # `done` says whether the sibling of the node there has been visited.
         node = 1
         level = 0
         done = 1
         while node > 0:
-            if _square_to_box(boxes, node, x, y, z) < squares[at + k - 1]:
+            if _square_to_box(boxes, node, x) < squares[at + k - 1]:
                 if level == levels:
                     i = node - (1 << level)
-                    _look_at_leaf(points, (n * i) >> level, (n * (i + 1)) >> level, own, x, y, z, squares, at, k)
+                    _insert_leaf(points, (n * i) >> level, (n * (i + 1)) >> level, point, x, squares, at, k)
                 else:
-                    left = _square_to_box(boxes, 2 * node, x, y, z)
-                    right = _square_to_box(boxes, 2 * node + 1, x, y, z)
-                    node = 2 * node + (1 if right < left else 0)
+                    to_left = _square_to_box(boxes, 2 * node, x)
+                    to_right = _square_to_box(boxes, 2 * node + 1, x)
+                    node = 2 * node + (1 if to_right < to_left else 0)
                     done = 2 * done
                     level += 1
                     continue

@@ -27,9 +27,9 @@ def scaled_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray, factor:
     slop = (np.abs(triangles).max() + np.abs(centre).max()) * 2.0**-51 / unit + 1e-37
     nodes = tree.nodes.copy()
     floats = nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 2, 3, WIDTH)
-    given = floats.astype(np.float64) * mantissa
-    floats[:, 0] = given[:, 0]
-    halves = given[:, 1] * (1 + 2.0**-22) + np.abs(given[:, 0]) * 2.0**-22 + slop
+    scaled = floats.astype(np.float64) * mantissa
+    floats[:, 0] = scaled[:, 0]
+    half_lengths = scaled[:, 1] * (1 + 2.0**-22) + np.abs(scaled[:, 0]) * 2.0**-22 + slop
     used = floats[:, 1] > NOTHING / 2
-    floats[:, 1] = np.where(used, halves, floats[:, 1])
+    floats[:, 1] = np.where(used, half_lengths, floats[:, 1])
     return MeshTree(nodes, triangles, tree.ids, centre, tree.exponent + exponent, tree.depth)

@@ -1,10 +1,14 @@
-"""What each shell encloses, with its sign proven, and which facets have no area: doubles first, integers where they cannot tell."""
+"""The volume of each shell, its sign proven, and which facets have no area.
+
+Both are computed in doubles with an error bound, and in integers where that leaves a sign open.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
+from collide.numerics.vec3 import absolute, cross, dot, sub, vec3_at
 
 #: A term of a volume is the product of three rounded differences, eight roundings deep at most; twice that.
 _TERM_ERROR = 2.0**-49
@@ -27,24 +31,16 @@ def scaled_to_one(vertices: np.ndarray) -> tuple[np.ndarray, int]:
     return np.ascontiguousarray(np.ldexp(vertices, -exponent)), exponent
 
 
-def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Cross products of rows, of doubles or of Python integers."""
-    a, b = u.T, v.T
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], axis=-1)
-
-
-def inner(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Inner products of rows."""
-    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
-
-
 class Shells:
-    """Facets by shell: sorted once, so that asking for one shell does not look at the others."""
+    """Facets by shell: sorted once, so that the facets of one shell are found without a look at the others.
 
-    def __init__(self, corners: np.ndarray, shells: np.ndarray, many: int):
-        self.corners, self.shells, self.many = corners, shells, many
+    corners : (f, 3) int32.   shells : (f,) int32, the shell of each facet, −1 for none.   n : how many shells.
+    """
+
+    def __init__(self, corners: np.ndarray, shells: np.ndarray, n: int):
+        self.corners, self.shells, self.n = corners, shells, n
         self.order = np.argsort(shells, kind="stable")
-        self.starts = np.searchsorted(shells[self.order], np.arange(many + 1))
+        self.starts = np.searchsorted(shells[self.order], np.arange(n + 1))
 
     def __getitem__(self, shell: int) -> np.ndarray:
         """(k, 3) corners of a shell's facets, in the order of the facets."""
@@ -52,16 +48,13 @@ class Shells:
 
 
 def shell_volumes(vertices: np.ndarray, parts: Shells) -> tuple[np.ndarray, np.ndarray]:
-    """(volumes, signs) of closed shells, (many,) each; the signs are exact.
-
-    vertices : (n, 3).   parts : facets with int32 corners and shells, −1 for those that belong to none.
-    """
-    corners, shells, many = parts.corners, parts.shells, parts.many
+    """(volumes, signs) of closed shells, (parts.n,) each; the signs are exact.   vertices : (n, 3)."""
+    n = parts.n
     scaled, exponent = scaled_to_one(vertices)
-    six, sizes = np.zeros(many), np.zeros(many)
-    members, first = np.zeros(many, dtype=np.int32), np.full(many, -1, dtype=np.int32)
+    six, sizes = np.zeros(n), np.zeros(n)
+    members, first = np.zeros(n, dtype=np.int32), np.full(n, -1, dtype=np.int32)
     sum_volumes(
-        address_of(scaled), len(vertices), address_of(corners), len(corners), address_of(shells), many,
+        address_of(scaled), len(vertices), address_of(parts.corners), len(parts.corners), address_of(parts.shells), n,
         address_of(first), address_of(members), address_of(six), address_of(sizes),
     )  # fmt: skip
     margin = sizes * 2.0 * (_TERM_ERROR + _UNIT * members) + _UNDERFLOW * members
@@ -75,11 +68,16 @@ def shell_volumes(vertices: np.ndarray, parts: Shells) -> tuple[np.ndarray, np.n
 
 def _exact_sign(vertices: np.ndarray, corners: np.ndarray) -> int:
     """Sign of the volume that closed facets enclose, in Python integers."""
+    a, b, c = _exact_corners(vertices, corners)
+    total = int((a * np.cross(b, c)).sum())
+    return (total > 0) - (total < 0)
+
+
+def _exact_corners(vertices: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
+    """The three corners of facets, (f, 3) each, in Python integers."""
     rows, ids = np.unique(corners, return_inverse=True)
     exact = exact_integers(vertices[rows])
-    a, b, c = (exact[ids.reshape(-1, 3)[:, k]] for k in range(3))
-    total = int(inner(a, cross(b, c)).sum())
-    return (total > 0) - (total < 0)
+    return [exact[ids.reshape(-1, 3)[:, k]] for k in range(3)]
 
 
 def without_area(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -90,60 +88,55 @@ def without_area(vertices: np.ndarray, corners: np.ndarray) -> np.ndarray:
     result = np.zeros(len(corners), dtype=bool)
     suspects = np.flatnonzero(thin)
     if len(suspects):
-        rows, ids = np.unique(corners[suspects], return_inverse=True)
-        exact = exact_integers(vertices[rows])
-        a, b, c = (exact[ids.reshape(-1, 3)[:, k]] for k in range(3))
-        result[suspects] = (cross(b - a, c - a) == 0).all(axis=1)
+        a, b, c = _exact_corners(vertices, corners[suspects])
+        result[suspects] = (np.cross(b - a, c - a) == 0).all(axis=1)
     return result
 
 
-@kernel
-def _term(points, o, a, b, c):
-    """The determinant of a − o, b − o, c − o, and the sum of its terms' magnitudes."""
-    ax = points[3 * a] - points[3 * o]
-    ay = points[3 * a + 1] - points[3 * o + 1]
-    az = points[3 * a + 2] - points[3 * o + 2]
-    bx = points[3 * b] - points[3 * o]
-    by = points[3 * b + 1] - points[3 * o + 1]
-    bz = points[3 * b + 2] - points[3 * o + 2]
-    cx = points[3 * c] - points[3 * o]
-    cy = points[3 * c + 1] - points[3 * o + 1]
-    cz = points[3 * c + 2] - points[3 * o + 2]
-    value = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    size = abs(ax) * (abs(by * cz) + abs(bz * cy))
-    size += abs(ay) * (abs(bz * cx) + abs(bx * cz))
-    size += abs(az) * (abs(bx * cy) + abs(by * cx))
-    return value, size
+@kernel(inline=True)
+def permanent(u, v, w):
+    """The terms of the determinant of three vectors, all taken positive, summed."""
+    u = absolute(u)
+    size = u.x * (abs(v.y * w.z) + abs(w.y * v.z))
+    size += u.y * (abs(v.z * w.x) + abs(w.z * v.x))
+    return size + u.z * (abs(v.x * w.y) + abs(w.x * v.y))
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def sum_volumes(points_at, n, corners_at, facets, shells_at, many, first_at, members_at, six_at, sizes_at):
-    """Six times the volume of every shell, seen from a corner of its first facet, and the magnitudes summed."""
+def sum_volumes(points_at, n, corners_at, n_facets, shells_at, n_shells, first_at, members_at, six_at, sizes_at):
+    """Six times the volume of every shell, seen from a corner of its first facet, and its terms' magnitudes summed.
+
+    first, six, sizes : of every shell that corner, −1 at first; the volume and the magnitudes, 0 at first.
+    members : out, the facets of every shell counted.
+    """
     points = view_f64(points_at, 3 * n)
-    corners = view_i32(corners_at, 3 * facets)
-    shells = view_i32(shells_at, facets)
-    first = view_i32(first_at, many)
-    members = view_i32(members_at, many)
-    six = view_f64(six_at, many)
-    sizes = view_f64(sizes_at, many)
-    for f in range(facets):
+    corners = view_i32(corners_at, 3 * n_facets)
+    shells = view_i32(shells_at, n_facets)
+    first = view_i32(first_at, n_shells)
+    members = view_i32(members_at, n_shells)
+    six = view_f64(six_at, n_shells)
+    sizes = view_f64(sizes_at, n_shells)
+    for f in range(n_facets):
         s = shells[f]
         if s >= 0:
             if first[s] < 0:
                 first[s] = corners[3 * f]
-            value, size = _term(points, first[s], corners[3 * f], corners[3 * f + 1], corners[3 * f + 2])
-            six[s] += value
-            sizes[s] += size
+            origin = vec3_at(points, 3 * first[s])
+            a = sub(vec3_at(points, 3 * corners[3 * f]), origin)
+            b = sub(vec3_at(points, 3 * corners[3 * f + 1]), origin)
+            c = sub(vec3_at(points, 3 * corners[3 * f + 2]), origin)
+            six[s] += dot(a, cross(b, c))
+            sizes[s] += permanent(a, b, c)
             members[s] += 1
 
 
 @entry("void(int64, int64, int64, int64, int64)")
-def mark_thin(points_at, n, corners_at, facets, thin_at):
-    """1 for facets whose area doubles cannot tell from 0."""
+def mark_thin(points_at, n, corners_at, n_facets, thin_at):
+    """thin : out, 1 for facets whose area doubles cannot tell from 0."""
     points = view_f64(points_at, 3 * n)
-    corners = view_i32(corners_at, 3 * facets)
-    thin = view_i32(thin_at, facets)
-    for f in range(facets):
+    corners = view_i32(corners_at, 3 * n_facets)
+    thin = view_i32(thin_at, n_facets)
+    for f in range(n_facets):
         a = corners[3 * f]
         b = corners[3 * f + 1]
         c = corners[3 * f + 2]

@@ -1,4 +1,7 @@
-"""Disjoint classes of numbered things, joined two at a time; the lowest number speaks for its class."""
+"""Union–find in kernels: disjoint classes of numbered elements; the lowest number is the root of its class.
+
+R. E. Tarjan, "Efficiency of a good but not linear set union algorithm" (1975); paths are halved as they are followed.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,8 @@ from collide.kernels import kernel
 
 
 @kernel
-def speaker(parent, k):
-    """The lowest member of k's class; shortens the way there (path halving)."""
+def find(parent, k):
+    """The root of k's class."""
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]
@@ -15,10 +18,10 @@ def speaker(parent, k):
 
 
 @kernel
-def join(parent, i, j):
+def union(parent, i, j):
     """Make one class of those of i and j."""
-    i = speaker(parent, i)
-    j = speaker(parent, j)
+    i = find(parent, i)
+    j = find(parent, j)
     if i < j:
         parent[j] = i
     else:
@@ -26,29 +29,29 @@ def join(parent, i, j):
 
 
 @kernel
-def speaker_and_turn(parent, turned, k):
-    """`speaker`, and whether k is turned over against it; turned[k] is against parent[k]."""
+def find_with_parity(parent, parity, k):
+    """(root of k's class, k's parity against it); parity[k], 0 or 1, is against parent[k]."""
     total = 0
     while parent[k] != k:
-        turned[k] ^= turned[parent[k]]
+        parity[k] ^= parity[parent[k]]
         parent[k] = parent[parent[k]]
-        total ^= turned[k]
+        total ^= parity[k]
         k = parent[k]
     return k, total
 
 
 @kernel
-def join_turned(parent, turned, i, j, against):
-    """Make one class of those of i and j, which are turned against each other (1) or not (0).
+def union_with_parity(parent, parity, i, j, against):
+    """Make one class of those of i and j, whose parities differ (against = 1) or not (0).
 
-    Returns False where they already are in one class that says otherwise.
+    Returns False where they already are in one class that contradicts this.
     """
-    i, turn_i = speaker_and_turn(parent, turned, i)
-    j, turn_j = speaker_and_turn(parent, turned, j)
+    i, parity_i = find_with_parity(parent, parity, i)
+    j, parity_j = find_with_parity(parent, parity, j)
     if i == j:
-        return (turn_i ^ turn_j) == against
+        return (parity_i ^ parity_j) == against
     if i > j:
         i, j = j, i
     parent[j] = i
-    turned[j] = turn_i ^ turn_j ^ against
+    parity[j] = parity_i ^ parity_j ^ against
     return True

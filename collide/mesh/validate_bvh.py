@@ -9,7 +9,7 @@ from collide.mesh.bvh_slabs import make_slabs
 
 
 def validate_mesh_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Every facet is in one leaf, with the corners given; every box holds all corners below it, every slab too.
+    """Every facet is in one leaf, with its corners; every box holds all corners below it, every slab too.
 
     Raises AssertionError naming the node. O(m·depth).
     """
@@ -17,13 +17,13 @@ def validate_mesh_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray) 
     corners = np.asarray(vertices, dtype=float)[np.asarray(faces)[tree.ids]]
     assert np.array_equal(corners.reshape(-1, 9), tree.triangles), "triangles are not those of the facets"
     first, last = _ranges(tree)
-    centres, halves = tree.boxes()
+    centres, half_lengths = tree.boxes()
     slabs = make_slabs(tree).reshape(-1, 5, 8).astype(float)
     scaled = (corners - tree.centre) * 2.0**-tree.exponent
     rounding = 4e-16 * (1.0 + np.abs(corners).max() * 2.0**-tree.exponent)
     for node, slot in zip(*np.nonzero(tree.used())):
         points = scaled[first[node, slot] : last[node, slot]].reshape(-1, 3)
-        off = np.abs(points - centres[node, slot]) - halves[node, slot]
+        off = np.abs(points - centres[node, slot]) - half_lengths[node, slot]
         assert (off <= rounding).all(), f"box {slot} of node {node} does not hold what is below it"
         heights = (points * slabs[node, :3, slot]).sum(axis=1)
         off = np.abs(heights - slabs[node, 3, slot]) - slabs[node, 4, slot]

@@ -1,6 +1,6 @@
-"""Vertices with equal coordinates, found: files such as STL name each vertex once for every facet.
+"""Vertices with equal coordinates: files such as STL name each vertex once for every facet.
 
-Coordinates are compared as numbers, exactly: no tolerance, so that nothing is joined that the file keeps apart.
+Coordinates are compared as numbers, exactly, without a tolerance: vertices that the file keeps apart stay apart.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def weld(vertices: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _stir(h, bits):
-    """A hash with 62 bits of a double stirred in; the two highest come in with the lower half."""
+def _mix(h, bits):
+    """A hash with 62 bits of a double mixed in, the two highest together with the lower half."""
     h = ((h ^ (bits & _MASK) ^ ((bits >> 62) & 3)) * _MULTIPLIER) & _MASK
     h ^= h >> 15
     h = ((h ^ ((bits >> 31) & _MASK)) * _MULTIPLIER) & _MASK
@@ -47,17 +47,17 @@ def first_rows(points_at, n, table_at, size, first_at):
     for k in range(n):
         h = 0
         for axis in range(3):
-            h = _stir(h, bits[3 * k + axis])
+            h = _mix(h, bits[3 * k + axis])
         slot = (h ^ (h << 7)) & (size - 1)
-        found = table[slot]
-        while found >= 0 and not (
-            points[3 * found] == points[3 * k]
-            and points[3 * found + 1] == points[3 * k + 1]
-            and points[3 * found + 2] == points[3 * k + 2]
+        row = table[slot]
+        while row >= 0 and not (
+            points[3 * row] == points[3 * k]
+            and points[3 * row + 1] == points[3 * k + 1]
+            and points[3 * row + 2] == points[3 * k + 2]
         ):
             slot = (slot + 1) & (size - 1)
-            found = table[slot]
-        if found < 0:
+            row = table[slot]
+        if row < 0:
             table[slot] = k
-            found = k
-        first[k] = found
+            row = k
+        first[k] = row

@@ -60,10 +60,7 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
     if is_gap and is_refinable(size):
         write_guess(row, distance, lower, upper, core.nhat)
         write_vertices(row, work.ids, core.n_vertices, flip)
-        return enqueue(
-            pair, query.terms_at, work.ids, work.weights, core.n_points, flip, how, row_number, size, ordered.slop, error,
-            work.queue_at, work.queue_integers_at,
-        )  # fmt: skip
+        return enqueue(ordered, query, work, core.n_points, how, row_number, error)
     decided = lower > 0.0 or upper <= 0.0
     if core.deepest < math.inf:
         rounding = 4.0 * 2.0**-53 * radius

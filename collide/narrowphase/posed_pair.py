@@ -139,21 +139,22 @@ class OrderedPair(NamedTuple):
 
 
 @kernel(inline=True)
-def _posed_body(ints, coords, shape, part):
+def posed_body(ints, shape, part):
+    """The `PosedBody` of a row of the `ShapeTable` at the pose of a part."""
     at = INTS * shape
     return PosedBody(
-        coords, ints[at + COUNT], ints[at + PADDED], ints[at + KIND], shape, NUMBERS * shape + PARAMS, POSE * part,
+        view_f64(ints[at + ADDRESS], 3 * ints[at + PADDED]), ints[at + COUNT], ints[at + PADDED], ints[at + KIND], shape, NUMBERS * shape + PARAMS, POSE * part,
         ints[at + TREE], ints[at + COARSE_AT],
     )  # fmt: skip
 
 
 @kernel(inline=True)
-def posed_pair(ints, numbers, poses, coords_a, coords_b, sa, pa, sb, pb):
+def posed_pair(ints, numbers, poses, sa, pa, sb, pb):
     """The `PosedPair` of shapes sa and sb at the poses of parts pa and pb."""
     p = POSE * pa
     q = POSE * pb
     t = Vec3(poses[q + 9] - poses[p + 9], poses[q + 10] - poses[p + 10], poses[q + 11] - poses[p + 11])
-    return PosedPair(_posed_body(ints, coords_a, sa, pa), _posed_body(ints, coords_b, sb, pb), numbers, poses, t)
+    return PosedPair(posed_body(ints, sa, pa), posed_body(ints, sb, pb), numbers, poses, t)
 
 
 @kernel(inline=True)
@@ -166,9 +167,7 @@ def ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pa, pb):
     numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
     poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
     sa, pa, sb, pb, flip = in_order(ints, poses, sa, pa, sb, pb)
-    at_a, n_a = coordinates_of(ints, sa)
-    at_b, n_b = coordinates_of(ints, sb)
-    pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
+    pair = posed_pair(ints, numbers, poses, sa, pa, sb, pb)
     size, slop, exact_numbers = size_and_slop(numbers, poses, sa, pa, sb, pb)
     return OrderedPair(pair, ints, flip, size, slop, exact_numbers)
 
@@ -226,9 +225,3 @@ def stretch_of(xx, yy, zz, xy, yz, zx):
     yz = abs(yz)
     zx = abs(zx)
     return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx, _LEAST_SQUARE))
-
-
-@kernel(inline=True)
-def coordinates_of(ints, s):
-    """Address and length of a shape's coordinates."""
-    return ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED]

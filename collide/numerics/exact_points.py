@@ -32,22 +32,20 @@ def integers(values) -> tuple[list[int], int]:
 
 
 def placed(X: np.ndarray, points: np.ndarray) -> tuple[list[Point], int]:
-    """(points (k, 3) placed by the pose X as integers, exponent of their grid), entries taken as exact numbers."""
-    own, own_at = integers(points)
-    return moved(X, zip(own[0::3], own[1::3], own[2::3]), own_at)
+    """(points (k, 3) placed by the pose X (4, 4) as integers, exponent of their grid), entries taken as exact numbers."""
+    local, grid = integers(points)
+    return moved(X, zip(local[0::3], local[1::3], local[2::3]), grid)
 
 
-def moved(X: np.ndarray, points: Iterable[Point], own_at: int) -> tuple[list[Point], int]:
-    """The same of points that are integers times 2^own_at."""
-    turn, turn_at = integers(X[:3, :3])
-    shift, shift_at = integers(X[:3, 3])
-    low = min(turn_at + own_at, shift_at)
-    up, over = turn_at + own_at - low, shift_at - low
-    t = [s << over for s in shift]
-    result = []
-    for x, y, z in points:
-        result.append(tuple(((turn[i] * x + turn[i + 1] * y + turn[i + 2] * z) << up) + t[i // 3] for i in (0, 3, 6)))
-    return result, low  # type: ignore[return-value]
+def moved(X: np.ndarray, points: Iterable[Point], grid: int) -> tuple[list[Point], int]:
+    """The same of points that are integers times 2^grid."""
+    R, R_grid = integers(X[:3, :3])
+    p, p_grid = integers(X[:3, 3])
+    low = min(R_grid + grid, p_grid)
+    R = [entry << (R_grid + grid - low) for entry in R]
+    p = [entry << (p_grid - low) for entry in p]
+    rows = [(*R[3 * i : 3 * i + 3], p[i]) for i in range(3)]
+    return [tuple(a * x + b * y + c * z + t for a, b, c, t in rows) for x, y, z in points], low  # type: ignore[misc]
 
 
 def on_one_grid(*groups: tuple[list[Point], int]) -> tuple[list[list[Point]], int]:
@@ -104,14 +102,14 @@ def enters(triangle: list[Point], origin: Point, direction: Point) -> Fraction:
         sides = (cross(direction, minus(triangle[j], triangle[i])) for i, j in ((0, 1), (1, 2), (2, 0)))
         across = next((side for side in sides if side != (0, 0, 0)), (0, 0, 0))
     square = inner(direction, direction)
-    left = [inner(across, cross(direction, p)) for p in v]
+    side = [inner(across, cross(direction, p)) for p in v]
     along = [inner(direction, p) for p in v]
     if across == (0, 0, 0):  # a point, or a segment along the ray
-        left = [0 if cross(direction, p) == (0, 0, 0) else 1 for p in v]
-    met = [Fraction(along[k], square) for k in range(3) if left[k] == 0]
+        side = [0 if cross(direction, p) == (0, 0, 0) else 1 for p in v]
+    crossings = [Fraction(along[k], square) for k in range(3) if side[k] == 0]
     for i, j in ((0, 1), (1, 2), (2, 0)):
-        if left[i] * left[j] < 0:
-            met.append(Fraction(left[j] * along[i] - left[i] * along[j], (left[j] - left[i]) * square))
-    if not met or max(met) < 0:
-        raise AssertionError("a ray that meets a facet, and does not")
-    return max(min(met), Fraction(0))
+        if side[i] * side[j] < 0:
+            crossings.append(Fraction(side[j] * along[i] - side[i] * along[j], (side[j] - side[i]) * square))
+    if not crossings or max(crossings) < 0:
+        raise AssertionError("a ray that is known to meet a facet misses it")
+    return max(min(crossings), Fraction(0))

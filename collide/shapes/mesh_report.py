@@ -113,6 +113,6 @@ def make_report(vertices: int, solid: bool, survey: Survey) -> MeshReport:
     else:
         why = "asked for; it could be a solid"
     return MeshReport(
-        solid, why, vertices, len(survey.flags), survey.used, survey.welded, survey.edges, survey.many_shells,
+        solid, why, vertices, len(survey.flags), survey.used, survey.welded, survey.edges, survey.n_shells,
         survey.euler, float(survey.volumes.sum()), defects,
     )  # fmt: skip

@@ -21,11 +21,14 @@ def box_of(shape: collide.Shape, X_WB: np.ndarray) -> np.ndarray:
     (packed, X_BP), = shape.parts()
     table = ShapeTable([packed])
     table.plant(np.zeros(1, dtype=np.int64))
-    return boxes_of(table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64))[0]
+    return boxes_of(
+        table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64)
+    )[0]
 
 
 def reaches(shape: collide.Shape, g, bound: Fraction) -> bool:
-    """Whether a curved shape's support value along g, in its own frame, is at most the bound: exactly, without roots."""
+    """Whether a curved shape's support value along g, in its own frame, is at most the bound: exactly, without
+    roots."""
     x, y, z = g
     if isinstance(shape, collide.Ellipsoid):
         square = sum((Fraction(r) * c) ** 2 for r, c in zip(shape.radii.tolist(), g))
@@ -40,7 +43,9 @@ def holds(shape: collide.Shape, X: np.ndarray, box) -> bool:
     if isinstance(shape, (collide.Ellipsoid, collide.Cylinder, collide.Cone)):
         for axis in range(3):
             g, t = [Fraction(v) for v in X[axis, :3].tolist()], Fraction(float(X[axis, 3]))
-            if not reaches(shape, g, Fraction(box[3 + axis]) - t) or not reaches(shape, [-v for v in g], t - Fraction(box[axis])):
+            if not reaches(shape, g, Fraction(box[3 + axis]) - t) or not reaches(
+                shape, [-v for v in g], t - Fraction(box[axis])
+            ):
                 return False
         return True
     points, radius = naive.corners(shape)

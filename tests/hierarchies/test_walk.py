@@ -97,7 +97,7 @@ def test_equal_to_the_default_on_many_poses():
         assert (found.rows["rounds"] <= found.depth_p + found.depth_q - 1).all()
         packed = A.parts()[0][0], B.parts()[0][0]
         early, _ = run_walks(A._walk, B._walk, *packed, X_WA, X_WB, early=True)
-        assert ((early["said"] == MEETING) == found.hit)[early["said"] >= APART].all()
+        assert ((early["status"] == MEETING) == found.hit)[early["status"] >= APART].all()
         assert (early["rounds"] <= found.rows["rounds"]).all()
 
 
@@ -178,7 +178,7 @@ def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
     assert found.walked.all()
     Q, _ = exact.world_points(B.points, EYE[:3, :3], EYE[:3, 3])
     for X, row, hit in zip(X_WA, found.rows, found.hit):
-        assert row["said"] == (MEETING if hit else APART)
+        assert row["status"] == (MEETING if hit else APART)
         if not hit:
             P, e_p = exact.world_points(A.points, X[:3, :3], X[:3, 3])
             Q, e_q = exact.world_points(B.points, EYE[:3, :3], EYE[:3, 3])
@@ -306,7 +306,7 @@ def test_a_body_whose_walk_is_lost_is_handed_over(monkeypatch):
 
     monkeypatch.setattr("collide.hierarchies.hierarchy_queries.run_walks", lost)
     found = collide.walk(A, B, X_WA, EYE[None])
-    assert not found.walked.any() and (found.rows["said"] == LOST).all() and (found.hit == truth).all()
+    assert not found.walked.any() and (found.rows["status"] == LOST).all() and (found.hit == truth).all()
 
 
 def test_rounds_grow_with_the_logarithm():

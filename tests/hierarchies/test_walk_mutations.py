@@ -39,13 +39,17 @@ print(wrong, broken)
 MUTATIONS = {
     "none": ("walk_proof.py", "", ""),
     "planes need no room for rounding": ("walk_proof.py", "> 1.000001 * error", "> -1e-3"),
-    "points need no room": ("walk_proof.py", "+ error < room", "- 1e-3 < room"),
-    "the ball does not shrink towards the facet": ("walk_proof.py", "room = (1.0 - s) * ", "room = 1.0 * "),
+    "points need no room": ("walk_proof.py", "+ error < radius", "- 1e-3 < radius"),
+    "the ball does not shrink towards the facet": ("walk_proof.py", "radius = (1.0 - s) * ", "radius = 1.0 * "),
     "cones are not looked at": ("walk_steps.py", "t = min(t, before / (before - after))", "t = 1.0"),
     "case 1 in the primal space always": ("walk_steps.py", "if height + shift > 1.0:", "if height + shift > -1e300:"),
     "case 1 in the polar space always": ("walk_steps.py", "if -height <= 1.0:", "if -height <= 1e300:"),
-    "the vertex beyond is not looked for": ("packed_hierarchy.py", "        if other < height:", "        if other < -1e300:"),
-    "the star keeps the old plane": ("walk_steps.py", "state[Z_STAR + k] = state[Z + k]", "state[Z_STAR + k] = state[Z_STAR + k] + 0.0"),
+    "the vertex beyond is not looked for": (
+        "packed_hierarchy.py", "        if lower < height:", "        if lower < -1e300:",
+    ),
+    "the star keeps the old plane": (
+        "walk_steps.py", "put_vec3(state, Z_STAR, z)", "put_vec3(state, Z_STAR, vec3_at(state, Z_STAR))",
+    ),
 }  # fmt: skip
 
 

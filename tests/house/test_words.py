@@ -72,7 +72,10 @@ FIRST = {"few": "max_", "many": "n_", "most": "max_"}
 #: (file, name) → why the word is right there.
 EXCEPTIONS: dict[tuple[str, str], str] = {
     **{
-        (f"adapters/peers/{name}.py", "P"): "polytopes P and Q in their own frames, as in the literature; A and B are their images"
+        (
+            f"adapters/peers/{name}.py",
+            "P",
+        ): "polytopes P and Q in their own frames, as in the literature; A and B are their images"
         for name in ("exact", "exact_meshes", "exact_peer")
     },
     ("scenes/families/case.py", "P"): "the same: the arguments of the exact oracle, field by field",
@@ -186,8 +189,10 @@ def test_exceptions_are_needed():
 @pytest.mark.parametrize(
     ("name", "good"),
     [
-        ("_told", False), ("told_at", False), ("OUT_OF_ROOM", False), ("most_facets", False), ("other", False), ("O", False),
-        ("Posed", False), ("foundations", True), ("max_facets", True), ("another", True), ("mostly", True), ("PosedPair", True),
+        ("_told", False), ("told_at", False), ("OUT_OF_ROOM", False), ("most_facets", False), ("other", False),
+        ("O", False),
+        ("Posed", False), ("foundations", True), ("max_facets", True), ("another", True), ("mostly", True),
+        ("PosedPair", True),
     ],
 )  # fmt: skip
 def test_rule_knows_good_names_from_bad(name, good):

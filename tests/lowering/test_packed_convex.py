@@ -25,7 +25,9 @@ def test_points(n):
     points = rng.normal(size=(n, 3)) * 10.0 ** rng.integers(-3, 4, size=(n, 3))
     packed = P.pack_points(points.copy(), radius=0.25, slop=1e-9)
     columns = packed.coordinates
-    assert columns.shape[1] % P.BLOCK == 0 and columns.shape[1] - n < P.BLOCK and address_of(columns) % (8 * P.BLOCK) == 0
+    assert (
+        columns.shape[1] % P.BLOCK == 0 and columns.shape[1] - n < P.BLOCK and address_of(columns) % (8 * P.BLOCK) == 0
+    )
     assert np.array_equal(columns[:, :n].T, points) and (columns[:, n:] == points[0][:, None]).all()
     assert (packed.radius, packed.slop) == (0.25, 1e-9)
     farthest = max(sum(Fraction(v) ** 2 for v in p) for p in points.tolist())
@@ -33,11 +35,6 @@ def test_points(n):
     assert is_integer_times(points, packed.lowest) and not is_integer_times(points, packed.lowest + 1)
     assert (packed.coarse is not None) == (n >= 64)
     assert not packed.points.flags.writeable and not columns.flags.writeable
-
-
-def test_lowest_bits():
-    for values, lowest in (([0.0], 2000), ([1.0, 0.0], 0), ([0.75, 8.0], -2), ([5e-324], -1074), ([2.0**1000, 3.0], 0)):
-        assert P.lowest_exponent(np.array(values)) == lowest
 
 
 def test_content_tells_sets_apart():
@@ -48,18 +45,27 @@ def test_content_tells_sets_apart():
     moved = points.copy()
     moved[1, 2] = np.nextafter(1.0, 2.0)
     others = [
-        P.pack_points(moved), P.pack_points(points[::-1].copy()), P.pack_points(points.copy(), radius=0.5), P.pack_points(points[:1].copy()),
-        P.pack_curved(P.CYLINDER, (1.0, 2.0), 3.0), P.pack_curved(P.CONE, (1.0, 2.0), 3.0), P.pack_halfspace((0.0, 0.0, 1.0), 2.0),
+        P.pack_points(moved), P.pack_points(points[::-1].copy()), P.pack_points(points.copy(), radius=0.5),
+        P.pack_points(points[:1].copy()),
+        P.pack_curved(P.CYLINDER, (1.0, 2.0), 3.0), P.pack_curved(P.CONE, (1.0, 2.0), 3.0),
+        P.pack_halfspace((0.0, 0.0, 1.0), 2.0),
     ]  # fmt: skip
     assert len({same, *(p.content for p in others)}) == 1 + len(others)
 
 
 def test_tables_hold_what_was_packed():
     rng = rng_of("shape table")
-    packed = [P.pack_points(hull_points(rng, n)) for n in (4, 9, 100)] + [P.pack_curved(P.ELLIPSOID, (1.0, 2.0, 3.0), 3.0)]
+    packed = [P.pack_points(hull_points(rng, n)) for n in (4, 9, 100)] + [
+        P.pack_curved(P.ELLIPSOID, (1.0, 2.0, 3.0), 3.0)
+    ]
     table = ShapeTable([*packed, packed[1]])
     for row, p in zip(table.ints, [*packed, packed[1]]):
-        assert (row[KIND], row[COUNT], row[PADDED], row[LOWEST]) == (p.kind, len(p.points), p.coordinates.shape[1], p.lowest)
+        assert (row[KIND], row[COUNT], row[PADDED], row[LOWEST]) == (
+            p.kind,
+            len(p.points),
+            p.coordinates.shape[1],
+            p.lowest,
+        )
         assert row[ADDRESS] == address_of(p.coordinates)
     ranks = table.ints[:, RANK].tolist()
     assert ranks[4] == ranks[1] and sorted(set(ranks)) == list(range(4))
@@ -76,7 +82,12 @@ def test_triangles_stand_in_tables_as_shapes_do():
     alone = ShapeTable([P.pack_points(t.copy()) for t in corners] + [packed])
     columns = [KIND, COUNT, PADDED, LOWEST]
     assert np.array_equal(table.ints[:, columns], alone.ints[:, columns])
-    assert np.array_equal(table.numbers[-1], alone.numbers[-1]) and np.array_equal(table.numbers[:, REACH], alone.numbers[:, REACH])
+    assert np.array_equal(table.numbers[-1], alone.numbers[-1]) and np.array_equal(
+        table.numbers[:, REACH], alone.numbers[:, REACH]
+    )
     assert (table.ints[:-1, RANK] < table.ints[-1, RANK]).all()
     for k in range(20):
-        assert np.array_equal(table.coordinates[k, :, :3].T, corners[k]) and (table.coordinates[k, :, 3:] == corners[k, :1].T).all()
+        assert (
+            np.array_equal(table.coordinates[k, :, :3].T, corners[k])
+            and (table.coordinates[k, :, 3:] == corners[k, :1].T).all()
+        )

@@ -16,7 +16,8 @@ SOURCE = "n, joins = {n}, {joins}  # tests/mesh/test_union_find.py"
 
 
 def searched(n: int, joins) -> tuple[list[int], list[int], bool]:
-    """(lowest member of everything's class, which way up it is against that one, whether the joins agree), step by step."""
+    """(lowest member of everything's class, which way up it is against that one, whether the joins agree), step by
+    step."""
     across: list[list[tuple[int, int]]] = [[] for _ in range(n)]
     for i, j, against in joins:
         across[i].append((j, against))
@@ -51,9 +52,9 @@ def test_classes():
         parent = list(range(n))
         with reproducing(SOURCE, n=n, joins=joins):
             for i, j, _ in joins:
-                U.join(parent, i, j)
+                U.union(parent, i, j)
             lowest, _, _ = searched(n, joins)
-            assert [U.speaker(parent, k) for k in range(n)] == lowest
+            assert [U.find(parent, k) for k in range(n)] == lowest
         sizes[min(len(set(lowest)), 5)] += 1
     assert min(sizes[1], sizes[2], sizes[5]) > 10, sizes
 
@@ -67,12 +68,12 @@ def test_classes_with_parity():
         with reproducing(SOURCE, n=n, joins=joins):
             agreed = True
             for k, (i, j, against) in enumerate(joins):
-                agreed &= U.join_turned(parent, turned, i, j, against)
+                agreed &= U.union_with_parity(parent, turned, i, j, against)
                 assert agreed == searched(n, joins[: k + 1])[2]
                 if not agreed:
                     break
             if agreed:
                 lowest, up, _ = searched(n, joins)
-                assert [U.speaker_and_turn(parent, turned, k) for k in range(n)] == list(zip(lowest, up))
+                assert [U.find_with_parity(parent, turned, k) for k in range(n)] == list(zip(lowest, up))
         contradicted += not agreed
     assert 20 < contradicted < 280, contradicted

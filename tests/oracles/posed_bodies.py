@@ -14,7 +14,8 @@ from collide.narrowphase.posed_pair import ordered_pair
 class PosedBodies:
     """The `OrderedPair` of A at X_WA and B at X_WB, and the buffers that it sees.
 
-    ordered, pair : as kernels have them; ``ordered.flip`` says whether B comes first.   error : of a bound in doubles [m].
+    ordered, pair : as kernels have them; ``ordered.flip`` says whether B comes first.   error : of a bound in doubles
+    [m].
     """
 
     def __init__(self, A: collide.Shape, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):

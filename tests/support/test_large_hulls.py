@@ -42,7 +42,9 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
         A, B, X_WA, X_WB = case.shapes()
         with_trees = collide.distance(A, B, X_WA, X_WB)
         trees += _planted(A) + _planted(B)
-        plain = [collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)]
+        plain = [
+            collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)
+        ]
         for S in plain:
             if isinstance(S, collide.ConvexHull):
                 object.__setattr__(S, "_tree", None)
@@ -51,7 +53,9 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
         assert max(with_trees.lower, scanned.lower) <= min(with_trees.upper, scanned.upper), case.snippet()
         if with_trees.certificate is not None:
             collide.verify(A, B, X_WA, X_WB, with_trees)
-    if not family.startswith(("box", "halfspace", "swept", "flat", "degenerate", "touch_scaled", "long", "padded", "tiny_m")):
+    if not family.startswith(
+        ("box", "halfspace", "swept", "flat", "degenerate", "touch_scaled", "long", "padded", "tiny_m")
+    ):
         assert trees >= 8, f"{trees} trees in {family}: the test no longer tests them"
 
 
@@ -62,7 +66,9 @@ def test_large_hulls_answer_as_scans_do(axes):
     scans = [collide.ConvexHull(S.points) for S in (A, B)]
     for S in scans:
         object.__setattr__(S, "_tree", None)
-    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+    X_WB = np.array(
+        [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
+    )
     r, scanned = collide.distance(A, B, EYE, X_WB), collide.distance(*scans, EYE, X_WB)
     assert _planted(A) and _planted(B)
     assert 20 < r.hit.sum() < 280 and np.array_equal(r.hit, scanned.hit)
@@ -83,7 +89,11 @@ def test_large_hulls_that_touch_are_decided_exactly():
     B = collide.ConvexHull(slab)
     for z, expected in ((1.5, True), (np.nextafter(1.5, 2), False), (np.nextafter(1.5, 1), True)):
         r = collide.distance(A, B, EYE, collide.pose((0.25, -0.5, z)))
-        assert r.hit is expected and r.how == EXACT and collide.collide(A, B, EYE, collide.pose((0.25, -0.5, z))) is expected
+        assert (
+            r.hit is expected
+            and r.how == EXACT
+            and collide.collide(A, B, EYE, collide.pose((0.25, -0.5, z))) is expected
+        )
         collide.verify(A, B, EYE, collide.pose((0.25, -0.5, z)), r)
     mirrored = collide.ConvexHull(top * (1, 1, -1))
     r = collide.distance(A, mirrored, EYE, collide.pose((0, 0, 3)))
@@ -180,7 +190,9 @@ def test_bad_proposals_cost_time_not_truth(axes):
         B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
     )
     object.__setattr__(B, "_tree", shuffled)
-    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+    X_WB = np.array(
+        [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
+    )
     good, bad = collide.distance(A, A, EYE, X_WB), collide.distance(A, B, EYE, X_WB)
     assert 30 < good.hit.sum() < 270
     assert np.array_equal(good.hit, bad.hit) and np.array_equal(collide.collide(A, B, EYE, X_WB), good.hit)

@@ -16,9 +16,10 @@ from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, has_face
 from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.body_pairs import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
-from collide.narrowphase.facets.mesh_curved import curved_rows, decide
+from collide.narrowphase.facets.mesh_curved import curved_rows, settle_curved
 from collide.narrowphase.facets.mesh_rows import hull_shape, mesh_rows, mesh_states
-from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN, PROMISE
+from collide.narrowphase.facets.surface_gaps import PROMISE
+from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
@@ -50,7 +51,7 @@ def part_states(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop) ->
 def _curved_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     if not has_facets(A):
         A, B, PA, PB = B, A, PB, PA
-    return decide(body_of(A), enclosure_of(B), PA, PB).state
+    return settle_curved(body_of(A), enclosure_of(B), PA, PB).state
 
 
 def part_rows(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop, limit: float) -> np.ndarray:

@@ -179,7 +179,7 @@ def _overlap(A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting:
     row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
     if sure:
         row["how"] = row["how"] or EXACT
-    if depths and (A.endless or B.endless):
+    if depths and (A.unbounded or B.unbounded):
         row["distance"] = row["lower"] = -math.inf
         row["normal"], row["certified"] = (0.0, 0.0, 1.0), False
     elif depths:

@@ -13,22 +13,9 @@ from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.shape_table import (
-    COUNT,
-    INTS,
-    KIND,
-    NUMBERS,
-    PADDED,
-    PARAMS,
-    POSE,
-    POSE_SLOP,
-    RADIUS,
-    REACH,
-    SLOP,
-    TREE,
-)
+from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH, SLOP
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.posed_pair import coordinates_of
+from collide.narrowphase.posed_pair import posed_body, radius_of
 from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
@@ -111,10 +98,10 @@ def copy_row(row_at, out_at):
 @kernel
 def add_row(score, at, row_at, number, out_at):
     """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of least number."""
-    row, words, marks = view_row(row_at)
-    distance = row[DISTANCE]
-    lower = row[LOWER]
-    upper = row[UPPER]
+    row = view_row(row_at)
+    distance = row.doubles[DISTANCE]
+    lower = row.doubles[LOWER]
+    upper = row.doubles[UPPER]
     nearest = score[at + _NEAREST]
     if nearest < 0.0 or distance < score[at + _LEAST] or (distance == score[at + _LEAST] and number < nearest):
         score[at + _LEAST] = distance
@@ -124,11 +111,11 @@ def add_row(score, at, row_at, number, out_at):
         score[at + _FIRST_UPPER] = upper
     score[at + _LOWER] = min(score[at + _LOWER], lower)
     score[at + _UPPER] = min(score[at + _UPPER], upper)
-    if marks[CERTIFIED] == 0:
+    if row.flags[CERTIFIED] == 0:
         score[at + _UNCERTIFIED] = min(score[at + _UNCERTIFIED], lower)
-    if marks[HIT] != 0:
+    if row.flags[HIT] != 0:
         score[at + _HIT] = 1.0
-    rounds = words[ITERATIONS]
+    rounds = row.words[ITERATIONS]
     score[at + _GJK] += float(rounds & 0xFFFF)
     score[at + _EPA] += float(rounds >> 16)
     if upper < 0.0:
@@ -138,8 +125,8 @@ def add_row(score, at, row_at, number, out_at):
 @kernel
 def _add_overlap(score, at, row_at, number):
     """Insert an overlap among the deepest, in their order."""
-    row, words, _ = view_row(row_at)
-    distance = row[DISTANCE]
+    row = view_row(row_at)
+    distance = row.doubles[DISTANCE]
     n = int(score[at + _N_OVERLAPS])
     first = at + _DEEPEST
     place = 0
@@ -157,24 +144,24 @@ def _add_overlap(score, at, row_at, number):
     overlap = first + _OVERLAP * place
     score[overlap + _DISTANCE] = distance
     score[overlap + _NUMBER] = float(number)
-    score[overlap + _OF_A] = float(words[PART_A])
-    score[overlap + _OF_B] = float(words[PART_B])
+    score[overlap + _OF_A] = float(row.words[PART_A])
+    score[overlap + _OF_B] = float(row.words[PART_B])
     for k in range(9):
-        score[overlap + _VECTORS + k] = row[NORMAL + k]
+        score[overlap + _VECTORS + k] = row.doubles[NORMAL + k]
     score[at + _N_OVERLAPS] = float(n)
 
 
 @kernel
 def close_score(score, at, out_at):
     """The nearest row, its bracket widened to hold for the bodies; whether they overlap for certain."""
-    row, words, marks = view_row(out_at)
-    row[LOWER] = score[at + _LOWER]
-    row[UPPER] = score[at + _UPPER]
-    marks[HIT] = 1 if score[at + _HIT] != 0.0 else 0
+    row = view_row(out_at)
+    row.doubles[LOWER] = score[at + _LOWER]
+    row.doubles[UPPER] = score[at + _UPPER]
+    row.flags[HIT] = 1 if score[at + _HIT] != 0.0 else 0
     # Every row that may be the nearest is certified.
     all_certified = score[at + _UNCERTIFIED] == math.inf or score[at + _UNCERTIFIED] > score[at + _UPPER]
-    marks[CERTIFIED] = 1 if all_certified else 0
-    words[ITERATIONS] = min(int(score[at + _GJK]), 0xFFFF) | (min(int(score[at + _EPA]), 0x7FFF) << 16)
+    row.flags[CERTIFIED] = 1 if all_certified else 0
+    row.words[ITERATIONS] = min(int(score[at + _GJK]), 0xFFFF) | (min(int(score[at + _EPA]), 0x7FFF) << 16)
     return score[at + _UPPER] < 0.0
 
 
@@ -191,7 +178,8 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
     """
     if _is_halfspace(parts, first_a, n_a) or _is_halfspace(parts, first_b, n_b):
         return
-    row, words, marks = view_row(out_at)
+    row = view_row(out_at)
+    doubles = row.doubles
     # Seen from between the bodies, whichever is A: where in the world the pair stands is no part of its size.
     p_a = vec3_at(parts.poses, POSE * first_a + 9)
     p_b = vec3_at(parts.poses, POSE * first_b + 9)
@@ -201,7 +189,7 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
     size = size_a.size + size_b.size
     error = ERROR * size + (size_a.slop + size_b.slop)
     best = math.inf
-    upper = row[UPPER]
+    upper = doubles[UPPER]
     for k in range(int(score[at + _N_OVERLAPS])):
         overlap = at + _DEEPEST + _OVERLAP * k
         n = vec3_at(score, overlap + _VECTORS)
@@ -209,23 +197,23 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
         if depth + error < best:
             best = depth + error
             for j in range(9):
-                row[NORMAL + j] = score[overlap + _VECTORS + j]
-            words[PART_A] = int(score[overlap + _OF_A])
-            words[PART_B] = int(score[overlap + _OF_B])
-            row[DISTANCE] = min(-depth, upper)
-            row[LOWER] = -depth - error
+                doubles[NORMAL + j] = score[overlap + _VECTORS + j]
+            row.words[PART_A] = int(score[overlap + _OF_A])
+            row.words[PART_B] = int(score[overlap + _OF_B])
+            doubles[DISTANCE] = min(-depth, upper)
+            doubles[LOWER] = -depth - error
     if best == math.inf:
-        row[DISTANCE] = -math.inf
-        row[LOWER] = -math.inf
+        doubles[DISTANCE] = -math.inf
+        doubles[LOWER] = -math.inf
     else:
         # The points of the deepest parts fit that normal's own depth: their middle stays.
-        middle = scale(0.5, add(vec3_at(row, POINT_A), vec3_at(row, POINT_B)))
-        half = scale(0.5 * row[DISTANCE], vec3_at(row, NORMAL))
-        put_vec3(row, POINT_A, sub(middle, half))
-        put_vec3(row, POINT_B, add(middle, half))
+        middle = scale(0.5, add(vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B)))
+        half = scale(0.5 * doubles[DISTANCE], vec3_at(doubles, NORMAL))
+        put_vec3(doubles, POINT_A, sub(middle, half))
+        put_vec3(doubles, POINT_B, add(middle, half))
     promised = (PROMISE_CURVED if size_a.curved or size_b.curved else PROMISE_STORED) * size
-    if not upper - row[LOWER] <= promised:
-        marks[CERTIFIED] = 0
+    if not upper - doubles[LOWER] <= promised:
+        row.flags[CERTIFIED] = 0
 
 
 @kernel(inline=True)
@@ -255,22 +243,17 @@ def _size_of(parts, first, n, origin):
 @kernel
 def _extent(parts, first, n_parts, origin, n):
     """How far a body reaches along n from a point of the world [m]."""
-    ints, numbers, poses = parts.ints, parts.numbers, parts.poses
     farthest = -math.inf
     for part in range(first, first + n_parts):
-        shape = parts.shape_of[part]
-        kind = ints[INTS * shape + KIND]
-        if kind == HALFSPACE:
+        body = posed_body(parts.ints, parts.shape_of[part], part)
+        if body.kind == HALFSPACE:
             return math.inf  # bounded in one direction only, which a rounded normal never is
-        p = POSE * part
-        g = rotate_back(poses, p, n)
-        at, length = coordinates_of(ints, shape)
+        g = rotate_back(parts.poses, body.pose_at, n)
         _, x, y, z, _ = support(
-            kind, view_f64(at, length), ints[INTS * shape + COUNT], ints[INTS * shape + PADDED], numbers,
-            NUMBERS * shape + PARAMS, ints[INTS * shape + TREE], 0, -1, g.x, g.y, g.z,
-        )  # fmt: skip
-        shift = dot(sub(vec3_at(poses, p + 9), origin), n)
-        farthest = max(farthest, dot(Vec3(x, y, z), g) + shift + numbers[NUMBERS * shape + RADIUS])
+            body.kind, body.coords, body.n, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g.x, g.y, g.z
+        )
+        shift = dot(sub(vec3_at(parts.poses, body.pose_at + 9), origin), n)
+        farthest = max(farthest, dot(Vec3(x, y, z), g) + shift + radius_of(parts, body))
     return farthest
 
 

@@ -51,8 +51,8 @@ from collide.numerics.vec3 import (
 MAX_VERTICES, MAX_PLANES = 64, 60_000
 #: Most planes that double-doubles may leave.
 _MAX_CANDIDATES = 256
-#: Of a candidate: three points of its plane (6 vertex ids), a lower bound of the extent.
-_PLANE = 7
+#: Of a candidate: the ends of two edges along its plane, numbers among the points of A, then of B; a lower bound of the extent.
+_EXTENT, _PLANE = 4, 5
 #: Most points of a facet that are looked at for the nearest one, and doubles of each: the point, its vertex pair.
 _MAX_CORNERS, _CORNER = 64, 5
 # Doubles of workspace: points of A and of B, a direction, low parts of poses, candidates.
@@ -123,9 +123,7 @@ def depth_by_all_planes(ordered, terms, terms_at, digits, doubles_at, ids):
     planes = view_f64(doubles_at + 8 * _PLANES, _PLANE * _MAX_CANDIDATES)
     best = PlaneDepth(False, DD(math.inf, 0.0), Vec3(0.0, 0.0, 1.0))
     for k in range(n_planes):
-        at = _PLANE * k
-        for point in range(3):
-            set_point(exact, point, int(planes[at + 2 * point]), int(planes[at + 2 * point + 1]))
+        _set_points(exact, planes, _PLANE * k)
         found = _extent(exact)
         if dd.less(found.depth, best.depth):
             best = found
@@ -133,6 +131,27 @@ def depth_by_all_planes(ordered, terms, terms_at, digits, doubles_at, ids):
         return unproven
     _find_corners(exact, doubles_at, ids, best)
     return best
+
+
+@kernel
+def _set_points(exact, planes, at):
+    """Points 0, 1, 2 become points of A ⊖ B: a corner of both edges, and where either leads from it."""
+    n_a = exact.pair.A.n
+    p, q, r, s = int(planes[at]), int(planes[at + 1]), int(planes[at + 2]), int(planes[at + 3])
+    set_point(exact, 0, _of_a(p, n_a), _of_b(r, n_a))
+    set_point(exact, 1, _of_a(q, n_a), _of_b(q if q >= n_a else r, n_a))
+    set_point(exact, 2, _of_a(s if s < n_a else p, n_a), _of_b(s, n_a))
+
+
+@kernel(inline=True)
+def _of_a(k, n_a):
+    """The vertex of A that point k is; 0 for one of B, where all of a plane's points have it in common."""
+    return k if k < n_a else 0
+
+
+@kernel(inline=True)
+def _of_b(k, n_a):
+    return k - n_a if k >= n_a else 0
 
 
 @kernel
@@ -249,49 +268,33 @@ def _consider_finely(search, p, q, r, s, candidates):
         n = _prune(search.planes, n, best)
         if n == _MAX_CANDIDATES:
             return Candidates(-1, best)
-    _put_plane(search, n, p, q, r, s, extent)
+    at = _PLANE * n
+    search.planes[at] = p
+    search.planes[at + 1] = q
+    search.planes[at + 2] = r
+    search.planes[at + 3] = s
+    search.planes[at + _EXTENT] = extent
     return Candidates(n + 1, best)
 
 
 @kernel
 def _extent_above(search, sign):
     """The greatest height of A ⊖ B along the direction (sign 1) or its opposite (−1), rounded once."""
+    n_a = search.n_a
     # Point 0 stands among those of A and those of B, and once too often.
     total = dd.scale(-sign, fine_height(search.fine, 0, search.direction))
-    for body in range(2):
-        highest = DD(-math.inf, 0.0)
-        first = search.n_a if body == 1 else 0
-        last = search.n_a + search.n_b if body == 1 else search.n_a
-        for k in range(first, last):
-            height = dd.scale(sign, fine_height(search.fine, k, search.direction))
-            if dd.less(highest, height):
-                highest = height
-        total = dd.add(total, highest)
-    return total.high
+    total = dd.add(total, _highest(search, 0, n_a, sign))
+    return dd.add(total, _highest(search, n_a, n_a + search.n_b, sign)).high
 
 
 @kernel
-def _put_plane(search, k, p, q, r, s, extent):
-    """Candidate k by points of A ⊖ B: the corner of both edges, and where either leads from it."""
-    at = _PLANE * k
-    n_a = search.n_a
-    if r >= n_a and p < n_a:
-        _put_ids(search.planes, at, p, r - n_a, q, r - n_a, p, s - n_a)
-    elif p < n_a:
-        _put_ids(search.planes, at, p, 0, q, 0, s, 0)
-    else:
-        _put_ids(search.planes, at, 0, p - n_a, 0, q - n_a, 0, s - n_a)
-    search.planes[at + 6] = extent
-
-
-@kernel
-def _put_ids(planes, at, i, j, i_first, j_first, i_second, j_second):
-    planes[at] = i
-    planes[at + 1] = j
-    planes[at + 2] = i_first
-    planes[at + 3] = j_first
-    planes[at + 4] = i_second
-    planes[at + 5] = j_second
+def _highest(search, first, last, sign):
+    highest = DD(-math.inf, 0.0)
+    for k in range(first, last):
+        height = dd.scale(sign, fine_height(search.fine, k, search.direction))
+        if dd.less(highest, height):
+            highest = height
+    return highest
 
 
 @kernel
@@ -299,7 +302,7 @@ def _prune(planes, n, extent):
     """Drop candidates whose extent is greater; how many remain."""
     remaining = 0
     for k in range(n):
-        if planes[_PLANE * k + 6] <= extent:
+        if planes[_PLANE * k + _EXTENT] <= extent:
             for j in range(_PLANE):
                 planes[_PLANE * remaining + j] = planes[_PLANE * k + j]
             remaining += 1

@@ -43,8 +43,8 @@ def _write_depth(ordered, space, row_at, limit):
     if not found.proven:
         return False
     bracket = bracket_of_depth(found.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B))
-    put_normal_and_points(row.doubles, ordered, space.terms_at, space.facet, 3, space.digits_at, neg(found.nhat), bracket.nearest
-    )
+    v = neg(found.nhat)
+    put_normal_and_points(row, ordered, space.terms_at, space.facet, 3, space.digits_at, v, bracket.nearest)
     lower, upper = max(row.doubles[LOWER], bracket.lower), min(row.doubles[UPPER], bracket.upper)
     write_verdict(row, bracket.nearest, lower, upper, EXACT, 0.0, limit)
     return True

@@ -95,13 +95,13 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
                 upper = min(upper, bracket.upper)
     # The digits have done their work; their place serves as workspace of doubles.
     if answer.cores_apart:
-        put_normal_and_points(row.doubles, ordered, space.terms_at, ids, answer.n, space.digits_at, answer.v, distance)
+        put_normal_and_points(row, ordered, space.terms_at, ids, answer.n, space.digits_at, answer.v, distance)
     write_verdict(row, distance, lower, upper, EXACT, math.inf if boolean else 0.0, limit)
-    if has_depth and is_refinable(ordered.size) and points_miss(row.doubles, ordered.size, row.doubles[DISTANCE]):
-        put_points(row.doubles, ordered, space.terms_at, ids, answer.n, space.digits_at, row.doubles[DISTANCE])
+    if has_depth and is_refinable(ordered.size) and points_miss(row, ordered.size, row.doubles[DISTANCE]):
+        put_points(row, ordered, space.terms_at, ids, answer.n, space.digits_at, row.doubles[DISTANCE])
     wants_point = touching and not answer.cores_apart and not (boolean or depths)
-    if wants_point and points_miss(row.doubles, ordered.size, 0.0):
-        put_common_point(row.doubles, ordered, ids, answer.n, space.digits_at)
+    if wants_point and points_miss(row, ordered.size, 0.0):
+        put_common_point(row, ordered, ids, answer.n, space.digits_at)
     if answer.verdict == SEPARATE:  # also where the gap is smaller than the smallest double
         row.flags[HIT] = 0
         row.flags[HOW] = EXACT

@@ -3,7 +3,7 @@
 Those that doubles have found carry the direction of a difference of nearly equal points, which says nothing where the gap
 is below rounding, and need not lie on that feature.
 
-Everywhere: row : doubles of a row.   ordered : the `OrderedPair`.   ids : vertex pairs of n ≤ 4 points of A ⊖ B.
+Everywhere: row : `Row`.   ordered : the `OrderedPair`.   ids : vertex pairs of n ≤ 4 points of A ⊖ B.
 doubles_at, terms_at : of workspace, and of the `PoseTable`.
 """
 
@@ -29,15 +29,16 @@ _NEAR_MISS = 2.0**-48
 @kernel
 def put_normal_and_points(row, ordered, terms_at, ids, n, doubles_at, v, distance):
     """The normal from the exact direction, and the witness points.   v : unit vector from B to A."""
-    put_vec3(row, NORMAL, add(scale(1.0 if ordered.flip else -1.0, v), Vec3(0.0, 0.0, 0.0)))  # never −0.0
+    doubles = row.doubles
+    put_vec3(doubles, NORMAL, add(scale(1.0 if ordered.flip else -1.0, v), Vec3(0.0, 0.0, 0.0)))  # never −0.0
     if is_refinable(ordered.size):
         put_points(row, ordered, terms_at, ids, n, doubles_at, distance)
         return
-    nhat = vec3_at(row, NORMAL)
-    middle = scale(0.5, add(vec3_at(row, POINT_A), vec3_at(row, POINT_B)))
+    nhat = vec3_at(doubles, NORMAL)
+    middle = scale(0.5, add(vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B)))
     p_a = sub(middle, scale(0.5 * distance, nhat))
-    put_vec3(row, POINT_A, p_a)
-    put_vec3(row, POINT_B, add(p_a, scale(distance, nhat)))
+    put_vec3(doubles, POINT_A, p_a)
+    put_vec3(doubles, POINT_B, add(p_a, scale(distance, nhat)))
 
 
 @kernel
@@ -56,7 +57,7 @@ def put_points(row, ordered, terms_at, ids, n, doubles_at, distance):
     radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
     # The normal is that of the pair as asked; the bodies here may be exchanged.
     sign = -1.0 if ordered.flip else 1.0
-    foot = scale(-sign * (distance + (radius_a + radius_b)) * unit, vec3_at(row, NORMAL))
+    foot = scale(-sign * (distance + (radius_a + radius_b)) * unit, vec3_at(row.doubles, NORMAL))
     weigh_corners(corners, STRIDE, n, weights, foot)
     A, B, poses = pair.A, pair.B, pair.poses
     a = Vec3(0.0, 0.0, 0.0)
@@ -64,7 +65,7 @@ def put_points(row, ordered, terms_at, ids, n, doubles_at, distance):
     for k in range(n):
         a = add(a, scale(weights[k], rotate(poses, A.pose_at, column_at(A.coords, A.padded, ids[2 * k]))))
         b = add(b, scale(weights[k], rotate(poses, B.pose_at, column_at(B.coords, B.padded, ids[2 * k + 1]))))
-    nhat = scale(sign, vec3_at(row, NORMAL))
+    nhat = scale(sign, vec3_at(row.doubles, NORMAL))
     a = add(a, add(vec3_at(poses, A.pose_at + 9), scale(radius_a, nhat)))
     b = add(b, sub(vec3_at(poses, B.pose_at + 9), scale(radius_b, nhat)))
     _put_flipped(row, a, b, ordered.flip)
@@ -91,14 +92,14 @@ def put_common_point(row, ordered, ids, n, doubles_at):
 
 @kernel(inline=True)
 def _put_flipped(row, a, b, flip):
-    put_vec3(row, POINT_B if flip else POINT_A, a)
-    put_vec3(row, POINT_A if flip else POINT_B, b)
+    put_vec3(row.doubles, POINT_B if flip else POINT_A, a)
+    put_vec3(row.doubles, POINT_A if flip else POINT_B, b)
 
 
 @kernel
 def points_miss(row, size, distance):
     """Whether the witness points are not what this distance and the normal say, by more than rounding."""
-    p_a = vec3_at(row, POINT_A)
-    p_b = vec3_at(row, POINT_B)
-    miss = norm1(sub(sub(p_b, p_a), scale(distance, vec3_at(row, NORMAL))))
+    p_a = vec3_at(row.doubles, POINT_A)
+    p_b = vec3_at(row.doubles, POINT_B)
+    miss = norm1(sub(sub(p_b, p_a), scale(distance, vec3_at(row.doubles, NORMAL))))
     return miss > _NEAR_MISS * max(size, max_abs(p_a), max_abs(p_b))

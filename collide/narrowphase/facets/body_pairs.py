@@ -1,9 +1,10 @@
 """Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
 
-Kernels answer whole batches (`surface_pairs.py`). Completed here, pose by pose, is what a row may still lack: depths,
-the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the surfaces' distance less
-the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation that is proven to part the
-bodies (`separating_translation.py`); how much shorter another may be is not known, so the bracket reaches up to 0.
+Kernels answer whole batches (`surface_pairs.py`, `surface_gaps.py`). Completed here, pose by pose, is what a row may
+still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
+surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
+that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so the
+bracket reaches up to 0.
 """
 
 from __future__ import annotations
@@ -14,32 +15,40 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import InvalidPose
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.facet_bodies import Body, hull_of, reach_of
-from collide.mesh.bvh import WIDTH
 from collide.mesh.bvh_slabs import make_slabs
 from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
 from collide.narrowphase.facets.exact_triangles import decide_exactly
-from collide.narrowphase.facets.facet_queries import HEAP, Workspace, surface_distances, workspace
+from collide.narrowphase.facets.facet_queries import (
+    HEAP,
+    Workspace,
+    not_invertible,
+    stack_of,
+    surface_distances,
+    workspace,
+)
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.narrowphase.facets.surface_pairs import (
-    APART,
+from collide.narrowphase.facets.surface_gaps import (
     CORES_MEET,
     FARTHEST,
     NEARLY_TOUCH,
-    NO_POSE,
     PROMISE,
     RADII_MEET,
-    RADIUS_A,
-    RADIUS_B,
     ROW_NO_POSE,
     TOO_FAR,
     gap_poses,
     gap_single,
+)
+from collide.narrowphase.facets.surface_pairs import (
+    APART,
+    NO_POSE,
+    RADIUS_A,
+    RADIUS_B,
+    cull_poses,
     meet_poses,
     meet_single,
 )
@@ -47,7 +56,7 @@ from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.transforms import as_poses
 
 #: Points of parts, more than which keep single calls from holding Python's lock.
-_MOST_POINTS = 64
+_MAX_POINTS = 64
 
 
 class Hits(NamedTuple):
@@ -68,6 +77,25 @@ def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bo
     """
     inside = np.full((number_of_poses(X_WA, X_WB), 3), np.nan)
     return Hits(_states(A, B, False, X_WA, X_WB, check=check, inside=inside) != APART, inside)
+
+
+def balls_farther(
+    numbers_a: np.ndarray, numbers_b: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, *, check: bool = False
+) -> np.ndarray:
+    """(n,) bool: whether balls around two bodies are certainly farther apart than a margin [m].
+
+    numbers_a, numbers_b : (7,) as of a `MeshTree`.   poses, check : as of `states`. Raises InvalidPose.
+    """
+    out = np.zeros(number_of_poses(X_WA, X_WB), dtype=np.uint8)
+
+    def ask_from(first: int, check: bool) -> int:
+        return cull_poses(
+            address_of(numbers_a), address_of(X_WA), _step(X_WA), address_of(numbers_b), address_of(X_WB), _step(X_WB),
+            first, len(out), check, margin, address_of(out),
+        )  # fmt: skip
+
+    _ask_all(ask_from, len(out), X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
+    return out == APART
 
 
 def states(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
@@ -93,11 +121,11 @@ def _states(
     out = np.zeros(n, dtype=np.uint8)
     if A.radius + B.radius > 0.0 and inside is None:
         _make_slabs(A, B)
-    header, steps = _header(A, B, exchanged, workspace(_stack(A, B))), (_step(X_WA), _step(X_WB))
+    header = _header(A, B, exchanged, workspace(stack_of(A.tree, B.tree)))
 
     def ask_from(first: int, check: bool) -> int:
         return meet_poses(
-            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, n, check,
+            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, n, check,
             inside is not None, 0 if inside is None else address_of(inside), address_of(out),
         )  # fmt: skip
 
@@ -112,7 +140,7 @@ def _ask_all(
     done = ask_from(0, check)
     while done < n:
         if not is_no_pose(done):
-            raise InvalidPose(f"pose {done}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+            raise not_invertible(done)
         for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
             as_poses(X, name, check=check)
         if not check:
@@ -126,15 +154,10 @@ def _step(X: np.ndarray) -> int:
     return 16 * (len(X) > 1)
 
 
-def _stack(A: Body, B: Body) -> int:
-    """How many pairs of boxes may wait on the stack of a traversal."""
-    return WIDTH * (A.tree.depth + B.tree.depth + 4)
-
-
 def _make_slabs(A: Body, B: Body) -> None:
     """Distances look at slabs around the boxes' facets, made at most once."""
-    A.tree.ask_slabs(make_slabs)
-    B.tree.ask_slabs(make_slabs)
+    A.tree.need_slabs(make_slabs)
+    B.tree.need_slabs(make_slabs)
 
 
 def _header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
@@ -191,15 +214,14 @@ def _fill_rows(
     """(n,) uint8: what rows lack (`gap_poses`), having written them. hulls : their hulls' rows, for directions."""
     lacks = np.zeros(len(rows), dtype=np.uint8)
     exchanged = B.key < A.key
-    one, two = (B, A) if exchanged else (A, B)
-    _make_slabs(one, two)
-    header, steps = _header(one, two, exchanged, workspace(_stack(one, two))), (_step(X_WA), _step(X_WB))
+    _make_slabs(A, B)
+    header = _header(*((B, A) if exchanged else (A, B)), exchanged, workspace(stack_of(A.tree, B.tree)))
     reach = _reach_of_search(A, B, limit)
 
     def ask_from(first: int, check: bool) -> int:
         return gap_poses(
-            address_of(header), address_of(X_WA), steps[0], address_of(X_WB), steps[1], first, len(rows), check, limit,
-            reach, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, len(rows), check,
+            limit, reach, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
         )  # fmt: skip
 
     _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
@@ -237,8 +259,8 @@ def _completed_in_order(
     if lacks & RADII_MEET:
         point = 0.5 * (row["point_a"][0] + row["point_b"][0])
         if depths:
-            found = surface_distances(A.tree, B.tree, X_WA, X_WB, _reach_of_search(A, B, limit))
-            overlap = (A.radius + B.radius - float(found.lower[0])) * (1 + 1e-12) + 1e-300
+            lower = surface_distances(A.tree, B.tree, X_WA, X_WB, _reach_of_search(A, B, limit)).lower[0]
+            overlap = (A.radius + B.radius - float(lower)) * (1 + 1e-12) + 1e-300
             steps = [overlap * row["normal"][0]] if overlap > 0.0 else []
     else:
         assert lacks == CORES_MEET
@@ -293,21 +315,22 @@ class SinglePair:
 
     def __init__(self, A: Body, B: Body):
         exchanged = B.key < A.key
-        one, two = (B, A) if exchanged else (A, B)
-        space, n_stack = SinglePair._space, _stack(one, two)
+        if exchanged:
+            A, B = B, A
+        space, n_stack = SinglePair._space, stack_of(A.tree, B.tree)
         if space is None or space.n_stack < n_stack:
             space = SinglePair._space = Workspace(max(512, n_stack))
-        self._held = one, two, space
-        self._has_slabs = one.radius + two.radius > 0.0
+        self._held = A, B, space
+        self._has_slabs = A.radius + B.radius > 0.0
         if self._has_slabs:
-            _make_slabs(one, two)
-        header = _header(one, two, exchanged, space)
+            _make_slabs(A, B)
+        header = _header(A, B, exchanged, space)
         self.collide, self._gap = prepared_boolean(meet_single, header), prepared_row(gap_single, header)
 
     @staticmethod
     def serves(A: Body, B: Body) -> bool:
         """Whether single calls are short enough to keep Python's lock."""
-        return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MOST_POINTS
+        return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, bytes as of a batch; None of overlaps, and of what kernels do not complete."""

@@ -32,14 +32,14 @@ def set_probe(placing, which, boxes, ref, probe):
 @kernel(inline=True)
 def _set_box(placing, which, box, probe):
     """Make a box of A or B the probe."""
-    own = FRAMES + FRAME_SIZE * which
-    other = FRAMES + FRAME_SIZE * (1 - which)
+    to_probe = FRAMES + FRAME_SIZE * which
+    to_node = FRAMES + FRAME_SIZE * (1 - which)
     for i in range(3):
-        row = vec3_at(placing, other + 3 * i)
-        probe[i] = np.float32(dot(row, box.centre) + placing[other + 9 + i])
-        probe[3 + i] = np.float32(dot(absolute(row), box.half) + placing[other + 12 + i])
-    put_floats(probe, 6, sub(vec3_at(placing, own + 9), box.centre))
-    put_floats(probe, 9, add(box.half, vec3_at(placing, own + 12)))
+        row = vec3_at(placing, to_node + 3 * i)
+        probe[i] = np.float32(dot(row, box.centre) + placing[to_node + 9 + i])
+        probe[3 + i] = np.float32(dot(absolute(row), box.half) + placing[to_node + 12 + i])
+    put_floats(probe, 6, sub(vec3_at(placing, to_probe + 9), box.centre))
+    put_floats(probe, 9, add(box.half, vec3_at(placing, to_probe + 12)))
 
 
 @kernel(inline=True)
@@ -97,19 +97,19 @@ def _set_edge(placing, which, out, triangle, probe, at):
 @kernel(inline=True)
 def _set_line(placing, which, n, probe, at):
     """Write a direction n of the probe's frame as the node's has it; returns n · shift and a bound of its rounding."""
-    own = FRAMES + FRAME_SIZE * which
-    middle = dot(n, vec3_at(placing, own + 9))
+    to_probe = FRAMES + FRAME_SIZE * which
+    middle = dot(n, vec3_at(placing, to_probe + 9))
     # Of the frame, of heights and of the sums of floats; a triangle is within its units.
     reach = _FLOAT_ERROR * 6.0 + 2.0**-110
-    return middle, _set_direction(placing, own, n, reach, probe, at)
+    return middle, _set_direction(placing, to_probe, n, reach, probe, at)
 
 
 @kernel(inline=True)
-def _set_direction(placing, own, n, reach, probe, at):
+def _set_direction(placing, to_probe, n, reach, probe, at):
     """Write a direction of the probe's frame as the node's has it; returns ``reach`` plus the frame's rounding."""
-    reach += dot(absolute(n), vec3_at(placing, own + 12))
+    reach += dot(absolute(n), vec3_at(placing, to_probe + 12))
     for j in range(3):
-        entry = n.x * placing[own + j] + n.y * placing[own + 3 + j] + n.z * placing[own + 6 + j]
+        entry = n.x * placing[to_probe + j] + n.y * placing[to_probe + 3 + j] + n.z * placing[to_probe + 6 + j]
         probe[at + j] = np.float32(entry)
         reach += _FLOAT_ERROR * abs(entry)
     return reach
@@ -147,12 +147,12 @@ def _set_slab(placing, which, tree, run, probe):
         low = min(low, height)
         high = max(high, height)
     unit = math.ldexp(1.0, int(-tree.header[EXPONENT]))
-    own = FRAMES + FRAME_SIZE * which
-    middle = dot(n, vec3_at(placing, own + 9)) - 0.5 * (low + high) * unit
+    to_probe = FRAMES + FRAME_SIZE * which
+    middle = dot(n, vec3_at(placing, to_probe + 9)) - 0.5 * (low + high) * unit
     # What rounding can do to the frame, to heights and to the sums of floats.
     reach = 0.5 * (high - low) * unit + _FLOAT_ERROR * (3.0 + abs(middle)) + 2.0**-110
     probe[_SLAB + 3] = np.float32(middle)
-    probe[_SLAB + 4] = np.float32(_set_direction(placing, own, n, reach, probe, _SLAB))
+    probe[_SLAB + 4] = np.float32(_set_direction(placing, to_probe, n, reach, probe, _SLAB))
 
 
 @kernel(inline=True)

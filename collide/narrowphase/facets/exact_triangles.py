@@ -42,7 +42,7 @@ INTEGERS = STATE + DIGITS
 class ExactCall(NamedTuple):
     """Addresses: of `decide_exactly`, and of what it takes."""
 
-    decide: int
+    address: int
     corners_at: int
     placing_at: int
     integers_at: int
@@ -72,7 +72,7 @@ _call_exactly = native_call(SIGNATURE)
 def ask_exactly(exact, what):
     """What `decide_exactly` answers.   exact : an `ExactCall`."""
     arguments = (what, exact.corners_at, exact.placing_at, exact.integers_at, exact.XA_at, exact.XB_at)
-    return _call_exactly(exact.decide, arguments)
+    return _call_exactly(exact.address, arguments)
 
 
 @kernel

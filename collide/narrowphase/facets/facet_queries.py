@@ -1,8 +1,8 @@
 """Questions about two mesh trees from Python: poses in, arrays out.
 
-Bodies are taken in the order of their contents, so that swapped questions are worked out on the same numbers; of
-two that are alike the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and
-asking numpy for their addresses, takes longer than most booleans.
+Bodies are taken in the order of their contents, so that swapped questions are worked out on the same numbers; of two
+equal ones the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and asking numpy for their
+addresses, takes longer than most booleans.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def surfaces_meet(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) 
     """(N,) bool: whether two surfaces share a point; parameters as for `first_hits`, which says where."""
     if B.content < A.content:
         A, B, X_WA, X_WB = B, A, X_WB, X_WA
-    _, starts, _ = _walked(A, B, X_WA, X_WB, True)
+    _, starts, _ = _hit_keys(A, B, X_WA, X_WB, True)
     return starts[1:] > starts[:-1]
 
 
@@ -98,46 +98,43 @@ def first_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> 
     mesh inside another meets nothing. Raises InvalidPose where a matrix is singular or nearly so.
     """
     if B.content < A.content:
-        keys, starts, counters = _walked(B, A, X_WB, X_WA, True)
+        keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, True)
         return SurfacePairs(np.stack(np.divmod(keys, len(A.ids))[::-1], axis=1), starts, counters)
-    keys, starts, counters = _walked(A, B, X_WA, X_WB, True)
+    keys, starts, counters = _hit_keys(A, B, X_WA, X_WB, True)
     return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
 
 
 def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
     """All pairs of facets that meet; parameters as for `first_hits`. None is lost, however many there are."""
     if B.content < A.content:
-        keys, starts, counters = _walked(B, A, X_WB, X_WA, False)
+        keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, False)
         b, a = np.divmod(keys, len(A.ids))
         keys = a * len(B.ids) + b
     else:
-        keys, starts, counters = _walked(A, B, X_WA, X_WB, False)
+        keys, starts, counters = _hit_keys(A, B, X_WA, X_WB, False)
     for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist()):
         keys[begin:end].sort()
     return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
 
 
-def _walked(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _hit_keys(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(keys, starts, counters) of bodies in order; a key is a facet of A times B's number of facets, and one of B."""
     X_WA, X_WB, n = matched(X_WA, X_WB)
-    work = workspace(WIDTH * (A.depth + B.depth + 4))
+    work = workspace(stack_of(A, B))
     keys = np.empty(64 + n if first_only else 4096, dtype=np.int64)
-    told = np.zeros(3 + n + 1 + COUNTERS * n, dtype=np.int64)
-    where_at = told.ctypes.data
-    starts_at, counters_at = where_at + 24, where_at + 8 * (4 + n)
-    step_a, step_b = step(X_WA), step(X_WB)
+    progress = np.zeros(3, dtype=np.int64)
+    starts, counters = np.zeros(n + 1, dtype=np.int64), np.zeros((n, COUNTERS), dtype=np.int64)
     while True:
-        said = walk_surfaces(
-            A.address, B.address, X_WA.ctypes.data, step_a, X_WB.ctypes.data, step_b, n, A.content == B.content,
-            first_only, keys.ctypes.data, len(keys), starts_at, counters_at, where_at, *work.addresses,
+        status = walk_surfaces(
+            A.address, B.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), n, A.content == B.content,
+            first_only, address_of(keys), len(keys), address_of(starts), address_of(counters), address_of(progress),
+            *work.addresses,
         )  # fmt: skip
-        if said == SINGULAR:
-            raise InvalidPose(f"pose {int(told[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
-        if said != FULL:
-            break
+        if status == SINGULAR:
+            raise not_invertible(int(progress[0]))
+        if status != FULL:
+            return keys[: starts[-1]], starts, counters
         keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
-    starts = told[3 : 4 + n]
-    return keys[: starts[-1]], starts, told[4 + n :].reshape(n, COUNTERS)
 
 
 def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.inf) -> SurfaceDistances:
@@ -149,40 +146,41 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
         r = surface_distances(B, A, X_WB, X_WA, limit)
         return r._replace(point_a=r.point_b, point_b=r.point_a, normal=-r.normal, facets=r.facets[:, ::-1])
     for tree in (A, B):
-        tree.ask_slabs(make_slabs)
+        tree.need_slabs(make_slabs)
     X_WA, X_WB, n = matched(X_WA, X_WB)
     results, marks = _near(A, B, X_WA, X_WB, n, limit)
     # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
-    left = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
-    if len(left):
-        X_WO, X_WT = (X if X.ndim == 2 else np.ascontiguousarray(X[left]) for X in (X_WA, X_WB))
-        results[left], marks[left] = _near(A, B, X_WO, X_WT, len(left), np.inf)
+    between = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
+    if len(between):
+        some = [X if X.ndim == 2 else np.ascontiguousarray(X[between]) for X in (X_WA, X_WB)]
+        results[between], marks[between] = _near(A, B, *some, len(between), np.inf)
     return SurfaceDistances(
         results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
         marks[:, 2] != 0, marks[:, 3:],
     )  # fmt: skip
 
 
-def _near(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, n: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
+def _near(A: MeshTree, B: MeshTree, X_WA, X_WB, n: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
     """(results, marks) of `distances.near_surfaces`."""
     results = np.empty((n, distances.RESULT))
     marks = np.zeros((n, distances.MARKS), dtype=np.int64)
-    work = workspace(WIDTH * (A.depth + B.depth + 4))
-    stack_at, n_stack, doubles_at, integers_at, decide = work.addresses
+    work = workspace(stack_of(A, B))
     done = distances.near_surfaces(
-        A.address, B.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), n, A.content == B.content,
-        float(limit), results.ctypes.data, marks.ctypes.data, stack_at, n_stack, work.heap_address, HEAP, doubles_at,
-        integers_at, decide,
+        A.address, B.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), n, A.content == B.content,
+        float(limit), address_of(results), address_of(marks), *work.addresses[:2], work.heap_address, HEAP,
+        *work.addresses[2:],
     )  # fmt: skip
     if done < n:
-        raise InvalidPose(f"pose {done}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+        raise not_invertible(done)
     return results, marks
 
 
-def facets_within(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, reach: float, most: int) -> NearPairs | None:
+def facets_within(
+    A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, reach: float, max_pairs: int
+) -> NearPairs | None:
     """All pairs of facets at most ``reach`` [m] apart, and a few that are farther by rounding; poses (4, 4).
 
-    most : None is returned where there are more pairs than about this. Raises InvalidPose where a matrix is singular.
+    max_pairs : None is returned where there are more than about this. Raises InvalidPose where a matrix is singular.
     Costs about 0.1 µs a pair of boxes and 0.3 µs a pair listed.
     """
     X_WA, X_WB = (np.ascontiguousarray(X, dtype=np.float64) for X in (X_WA, X_WB))
@@ -190,21 +188,21 @@ def facets_within(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, 
     capacity = 512
     while True:
         out = np.empty((capacity, near_pairs.NUMBERS_OF_PAIR))
-        told = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
-        said = near_pairs.list_near_pairs(
-            A.address, B.address, X_WA.ctypes.data, X_WB.ctypes.data, float(reach), out.ctypes.data, told.ctypes.data,
+        marks = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
+        count = near_pairs.list_near_pairs(
+            A.address, B.address, address_of(X_WA), address_of(X_WB), float(reach), address_of(out), address_of(marks),
             capacity, *work.addresses,
         )  # fmt: skip
-        if said == -SINGULAR:
-            raise InvalidPose("a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
-        if said != -FULL:
+        if count == -SINGULAR:
+            raise not_invertible(0)
+        if count != -FULL:
             break
-        if capacity >= most:
+        if capacity >= max_pairs:
             return None
-        capacity = min(4 * capacity, max(most, capacity + 1))
-    order = np.lexsort((told[:said, 1], told[:said, 0]))
-    out, told = out[order], told[order]
-    return NearPairs(told[:, :2], told[:, 2] != 0, out[:, 0], out[:, 1], out[:, 2:5], out[:, 5:8])
+        capacity = min(4 * capacity, max(max_pairs, capacity + 1))
+    order = np.lexsort((marks[:count, 1], marks[:count, 0]))
+    out, marks = out[order], marks[order]
+    return NearPairs(marks[:, :2], marks[:, 2] != 0, out[:, 0], out[:, 1], out[:, 2:5], out[:, 5:8])
 
 
 def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
@@ -227,12 +225,12 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
     counters = np.zeros((n, 3), dtype=np.int64)
     work = workspace(WIDTH * (A.depth + 2))
     inside.points_inside(
-        A.address, X_WA.ctypes.data, step(X_WA), X_WB.ctypes.data, step(X_WB), points.ctypes.data,
-        3 if points.ndim == 2 else 0, n, answers.ctypes.data, counters.ctypes.data, *work.addresses,
+        A.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), address_of(points),
+        3 if points.ndim == 2 else 0, n, address_of(answers), address_of(counters), *work.addresses,
     )  # fmt: skip
-    if (answers == inside.SINGULAR).any():
-        k = int(np.flatnonzero(answers == inside.SINGULAR)[0])
-        raise InvalidPose(f"pose {k}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
+    singular = np.flatnonzero(answers == inside.SINGULAR)
+    if len(singular):
+        raise not_invertible(int(singular[0]))
     return answers
 
 
@@ -243,41 +241,40 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
     one facet twice are among the pairs.
     """
     keys = np.empty(4096, dtype=np.int64)
-    counters, where = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    counters, progress = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
     planes = np.empty(self_contact.PLANE * len(tree.ids))
     work = workspace(WIDTH * WIDTH * (tree.depth + 2))
     while True:
-        said = self_contact.walk_itself(
-            tree.address, keys.ctypes.data, len(keys), counters.ctypes.data, where.ctypes.data, planes.ctypes.data,
+        status = self_contact.walk_itself(
+            tree.address, address_of(keys), len(keys), address_of(counters), address_of(progress), address_of(planes),
             *work.addresses,
         )
-        if said != self_contact.FULL:
+        if status != self_contact.FULL:
             break
         keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])
-    found = np.sort(keys[: where[1]])
-    return np.stack(np.divmod(found, len(tree.ids)), axis=1), counters
+    return np.stack(np.divmod(np.sort(keys[: progress[1]]), len(tree.ids)), axis=1), counters
 
 
-def facets_on_rays(A: MeshTree, X_WA, given: np.ndarray, first_only: bool) -> tuple[np.ndarray, np.ndarray]:
+def facets_on_rays(A: MeshTree, X_WA, rays_T: np.ndarray, first_only: bool) -> tuple[np.ndarray, np.ndarray]:
     """(hits (k, rays.HIT), counters (N, 3): boxes, triangles and exact decisions) of N rays, each ray's together.
 
-    X_WA : (4, 4) or (N, 4, 4).   given : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
+    X_WA : (4, 4) or (N, 4, 4).   rays_T : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
     first_only : only facets that may be the first of their ray, by brackets; all that are met otherwise.
     """
     X_WA = np.ascontiguousarray(X_WA, dtype=np.float64)
-    n = len(given)
+    n = len(rays_T)
     hits = np.empty((n + 64, rays.HIT))
-    counters, where = np.zeros((n, 3), dtype=np.int64), np.zeros(2, dtype=np.int64)
+    counters, progress = np.zeros((n, 3), dtype=np.int64), np.zeros(2, dtype=np.int64)
     work = workspace(WIDTH * (A.depth + 2))
     while True:
-        said = rays.cast_rays(
-            A.address, X_WA.ctypes.data, step(X_WA), given.ctypes.data, n, first_only, hits.ctypes.data, len(hits),
-            counters.ctypes.data, where.ctypes.data, *work.addresses,
+        status = rays.cast_rays(
+            A.address, address_of(X_WA), step(X_WA), address_of(rays_T), n, first_only, address_of(hits), len(hits),
+            address_of(counters), address_of(progress), *work.addresses,
         )  # fmt: skip
-        if said == rays.SINGULAR:
-            raise InvalidPose(f"pose {int(where[0])}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")
-        if said != rays.FULL:
-            return hits[: where[1]], counters
+        if status == rays.SINGULAR:
+            raise not_invertible(int(progress[0]))
+        if status != rays.FULL:
+            return hits[: progress[1]], counters
         hits = np.concatenate([hits, np.empty((3 * len(hits), rays.HIT))])
 
 
@@ -325,12 +322,22 @@ class Workspace:
         self.heap_address, self.scratch_address = address_of(self._heap), address_of(self._scratch)
 
 
-_kept = threading.local()
+_of_thread = threading.local()
 
 
 def workspace(n_stack: int) -> Workspace:
     """This thread's workspace, with room for a stack of this many entries."""
-    work = getattr(_kept, "work", None)
+    work = getattr(_of_thread, "workspace", None)
     if work is None or work.n_stack < n_stack:
-        work = _kept.work = Workspace(max(n_stack, 512))
+        work = _of_thread.workspace = Workspace(max(n_stack, 512))
     return work
+
+
+def stack_of(A: MeshTree, B: MeshTree) -> int:
+    """How many pairs of boxes may wait on the stack of a traversal of two trees."""
+    return WIDTH * (A.depth + B.depth + 4)
+
+
+def not_invertible(k: int) -> InvalidPose:
+    """The error of a pose, number k of its batch, at which a mesh cannot be placed."""
+    return InvalidPose(f"pose {k}: a matrix that is singular, nearly so, or mirrors, cannot place a mesh")

@@ -46,7 +46,7 @@ INTS_OF_PAIR = 3
 # Doubles of workspace besides a placing and corners: reaches along both frames' axes (6), two triangles (18), points
 # (6), and two integers, the facet pairs found and those decided exactly.
 _REACHES, _TRIANGLES, _POINTS, _COUNTERS = 0, 6, 24, 30
-_FOUND, _EXACT = range(2)
+_N_PAIRS, _EXACT = range(2)
 DOUBLES = PLACING + CORNERS + 32
 FLOATS = 2 * FRAME + PROBE
 
@@ -96,14 +96,14 @@ def _set_reaches(A, B, placing, reach, out):
 def _widen_probe(query, which, probe):
     """Enlarge a probe's half lengths and slab by the reach."""
     reaches = query.reaches
-    own = 3 * which
-    other = 3 - own
+    probe_axes = 3 * which
+    node_axes = 3 - probe_axes
     half_width = float(probe[16])
     for i in range(3):
-        probe[3 + i] = np.float32((float(probe[3 + i]) + reaches[other + i]) * (1.0 + 2.0**-20))
-        probe[9 + i] = np.float32((float(probe[9 + i]) + reaches[own + i]) * (1.0 + 2.0**-20))
+        probe[3 + i] = np.float32((float(probe[3 + i]) + reaches[node_axes + i]) * (1.0 + 2.0**-20))
+        probe[9 + i] = np.float32((float(probe[9 + i]) + reaches[probe_axes + i]) * (1.0 + 2.0**-20))
     if half_width > 0.0:
-        probe[16] = np.float32(half_width * (1.0 + 2.0**-20) + reaches[own] + reaches[own + 1] + reaches[own + 2])
+        probe[16] = np.float32(half_width * (1.0 + 2.0**-20) + reaches[probe_axes] + reaches[probe_axes + 1] + reaches[probe_axes + 2])
 
 
 @kernel
@@ -120,7 +120,7 @@ def _world_error(A, XA, B, XB):
 
 @kernel(inline=True)
 def _unless_full(query, _stack, top):
-    return -top if query.counters[_FOUND] + MAX_FACET_PAIRS > query.capacity else top
+    return -top if query.counters[_N_PAIRS] + MAX_FACET_PAIRS > query.capacity else top
 
 
 @kernel(inline=True)
@@ -156,16 +156,16 @@ def _measure(query, a, b):
         point_b = point_a
         length = 0.0
         lower = 0.0
-    out = NUMBERS_OF_PAIR * counters[_FOUND]
+    out = NUMBERS_OF_PAIR * counters[_N_PAIRS]
     query.out[out + LENGTH] = length
     query.out[out + LOWER] = lower
     put_vec3(query.out, out + POINT_A, point_a)
     put_vec3(query.out, out + POINT_B, point_b)
-    out = INTS_OF_PAIR * counters[_FOUND]
+    out = INTS_OF_PAIR * counters[_N_PAIRS]
     query.facets[out + FACET_A] = query.trees.A.ids[a]
     query.facets[out + FACET_B] = query.trees.B.ids[b]
     query.facets[out + MEETS] = 1 if meets else 0
-    counters[_FOUND] += 1
+    counters[_N_PAIRS] += 1
 
 
 _traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open_larger(_widen_probe))
@@ -174,7 +174,7 @@ _traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open
 @entry("int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
-    integers_at, decide,
+    integers_at, exact_at,
 ):  # fmt: skip
     """How many pairs of facets come within ``reach`` at one pair of poses (16 doubles each); −FULL, −SINGULAR.
 
@@ -184,21 +184,21 @@ def list_near_pairs(
     """
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)
-    trees, invertible = pose_trees(A, XA_at, B, XB_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, decide)
+    trees, invertible = pose_trees(A, XA_at, B, XB_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, exact_at)
     if not invertible:
         return -SINGULAR
-    own_at = doubles_at + 8 * (PLACING + CORNERS)
+    numbers_at = doubles_at + 8 * (PLACING + CORNERS)
     error = _world_error(A, trees.XA, B, trees.XB)
     query = _Query(
-        trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(own_at + 8 * _REACHES, 6),
-        view_f64(own_at + 8 * _TRIANGLES, 18), view_f64(own_at + 8 * _POINTS, 6), view_i64(own_at + 8 * _COUNTERS, 2),
+        trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(numbers_at + 8 * _REACHES, 6),
+        view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6), view_i64(numbers_at + 8 * _COUNTERS, 2),
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
     )  # fmt: skip
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)
-    query.counters[_FOUND] = 0
+    query.counters[_N_PAIRS] = 0
     query.counters[_EXACT] = 0
     stack = view_i64(stack_at, n_stack)
     stack[0] = 0
     if _traverse(query, stack, 1) != 0:
         return -FULL
-    return query.counters[_FOUND]
+    return query.counters[_N_PAIRS]

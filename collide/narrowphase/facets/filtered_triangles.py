@@ -13,7 +13,7 @@ normal of B: edges are off by 2E + uL: 24·L·D·E more. Orientation of any four
 from __future__ import annotations
 
 from collide.kernels import kernel
-from collide.numerics.vec3 import Vec3, cross, dot, max_abs, sub, vec3_at
+from collide.numerics.vec3 import Vec3, component, cross, dot, max_abs, sub, vec3_at
 
 #: Verdicts of `meeting_in_doubles`.
 APART, MEETING, AMBIGUOUS = 0, 1, -1
@@ -37,18 +37,18 @@ def _all_certain(signs, limit):
 
 
 @kernel(inline=True)
-def meeting_in_doubles(P, Q, b, a, error):
-    """APART, MEETING or AMBIGUOUS for the triangles P[a:a + 9] and Q[b:b + 9], both in A's frame.
+def meeting_in_doubles(A, a, B, b, error):
+    """APART, MEETING or AMBIGUOUS for the triangles A[a:] and B[b:], both in A's frame.
 
-    error : bound of the error of every coordinate of Q.
+    error : bound of the error of every coordinate of B's corners.
     """
     # Sides of B's corners of A's plane.
-    first = vec3_at(P, a)
-    u = sub(vec3_at(P, a + 3), first)
-    v = sub(vec3_at(P, a + 6), first)
-    w0 = sub(vec3_at(Q, b), first)
-    w1 = sub(vec3_at(Q, b + 3), first)
-    w2 = sub(vec3_at(Q, b + 6), first)
+    first = vec3_at(A, a)
+    u = sub(vec3_at(A, a + 3), first)
+    v = sub(vec3_at(A, a + 6), first)
+    w0 = sub(vec3_at(B, b), first)
+    w1 = sub(vec3_at(B, b + 3), first)
+    w2 = sub(vec3_at(B, b + 6), first)
     n = cross(u, v)
     sides_b = Vec3(dot(n, w0), dot(n, w1), dot(n, w2))
     edge = max(max_abs(u), max_abs(v))
@@ -70,7 +70,7 @@ def meeting_in_doubles(P, Q, b, a, error):
         return APART
     if not (_all_certain(sides_b, limit_b) and _all_certain(sides_a, limit_a)):
         return AMBIGUOUS
-    return _intervals_overlap(P, a, sides_a, Q, b, sides_b, sign_error(reach, error))
+    return _intervals_overlap(A, a, sides_a, B, b, sides_b, sign_error(reach, error))
 
 
 @kernel(inline=True)
@@ -83,7 +83,7 @@ def sign_error(reach, error):
 
 
 @kernel
-def _intervals_overlap(P, a, sides_a, Q, b, sides_b, limit):
+def _intervals_overlap(A, a, sides_a, B, b, sides_b, limit):
     """The planes cross, and both triangles cross the line: whether they overlap on it.
 
     sides_a : on which sides of B's plane A's corners are, all certain; sides_b likewise.
@@ -97,22 +97,17 @@ def _intervals_overlap(P, a, sides_a, Q, b, sides_b, limit):
     p2 = b + 3 * j
     q2 = b + 3 * ((j + 1) % 3)
     r2 = b + 3 * ((j + 2) % 3)
-    if not _component(sides_a, i) > 0.0:
+    if not component(sides_a, i) > 0.0:
         q2, r2 = r2, q2
-    if not _component(sides_b, j) > 0.0:
+    if not component(sides_b, j) > 0.0:
         q1, r1 = r1, q1
-    lower = orientation(P, p1, P, q1, Q, p2, Q, q2)
+    lower = orientation(A, p1, A, q1, B, p2, B, q2)
     if lower > limit:
         return APART
-    upper = orientation(P, p1, P, r1, Q, r2, Q, p2)
+    upper = orientation(A, p1, A, r1, B, r2, B, p2)
     if upper > limit:
         return APART
     return MEETING if lower < -limit and upper < -limit else AMBIGUOUS
-
-
-@kernel(inline=True)
-def _component(a, k):
-    return a.x if k == 0 else (a.y if k == 1 else a.z)
 
 
 @kernel(inline=True)
@@ -137,24 +132,24 @@ def opposed(x, y, limit):
 
 
 @kernel(inline=True)
-def segment_against_triangle(P, t, S, p, q, error):
-    """(APART, MEETING or AMBIGUOUS, whether p is above the plane) for the segment S[p:], S[q:] and the triangle P[t:].
+def segment_against_triangle(T, t, S, p, q, error):
+    """(APART, MEETING or AMBIGUOUS, whether p is above the plane) for the segment S[p:], S[q:] and the triangle T[t:].
 
     MEETING : the segment crosses the inside of the triangle.   error : bound of the error of a coordinate of S.
     """
-    first = vec3_at(P, t)
-    far = max(max_abs(sub(vec3_at(P, t + 3), first)), max_abs(sub(vec3_at(P, t + 6), first)))
+    first = vec3_at(T, t)
+    far = max(max_abs(sub(vec3_at(T, t + 3), first)), max_abs(sub(vec3_at(T, t + 6), first)))
     limit = sign_error(max(far, max_abs(sub(vec3_at(S, p), first)), max_abs(sub(vec3_at(S, q), first))), error)
-    start = orientation(P, t, P, t + 3, P, t + 6, S, p)
-    end = orientation(P, t, P, t + 3, P, t + 6, S, q)
+    start = orientation(T, t, T, t + 3, T, t + 6, S, p)
+    end = orientation(T, t, T, t + 3, T, t + 6, S, q)
     above = start > 0.0
     if (start > limit and end > limit) or (start < -limit and end < -limit):
         return APART, above
-    x = orientation(P, t, P, t + 3, S, p, S, q)
-    y = orientation(P, t + 3, P, t + 6, S, p, S, q)
+    x = orientation(T, t, T, t + 3, S, p, S, q)
+    y = orientation(T, t + 3, T, t + 6, S, p, S, q)
     if opposed(x, y, limit):
         return APART, above
-    z = orientation(P, t + 6, P, t, S, p, S, q)
+    z = orientation(T, t + 6, T, t, S, p, S, q)
     if opposed(x, z, limit) or opposed(y, z, limit):
         return APART, above
     certain = abs(start) > limit and abs(end) > limit and _all_certain(Vec3(x, y, z), limit)

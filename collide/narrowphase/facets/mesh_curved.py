@@ -17,7 +17,7 @@ from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, reach_o
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_queries import number_of_poses
-from collide.narrowphase.facets.body_pairs import core_hits, farthest_gap, hull_rows
+from collide.narrowphase.facets.body_pairs import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_convex import facet_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.near_facets import Facets, near_facets
@@ -28,10 +28,10 @@ from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 
 #: Facets of a pose that are asked about together: so many first, then so many times more.
-_FIRST, _MORE = 8, 4
+_FIRST_ROUND, _GROWTH = 8, 4
 
 
-class Decided(NamedTuple):
+class CurvedStates(NamedTuple):
     """n poses of a mesh A and a shape B.
 
     state : (n,) APART, HIT or OPEN.   how : (n,) index into `results.HOW`.
@@ -49,73 +49,83 @@ def curved_states(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, *, 
     """(n,) APART, HIT or OPEN for poses (n, 4, 4) or (1, 4, 4); check: refuse matrices that are no rotation."""
     n = number_of_poses(X_WA, X_WB)
     near = np.flatnonzero(core_hits(A, E.outer, X_WA, X_WB, check=check).core)
-    state = np.full(n, APART)
+    states = np.full(n, APART)
     if len(near):
         PA, PB = (as_given(np.broadcast_to(X, (n, 4, 4))[near]) for X in (X_WA, X_WB))
-        state[near] = decide(A, E, PA, PB).state
-    return state
+        states[near] = settle_curved(A, E, PA, PB, outer_meets=True).state
+    return states
 
 
-def decide(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> Decided:
-    """Whether a mesh and a shape share a point, proven for the poses and everything within their slops."""
-    n = len(X_WA.X)
-    done = Decided(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
-    exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)
-    _between_polytopes(A, E, X_WA.X, X_WB.X, np.flatnonzero(exact), done)
-    left = np.flatnonzero(done.state == OPEN)
-    if len(left):
-        where = points_in_solid(A.tree, X_WA.X[left], E.outer.points[0], X_WB.X[left])  # refuses poses that are none
-        _by_facets(A, E, X_WA, X_WB, left, done)
+def settle_curved(
+    A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, *, outer_meets: bool = False
+) -> CurvedStates:
+    """Whether a mesh and a shape share a point, proven for the poses and everything within their slops.
+
+    outer_meets : the polytope around the shape is known to meet the mesh at all poses, which have no slop.
+    """
+    n = len(PA.X)
+    states = CurvedStates(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
+    exact = np.flatnonzero((PA.slop == 0.0) & (PB.slop == 0.0))
+    if len(exact):
+        _settle_by_polytopes(A, E, PA.X, PB.X, exact, states, outer_meets)
+    remaining = np.flatnonzero(states.state == OPEN)
+    if len(remaining):
+        # Refuses poses that are none.
+        where = points_in_solid(A.tree, PA.X[remaining], E.outer.points[0], PB.X[remaining])
+        _settle_by_facets(A, E, PA, PB, remaining, states)
         if A.solid:
-            free = (done.state[left] == APART) & (where != OUTSIDE)
-            done.state[left[free]], done.how[left[free]] = HIT, EXACT
-            done.point[left[free]] = _moved(X_WB.X[left[free]], E.outer.points[0])
-    return done
+            inside = remaining[(states.state[remaining] == APART) & (where != OUTSIDE)]
+            states.state[inside], states.how[inside] = HIT, EXACT
+            states.point[inside] = _moved(PB.X[inside], E.outer.points[0])
+    return states
 
 
-def _between_polytopes(A: Body, E: Enclosure, X_WA, X_WB, left: np.ndarray, done: Decided) -> None:
-    if not len(left):
-        return
-    around = core_hits(A, E.outer, X_WA[left], X_WB[left]).core
-    done.state[left[~around]] = APART
-    left = left[around]
-    if E.inner is not None and len(left):
-        within = core_hits(A, E.inner, X_WA[left], X_WB[left])
-        done.state[left[within.core]] = HIT
-        done.point[left] = within.inside
+def _settle_by_polytopes(
+    A: Body, E: Enclosure, X_WA, X_WB, poses: np.ndarray, states: CurvedStates, outer_meets: bool
+) -> None:
+    """Apart from the polytope around the shape is apart, meeting the one inside it is a hit."""
+    if not outer_meets:
+        meets = core_hits(A, E.outer, X_WA[poses], X_WB[poses]).core
+        states.state[poses[~meets]] = APART
+        poses = poses[meets]
+    if E.inner is not None and len(poses):
+        inner = core_hits(A, E.inner, X_WA[poses], X_WB[poses])
+        states.state[poses[inner.core]] = HIT
+        states.point[poses] = inner.inside
 
 
-def _by_facets(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, left: np.ndarray, done: Decided) -> None:
+def _settle_by_facets(
+    A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, poses: np.ndarray, states: CurvedStates
+) -> None:
     """Ask about every facet that may touch, until one does."""
-    PA, PB = X_WA.of(left), X_WB.of(left)
-    near = near_facets(A.tree, E.packed, PA, PB, _across(A, E, PA, PB), np.zeros(len(left)))
-    hit, unsure = np.zeros(len(left), dtype=bool), np.zeros(len(left), dtype=bool)
-    how, place = np.full(len(left), EXACT), np.full(len(left), -1)
+    n, PA, PB = len(poses), X_WA.of(poses), X_WB.of(poses)
+    near = near_facets(A.tree, E.packed, PA, PB, _across(A, E, PA, PB), np.zeros(n))
+    hit, ambiguous = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    how, place = np.full(n, EXACT), np.full(n, -1)
     for some in _rounds(near, lambda facets: ~hit[facets.pose]):
-        pose, own = near.pose[some], near.place[some]
-        rows = facet_rows(A.tree, E.packed, PA, PB, pose, own, boolean=True, limit=0.0)
+        rows = facet_rows(A.tree, E.packed, PA, PB, near.pose[some], near.place[some], boolean=True, limit=0.0)
         for k in np.flatnonzero(rows["hit"]).tolist():
-            p, sure = pose[k], rows["how"][k] != UNDECIDED
-            if not hit[p] and (sure or not unsure[p]):
-                place[p], how[p] = own[k], rows["how"][k]
-            hit[p] |= sure
-            unsure[p] |= not sure
-    done.state[left] = np.where(hit, HIT, np.where(unsure, OPEN, APART))
-    done.how[left], done.place[left] = how, place
+            p, proven = near.pose[some][k], rows["how"][k] != UNDECIDED
+            if not hit[p] and (proven or not ambiguous[p]):
+                place[p], how[p] = near.place[some][k], rows["how"][k]
+            hit[p] |= proven
+            ambiguous[p] |= not proven
+    states.state[poses] = np.where(hit, HIT, np.where(ambiguous, OPEN, APART))
+    states.how[poses], states.place[poses] = how, place
 
 
 def _rounds(near: Facets, wanted):
     """Yields indices of facets to be asked about next: nearest first, as many of every pose whatever the others."""
     ranks = near.ranks()
-    begin, size = 0, _FIRST
-    most = int(ranks.max()) + 1 if len(ranks) else 0
-    while begin < most:
+    begin, size = 0, _FIRST_ROUND
+    end = int(ranks.max()) + 1 if len(ranks) else 0
+    while begin < end:
         some = np.flatnonzero((ranks >= begin) & (ranks < begin + size))
         some = some[wanted(near)[some]]
         if len(some):
             yield some
         begin += size
-        size *= _MORE
+        size *= _GROWTH
 
 
 def _across(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
@@ -131,35 +141,46 @@ def _moved(X: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def curved_rows(
-    A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, *, limit: float, depths: bool
+    A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, *, limit: float, depths: bool
 ) -> np.ndarray:
     """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop only."""
-    decided = decide(A, E, X_WA, X_WB)
-    rows = np.zeros(len(X_WA.X), dtype=PAIR_DTYPE)
+    rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
     rows["vertices_a"] = rows["vertices_b"] = -1
-    exact = (X_WA.slop == 0.0) & (X_WB.slop == 0.0)
-    for own, farthest in ((exact, limit), (~exact, math.inf)):  # what is in sight must not depend on the batch
-        left = np.flatnonzero((decided.state == APART) & own)
-        if len(left):
-            rows[left] = _gaps(A, E, X_WA.of(left), X_WB.of(left), farthest, limit)
-    for k in np.flatnonzero(decided.state != APART).tolist():
-        _overlap(A, E, X_WA, X_WB, decided, rows, k, depths)
+    exact = (PA.slop == 0.0) & (PB.slop == 0.0)
+    far = exact & _balls_beyond(A, E, PA.X, PB.X, limit)
+    rows[far] = _beyond(A, E, PA.X[far], PB.X[far], limit)
+    near = np.flatnonzero(~far)
+    if not len(near):
+        return rows
+    states = settle_curved(A, E, PA.of(near), PB.of(near))
+    for group, reach in ((exact[near], limit), (~exact[near], math.inf)):  # what is seen must not depend on the batch
+        apart = near[(states.state == APART) & group]
+        if len(apart):
+            rows[apart] = _gaps(A, E, PA.of(apart), PB.of(apart), reach, limit)
+    for k in np.flatnonzero(states.state != APART).tolist():
+        _write_overlap(rows[near[k]], A, E, PA.of(near[k : k + 1]), PB.of(near[k : k + 1]), states, k, depths)
     return rows
 
 
-def _gaps(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, farthest: float, limit: float) -> np.ndarray:
-    """Rows of bodies that are known to be apart; only what is no farther than ``farthest`` [m] is looked for."""
+def _balls_beyond(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """(n,) bool: whether balls around both are beyond the limit, no traversal being wanted to see it."""
+    if limit > farthest_gap(A, E.outer):
+        return np.zeros(len(X_WA), dtype=bool)
+    return balls_farther(A.tree.numbers, E.outer.tree.numbers, X_WA, X_WB, math.nextafter(limit, math.inf))
+
+
+def _gaps(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, reach: float, limit: float) -> np.ndarray:
+    """Rows of bodies that are known to be apart; only what is no farther than ``reach`` [m] is looked for."""
     rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
-    facets = _facets_to_begin_with(A, E, PA, PB, farthest)
-    seen = np.flatnonzero(facets >= 0)
+    facets = _first_facets(A, E, PA, PB, reach)
+    seen, unseen = np.flatnonzero(facets >= 0), np.flatnonzero(facets < 0)
     if len(seen):
         rows[seen] = _nearest(A, E, PA.of(seen), PB.of(seen), facets[seen])
-    unseen = np.flatnonzero(facets < 0)
-    if farthest <= farthest_gap(A, E.outer):
-        rows[unseen] = _beyond(A, E, PA.X[unseen], PB.X[unseen], farthest)
+    if reach <= farthest_gap(A, E.outer):
+        rows[unseen] = _beyond(A, E, PA.X[unseen], PB.X[unseen], reach)
     else:
         for k in unseen.tolist():
-            rows[k] = _far(A, E, PA, PB, k, farthest)
+            rows[k] = _far(A, E, PA, PB, k, reach)
     rows["vertices_a"] = rows["vertices_b"] = -1
     rows["hit"] = False
     beyond = (rows["lower"] > limit) | rows["beyond"]
@@ -168,16 +189,16 @@ def _gaps(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, farthest:
     return rows
 
 
-def _facets_to_begin_with(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, farthest: float) -> np.ndarray:
-    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``farthest``.
+def _first_facets(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, reach: float) -> np.ndarray:
+    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``reach`` [m].
 
-    The polytope around the shape tells, by its surface: what comes nearer to the shape than the limit either comes as
+    Known by the surface of the polytope around the shape: what comes nearer to the shape than the limit either comes as
     near to that surface, or lies inside it. So a part of the mesh that is wholly inside, however far from the surface,
     is not beyond the limit; one point of every part says whether there is one.
     """
-    facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(farthest, math.inf)).facets[:, 0].copy()
+    facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(reach, math.inf)).facets[:, 0].copy()
     unseen = np.flatnonzero(facets < 0)
-    if len(unseen) and farthest < math.inf:
+    if len(unseen) and reach < math.inf:
         enclosed = unseen[core_hits(E.outer, A, PB.X[unseen], PA.X[unseen]).core]
         if len(enclosed):
             nearest = surface_distances(A.tree, E.outer.tree, PA.X[enclosed], PB.X[enclosed]).facets[:, 0]
@@ -188,30 +209,34 @@ def _facets_to_begin_with(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWit
 def _nearest(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets: np.ndarray) -> np.ndarray:
     """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
 
-    Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need not.
+    Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need
+    not.
     """
-    n = len(PA.X)
+
+    def gaps_at(pose: np.ndarray, place: np.ndarray) -> np.ndarray:  # without a limit: the same whatever the batch
+        return facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=False)
+
+    def may_be_nearer(facets: Facets) -> np.ndarray:
+        return (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])
+
     order = np.empty(len(A.tree.ids), dtype=np.int64)
     order[A.tree.ids] = np.arange(len(order))
     first = order[facets]
-    poses, places = [np.arange(n)], [first]
-    asked = [facet_rows(A.tree, E.packed, PA, PB, poses[0], first, boolean=False, limit=math.inf, depths=False)]
-    upper = asked[0]["upper"].copy()
-    near = near_facets(A.tree, E.packed, PA, PB, asked[0]["normal"], upper)
-    for some in _rounds(near, lambda facets: (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])):
-        pose, place = near.pose[some], near.place[some]
-        rows = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=False)  # whatever the batch
-        poses.append(pose)
-        places.append(place)
-        asked.append(rows)
-        np.minimum.at(upper, pose, rows["upper"])
-    pose, place, rows = np.concatenate(poses), np.concatenate(places), np.concatenate(asked)
-    return _least(A, E, PA, PB, pose, place, rows, upper)
+    poses, places = [np.arange(len(PA.X))], [first]
+    rows = [gaps_at(poses[0], first)]
+    upper = rows[0]["upper"].copy()
+    near = near_facets(A.tree, E.packed, PA, PB, rows[0]["normal"], upper)
+    for some in _rounds(near, may_be_nearer):
+        poses.append(near.pose[some])
+        places.append(near.place[some])
+        rows.append(gaps_at(poses[-1], places[-1]))
+        np.minimum.at(upper, poses[-1], rows[-1]["upper"])
+    return _least(A, E, PA, PB, np.concatenate(poses), np.concatenate(places), np.concatenate(rows), upper)
 
 
 def _least(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, pose, place, rows, upper) -> np.ndarray:
     """One row a pose from those of its facets."""
-    # The nearest by its upper bound and the width of its bracket: where that is wide the distance is a guess, and so are points.
+    # The nearest by its upper bound and the width of its bracket: where that is wide, distance and points are guesses.
     order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
     best = order[np.flatnonzero(np.diff(pose[order], prepend=-1))]
     out = np.zeros(len(best), dtype=PAIR_DTYPE)
@@ -224,10 +249,11 @@ def _least(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, pose, pl
     np.logical_and.at(certified, pose, rows["certified"] | (rows["lower"] > upper[pose]))
     out["lower"], out["upper"] = np.maximum(lower, 0.0), np.maximum(upper, 0.0)
     out["distance"] = np.clip(out["distance"], out["lower"], out["upper"])
-    none = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
-    out["distance"][none] = np.maximum(out["upper"][none], 5e-324)
+    zero = out["distance"] == 0.0  # apart, and nearer than the bracket is wide: 0 would say that they touch
+    out["distance"][zero] = np.maximum(out["upper"][zero], 5e-324)
     out["upper"] = np.maximum(out["upper"], out["distance"])
-    lay_points_apart(out, np.flatnonzero((out["distance"] != rows["distance"][best]) | (rows["how"][best] == UNDECIDED)))
+    moved = (out["distance"] != rows["distance"][best]) | (rows["how"][best] == UNDECIDED)
+    lay_points_apart(out, np.flatnonzero(moved))
     promise = PROMISE_STORED if E.packed.kind == POINTS else PROMISE_CURVED
     out["certified"] = certified | (out["upper"] - out["lower"] <= promise * _size(A, E, PA, PB))
     out["how"][out["how"] == UNDECIDED] = EXACT  # the polytope around it is apart from the mesh
@@ -261,30 +287,32 @@ def _beyond(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, limit: fl
     normal = np.where(length > 0.0, across / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
     rows["distance"] = rows["lower"] = math.nextafter(limit, math.inf)
     rows["upper"], rows["beyond"], rows["how"], rows["normal"] = math.inf, True, EXACT, normal + 0.0
+    rows["vertices_a"] = rows["vertices_b"] = -1
+    rows["certified"] = True
     half = 0.5 * rows["distance"][:, None] * normal
     rows["point_a"], rows["point_b"] = 0.5 * (start + end) - half, 0.5 * (start + end) + half
     return rows
 
 
-def _overlap(A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, decided: Decided, rows, k: int, depths: bool) -> None:
-    """Fill in row k of bodies that meet, or may."""
-    row, some = rows[k], slice(k, k + 1)
-    PA, PB = X_WA.of(some), X_WB.of(some)
-    sure = decided.state[k] == HIT
-    row["hit"], row["how"] = True, decided.how[k] if sure else UNDECIDED
-    point = decided.point[k]
-    if np.isnan(point[0]) and decided.place[k] >= 0:
-        place = decided.place[some]
-        facet = facet_rows(A.tree, E.packed, PA, PB, np.zeros(1, dtype=np.int64), place, boolean=False, limit=math.inf)[0]
+def _write_overlap(
+    row, A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, states: CurvedStates, k: int, depths: bool
+) -> None:
+    """Make a row that of bodies that meet, or may, in place; one pair of poses, number k of the states."""
+    proven = states.state[k] == HIT
+    row["hit"], row["how"] = True, states.how[k] if proven else UNDECIDED
+    point, place = states.point[k], states.place[k : k + 1]
+    if np.isnan(point[0]) and place[0] >= 0:
+        pose = np.zeros(1, dtype=np.int64)
+        facet = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf)[0]
         point = 0.5 * (facet["point_a"] + facet["point_b"])
         row["part_a"] = A.tree.ids[place[0]]
-        row["upper"] = 0.0 if sure else max(float(facet["upper"]), 0.0)
+        row["upper"] = 0.0 if proven else max(float(facet["upper"]), 0.0)
     elif np.isnan(point[0]):
         meeting = surface_distances(A.tree, E.inner.tree, PA.X, PB.X)  # type: ignore[union-attr]
         point = meeting.point_a[0]
         row["part_a"] = max(int(meeting.facets[0, 0]), 0)
     row["point_a"] = row["point_b"] = point
-    row["certified"] = sure
+    row["certified"] = proven
     if depths:
         hulls = hull_rows(A, E.outer, PA.X, PB.X, math.inf)[0]
 

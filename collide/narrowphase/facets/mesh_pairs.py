@@ -10,12 +10,14 @@ import math
 
 import numpy as np
 
+from collide.lowering.composite_parts import union_of
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
+from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.body_pairs import SinglePair
+from collide.narrowphase.facets.body_pairs import SinglePair, balls_farther
 from collide.narrowphase.facets.mesh_rows import checked_poses, mesh_rows, mesh_states
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -42,7 +44,7 @@ def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check
 def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:
     """States of two shapes; parts_open: tell OPEN from HIT among convex parts, too."""
     if _are_unions(A, B):
-        states = union_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
+        states = _union_states(A, B, X_WA, X_WB, check, parts_open)
     else:
         states = mesh_states(A, B, X_WA, X_WB, check=check)
     undecided = np.flatnonzero(states == OPEN)
@@ -50,6 +52,19 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool,
     if covers is not None:
         hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
         states[undecided[~hulls_meet]] = APART
+    return states
+
+
+def _union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, parts_open: bool) -> np.ndarray:
+    """States of unions, of which only those are taken apart that balls around them leave open."""
+    union_a, union_b = union_of(A), union_of(B)
+    if union_a.ball is None or union_b.ball is None:
+        return union_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
+    near = np.flatnonzero(~balls_farther(union_a.ball, union_b.ball, X_WA, X_WB, 0.0, check=check))
+    states = np.full(number_of_poses(X_WA, X_WB), APART)
+    if len(near):
+        poses = (np.broadcast_to(X, (len(states), 4, 4))[near] for X in (X_WA, X_WB))
+        states[near] = union_states(A, B, *poses, open_ones=parts_open)
     return states
 
 

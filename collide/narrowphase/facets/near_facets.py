@@ -2,7 +2,7 @@
 
 Boxes and triangles are parted from the set along a few directions a pose: the mesh's axes, the set's, and one that
 the caller knows. Three gaps along the axes of a frame add up as a diagonal does, less how far the axes are from
-right angles. All of it is a lower bound of the distance, rounding taken off; what is left is a superset.
+right angles. All of it is a lower bound of the distance, rounding taken off: facets are left out only where proven.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS, PackedConvex
 from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
 
-#: More boxes at once are walked in two halves of the poses.
-_MOST_BOXES = 1 << 16
+#: More boxes at once are walked in two parts of the poses.
+_MAX_BOXES = 1 << 16
 #: Of the largest numbers met, what rounding takes off a gap; unit vectors are this much shorter than 1.
 _ROUNDING, _SHORTER = 2.0**-46, 1 - 2.0**-40
 
@@ -36,36 +36,38 @@ class Facets:
         return np.arange(len(self.pose)) - np.repeat(starts, counts)
 
 
-def near_facets(tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray) -> Facets:
+def near_facets(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray
+) -> Facets:
     """Facets of A not proven farther than ``upper`` (n,) from the set at B, at n pairs of poses.
 
     along : (n, 3) a direction worth trying, of any length.
     """
     spans = _Spans(tree, packed, A, B, along)
-    found = list(_walk(tree, spans, upper, np.arange(len(upper))))
-    return Facets(*(np.concatenate(column) for column in zip(*found)))
+    blocks = _walk(tree, spans, upper, np.arange(len(upper)))
+    return Facets(*(np.concatenate(column) for column in zip(*blocks)))
 
 
 def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
-    """Yields (pose, place, bound) of the facets left."""
+    """Yields (pose, place, bound) of the facets that may be near enough, block by block."""
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
     runs = []
     while len(at):
         nodes = tree.nodes[at]
         floats = nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
-        halves = floats[:, 3:].transpose(0, 2, 1)
-        used = halves[:, :, 0] > NOTHING / 2
-        many = np.repeat(pose, WIDTH).reshape(-1, WIDTH)[used]
+        half_lengths = floats[:, 3:].transpose(0, 2, 1)
+        used = half_lengths[:, :, 0] > NOTHING / 2
+        pose = np.repeat(pose, WIDTH).reshape(-1, WIDTH)[used]
         link = links[at][used].astype(np.int64)
         scale = np.ldexp(1.0, tree.exponent)
         centres = tree.centre + floats[:, :3].transpose(0, 2, 1)[used] * scale
-        near = ~(spans.of_boxes(many, centres, halves[used] * scale) > upper[many])
-        many, link = many[near], link[near]
+        near = ~(spans.of_boxes(pose, centres, half_lengths[used] * scale) > upper[pose])
+        pose, link = pose[near], link[near]
         leaf = link < 0
-        runs.append((many[leaf], link[leaf]))
-        pose, at = many[~leaf], link[~leaf]
-        if len(at) * WIDTH > _MOST_BOXES and len(poses) > 1:
+        runs.append((pose[leaf], link[leaf]))
+        pose, at = pose[~leaf], link[~leaf]
+        if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
             half = len(poses) // 2
             yield from _walk(tree, spans, upper, poses[:half])
             yield from _walk(tree, spans, upper, poses[half:])
@@ -74,8 +76,8 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
     first, count = leaf_runs(link)
     pose = np.repeat(pose, count)
     place = np.repeat(first - (np.cumsum(count) - count), count) + np.arange(len(pose))
-    for begin in range(0, max(len(pose), 1), _MOST_BOXES):
-        some = slice(begin, begin + _MOST_BOXES)
+    for begin in range(0, max(len(pose), 1), _MAX_BOXES):
+        some = slice(begin, begin + _MAX_BOXES)
         bound = spans.of_triangles(pose[some], tree.triangles[place[some]].reshape(-1, 3, 3))
         near = ~(bound > upper[pose[some]])
         yield pose[some][near], place[some][near], bound[near]
@@ -104,10 +106,10 @@ class _Spans:
         self.slack = _ROUNDING * (reach_a + reach_b + np.abs(t).sum(axis=1)[:, None] + slop)
         self.worth = np.stack([_worth(D[:, :3]), _worth(D[:, 3:6])], axis=1)
 
-    def of_boxes(self, pose, centres, halves) -> np.ndarray:
+    def of_boxes(self, pose, centres, half_lengths) -> np.ndarray:
         """(k,) bounds for boxes of the mesh's frame, by centres and half lengths (k, 3)."""
         along = self.along[pose]
-        middle, half = _dot(along, centres[:, None]), _dot(np.abs(along), halves[:, None])
+        middle, half = _dot(along, centres[:, None]), _dot(np.abs(along), half_lengths[:, None])
         return self._bound(pose, middle - half, middle + half)
 
     def of_triangles(self, pose, corners) -> np.ndarray:
@@ -117,9 +119,9 @@ class _Spans:
 
     def _bound(self, pose, low, high) -> np.ndarray:
         gaps = np.maximum(self.low[pose] - high, low - self.high[pose]) - self.slack[pose]
-        clear = np.maximum(gaps, 0.0)
-        one, other = (np.sqrt(_dot(clear[:, k : k + 3], clear[:, k : k + 3])) for k in (0, 3))
-        bound = np.maximum(one * self.worth[pose, 0], other * self.worth[pose, 1])
+        positive = np.maximum(gaps, 0.0)
+        of_a, of_b = (np.sqrt(_dot(positive[:, k : k + 3], positive[:, k : k + 3])) for k in (0, 3))
+        bound = np.maximum(of_a * self.worth[pose, 0], of_b * self.worth[pose, 1])
         return np.where(bound > 0.0, np.maximum(bound, gaps[:, 6]), gaps.max(axis=1))
 
 

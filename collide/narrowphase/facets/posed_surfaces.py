@@ -223,9 +223,9 @@ def sum_is_exact(x, y):
 
 
 @kernel
-def _set_frame(own, other, placing, matrix, error, at, frame):
-    """From the other tree's boxes to the own ones: FRAME_SIZE doubles at ``at``, and the matrix as floats."""
-    if other.exponent - own.exponent > MAX_UNIT_EXPONENT:  # floats might overflow: nothing is culled in this frame
+def _set_frame(probe, node, placing, matrix, error, at, frame):
+    """From the boxes of the nodes' tree to those of the probe's: FRAME_SIZE doubles at ``at``, and the matrix as floats."""
+    if node.exponent - probe.exponent > MAX_UNIT_EXPONENT:  # floats might overflow: nothing is culled in this frame
         for k in range(9):
             placing[at + k] = 0.0
             frame[k] = np.float32(0.0)
@@ -233,18 +233,18 @@ def _set_frame(own, other, placing, matrix, error, at, frame):
             placing[at + 9 + i] = 0.0
             placing[at + 12 + i] = 1e30
         return
-    units = math.ldexp(1.0, int(other.exponent - own.exponent))
-    scale = math.ldexp(1.0, int(-own.exponent))
+    units = math.ldexp(1.0, int(node.exponent - probe.exponent))
+    scale = math.ldexp(1.0, int(-probe.exponent))
     for i in range(3):
         shift = placing[matrix + 9 + i]
-        centre = own.numbers[CENTRE + i]
+        centre = probe.numbers[CENTRE + i]
         moved = shift - centre
         size = abs(shift) + abs(centre)
         spread = 0.0
         for j in range(3):
             entry = placing[matrix + 3 * i + j]
-            moved += entry * other.numbers[CENTRE + j]
-            size += abs(entry * other.numbers[CENTRE + j])
+            moved += entry * node.numbers[CENTRE + j]
+            size += abs(entry * node.numbers[CENTRE + j])
             spread += abs(entry * units) * _EXTENT
             placing[at + 3 * i + j] = entry * units
             frame[3 * i + j] = np.float32(entry * units)

@@ -43,12 +43,12 @@ class PosedTrees(NamedTuple):
 
 
 @kernel(inline=True)
-def pose_trees(A, XA_at, B, XB_at, doubles_at, floats_at, n_probe, integers_at, decide):
+def pose_trees(A, XA_at, B, XB_at, doubles_at, floats_at, n_probe, integers_at, exact_at):
     """(the `PosedTrees` of two trees and poses, False where a matrix is not clearly invertible).
 
     doubles_at : room for PLACING + CORNERS doubles.   floats_at : for 2 FRAME + n_probe floats.
     """
-    exact = ExactCall(decide, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at, XB_at)
+    exact = ExactCall(exact_at, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at, XB_at)
     trees = PosedTrees(
         A, B, view_f64(XA_at, 16), view_f64(XB_at, 16), view_f64(doubles_at, PLACING),
         view_f64(doubles_at + 8 * PLACING, CORNERS), view_f32(floats_at, FRAME), view_f32(floats_at + 4 * FRAME, FRAME),
@@ -66,7 +66,7 @@ def facets_meet(trees, a, b, counters, exact_at):
     counters[exact_at] counts the pairs that doubles leave open.
     """
     corners = trees.corners
-    verdict = meeting_in_doubles(trees.A.triangles, corners, 9, 9 * a, trees.placing[ERROR])
+    verdict = meeting_in_doubles(trees.A.triangles, 9 * a, corners, 9, trees.placing[ERROR])
     if verdict == AMBIGUOUS:
         counters[exact_at] += 1
         put_triangle(corners, 0, triangle_at(trees.A.triangles, 9 * a))

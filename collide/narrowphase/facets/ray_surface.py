@@ -61,7 +61,7 @@ HIT = 6
 RAY_OF, FACET_OF, LOWER, VALUE, UPPER, OPEN = range(HIT)
 
 # Progress, integers: the ray, the hits found.
-AT_RAY, FOUND = range(2)
+AT_RAY, N_HITS = range(2)
 DONE, FULL, SINGULAR = range(3)
 # Counters, a row of integers a ray: boxes compared, triangles tested, of them decided exactly.
 _BOXES, _TRIANGLES, _EXACT = range(3)
@@ -71,8 +71,8 @@ _MAX_HITS = 8
 # Doubles of workspace besides a placing, corners, and the numbers and pose of the ray as a body. What changes on the
 # way: the least upper bound of t so far, and a bracket of t (3).
 _BEST, _BRACKET = 0, 1
-_OWN = PLACING + CORNERS + NUMBERS + 16
-DOUBLES = _OWN + 4
+_CHANGING = PLACING + CORNERS + NUMBERS + 16
+DOUBLES = _CHANGING + 4
 FLOATS = 3 * FRAME + PROBE
 
 _U = 2.0**-53
@@ -195,12 +195,12 @@ def _enlarged(line, centre, half):
 
 
 @kernel
-def _bracket(P, a, corners, line, out):
+def _bracket(triangles, a, corners, line, out):
     """Bracket of t of the crossing of a facet's plane, in out[_BRACKET …]; False where doubles cannot tell.
 
     Bounds as in `filtered_triangles.py`: with edges up to L, sides of points at distance w: L² (8E + 64 u w).
     """
-    triangle = triangle_at(P, a)
+    triangle = triangle_at(triangles, a)
     n = normal_of(triangle)
     w = sub(triangle.p, vec3_at(corners, 9))
     side = dot(n, w)
@@ -219,12 +219,12 @@ def _bracket(P, a, corners, line, out):
 
 
 @kernel
-def _meets(P, a, corners, line, out):
+def _meets(triangles, a, corners, line, out):
     """APART, MEETING or AMBIGUOUS by doubles, for the ray and one facet; where MEETING, out is the bracket of t."""
     origin = vec3_at(corners, 9)
-    p = sub(vec3_at(P, a), origin)
-    q = sub(vec3_at(P, a + 3), origin)
-    r = sub(vec3_at(P, a + 6), origin)
+    p = sub(vec3_at(triangles, a), origin)
+    q = sub(vec3_at(triangles, a + 3), origin)
+    r = sub(vec3_at(triangles, a + 6), origin)
     d = line.direction
     limit = sign_error(max(max_abs(p), max_abs(q), max_abs(r), max_abs(d)), line.error)
     x = dot(cross(p, q), d)
@@ -234,7 +234,7 @@ def _meets(P, a, corners, line, out):
     z = dot(cross(r, p), d)
     if opposed(x, z, limit) or opposed(y, z, limit):
         return APART
-    if not _bracket(P, a, corners, line, out):
+    if not _bracket(triangles, a, corners, line, out):
         return AMBIGUOUS
     if out[_BRACKET + 2] < 0.0 or out[_BRACKET] > 1.0:
         return APART
@@ -243,7 +243,7 @@ def _meets(P, a, corners, line, out):
 
 
 @kernel
-def _bracket_by_corners(P, a, corners, line, out):
+def _bracket_by_corners(triangles, a, corners, line, out):
     """Bracket of t by the facet's corners, projected onto the ray: for facets known to be met."""
     square = dot(line.direction, line.direction)
     size = max_abs(line.direction)
@@ -251,7 +251,7 @@ def _bracket_by_corners(P, a, corners, line, out):
     high = -math.inf
     far = 0.0
     for k in range(a, a + 9, 3):
-        w = sub(vec3_at(P, k), vec3_at(corners, 9))
+        w = sub(vec3_at(triangles, k), vec3_at(corners, 9))
         low = min(low, dot(w, line.direction))
         high = max(high, dot(w, line.direction))
         far = max(far, max_abs(w))
@@ -265,29 +265,29 @@ def _bracket_by_corners(P, a, corners, line, out):
 @kernel
 def _test_facet(query, a):
     """Add facet a to the hits where the ray meets it and may meet it first."""
-    P, corners, line, out = query.tree.triangles, query.corners, query.line, query.best
+    triangles, corners, line, out = query.tree.triangles, query.corners, query.line, query.best
     query.counters[_TRIANGLES] += 1
-    verdict = _meets(P, 9 * a, corners, line, out)
+    verdict = _meets(triangles, 9 * a, corners, line, out)
     if verdict == APART:
         return
     if verdict == AMBIGUOUS:
         query.counters[_EXACT] += 1
-        put_triangle(corners, 0, triangle_at(P, 9 * a))
+        put_triangle(corners, 0, triangle_at(triangles, 9 * a))
         if ask_exactly(query.exact, MEET) == 0:
             return
-        if not _bracket(P, 9 * a, corners, line, out):
-            _bracket_by_corners(P, 9 * a, corners, line, out)
+        if not _bracket(triangles, 9 * a, corners, line, out):
+            _bracket_by_corners(triangles, 9 * a, corners, line, out)
     t = vec3_at(out, _BRACKET)
     if t.x > out[_BEST]:
         return
-    at = HIT * query.progress[FOUND]
+    at = HIT * query.progress[N_HITS]
     query.hits[at + RAY_OF] = query.ray
     query.hits[at + FACET_OF] = query.tree.ids[a]
     query.hits[at + LOWER] = max(t.x, 0.0)
     query.hits[at + VALUE] = min(max(t.y, 0.0), t.z)
     query.hits[at + UPPER] = max(t.z, 0.0)
     query.hits[at + OPEN] = 1.0 if verdict == AMBIGUOUS else 0.0
-    query.progress[FOUND] += 1
+    query.progress[N_HITS] += 1
     if query.first_only:
         out[_BEST] = min(out[_BEST], t.z)
 
@@ -303,8 +303,8 @@ def _nearest_box(query, _stack, top):
 @kernel(inline=True)
 def _visit_leaf(query, pair):
     """Test the ray and a leaf's facets; True where there may be no room for all of them."""
-    if query.progress[FOUND] + _MAX_HITS > query.capacity:
-        query.progress[FOUND] = -1
+    if query.progress[N_HITS] + _MAX_HITS > query.capacity:
+        query.progress[N_HITS] = -1
         return True
     best = query.best[_BEST]
     run = ~pair.link_a
@@ -343,13 +343,13 @@ _traverse = make_traversal(_nearest_box, box_of_tree, _visit_leaf, _open_box)
 @kernel
 def _cast(query, stack):
     """All candidates of one ray; False where there is no room for more hits."""
-    begin = query.progress[FOUND]
+    begin = query.progress[N_HITS]
     stack[0] = 0
     query.keys[0] = -math.inf
     _traverse(query, stack, 1)
-    end = query.progress[FOUND]
+    end = query.progress[N_HITS]
     if end < 0:
-        query.progress[FOUND] = begin
+        query.progress[N_HITS] = begin
         return False
     if query.first_only:  # drop what begins beyond the nearest hit after all
         hits = query.hits
@@ -360,7 +360,7 @@ def _cast(query, stack):
                     for word in range(HIT):
                         hits[HIT * n_kept + word] = hits[HIT * k + word]
                 n_kept += 1
-        query.progress[FOUND] = n_kept
+        query.progress[N_HITS] = n_kept
     return True
 
 
@@ -386,7 +386,7 @@ def _set_ray(ray, XB, numbers_b, ends):
 )
 def cast_rays(
     header_at, XA_at, step_a, rays_at, n, first_only, hits_at, capacity, counters_at, progress_at, stack_at, n_stack,
-    doubles_at, integers_at, decide,
+    doubles_at, integers_at, exact_at,
 ):  # fmt: skip
     """Facets that n rays (RAY doubles each, in the world) meet, from where an earlier call stopped.
 
@@ -405,7 +405,7 @@ def cast_rays(
     numbers_b = view_f64(doubles_at + 8 * (PLACING + CORNERS), NUMBERS)
     XB_at = doubles_at + 8 * (PLACING + CORNERS + NUMBERS)
     XB = view_f64(XB_at, 16)
-    best = view_f64(doubles_at + 8 * _OWN, 4)
+    best = view_f64(doubles_at + 8 * _CHANGING, 4)
     frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
     frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
     frame = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, FRAME)
@@ -414,7 +414,7 @@ def cast_rays(
     for k in range(progress[AT_RAY], n):
         ray = view_f64(rays_at + 8 * RAY * k, RAY)
         exponent = _set_ray(ray, XB, numbers_b, ends)
-        exact = ExactCall(decide, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at)
+        exact = ExactCall(exact_at, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at)
         XA = view_f64(exact.XA_at, 16)
         progress[AT_RAY] = k
         if not place(extent_of(tree), XA, Extent(numbers_b, exponent), XB, placing, frame_a, frame_b):

@@ -42,7 +42,7 @@ BOXES, TRIANGLES, EXACT = range(3)
 #: Doubles of a facet's plane: a normal (3), and the largest component of an edge, squared.
 PLANE = 4
 # Progress, integers: the stack's height, the facet pairs found.
-TOP, FOUND = range(2)
+TOP, N_PAIRS = range(2)
 DONE, FULL = range(2)
 
 
@@ -67,21 +67,21 @@ class _Query(NamedTuple):
 
 
 @kernel(inline=True)
-def _equal(P, a, b):
-    return P[a] == P[b] and P[a + 1] == P[b + 1] and P[a + 2] == P[b + 2]
+def _equal(points, a, b):
+    return points[a] == points[b] and points[a + 1] == points[b + 1] and points[a + 2] == points[b + 2]
 
 
 @kernel(inline=True)
-def _common_corners(P, a, b):
+def _common_corners(points, a, b):
     """(how many points are corners of both, which corner of a the last one is, and which of b)."""
     count = 0
     of_a = -1
     of_b = -1
     for j in range(3):
-        if (j > 0 and _equal(P, b, b + 3 * j)) or (j > 1 and _equal(P, b + 3, b + 3 * j)):
+        if (j > 0 and _equal(points, b, b + 3 * j)) or (j > 1 and _equal(points, b + 3, b + 3 * j)):
             continue
         for i in range(3):
-            if _equal(P, a + 3 * i, b + 3 * j):
+            if _equal(points, a + 3 * i, b + 3 * j):
                 count += 1
                 of_a = i
                 of_b = j
@@ -92,9 +92,9 @@ def _common_corners(P, a, b):
 @kernel
 def _ask(query, what, a, b):
     """What the exact stage says about two triangles.   a, b : where the three corners of each stand."""
-    P, corners = query.trees.A.triangles, query.trees.corners
-    of_a = Triangle(vec3_at(P, a[0]), vec3_at(P, a[1]), vec3_at(P, a[2]))
-    of_b = Triangle(vec3_at(P, b[0]), vec3_at(P, b[1]), vec3_at(P, b[2]))
+    points, corners = query.trees.A.triangles, query.trees.corners
+    of_a = Triangle(vec3_at(points, a[0]), vec3_at(points, a[1]), vec3_at(points, a[2]))
+    of_b = Triangle(vec3_at(points, b[0]), vec3_at(points, b[1]), vec3_at(points, b[2]))
     query.counters[EXACT] += 1
     put_triangle(corners, 0, of_a)
     put_triangle(corners, 9, of_b)
@@ -105,9 +105,11 @@ def _ask(query, what, a, b):
 @kernel
 def _between(query, v, p, q):
     """Whether corner v lies between corners p and q: facets without area can be so, and no others."""
-    P = query.trees.A.triangles
+    points = query.trees.A.triangles
     for axis in range(3):
-        if P[v + axis] < min(P[p + axis], P[q + axis]) or P[v + axis] > max(P[p + axis], P[q + axis]):
+        x = points[p + axis]
+        y = points[q + axis]
+        if points[v + axis] < min(x, y) or points[v + axis] > max(x, y):
             return False
     return _ask(query, MEET, (v, v, v), (p, q, q)) != 0
 
@@ -115,15 +117,15 @@ def _between(query, v, p, q):
 @kernel
 def _opposite_meets(query, a, i, b):
     """Whether what facet a has opposite its corner i meets facet b: an edge, or less where a has no area."""
-    P = query.trees.A.triangles
+    points = query.trees.A.triangles
     v = a + 3 * i
     p = a + 3 * ((i + 1) % 3)
     q = a + 3 * ((i + 2) % 3)
-    if _equal(P, p, v):
+    if _equal(points, p, v):
         p = q
-    if _equal(P, q, v):
+    if _equal(points, q, v):
         q = p
-    if _equal(P, p, v):
+    if _equal(points, p, v):
         return False
     if _between(query, v, p, q):
         return _edge_meets(query, p, p, b) or _edge_meets(query, q, q, b)
@@ -133,23 +135,23 @@ def _opposite_meets(query, a, i, b):
 @kernel
 def _edge_meets(query, p, q, b):
     """Whether the edge between corners p and q of one facet meets facet b."""
-    P = query.trees.A.triangles
-    if segment_against_triangle(P, b, P, p, q, 0.0)[0] == APART:
+    points = query.trees.A.triangles
+    if segment_against_triangle(points, b, points, p, q, 0.0)[0] == APART:
         return False
     return _ask(query, MEET, (b, b + 3, b + 6), (p, q, q)) != 0
 
 
 @kernel(inline=True)
-def _certainly_one_side(P, v, face, i, facet, j):
+def _certainly_one_side(points, v, face, i, facet, j):
     """Whether the corners of a facet besides the common one, its corner j, are certainly on one side of a face's plane.
 
     v : the common corner, which is corner i of the face.
     """
-    common = vec3_at(P, v)
-    c = sub(vec3_at(P, face + 3 * ((i + 1) % 3)), common)
-    d = sub(vec3_at(P, face + 3 * ((i + 2) % 3)), common)
-    p = sub(vec3_at(P, facet + 3 * ((j + 1) % 3)), common)
-    q = sub(vec3_at(P, facet + 3 * ((j + 2) % 3)), common)
+    common = vec3_at(points, v)
+    c = sub(vec3_at(points, face + 3 * ((i + 1) % 3)), common)
+    d = sub(vec3_at(points, face + 3 * ((i + 2) % 3)), common)
+    p = sub(vec3_at(points, facet + 3 * ((j + 1) % 3)), common)
+    q = sub(vec3_at(points, facet + 3 * ((j + 2) % 3)), common)
     n = cross(c, d)
     side_p = dot(n, p)
     side_q = dot(n, q)
@@ -160,15 +162,15 @@ def _certainly_one_side(P, v, face, i, facet, j):
 @kernel
 def _conflict(query, a, b):
     """Whether two facets, whose corners stand at a and b, share more than corners and edges."""
-    P = query.trees.A.triangles
-    count, i, j = _common_corners(P, a, b)
+    points = query.trees.A.triangles
+    count, i, j = _common_corners(points, a, b)
     if count == 0:
-        verdict = meeting_in_doubles(P, P, b, a, 0.0)
+        verdict = meeting_in_doubles(points, a, points, b, 0.0)
         if verdict != AMBIGUOUS:
             return verdict != APART
         return _ask(query, MEET, (a, a + 3, a + 6), (b, b + 3, b + 6)) == 1
     if count == 1:
-        if _certainly_one_side(P, a + 3 * i, b, j, a, i) or _certainly_one_side(P, a + 3 * i, a, i, b, j):
+        if _certainly_one_side(points, a + 3 * i, b, j, a, i) or _certainly_one_side(points, a + 3 * i, a, i, b, j):
             return False
         return _opposite_meets(query, a, i, b) or _opposite_meets(query, b, j, a)
     if count == 2:
@@ -179,19 +181,20 @@ def _conflict(query, a, b):
 @kernel
 def _conflict_at_edge(query, a, b):
     """`_conflict` of facets with two corners in common."""
-    P = query.trees.A.triangles
-    free_a = _uncommon_corner(P, a, b)
-    free_b = _uncommon_corner(P, b, a)
+    points = query.trees.A.triangles
+    free_a = _uncommon_corner(points, a, b)
+    free_b = _uncommon_corner(points, b, a)
     if free_a < 0 or free_b < 0:
         return False  # a facet without area on an edge of the other
     x = a + 3 * free_a
     y = b + 3 * free_b
     far = 0.0
+    origin = vec3_at(points, x)
     for k in range(0, 9, 3):
-        far = max(far, max_abs(sub(vec3_at(P, a + k), vec3_at(P, x))), max_abs(sub(vec3_at(P, b + k), vec3_at(P, x))))
+        far = max(far, max_abs(sub(vec3_at(points, a + k), origin)), max_abs(sub(vec3_at(points, b + k), origin)))
     v = a + 3 * ((free_a + 1) % 3)
     w = a + 3 * ((free_a + 2) % 3)
-    if abs(orientation(P, v, P, w, P, x, P, y)) > sign_error(far, 0.0):
+    if abs(orientation(points, v, points, w, points, x, points, y)) > sign_error(far, 0.0):
         return False
     edge_b = b + 3 * ((free_b + 1) % 3), b + 3 * ((free_b + 2) % 3), y
     if _ask(query, OVERLAP, (v, w, x), edge_b) != 0:
@@ -204,12 +207,12 @@ def _conflict_at_edge(query, a, b):
 
 
 @kernel
-def _uncommon_corner(P, a, b):
+def _uncommon_corner(points, a, b):
     """The corner of a that is none of b's; −1 where all are."""
     for i in range(3):
         common = False
         for j in range(3):
-            common = common or _equal(P, a + 3 * i, b + 3 * j)
+            common = common or _equal(points, a + 3 * i, b + 3 * j)
         if not common:
             return i
     return -1
@@ -219,10 +222,10 @@ def _uncommon_corner(P, a, b):
 
 
 @kernel
-def _set_planes(P, n, planes):
+def _set_planes(points, n, planes):
     """PLANE doubles a facet."""
     for facet in range(n):
-        triangle = triangle_at(P, 9 * facet)
+        triangle = triangle_at(points, 9 * facet)
         edge = max(max_abs(sub(triangle.q, triangle.p)), max_abs(sub(triangle.r, triangle.p)))
         put_vec3(planes, PLANE * facet, normal_of(triangle))
         planes[PLANE * facet + 3] = edge * edge
@@ -240,32 +243,32 @@ def _coincide(p, q):
 
 
 @kernel(inline=True)
-def _off_plane(P, planes, face, facet, reach):
+def _off_plane(points, planes, face, facet, reach):
     """Whether a facet has corners besides a face's, and all those are certainly on one side of the face's plane.
 
     Then the facet has the common corners in that plane, and what is between them: no more. Coordinates are exact, so
     with edges up to L a side at distance w is off by 64 u L² w, as in `filtered_triangles.py`. reach : no w is more,
     along any axis.
     """
-    of_face = triangle_at(P, 9 * face)
-    other = triangle_at(P, 9 * facet)
+    of_face = triangle_at(points, 9 * face)
+    facet_b = triangle_at(points, 9 * facet)
     n = vec3_at(planes, PLANE * face)
-    p = dot(n, sub(other.p, of_face.p))
-    q = dot(n, sub(other.q, of_face.p))
-    r = dot(n, sub(other.r, of_face.p))
+    p = dot(n, sub(facet_b.p, of_face.p))
+    q = dot(n, sub(facet_b.q, of_face.p))
+    r = dot(n, sub(facet_b.r, of_face.p))
     limit = planes[PLANE * face + 3] * reach * 2.0**-47 + TINY
     above = (p > limit) | (q > limit) | (r > limit)
     below = (p < -limit) | (q < -limit) | (r < -limit)
     return (
         (above != below)
-        & ((abs(p) > limit) | _is_corner(of_face, other.p))
-        & ((abs(q) > limit) | _is_corner(of_face, other.q))
-        & ((abs(r) > limit) | _is_corner(of_face, other.r))
+        & ((abs(p) > limit) | _is_corner(of_face, facet_b.p))
+        & ((abs(q) > limit) | _is_corner(of_face, facet_b.q))
+        & ((abs(r) > limit) | _is_corner(of_face, facet_b.r))
     )
 
 
 @kernel
-def _beyond_a_side(P, planes, face, facet, reach):
+def _beyond_a_side(points, planes, face, facet, reach):
     """Whether, seen along a face's normal, a facet's corners are certainly beyond some side of it, or that side's ends.
 
     Facets around a vertex of a smooth surface are so. The wall on a side holds nothing of the face but the side, and of
@@ -275,13 +278,13 @@ def _beyond_a_side(P, planes, face, facet, reach):
     square = planes[PLANE * face + 3]
     limit = square * math.sqrt(square) * reach * 2.0**-44 + TINY
     for k in range(3):
-        start = vec3_at(P, 9 * face + 3 * k)
-        end = vec3_at(P, 9 * face + 3 * ((k + 1) % 3))
+        start = vec3_at(points, 9 * face + 3 * k)
+        end = vec3_at(points, 9 * face + 3 * ((k + 1) % 3))
         m = cross(sub(end, start), n)
         beyond = True
         proper = False
         for at in range(9 * facet, 9 * facet + 9, 3):
-            corner = vec3_at(P, at)
+            corner = vec3_at(points, at)
             w = sub(corner, start)
             outside = dot(m, w) > limit
             proper = proper | outside
@@ -296,13 +299,13 @@ def _beyond_a_side(P, planes, face, facet, reach):
 
 @kernel(inline=True)
 def _unless_full(query, _stack, top):
-    return -top if query.progress[FOUND] + MAX_FACET_PAIRS > query.capacity else top
+    return -top if query.progress[N_PAIRS] + MAX_FACET_PAIRS > query.capacity else top
 
 
 @kernel(inline=True)
 def _visit_leaves(query, pair):
     tree, planes, progress = query.trees.A, query.planes, query.progress
-    P = tree.triangles
+    points = tree.triangles
     run_a = ~pair.link_a
     run_b = ~pair.link_b
     # Boxes that meet hold both facets: no coordinate differs by more than their widths, and what probes are enlarged
@@ -313,15 +316,15 @@ def _visit_leaves(query, pair):
         for j in range(i + 1 if pair.a == pair.b else 0, run_b & 7):
             b = (run_b >> 3) + j
             query.counters[TRIANGLES] += 1
-            if _off_plane(P, planes, a, b, reach):
+            if _off_plane(points, planes, a, b, reach):
                 continue
-            if _off_plane(P, planes, b, a, reach) or _beyond_a_side(P, planes, a, b, reach):
+            if _off_plane(points, planes, b, a, reach) or _beyond_a_side(points, planes, a, b, reach):
                 continue
             if _conflict(query, 9 * a, 9 * b):
                 smaller = int(min(tree.ids[a], tree.ids[b]))
                 larger = int(max(tree.ids[a], tree.ids[b]))
-                query.pairs[progress[FOUND]] = smaller * tree.header[N_FACETS] + larger
-                progress[FOUND] += 1
+                query.pairs[progress[N_PAIRS]] = smaller * tree.header[N_FACETS] + larger
+                progress[N_PAIRS] += 1
     return False
 
 
@@ -373,7 +376,7 @@ def _keep_own_axes_only(frame, probe):
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def walk_itself(
     header_at, pairs_at, capacity, counters_at, progress_at, planes_at, stack_at, n_stack, doubles_at, integers_at,
-    decide
+    exact_at
 ):
     """Pairs of facets of one surface that share more than corners and edges; DONE or FULL, then to be called again.
 
@@ -391,7 +394,7 @@ def walk_itself(
     for k in range(16):
         identity[k] = 1.0 if k % 5 == 0 else 0.0
     trees, _ = pose_trees(
-        tree, identity_at, tree, identity_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, decide
+        tree, identity_at, tree, identity_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, exact_at
     )
     _keep_own_axes_only(trees.frame_a, trees.probe)
     rounding = vec3_at(trees.placing, FRAMES + 12)

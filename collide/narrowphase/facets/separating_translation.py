@@ -1,7 +1,7 @@
-"""How deep two overlapping bodies of facets are: a translation that parts them, proven, and as short as was found.
+"""How deep two overlapping bodies of facets are: a translation that separates them, proven, and as short as was found.
 
-The least one has no formula. A translation is proven to part two bodies where the exact test says that they do not
-meet after it, whatever led to it; so directions are guessed, and lengths tried. What parts the hulls parts the
+The shortest one has no formula. A translation is proven to separate two bodies where the exact test finds them apart
+after it, whatever led to it; so directions are guessed, and lengths tried. What separates the hulls separates the
 bodies, too: that is the longest answer given.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 from collide.lowering.facet_bodies import Body
 from collide.narrowphase.facets.facet_queries import all_hits
 
-#: Lengths tried in every direction: what parts the hulls, halved so many times; the same again from the last of them
-#: where that parts the bodies, too: they touch, or nearly.
+#: Lengths tried in every direction: what separates the hulls, halved so many times; the same again from the last of
+#: them where that separates the bodies, too: they touch, or nearly.
 _HALVINGS, _AGAIN = 16, 3
 #: Then, in the best direction, so many lengths between the best and its half, so many times.
 _BETWEEN, _ROUNDS = 16, 3
@@ -29,7 +29,7 @@ Hits = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
 
 
 class SeparatingTranslation(NamedTuple):
-    """A translation of B that parts it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
+    """A translation of B that separates it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
 
     length: float
     bound: float
@@ -39,7 +39,7 @@ class SeparatingTranslation(NamedTuple):
 def separating_translation(
     A: Body, B: Body, X_WA, X_WB, hull_row: np.ndarray, candidates: list[np.ndarray], hits: Hits
 ) -> SeparatingTranslation:
-    """A translation that parts two bodies that meet, at poses (4, 4).
+    """A translation that separates two bodies that meet, at poses (4, 4).
 
     hull_row : the row of their hulls.   candidates : translations (3,) to be tried first.   hits : whether bodies meet.
     """
@@ -62,45 +62,45 @@ def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTrans
 def shortened(
     meet: Callable, X_WA, X_WB, known: SeparatingTranslation, directions: np.ndarray, candidates: list[np.ndarray]
 ) -> SeparatingTranslation:  # fmt: skip
-    """The shortest translation found that parts two bodies, at most as long as one that is known to.
+    """The shortest translation found that separates two bodies, at most as long as one that is known to.
 
     meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit
     vectors that are tried.   candidates : translations (3,) to be tried first.
     """
     best, bound, normal = known
-    tried = [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, np.array(candidates).reshape(-1, 3))]
-    top = bound
+    tried = [(t, *_length(t)) for t in _separating(meet, X_WA, X_WB, np.array(candidates).reshape(-1, 3))]
+    longest = bound
     for _ in range(_AGAIN):
-        ladder = top * 2.0 ** -np.arange(1, _HALVINGS + 1)
-        steps = (directions[:, None] * ladder[None, :, None]).reshape(-1, 3)
-        tried += [(t, *_length(t)) for t in _parting(meet, X_WA, X_WB, steps)]
-        shortest = min(tried, key=lambda one: one[1], default=None)
+        lengths = longest * 2.0 ** -np.arange(1, _HALVINGS + 1)
+        steps = (directions[:, None] * lengths[None, :, None]).reshape(-1, 3)
+        tried += [(t, *_length(t)) for t in _separating(meet, X_WA, X_WB, steps)]
+        shortest = min(tried, key=lambda translation: translation[1], default=None)
         if shortest is not None and shortest[1] < best:
             best, bound, normal = shortest[1], shortest[2], shortest[0] / shortest[1]
-        if best > 1.5 * ladder[-1]:
+        if best > 1.5 * lengths[-1]:
             break
-        top = ladder[-1]
+        longest = lengths[-1]
     low = 0.5 * best
     for _ in range(_ROUNDS):
         lengths = low + (best - low) * np.arange(1, _BETWEEN) / _BETWEEN
-        found = _parting(meet, X_WA, X_WB, normal * lengths[:, None])
+        translations = _separating(meet, X_WA, X_WB, normal * lengths[:, None])
         step = (best - low) / _BETWEEN
-        if len(found):
-            value, upwards = min(map(_length, found))
-            if value < best:
-                best, bound = value, upwards
+        if len(translations):
+            length, upper = min(map(_length, translations))
+            if length < best:
+                best, bound = length, upper
         low = max(low, best - step)
     return SeparatingTranslation(best, bound, normal)
 
 
-def _parting(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
-    """(k, 3): those of the translations (n, 3) that part the bodies, as the poses they lead to really move them."""
+def _separating(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
+    """(k, 3): those of the translations (n, 3) that separate the bodies, as the poses they lead to really move them."""
     if not len(steps):
         return np.zeros((0, 3))
     moved = np.repeat(X_WB[None], len(steps), axis=0)
     moved[:, :3, 3] += steps
-    free = ~meet(np.repeat(X_WA[None], len(steps), axis=0), moved)
-    return (moved[:, :3, 3] - X_WB[:3, 3])[free]
+    apart = ~meet(np.repeat(X_WA[None], len(steps), axis=0), moved)
+    return (moved[:, :3, 3] - X_WB[:3, 3])[apart]
 
 
 def _length(step: np.ndarray) -> tuple[float, float]:
@@ -110,7 +110,7 @@ def _length(step: np.ndarray) -> tuple[float, float]:
 
 
 def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.ndarray:
-    """(k, 3) unit vectors along which the way out may be short: of the hulls, of facets that meet, of the axes."""
+    """(k, 3) unit vectors along which a separating translation may be short: of hulls, of facets that meet, of axes."""
     pairs = all_hits(A.tree, B.tree, X_WA, X_WB).pairs
     guesses = list(first)
     if len(pairs):
@@ -119,8 +119,8 @@ def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.nda
         guesses += [*means, means[0] + means[1], *of_a[:_FACETS], *of_b[:_FACETS]]
     guesses += [*np.eye(3), *-np.eye(3), *X_WA[:3, :3].T, *-X_WA[:3, :3].T, *X_WB[:3, :3].T, *-X_WB[:3, :3].T]
     lengths = np.sqrt(np.square(guesses).sum(axis=1))
-    clear = lengths > 1e-100
-    return np.array(guesses)[clear] / lengths[clear, None]
+    nonzero = lengths > 1e-100
+    return np.array(guesses)[nonzero] / lengths[nonzero, None]
 
 
 def _normals(body: Body, X: np.ndarray, facets: np.ndarray) -> np.ndarray:

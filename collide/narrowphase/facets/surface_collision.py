@@ -35,7 +35,7 @@ DOUBLES = PLACING + CORNERS
 FLOATS = 2 * FRAME + PRISM
 
 # Progress, integers: the pose, the stack's height, the facet pairs found.
-POSE, TOP, FOUND = range(3)
+POSE, TOP, N_PAIRS = range(3)
 #: Status: all poses done, no room for more pairs, or a matrix that cannot be inverted.
 DONE, FULL, SINGULAR = range(3)
 #: A reference with this bit is to a triangle: leaves that are compared with small boxes become their triangles.
@@ -63,7 +63,7 @@ class _Query(NamedTuple):
 @kernel(inline=True)
 def _unless_full(query, _stack, top):
     """The stack's height; negative where two leaves might find more facet pairs than there is room for."""
-    return -top if query.progress[FOUND] + MAX_FACET_PAIRS > query.capacity else top
+    return -top if query.progress[N_PAIRS] + MAX_FACET_PAIRS > query.capacity else top
 
 
 @kernel(inline=True)
@@ -93,9 +93,9 @@ def _visit_leaves(query, pair):
             if facets_meet(trees, a, b, query.counters, EXACT):
                 facet_a = int(A.ids[a])
                 facet_b = int(B.ids[b])
-                found = progress[FOUND]
-                query.pairs[found] = facet_b * len(B.ids) + facet_a if query.swapped else facet_a * len(B.ids) + facet_b
-                progress[FOUND] = found + 1
+                n_pairs = progress[N_PAIRS]
+                query.pairs[n_pairs] = facet_b * len(B.ids) + facet_a if query.swapped else facet_a * len(B.ids) + facet_b
+                progress[N_PAIRS] = n_pairs + 1
                 if query.first_only:
                     return True
     return False
@@ -145,7 +145,7 @@ SIGNATURE = (
 @entry(SIGNATURE)
 def walk_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, first_only, pairs_at, capacity, starts_at,
-    counters_at, progress_at, stack_at, n_stack, doubles_at, integers_at, decide,
+    counters_at, progress_at, stack_at, n_stack, doubles_at, integers_at, exact_at,
 ):  # fmt: skip
     """Facet pairs of two surfaces at n pairs of poses, from where an earlier call stopped; DONE, FULL or SINGULAR.
 
@@ -155,7 +155,7 @@ def walk_surfaces(
     same_tree : the trees are equal; they are then taken in the order of their poses, and answers exchanged.
     pairs : out, facet of A times the number of B's facets plus facet of B; of pose k those from starts[k] to
         starts[k + 1]. With ``first_only`` at most one a pose.
-    counters : COUNTERS integers a pose.   progress : POSE, TOP, FOUND; zeros at first.
+    counters : COUNTERS integers a pose.   progress : POSE, TOP, N_PAIRS; zeros at first.
     """
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)
@@ -174,13 +174,13 @@ def walk_surfaces(
         XB = view_f64(pose_b, 16)
         if progress[TOP] > 0 or not balls_apart(XA, A.numbers, XB, B.numbers, 0.0):
             trees, invertible = pose_trees(
-                A, pose_a, B, pose_b, doubles_at, doubles_at + 8 * DOUBLES, PRISM, integers_at, decide
+                A, pose_a, B, pose_b, doubles_at, doubles_at + 8 * DOUBLES, PRISM, integers_at, exact_at
             )
             if not invertible:
                 return SINGULAR
             counters = view_i64(counters_at + 8 * COUNTERS * k, COUNTERS)
             if progress[TOP] == 0:
-                starts[k] = progress[FOUND]
+                starts[k] = progress[N_PAIRS]
                 stack[0] = 0
                 progress[TOP] = 1
             query = _Query(trees, swapped, first_only, pairs, capacity, progress, counters)
@@ -188,7 +188,7 @@ def walk_surfaces(
             if progress[TOP] > 0:
                 return FULL
         else:
-            starts[k] = progress[FOUND]
-        starts[k + 1] = progress[FOUND]
+            starts[k] = progress[N_PAIRS]
+        starts[k + 1] = progress[N_PAIRS]
         progress[POSE] = k + 1
     return DONE

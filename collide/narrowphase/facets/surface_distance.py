@@ -77,7 +77,7 @@ _FLOAT_ERROR = 2.0**-19
 _MAX_UNIT = 2.0**MAX_UNIT_EXPONENT
 #: Depth first until so many pairs of leaves were met, to have a bound and a direction; then the nearest boxes first,
 #: and again depth first, which costs no heap, while the bound has not got better for so many pairs of leaves.
-_DIVES, _MAX_LEAVES_WITHOUT_IMPROVEMENT = 4, 16
+_DEPTH_FIRST_LEAVES, _MAX_LEAVES_WITHOUT_IMPROVEMENT = 4, 16
 
 #: Points nearer than so many times the error of a coordinate give no direction: it may be off by one over that.
 _DIRECTION_RATIO = 2.0**26
@@ -274,10 +274,10 @@ def _set_near_probe(query, which, tree, ref, gap):
     """`set_probe`, and what distances need besides.   gap : `_gap_of_box` of the box."""
     near, probe = query.near, query.trees.probe
     set_probe(query.trees.placing, which, tree.boxes, ref, probe)
-    own = _WORTH_A if which == 0 else _WORTH_B
-    other = _WORTH_B if which == 0 else _WORTH_A
-    put_floats(probe, 12, vec3_at(near, other))
-    put_floats(probe, 15, vec3_at(near, own))
+    probe_worth = _WORTH_A if which == 0 else _WORTH_B
+    node_worth = _WORTH_B if which == 0 else _WORTH_A
+    put_floats(probe, 12, vec3_at(near, node_worth))
+    put_floats(probe, 15, vec3_at(near, probe_worth))
     probe[18] = np.float32(near[_LINE_A if which == 0 else _LINE_B])
     put_floats(probe, 19, vec3_at(near, _ALONG_B) if which == 0 else neg(vec3_at(near, _ALONG_A)))
     probe[22] = np.float32(near[_OFFSET] + gap)
@@ -325,10 +325,10 @@ def _push_nearest(query, stack, top, word, step):
 
 @kernel(inline=True)
 def _next_pair(query, stack, top):
-    """Depth first, or the nearest of all pairs, as `_DIVES` says; what the bound excludes is left out."""
+    """Depth first, or the nearest of all pairs, as `_DEPTH_FIRST_LEAVES` says; what the bound excludes is left out."""
     ints, bounds, bound = query.ints, query.bounds, query.near[_BOUND]
     stale = ints[_LEAVES_WITHOUT_IMPROVEMENT] > _MAX_LEAVES_WITHOUT_IMPROVEMENT
-    while top > 0 and (ints[_LEAVES] < _DIVES or stale or ints[_HEAP_SIZE] + top > query.n_heap):
+    while top > 0 and (ints[_LEAVES] < _DEPTH_FIRST_LEAVES or stale or ints[_HEAP_SIZE] + top > query.n_heap):
         if bounds[top - 1] < bound:
             return top
         top -= 1
@@ -490,7 +490,7 @@ SIGNATURE = (
 @entry(SIGNATURE)
 def near_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, limit, results_at, marks_at, stack_at,
-    n_stack, heap_at, n_heap, doubles_at, integers_at, decide,
+    n_stack, heap_at, n_heap, doubles_at, integers_at, exact_at,
 ):  # fmt: skip
     """Distances of two surfaces at n pairs of poses; returns how many were done (fewer: that matrix is singular).
 
@@ -509,7 +509,7 @@ def near_surfaces(
         swapped = same_tree and is_swapped_order(view_f64(pose_a, 12), view_f64(pose_b, 12))
         if swapped:
             pose_a, pose_b = pose_b, pose_a
-        trees, invertible = pose_trees(A, pose_a, B, pose_b, doubles_at, floats_at, NEAR_PROBE, integers_at, decide)
+        trees, invertible = pose_trees(A, pose_a, B, pose_b, doubles_at, floats_at, NEAR_PROBE, integers_at, exact_at)
         if not invertible:
             return k
         query = _Query(

@@ -123,11 +123,11 @@ def _set_box_of_segment(ends, numbers, node):
 @kernel
 def _how_passed(query, a):
     """How the segment passes facet a: BY, THROUGH, BACK, FROM or UNCLEAR; in doubles, else exactly."""
-    P, corners = query.tree.triangles, query.corners
-    verdict, above = segment_against_triangle(P, 9 * a, corners, 9, 12, query.placing[ERROR])
+    triangles, corners = query.tree.triangles, query.corners
+    verdict, above = segment_against_triangle(triangles, 9 * a, corners, 9, 12, query.placing[ERROR])
     if verdict == AMBIGUOUS:
         query.counters[EXACT] += 1
-        put_triangle(corners, 0, triangle_at(P, 9 * a))
+        put_triangle(corners, 0, triangle_at(triangles, 9 * a))
         return ask_exactly(query.exact, PASS)
     if verdict == APART:
         return BY
@@ -186,7 +186,7 @@ SIGNATURE = (
 @entry(SIGNATURE)
 def points_inside(
     header_a_at, XA_at, step_a, XB_at, step_b, points_at, step_points, n, answers_at, counters_at, stack_at, n_stack,
-    doubles_at, integers_at, decide,
+    doubles_at, integers_at, exact_at,
 ):  # fmt: skip
     """Where point k of B's frame (3 doubles; step 3 or 0) is, for n pairs of poses: OUTSIDE … SINGULAR.
 
@@ -208,7 +208,7 @@ def points_inside(
     answers = view_i64(answers_at, n)
     for k in range(n):
         exact = ExactCall(
-            decide, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k
+            exact_at, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k
         )
         XA = view_f64(exact.XA_at, 16)
         XB = view_f64(exact.XB_at, 16)

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.kernels.lanes import LANES, view_lanes
-from collide.lowering.shape_table import ADDRESS, COUNT, INTS, NUMBERS, PADDED, POSE, TREE
+from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.narrowphase.gap import gap_layout as at
 from collide.narrowphase.gap.gap_layout import get, get_vec3, lane_of, put, put_vec3
 from collide.narrowphase.gap.precise_pair import LOW_PARTS_OF_PAIR, is_composed, put_low_parts, unit_scale
 from collide.narrowphase.gap.refine_gap import core_error, refine_gaps
-from collide.narrowphase.gap.tied_vertices import Vertices, lowest_pair, no_other_is_tied
-from collide.narrowphase.posed_pair import coordinates_of, posed_pair, radius_of
+from collide.narrowphase.gap.tied_vertices import lowest_pair, no_other_is_tied, vertices_of
+from collide.narrowphase.posed_pair import posed_body, posed_pair, radius_of
 from collide.narrowphase.rows import (
     BEYOND,
     CERTIFIED,
@@ -93,19 +93,21 @@ def clear_queue(integers_at):
 
 
 @kernel(inline=True)
-def enqueue(pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, error, doubles_at, integers_at):
+def enqueue(ordered, query, work, n, how, row_number, error):
     """Put a row into the queue whose gap is to be refined; returns its kind.
 
-    pair : as worked on, flip : whether its bodies are exchanged.   terms_at : of the `PoseTable`.
-    ids, weights : n vertex pairs; those with a weight are the feature, of four of two segments three corners.
-    how : what the row says if its digits are proven.   size, slop, error : of the pair.
+    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_query.py`: of its n vertex pairs those with a weight
+    are the feature, of four of two segments three corners.
+    how : what the row says if its digits are proven.   error : of a bound in doubles [m].
     """
+    pair = ordered.pair
+    doubles_at, integers_at = work.queue_at, work.queue_integers_at
     feature = view_i64(integers_at + 8 * _FEATURE_IDS, 6)
     n_points = 0
     for k in range(n):
-        if weights[k] > 0.0 and n_points < 3:
-            feature[2 * n_points] = ids[2 * k]
-            feature[2 * n_points + 1] = ids[2 * k + 1]
+        if work.weights[k] > 0.0 and n_points < 3:
+            feature[2 * n_points] = work.ids[2 * k]
+            feature[2 * n_points + 1] = work.ids[2 * k + 1]
             n_points += 1
     first, parts = _common_corner(feature, n_points)
     composed = is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)
@@ -119,7 +121,7 @@ def enqueue(pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, 
     ticket[_POSE_A] = pair.A.pose_at // POSE
     ticket[_SHAPE_B] = pair.B.shape
     ticket[_POSE_B] = pair.B.pose_at // POSE
-    ticket[_FLIP] = 1 if flip else 0
+    ticket[_FLIP] = 1 if ordered.flip else 0
     ticket[_HOW] = how
     for k in range(n_points):
         source = 2 * (first if k == 0 else (0 if k == first else k))
@@ -129,11 +131,11 @@ def enqueue(pair, terms_at, ids, weights, n, flip, how, row_number, size, slop, 
     _put_geometry(pair, question, ticket, n_points, parts)
     if composed:
         low_at = doubles_at + 8 * _LOWS
-        low = view_f64(low_at, put_low_parts(pair, terms_at, low_at))
+        low = view_f64(low_at, put_low_parts(pair, query.terms_at, low_at))
         for k in range(LOW_PARTS_OF_PAIR):
             put(question, at.LOW_A + k, low[k])
-    put(question, at.SCALE, unit_scale(size))
-    put(question, at.SLOP, slop)
+    put(question, at.SCALE, unit_scale(ordered.size))
+    put(question, at.SLOP, ordered.slop)
     put(question, at.ERROR, error)
     put(question, at.RADIUS_A, radius_of(pair, pair.A))
     put(question, at.RADIUS_B, radius_of(pair, pair.B))
@@ -249,8 +251,7 @@ def _is_unique_minimiser(ints_at, ticket, ids, n, question, answer):
 
 @kernel(inline=True)
 def _vertices(ints_at, shape):
-    row = view_i64(ints_at + 8 * INTS * shape, INTS)
-    return Vertices(view_f64(row[ADDRESS], 3 * row[PADDED]), row[COUNT], row[PADDED], row[TREE])
+    return vertices_of(posed_body(view_i64(ints_at, INTS * (shape + 1)), shape, 0))
 
 
 @kernel
@@ -265,9 +266,7 @@ def _widen_by_ties(
     ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
     numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
     poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
-    at_a, n_a = coordinates_of(ints, sa)
-    at_b, n_b = coordinates_of(ints, sb)
-    pair = posed_pair(ints, numbers, poses, view_f64(at_a, n_a), view_f64(at_b, n_b), sa, pa, sb, pb)
+    pair = posed_pair(ints, numbers, poses, sa, pa, sb, pb)
     low = view_f64(doubles_at + 8 * _LOWS, LOW_PARTS_OF_PAIR if composed else 0)
     direction = view_f64(doubles_at + 8 * _DIRECTION, dd.STRIDE)
     for k in range(dd.STRIDE):

@@ -150,7 +150,10 @@ def _asked(question) -> int:
 
 @pytest.mark.parametrize("ask", [collide.collide, collide.distance, _gap])
 def test_parts_far_away_are_not_asked(ask):
-    A, B = _row_of_boxes(64), collide.Compound([(collide.Box((0.2, 0.2, 0.2)), collide.pose((0, 0, 0.1 * k))) for k in range(2)])
+    A, B = (
+        _row_of_boxes(64),
+        collide.Compound([(collide.Box((0.2, 0.2, 0.2)), collide.pose((0, 0, 0.1 * k))) for k in range(2)]),
+    )
     rng = np.random.default_rng(8)
     X = np.array([collide.pose((2.0 * rng.integers(64), 0.0, rng.uniform(-1.5, 0.2))) for _ in range(200)])
     turned = np.array([collide.pose(rpy=(0.1, 0.2, 0.3))])
@@ -233,7 +236,9 @@ def test_parts_left_out_have_no_say():
         every = np.array([_rows_of_part(*one, *other, X_WA, X_WB) for one in A.parts() for other in B.parts()])
         least = every["distance"].min(axis=0)
         apart = ~found["hit"]
-        assert (found["distance"][apart] == least[apart]).all() and (found["lower"][apart] == every["lower"].min(axis=0)[apart]).all()
+        assert (found["distance"][apart] == least[apart]).all() and (
+            found["lower"][apart] == every["lower"].min(axis=0)[apart]
+        ).all()
         assert (found["upper"] == every["upper"].min(axis=0)).all()
         assert (found["hit"] == every["hit"].any(axis=0)).all()
         compared += apart.sum()

@@ -180,7 +180,9 @@ def test_no_row_depends_on_its_neighbours():
 def test_few_pairs_and_other_shapes_are_left_alone():
     cases = [case for case in asked(60, "few") if abs(collide.distance(*case).distance) < 0.1]
     assert not decided(rows_of(cases[:2])).any()
-    rounded = [Case(collide.ConvexHull(c.A.points, radius=0.1), c.B, c.X_WA, c.X_WB) for c in cases if hasattr(c.A, "points")]
+    rounded = [
+        Case(collide.ConvexHull(c.A.points, radius=0.1), c.B, c.X_WA, c.X_WB) for c in cases if hasattr(c.A, "points")
+    ]
     large = collide.ConvexHull(naive.hull_points(rng_of("large"), 80))
     for others in (rounded, [c._replace(A=collide.Sphere(1.0)) for c in cases], [c._replace(A=large) for c in cases]):
         assert len(others) > 7 and not decided(rows_of(others)).any()
@@ -233,7 +235,8 @@ for boolean in (True, False):
 def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CHILD, *(str(Path(file).parent) for file in (__file__, naive.__file__))],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=300, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True,
+        timeout=300, check=False,
     )  # fmt: skip
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     rows, gaps = (rows_of(asked(40, "plain"), boolean=boolean) for boolean in (True, False))
