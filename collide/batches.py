@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from collide.errors import InvalidPose
-from collide.lowering.kinds import kinds_of
+from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.pair_queries import OF_ONE_PAIR, answer_of
 from collide.results import PAIR_DTYPE
@@ -94,12 +94,12 @@ def _any_of_one_pair(A, B) -> bool:
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
-    kinds = kinds_of(A.shape_set)
+    kinds = tables_of(A.shape_set).kinds
     return OF_ONE_PAIR[kinds[A.rows], kinds[B.rows]]
 
 
 def _pairs_together(A, B) -> np.ndarray | None:
-    """(n,) numbers of the poses, those of the same two shapes one after another; None where they are all of one pair."""
+    """(n,) numbers of the poses, those of the same two shapes one after another; None where all are of one pair."""
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 

@@ -12,13 +12,14 @@ from naive_triangles import world_points
 
 import collide
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 
 EYE = np.eye(4)
 
 
 def box_of(shape: collide.Shape, X_WB: np.ndarray) -> np.ndarray:
-    (packed, X_BP), = shape.parts()
+    (packed, X_BP), = parts_of(shape)
     table = ShapeTable([packed])
     table.plant(np.zeros(1, dtype=np.int64))
     return boxes_of(
@@ -92,7 +93,7 @@ def test_parts_with_poses_of_their_own():
     for _ in range(20):
         hull = collide.ConvexHull(naive.hull_points(rng, 8))
         X_WB, X_BP = random_pose(rng, 1e6), random_pose(rng, 1e3)
-        (packed, _), = hull.parts()
+        (packed, _), = parts_of(hull)
         rows = pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows
         box = boxes_of(ShapeTable([packed]), rows, np.zeros(1, dtype=np.int64))[0].tolist()
         in_body = world_points(hull.points, X_BP)

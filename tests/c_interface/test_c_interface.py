@@ -26,6 +26,8 @@ import soak_pairs
 import collide
 from collide.kernels import mode
 from collide.kernels.library import library_path
+from collide.lowering.parts import convex_set_of, parts_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import PAIR_DTYPE, flipped
 
 if mode.MODE != mode.COMPILED:
@@ -244,7 +246,7 @@ def _touching() -> list:
 def _extent(shape) -> np.ndarray:
     if isinstance(shape, collide.Capsule):
         return 2 * shape.radius + np.array([0.0, 0.0, shape.length])
-    return 2 * np.abs(shape.parts()[0][0].points).max(axis=0) + 2 * shape.parts()[0][0].radius
+    return 2 * np.abs(convex_set_of(shape).points).max(axis=0) + 2 * convex_set_of(shape).radius
 
 
 @functools.cache
@@ -416,8 +418,8 @@ def test_support_trees_are_pythons():
     trees = 0
     for name, points in _clouds().items():
         shape = collide.ConvexHull(points)
-        packed, found = shape.parts()[0][0], _tree_of(c.CShape(shape))
-        tree = packed.tree.tree if packed.tree is not None else None
+        packed, found = convex_set_of(shape), _tree_of(c.CShape(shape))
+        tree = support_tree_of(packed).tree if may_have_tree(packed) else None
         if tree is None:
             assert found is None, name
             continue
@@ -470,7 +472,7 @@ def test_polytopes_of_halfspaces_are_pythons():
     for number in range(200):
         normals, offsets = _halfspaces(number)
         try:
-            packed = collide.HPolytope(normals, offsets).parts()[0][0]
+            packed = parts_of(collide.HPolytope(normals, offsets))[0][0]
         except collide.InvalidShape:
             packed = None
         status, handle = c.raw_shape("collide_hpolytope", normals, offsets, len(offsets))

@@ -18,6 +18,7 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.results import flipped
 
@@ -162,7 +163,7 @@ def test_depth_on_the_axis_of_a_curved_shape(shape, depth):
 @pytest.mark.parametrize("shape", [collide.Sphere(1), collide.Box((1, 1, 1)), collide.Capsule(1, 1)], ids=repr)
 def test_packed_points_cannot_be_written(shape):
     """Unions and worlds read them again at every query; Sphere, Box and Capsule hand out writable arrays."""
-    for packed, _ in shape.parts():
+    for packed, _ in parts_of(shape):
         assert not packed.points.flags.writeable
 
 

@@ -15,6 +15,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, facet_pairs, surface_distance, winding, world_points
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.mesh.validate_bvh import validate_mesh_tree
 
 TETRAHEDRON = (
@@ -295,7 +296,7 @@ def test_worlds_hold_meshes():
 def test_what_is_not_answered_is_refused_by_name():
     mesh = collide.Mesh(*box())
     with pytest.raises(collide.UnsupportedQuery, match="convex parts"):
-        collide.Compound([(mesh, np.eye(4))]).parts()
+        parts_of(collide.Compound([(mesh, np.eye(4))]))
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
     with pytest.raises(collide.InvalidPose):
         collide.collide(mesh, mesh, np.eye(4), mirror, check_poses=False)

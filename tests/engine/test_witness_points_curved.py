@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import collide
+from collide.lowering.parts import convex_set_of
 
 
 def outside_box(half, p) -> float:
@@ -131,7 +132,7 @@ def test_overlaps_of_curved_bodies(a, b):
         if not r.hit:
             continue
         told = f"{A} {B} X_WA=np.array({X_WA.tolist()}) X_WB=np.array({X_WB.tolist()})"
-        size = sum(float(np.linalg.norm(S.parts()[0][0].params[:3])) + S.parts()[0][0].reach for S in (A, B))
+        size = sum(float(np.linalg.norm(convex_set_of(S).params[:3])) + convex_set_of(S).reach for S in (A, B))
         off = off_bodies(A, B, X_WA, X_WB, r)
         hits += 1
         certified += r.certified

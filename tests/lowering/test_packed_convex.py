@@ -12,6 +12,8 @@ import collide
 from collide.kernels import address_of
 from collide.lowering import packed_convex as P
 from collide.lowering.facet_table import FacetTable
+from collide.lowering.parts import parts_of
+from collide.lowering.prepared_structures import coarse_address
 from collide.lowering.shape_table import ADDRESS, COUNT, KIND, LOWEST, PADDED, RANK, REACH, ShapeTable
 
 
@@ -33,7 +35,7 @@ def test_points(n):
     farthest = max(sum(Fraction(v) ** 2 for v in p) for p in points.tolist())
     assert farthest <= Fraction(packed.reach) ** 2 <= farthest * (1 + Fraction(1, 10**14))
     assert is_integer_times(points, packed.lowest) and not is_integer_times(points, packed.lowest + 1)
-    assert (packed.coarse is not None) == (n >= 64)
+    assert (coarse_address(packed) != 0) == (n >= 64)
     assert not packed.points.flags.writeable and not columns.flags.writeable
 
 
@@ -77,7 +79,7 @@ def test_triangles_stand_in_tables_as_shapes_do():
     rng = rng_of("facet table")
     corners = rng.normal(size=(20, 3, 3)) * 10.0 ** rng.integers(-3, 3, size=(20, 1, 1))
     corners[3] = 0.0
-    (packed, _), = collide.Box((1, 2, 3)).parts()
+    (packed, _), = parts_of(collide.Box((1, 2, 3)))
     table = FacetTable(corners, packed)
     alone = ShapeTable([P.pack_points(t.copy()) for t in corners] + [packed])
     columns = [KIND, COUNT, PADDED, LOWEST]

@@ -12,6 +12,7 @@ import surfaces
 from naive import SHARED, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.mesh import mesh_survey as says
 from collide.mesh import mesh_topology as meet
 from collide.mesh import shell_nesting as nesting
@@ -438,7 +439,7 @@ def test_a_value_like_other_shapes(tmp_path):
     assert mesh != collide.Mesh(mesh.vertices, mesh.faces, solid=False)
     assert mesh != collide.Mesh(mesh.vertices * 2, mesh.faces)
     with pytest.raises(collide.UnsupportedQuery, match="Mesh"):
-        mesh.parts()
+        parts_of(mesh)
 
 
 def test_what_is_pickled_keeps_its_word():

@@ -9,9 +9,11 @@ import pytest
 
 import collide
 from collide.errors import InvalidShape
+from collide.lowering import prepared_structures
+from collide.lowering.parts import convex_set_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
-from collide.shapes import convex_hull as hull_shape
 from collide.support import lazy_support_tree as planted
 from collide.support.support_tree import SupportTree, list_coordinates_of
 
@@ -26,12 +28,13 @@ def _ball(rng, n, axes=(1, 1, 1)):
 @pytest.fixture()
 def trees_everywhere(monkeypatch):
     """Every hull gets a support tree, however small, so that the hard families meet them."""
-    monkeypatch.setattr(hull_shape, "FEWEST_POINTS", 4)
+    monkeypatch.setattr(prepared_structures, "MIN_FOR_TREE", 4)
     monkeypatch.setattr(planted, "FEWEST_VERTICES", 4)
 
 
 def _planted(shape) -> bool:
-    return getattr(shape, "_tree", None) is not None and shape._tree.tree is not None
+    packed = convex_set_of(shape)
+    return may_have_tree(packed) and support_tree_of(packed).tree is not None
 
 
 @pytest.mark.parametrize("family", names())
@@ -47,7 +50,7 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
         ]
         for S in plain:
             if isinstance(S, collide.ConvexHull):
-                object.__setattr__(S, "_tree", None)
+                convex_set_of(S).prepared.with_tree = False
         scanned = collide.distance(*plain, X_WA, X_WB)
         assert with_trees.hit == scanned.hit == collide.collide(A, B, X_WA, X_WB), case.snippet()
         assert max(with_trees.lower, scanned.lower) <= min(with_trees.upper, scanned.upper), case.snippet()
@@ -65,7 +68,7 @@ def test_large_hulls_answer_as_scans_do(axes):
     A, B = (collide.ConvexHull(_ball(rng, 3000, axes)) for _ in range(2))
     scans = [collide.ConvexHull(S.points) for S in (A, B)]
     for S in scans:
-        object.__setattr__(S, "_tree", None)
+        convex_set_of(S).prepared.with_tree = False
     X_WB = np.array(
         [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
     )
@@ -142,10 +145,10 @@ def test_large_clouds_without_volume(flatten):
 
 def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     A = collide.ConvexHull(_ball(np.random.default_rng(12), 2000))
-    A.parts()
-    assert A._tree._tree is None, "packing alone needs no tree"
+    own_tree = support_tree_of(convex_set_of(A))
+    assert own_tree._tree is None, "packing alone needs no tree"
     seen = []
-    threads = [threading.Thread(target=lambda: seen.append(A._tree.address)) for _ in range(8)]
+    threads = [threading.Thread(target=lambda: seen.append(own_tree.address)) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -155,9 +158,9 @@ def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     B = collide.ConvexHull(A.points)
     world.add(B)
     world.add(B, collide.pose((50, 0, 0)))
-    assert not world.collides() and B._tree._tree is None, "nothing near: nothing to build"
+    assert not world.collides() and "tree" not in convex_set_of(B).prepared.made, "nothing near: nothing to build"
     world.add(collide.Sphere(0.5))
-    assert world.collides() and B._tree._tree is not None
+    assert world.collides() and support_tree_of(convex_set_of(B))._tree is not None
 
 
 def test_given_faces_are_checked_not_trusted():
@@ -189,7 +192,7 @@ def test_bad_proposals_cost_time_not_truth(axes):
     shuffled._tree = SupportTree(
         B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
     )
-    object.__setattr__(B, "_tree", shuffled)
+    convex_set_of(B).prepared.made["tree"] = shuffled
     X_WB = np.array(
         [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
     )

@@ -14,6 +14,7 @@ from naive import Case, pose, random_pose, rng_of
 
 import collide
 from collide.kernels import address_of, entry
+from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.gjk import mpr_batch as small_hulls
 from collide.narrowphase.gjk.mpr import MAX_ITERATIONS
@@ -63,7 +64,7 @@ def asked(n: int, *words) -> list[Case]:
 
 def rows_of(cases: list[Case], limit: float = 0.0, boolean: bool = True) -> np.ndarray:
     """What portals alone make of the rows."""
-    packed = [shape.parts()[0][0] for case in cases for shape in (case.A, case.B)]
+    packed = [convex_set_of(shape) for case in cases for shape in (case.A, case.B)]
     table = ShapeTable(packed)
     X = np.stack([X for case in cases for X in (case.X_WA, case.X_WB)])
     poses = pose_table(X, np.tile(np.eye(4), (len(X), 1, 1)), np.array([p.reach for p in packed]))
