@@ -18,7 +18,7 @@ from collide.narrowphase.gap.gap_queue import KINDS, clear_queue, refine_queued
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import halfspace_convex
 from collide.narrowphase.halfspace_halfspace import halfspace_halfspace
-from collide.narrowphase.pair_query import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
+from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
 from collide.narrowphase.posed_pair import Tables, ordered_pair
 from collide.narrowphase.rows import COUNT, HIT, HOW, ROW, VERTICES_A, VERTICES_B, clear_vertices, view_row
 from collide.results import REFUSED, UNDECIDED
