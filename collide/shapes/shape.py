@@ -35,7 +35,7 @@ class Shape:
     _surface: Any
     #: Which facets of that share corners, for contacts (`contact/contact_facets.py`).
     _topology: Any
-    #: Its parts, as unions with meshes ask about them (`lowering/composite_parts.py`).
+    #: Its parts, as unions with meshes ask about them (`narrowphase/composite/composite_parts.py`).
     _union: Any
     #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
     _laid_out: Any

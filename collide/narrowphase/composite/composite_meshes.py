@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from collide.lowering.composite_parts import UnionParts, union_of
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
+from collide.narrowphase.composite.composite_parts import UnionParts, union_of
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
 from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
