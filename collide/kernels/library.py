@@ -127,8 +127,8 @@ def _fits(built: Any) -> bool:
 
 
 def _library_of(files: dict) -> str:
-    (found,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
-    return found
+    (name_of_library,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
+    return name_of_library
 
 
 def _path(name: str) -> str:

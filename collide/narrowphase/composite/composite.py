@@ -101,7 +101,7 @@ def run_unions(
 
     which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
     """
-    table.plant(which)
+    table.build_trees(which)
     space = of_thread.space_for(table)
     header = space.header_of(table, run.scratch())
     while True:
@@ -131,7 +131,7 @@ class UnionPair:
 
     def __init__(self, A: LaidOut, B: LaidOut):
         self.unions = UnionTable([A, B])
-        self.unions.plant(None)
+        self.unions.build_trees(None)
         self.collide = self._distance = _long_way
         if self.unions.counts.prod() > _MAX_AT_ONCE:
             return
