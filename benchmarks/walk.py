@@ -25,6 +25,7 @@ from supports import cloud, least
 import collide
 from collide.hierarchies.run_walk import run_walks
 from collide.hierarchies.walk import APART
+from collide.lowering.parts import convex_set_of
 
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
 KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")
@@ -109,7 +110,7 @@ def measured(kind: str, n: int) -> dict:
     truth = collide.collide(A, B, X_WA, X_WB)
     assert (result.hit == truth).all(), f"{kind} {n}: the walk and the default disagree"
     axes = result.rows["axis"] * np.where(result.exchanged, -1.0, 1.0) * (result.rows["status"] == APART)[:, None]
-    packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
+    packed_a, packed_b = convex_set_of(A), convex_set_of(B)
     names = "default", "walk", "walk_kernel", "early_kernel", "default_with_axes"
     seconds = dict.fromkeys(names, 0.0)
     for start in range(0, POSES, CHUNK):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from collide.errors import InvalidPose
-from collide.lowering.kinds import kinds_of
+from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.pair_queries import OF_ONE_PAIR, answer_of
 from collide.results import PAIR_DTYPE
@@ -94,7 +94,7 @@ def _any_of_one_pair(A, B) -> bool:
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
-    kinds = kinds_of(A.shape_set)
+    kinds = tables_of(A.shape_set).kinds
     return OF_ONE_PAIR[kinds[A.rows], kinds[B.rows]]
 
 

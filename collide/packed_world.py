@@ -14,6 +14,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.filters import CULLED, count_skipped
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_queries import run_pairs
@@ -61,7 +62,7 @@ class PackedWorld:
 
     def _lay_out_parts(self) -> None:
         """Parts of all bodies, one body after another: those of its shape."""
-        parts = [shape.bounding_parts() for shape in self._shapes]
+        parts = [bounding_parts_of(shape) for shape in self._shapes]
         row_of, self._table = _table_of([packed for of_shape in parts for packed, _ in of_shape])
         X_SP = np.array([X for of_shape in parts for _, X in of_shape]).reshape(-1, 4, 4)
         reach = np.array([packed.reach for of_shape in parts for packed, _ in of_shape])
@@ -231,7 +232,7 @@ class PackedWorld:
 
     def against(self, shape: Shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
         """Rows of one outside shape at a pose (4, 4) against all bodies near it; b is a position, a is 0."""
-        parts = shape.bounding_parts()
+        parts = bounding_parts_of(shape)
         packed = [part for part, _ in parts]
         reach = np.array([part.reach for part in packed])
         poses = pose_table(np.repeat(X_WS[None], len(parts), axis=0), np.array([X for _, X in parts]), reach)

@@ -17,10 +17,11 @@ from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.narrowphase.convex_bodies import Question
 from collide.results import UNDECIDED
 from collide.shapes.convex_hull import ConvexHull
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, SMALLEST
 
 #: (A, B, X_WA, X_WB) of a pair, poses (4, 4).
@@ -60,9 +61,9 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
     stays.
     """
-    if not (is_plain(A) and is_plain(B)):
+    if not (is_single_convex(A) and is_single_convex(B)):
         return None
-    packed = [shape.parts()[0][0] for shape in (A, B)]
+    packed = [convex_set_of(shape) for shape in (A, B)]
     is_swept_points = [p.kind == POINTS and p.slop == 0.0 for p in packed]
     total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
     first = float(total)

@@ -1,5 +1,5 @@
-"""Oracles and families are importable by name from any test, for tests are no package; tests that need kernels of another
-kind than this process has are skipped."""
+"""Oracles and families are importable by name from any test, for tests are no package; tests that need kernels of
+another kind than this process has are skipped."""
 
 from __future__ import annotations
 
@@ -19,12 +19,16 @@ sys.path += sorted({str(file.parent) for file in HELPERS})
 #: Marks of tests, the mode of kernels in which each is skipped, and how to run it then.
 SKIPPED = {
     "own_kernels": (COMPILED, "defines kernels of its own: COLLIDE_JIT=1 python -m pytest -m own_kernels"),
-    "plain_kernels": (JUST_IN_TIME, "calls kernels as plain Python: NUMBA_DISABLE_JIT=1 python -m pytest -m plain_kernels"),
+    "plain_kernels": (
+        JUST_IN_TIME,
+        "calls kernels as plain Python: NUMBA_DISABLE_JIT=1 python -m pytest -m plain_kernels",
+    ),
 }
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Machine code divides by zero and overflows without a word; as Python, with numpy's numbers, kernels are warned."""
+    """Machine code divides by zero and overflows without a word; as Python, with numpy's numbers, kernels are
+    warned."""
     if PLAIN_PYTHON:
         config.addinivalue_line("filterwarnings", "ignore::RuntimeWarning")
 

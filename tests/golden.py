@@ -1,7 +1,8 @@
 """The bytes of the engine's answers, hashed: what a rewrite must not change.
 
     python tests/golden.py                # compares with tests/golden.json; tells the groups that moved
-    python tests/golden.py --write        # after a change that is meant: a commit of its own that says which rows moved, and why
+    python tests/golden.py --write        # after a change that is meant: a commit of its own that says which rows
+    moved, and why
 
 A group is a kind of question about one family of pairs, in one way of asking. Inputs are hashed as well: they come from
 random generators and from the C library's sines, and where they are others the answers cannot be compared.
@@ -77,7 +78,15 @@ def families() -> Iterator[tuple[str, list[Pair]]]:
     groups: dict[str, list[Pair]] = {}
     for case in drawn:
         kinds = set(case.kinds)
-        name = "meshes" if kinds & meshed else "compounds" if "compound" in kinds else "curved" if kinds & curved else "polytopes"
+        name = (
+            "meshes"
+            if kinds & meshed
+            else "compounds"
+            if "compound" in kinds
+            else "curved"
+            if kinds & curved
+            else "polytopes"
+        )
         groups.setdefault(f"drawn: {name}", []).append(Pair(case.A, case.B, case.X_WA, case.X_WB))
     yield from groups.items()
 
@@ -198,7 +207,10 @@ def main() -> None:
     moved = [name for name in found if name not in others and kept[name] != found[name]]
     for name in moved:
         print(f"moved: {name}")
-    print(f"{len(found)} groups, {len(moved)} moved, {len(others)} with other questions, {len(set(kept) - set(found))} gone")
+    print(
+        f"{len(found)} groups, {len(moved)} moved, {len(others)} with other questions, {len(set(kept) - set(found))} "
+        f"gone"
+    )
     sys.exit(bool(moved))
 
 

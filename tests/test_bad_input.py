@@ -224,8 +224,10 @@ def nested(depth: int):
 
 #: What is no real number, or not a finite one.
 NO_NUMBERS = {
-    "beyond doubles": 10**400, "below doubles": -(10**400), "too long to print": 10**5000, "fraction": Fraction(10**400),
-    "decimal": Decimal("1e400"), "text": "1.0", "bytes": b"1", "complex": 1 + 0j, "numpy complex": np.complex128(1), "None": None,
+    "beyond doubles": 10**400, "below doubles": -(10**400), "too long to print": 10**5000,
+    "fraction": Fraction(10**400),
+    "decimal": Decimal("1e400"), "text": "1.0", "bytes": b"1", "complex": 1 + 0j, "numpy complex": np.complex128(1),
+    "None": None,
     "time": np.timedelta64(1, "s"), "date": np.datetime64("2020-01-01"), "masked": np.ma.masked, "list": [1.0, 2.0],
     "array": np.ones(2), "nan": NAN, "object": object(), "deep": nested(2000), "numpy text": np.str_("1"),
 }  # fmt: skip
@@ -233,12 +235,17 @@ NO_NUMBERS = {
 NUMBER_TAKERS = {
     "Sphere": Sphere, "Capsule radius": lambda v: Capsule(v, 1), "Capsule length": lambda v: Capsule(1, v),
     "Cylinder height": lambda v: Cylinder(1, height=v), "Cone": lambda v: Cone(v, 1), "Box": lambda v: Box(1, v, 1),
-    "Box of three": lambda v: Box((1, 1, v)), "Ellipsoid": lambda v: Ellipsoid(1, 1, v), "Halfspace": lambda v: Halfspace((0, 0, 1), v),
+    "Box of three": lambda v: Box((1, 1, v)), "Ellipsoid": lambda v: Ellipsoid(1, 1, v),
+    "Halfspace": lambda v: Halfspace((0, 0, 1), v),
     "Halfspace normal": lambda v: Halfspace((0, v, 1), 0), "ConvexHull": lambda v: ConvexHull([[0, 0, v]]),
-    "ConvexHull radius": lambda v: ConvexHull([[0, 0, 0]], radius=v), "HPolytope": lambda v: HPolytope(CUBE, [1, 1, 1, 1, 1, v]),
-    "Mesh": lambda v: Mesh([[0, 0, 0], [1, 0, 0], [0, v, 0]], [[0, 1, 2]]), "Mesh.scaled": lambda v: triangle().scaled(v),
-    "pose": lambda v: pose((0, 0, v)), "rpy": lambda v: pose(rpy=(0, v, 0)), "quaternion": lambda v: pose(quat_wxyz=(1, v, 0, 0)),
-    "R": lambda v: pose(R=[[1, 0, 0], [0, 1, 0], [0, v, 1]]), "a pose": lambda v: meets(Sphere(1), Sphere(1), EYE, [*EYE.tolist()[:3], [0, 0, v, 1]]),
+    "ConvexHull radius": lambda v: ConvexHull([[0, 0, 0]], radius=v),
+    "HPolytope": lambda v: HPolytope(CUBE, [1, 1, 1, 1, 1, v]),
+    "Mesh": lambda v: Mesh([[0, 0, 0], [1, 0, 0], [0, v, 0]], [[0, 1, 2]]),
+    "Mesh.scaled": lambda v: triangle().scaled(v),
+    "pose": lambda v: pose((0, 0, v)), "rpy": lambda v: pose(rpy=(0, v, 0)),
+    "quaternion": lambda v: pose(quat_wxyz=(1, v, 0, 0)),
+    "R": lambda v: pose(R=[[1, 0, 0], [0, 1, 0], [0, v, 1]]),
+    "a pose": lambda v: meets(Sphere(1), Sphere(1), EYE, [*EYE.tolist()[:3], [0, 0, v, 1]]),
     "(R, t)": lambda v: meets(Sphere(1), Sphere(1), EYE, (np.eye(3), [0, v, 0])),
     "max_distance": lambda v: distance(Sphere(1), Sphere(1), EYE, EYE, max_distance=v),
     "security_margin": lambda v: meets(Sphere(1), Sphere(1), EYE, EYE, security_margin=v),
@@ -249,13 +256,17 @@ NUMBER_TAKERS = {
     "contains": lambda v: collide.contains(Sphere(1), EYE, (0, v, 0)),
     "raycast origin": lambda v: collide.raycast(Box(1, 1, 1), EYE, (0, v, 0), (0, 0, 1)),
     "raycast limit": lambda v: collide.raycast(Box(1, 1, 1), EYE, (0, 0, 0), (0, 0, 1), max_distance=v),
-    "World.add": lambda v: World().add(Sphere(1), (np.eye(3), (v, 0, 0))), "World.distances": lambda v: world_of_three().distances(v),
-    "World.query": lambda v: world_of_three().query(Sphere(1), EYE, v), "World.remove": lambda v: world_of_three().remove(v),
-    "World.contacts": lambda v: world_of_three().contacts(v), "Compound": lambda v: Compound([(Sphere(1), (np.eye(3), (v, 0, 0)))]),
+    "World.add": lambda v: World().add(Sphere(1), (np.eye(3), (v, 0, 0))),
+    "World.distances": lambda v: world_of_three().distances(v),
+    "World.query": lambda v: world_of_three().query(Sphere(1), EYE, v),
+    "World.remove": lambda v: world_of_three().remove(v),
+    "World.contacts": lambda v: world_of_three().contacts(v),
+    "Compound": lambda v: Compound([(Sphere(1), (np.eye(3), (v, 0, 0)))]),
 }  # fmt: skip
 #: Whole numbers of any size are as good here.
 WHOLE = {("threads", "beyond doubles"), ("threads", "too long to print"), ("threads of distance", "beyond doubles"),
-         ("threads of distance", "too long to print"), ("max_contacts", "beyond doubles"), ("max_contacts", "too long to print")}  # fmt: skip
+         ("threads of distance", "too long to print"), ("max_contacts", "beyond doubles"),
+         ("max_contacts", "too long to print")}  # fmt: skip
 
 
 def triangle():
@@ -280,7 +291,15 @@ def test_what_is_no_number_is_refused_wherever_it_is_given(taker):
 
 def test_numbers_of_every_kind_are_taken():
     wanted = Box(1, 0.5, 0.25)
-    for value in (Fraction(1, 2), Decimal("0.5"), np.float32(0.5), np.float16(0.5), np.longdouble(0.5), np.array(0.5), 0.5):
+    for value in (
+        Fraction(1, 2),
+        Decimal("0.5"),
+        np.float32(0.5),
+        np.float16(0.5),
+        np.longdouble(0.5),
+        np.array(0.5),
+        0.5,
+    ):
         assert Box(1, value, 0.25) == Box((1, value, 0.25)) == wanted and Sphere(value) == Sphere(0.5)
     assert Sphere(True) == Sphere(np.int8(1)) == Sphere(np.uint64(1)) == Sphere(1.0)
     assert Box(np.ma.array([1, 0.5, 0.25], mask=False)) == wanted
@@ -291,8 +310,10 @@ RAGGED = [[1, 2], [3]]
 NO_ARRAYS = {
     "ragged": (RAGGED, "lengths"), "masked": (np.ma.array(np.eye(3), mask=np.eye(3)), "masked"),
     "masked rows": ([np.ma.array([0.0, 0, 0], mask=[1, 0, 0])], "masked"), "text": ([["0", "0", "1"]], "text"),
-    "complex": (np.eye(3) * 1j, "complex"), "times": (np.eye(3).astype("m8[s]"), "time spans"), "deep": (nested(2000), "lengths"),
-    "None": ([[0, 0, None]], "None"), "a dictionary": ({"x": 1}, "x"), "records": (np.zeros(3, dtype=[("x", "f8")]), "records"),
+    "complex": (np.eye(3) * 1j, "complex"), "times": (np.eye(3).astype("m8[s]"), "time spans"),
+    "deep": (nested(2000), "lengths"),
+    "None": ([[0, 0, None]], "None"), "a dictionary": ({"x": 1}, "x"),
+    "records": (np.zeros(3, dtype=[("x", "f8")]), "records"),
 }  # fmt: skip
 
 
@@ -300,10 +321,13 @@ NO_ARRAYS = {
 def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
     value, words = NO_ARRAYS[name]
     for take in (
-        ConvexHull, lambda v: HPolytope(v, [1]), lambda v: Mesh(v, [[0, 1, 2]]), Box, Ellipsoid, lambda v: Halfspace(v, 0),
-        lambda v: pose(R=v), lambda v: meets(Sphere(1), Sphere(1), v, EYE), lambda v: meets(Sphere(1), Sphere(1), EYE, (v, np.zeros(3))),
+        ConvexHull, lambda v: HPolytope(v, [1]), lambda v: Mesh(v, [[0, 1, 2]]), Box, Ellipsoid,
+        lambda v: Halfspace(v, 0),
+        lambda v: pose(R=v), lambda v: meets(Sphere(1), Sphere(1), v, EYE),
+        lambda v: meets(Sphere(1), Sphere(1), EYE, (v, np.zeros(3))),
         lambda v: collide.contains(triangle(), EYE, v), lambda v: collide.raycast(triangle(), EYE, v, (0, 0, 1)),
-        lambda v: collide.raycast(triangle(), EYE, (0, 0, 1), v), lambda v: collide.contacts(Sphere(1), Sphere(1), EYE, v),
+        lambda v: collide.raycast(triangle(), EYE, (0, 0, 1), v),
+        lambda v: collide.contacts(Sphere(1), Sphere(1), EYE, v),
         lambda v: World().add(Sphere(1), v), lambda v: collide.raycast(triangle(), v, (0, 0, 0), (0, 0, 1)),
     ):  # fmt: skip
         with warnings.catch_warnings(), pytest.raises(CollideError, match=words):
@@ -311,8 +335,14 @@ def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
             take(value)
 
 
-@pytest.mark.parametrize("faces", [RAGGED, np.ones((1, 3), "m8[s]"), np.ma.array([[0, 1, 2]], mask=[[1, 0, 0]]), [["0", "1", "2"]],
-                                   np.array([[0, 1, 2 + 0j]]), [[0, 1, 10**30]], nested(2000), [[0, 1, None]], [[True, False, True]]], ids=range(9))  # fmt: skip
+@pytest.mark.parametrize(
+    "faces",
+    [
+        RAGGED, np.ones((1, 3), "m8[s]"), np.ma.array([[0, 1, 2]], mask=[[1, 0, 0]]), [["0", "1", "2"]],
+        np.array([[0, 1, 2 + 0j]]), [[0, 1, 10**30]], nested(2000), [[0, 1, None]], [[True, False, True]],
+    ],
+    ids=range(9),
+)  # fmt: skip
 def test_faces_are_rows_of_integers(faces):
     for make in (lambda: Mesh(np.eye(3), faces), lambda: ConvexHull(np.eye(3), faces=faces)):
         with pytest.raises(InvalidShape, match="faces"):
@@ -322,7 +352,11 @@ def test_faces_are_rows_of_integers(faces):
 def test_values_are_shown_as_numbers_and_short():
     with pytest.raises(InvalidShape, match=r"size\.y must be > 0, got -1\.0$"):
         Box(np.array([1.0, -1.0, 1.0]))
-    for call in (lambda: Sphere("x" * 10**6), lambda: meets("x" * 10**6, Sphere(1), EYE, EYE), lambda: World().add("x" * 10**6)):
+    for call in (
+        lambda: Sphere("x" * 10**6),
+        lambda: meets("x" * 10**6, Sphere(1), EYE, EYE),
+        lambda: World().add("x" * 10**6),
+    ):
         with pytest.raises(CollideError) as caught:
             call()
         assert len(str(caught.value)) < 400
@@ -499,7 +533,12 @@ def test_a_copy_of_a_world_is_its_own():
     expected = len(world.distances())
     for other in (copy.copy(world), copy.deepcopy(world), pickle.loads(pickle.dumps(world))):
         other.remove("a")
-        assert len(other) == 2 and len(world) == 3 and len(other.distances()) == 1 and len(world.distances()) == expected == 3
+        assert (
+            len(other) == 2
+            and len(world) == 3
+            and len(other.distances()) == 1
+            and len(world.distances()) == expected == 3
+        )
     other = copy.deepcopy(world)
     del world
     assert other.collides() and len(other.collisions()) == 3

@@ -48,7 +48,9 @@ def _poses(rng, n, spread=0.8):
 def _many(rng, n):
     """n pairs of shapes and poses, none of two half-spaces."""
     shapes = _shapes(rng)
-    picks = [(shapes[i], shapes[j]) for i, j in rng.integers(0, len(shapes), size=(4 * n, 2)) if min(i, j) != 6 or i != j]
+    picks = [
+        (shapes[i], shapes[j]) for i, j in rng.integers(0, len(shapes), size=(4 * n, 2)) if min(i, j) != 6 or i != j
+    ]
     A, B = zip(*picks[:n])
     return list(A), list(B), _poses(rng, n), _poses(rng, n)
 
@@ -65,7 +67,12 @@ def test_single_calls_give_the_bits_of_batches():
             for k in range(20):
                 for _ in range(2):  # the first call prepares the pair, the second finds it prepared
                     one = collide.distance(A, B, X_WA, X_WB[k])
-                    assert one.rows.tobytes() == batch.rows[k : k + 1].tobytes(), (A, B, X_WA.tolist(), X_WB[k].tolist())
+                    assert one.rows.tobytes() == batch.rows[k : k + 1].tobytes(), (
+                        A,
+                        B,
+                        X_WA.tolist(),
+                        X_WB[k].tolist(),
+                    )
                     said = collide.collide(A, B, X_WA, X_WB[k])
                     assert isinstance(said, bool) and said == booleans[k] == one.hit
             hits += booleans.sum()
@@ -104,7 +111,9 @@ def test_shape_sets_answer_like_lists():
             assert 40 < hits.sum() < 160 and np.array_equal(hits, collide.collide(*lists, X_WA, X_WB))
             r = collide.distance(A, B, X_WA, X_WB, threads=threads)
             assert np.array_equal(r.rows, collide.distance(*lists, X_WA, X_WB).rows)
-        assert np.array_equal(collide.collide(A, members[0], X_WA, X_WB), collide.collide(lists[0], members[0], X_WA, X_WB))
+        assert np.array_equal(
+            collide.collide(A, members[0], X_WA, X_WB), collide.collide(lists[0], members[0], X_WA, X_WB)
+        )
         assert r[7].question[:2] == (members[i[7]], members[j[7]])
     with pytest.raises(InvalidArgument, match="0 … 7"):
         library[np.array([0, 8])]
@@ -261,7 +270,11 @@ def test_a_result_keeps_the_poses_it_was_asked_at():
 def test_axes_save_time_and_change_nothing(threads):
     rng = np.random.default_rng(6)
     A, B, X_WA, X_WB = _many(rng, 150)
-    for pair in ((A, B, X_WA, X_WB), (_shapes(rng)[4], _shapes(rng)[0], EYE, X_WB), (_shapes(rng)[0], _shapes(rng)[6], EYE, X_WB)):
+    for pair in (
+        (A, B, X_WA, X_WB),
+        (_shapes(rng)[4], _shapes(rng)[0], EYE, X_WB),
+        (_shapes(rng)[0], _shapes(rng)[6], EYE, X_WB),
+    ):
         expected = collide.collide(*pair)
         assert 10 < expected.sum() < 140
         for start in (np.zeros((150, 3)), rng.normal(size=(150, 3)), rng.normal(size=(150, 3)) * 1e-200):
@@ -349,7 +362,9 @@ def test_a_fork_while_a_tree_grows_does_not_hang():
         "    os._exit(0 if collide.collide(other, small, np.eye(4), np.eye(4)) else 1)\n"
         "assert os.waitpid(child, 0)[1] == 0\nthread.join()\n"
     )
-    run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    run = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
     assert run.returncode == 0, run.stderr[-2000:]
 
 

@@ -44,7 +44,8 @@ def fake_scene(*rows):
         stats=stats, names=dict(names),
     )
     bodies = [
-        SimpleNamespace(name=n, shape=Sphere(0.1), X_WB=np.eye(4), static=False, source="", approximation=None) for n in names.values()
+        SimpleNamespace(name=n, shape=Sphere(0.1), X_WB=np.eye(4), static=False, source="", approximation=None)
+        for n in names.values()
     ]
     return SimpleNamespace(
         name="fake", bodies=bodies, notes=[], sources=[], robots={}, seconds={"read": 0.0}, world=lambda: world
@@ -199,13 +200,20 @@ def test_ctrl_c_is_one_line(monkeypatch, capsys):
 @pytest.mark.parametrize(
     "arguments, words",
     [
-        (["report"], "required: SCENE"), (["nonsense"], "invalid choice"),
-        (["report", "x", "--clearance", "-1"], "negative"), (["report", "x", "--scale", "parsec"], "units"),
-        (["report", "x", "--clearance", "5parsec"], "units"), (["check", "x", "--min-dep", "1"], "--min-dep"),
-        (["report", "x", "--meshes", "voxels"], "voxels"), (["report", "x", "--scale", "nan"], "--scale: must be a finite"),
-        (["report", "x", "--scale", "0"], "other than 0"), (["compare", "x", "--engines", ""], "names no engine"),
-        (["compare", "x", "--engines", " , "], "names no engine"), (["compare", "x", "--tolerance", "-1"], "not negative"),
-        (["report", "x", "--resolution", "0"], "above 0"), (["compare", "x", "--fail-on", "luck"], "luck"),
+        (["report"], "required: SCENE"),
+        (["nonsense"], "invalid choice"),
+        (["report", "x", "--clearance", "-1"], "negative"),
+        (["report", "x", "--scale", "parsec"], "units"),
+        (["report", "x", "--clearance", "5parsec"], "units"),
+        (["check", "x", "--min-dep", "1"], "--min-dep"),
+        (["report", "x", "--meshes", "voxels"], "voxels"),
+        (["report", "x", "--scale", "nan"], "--scale: must be a finite"),
+        (["report", "x", "--scale", "0"], "other than 0"),
+        (["compare", "x", "--engines", ""], "names no engine"),
+        (["compare", "x", "--engines", " , "], "names no engine"),
+        (["compare", "x", "--tolerance", "-1"], "not negative"),
+        (["report", "x", "--resolution", "0"], "above 0"),
+        (["compare", "x", "--fail-on", "luck"], "luck"),
     ],
 )
 def test_usage_errors_are_one_line_too(capsys, arguments, words):

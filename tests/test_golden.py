@@ -23,9 +23,12 @@ def _levels() -> list[str]:
 @pytest.mark.skipif(PLAIN_PYTHON, reason="takes hours without compilation")
 @pytest.mark.parametrize("level", _levels())
 def test_answers_are_those_kept(level):
-    """On every level of processors that this one has. ``python tests/golden.py --write`` after a change that is meant."""
+    """On every level of processors that this one has. ``python tests/golden.py --write`` after a change that is
+    meant."""
     environment = {**os.environ, **({"COLLIDE_CPU": level} if level else {})}
-    done = subprocess.run([sys.executable, str(GOLDEN)], env=environment, capture_output=True, text=True, check=False, timeout=600)
+    done = subprocess.run(
+        [sys.executable, str(GOLDEN)], env=environment, capture_output=True, text=True, check=False, timeout=600
+    )
     if "no such level" in done.stderr:
         pytest.skip(f"this processor has no {level}")
     summary = done.stdout.splitlines()[-1] if done.stdout else done.stderr

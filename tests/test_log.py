@@ -36,7 +36,8 @@ def test_what_is_made_is_said_once(caplog):
     told = [record.getMessage() for record in caplog.records if "kernel" not in record.getMessage()]
     for words in (
         "support tree of a hull of 400 points made", "convex hull of 400 points made",
-        f"box-tree of a mesh of {len(mesh.faces)} facets made", f"convex hull around a mesh of {len(mesh.faces)} facets made",
+        f"box-tree of a mesh of {len(mesh.faces)} facets made",
+        f"convex hull around a mesh of {len(mesh.faces)} facets made",
         "tables and box-tree of a World of 2 bodies made",
     ):  # fmt: skip
         assert sum(line.startswith(f"{words}: ") and line.endswith(" s") for line in told) == 1, (words, told)
@@ -45,5 +46,9 @@ def test_what_is_made_is_said_once(caplog):
 
 def test_quiet_unless_asked():
     for options, said in (((), False), (("info",), True)):
-        done = subprocess.run([sys.executable, "-c", PROGRAM, *options], capture_output=True, text=True, check=True, timeout=300)
-        assert ("INFO:collide:support tree of a hull of 400 points made: " in done.stderr) == said and bool(done.stderr) == said, done.stderr
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *options], capture_output=True, text=True, check=True, timeout=300
+        )
+        assert ("INFO:collide:support tree of a hull of 400 points made: " in done.stderr) == said and bool(
+            done.stderr
+        ) == said, done.stderr

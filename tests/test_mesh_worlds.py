@@ -31,7 +31,9 @@ def build(rng, n, spread):
     world, kinds = collide.World(), shapes(rng)
     for k in range(n):
         static, group = bool(rng.random() < 0.2), int(rng.integers(1, 4))
-        world.add(kinds[k % len(kinds)], random_pose(rng, spread), static=static, group=group, mask=int(rng.integers(1, 8)))
+        world.add(
+            kinds[k % len(kinds)], random_pose(rng, spread), static=static, group=group, mask=int(rng.integers(1, 8))
+        )
     world.allow(0, 1, reason="bolted")
     return world
 
@@ -122,7 +124,8 @@ def test_boxes_of_posed_meshes_hold_them_and_are_tight():
     rng = rng_of("mesh boxes")
     scattered = rng.normal(size=(900, 3)) * (1.0, 1e-3, 100.0)
     for vertices, faces, most in (
-        (*bumpy_sphere(5000), 1.6), (*torus(60, 20), 1.6), (*block_ring(), 1.0), (scattered, np.arange(900).reshape(-1, 3), 2.0),
+        (*bumpy_sphere(5000), 1.6), (*torus(60, 20), 1.6), (*block_ring(), 1.0),
+        (scattered, np.arange(900).reshape(-1, 3), 2.0),
         (np.vstack([bumpy_sphere(3000)[0], [[1e9, 0, 0]]]), bumpy_sphere(3000)[1], 1.6),
     ):  # fmt: skip
         mesh = collide.Mesh(vertices, faces)

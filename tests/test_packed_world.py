@@ -1,4 +1,5 @@
-"""What a World keeps between questions: tables of bodies that stay, statistics until somebody asks; and what copies share."""
+"""What a World keeps between questions: tables of bodies that stay, statistics until somebody asks; and what copies
+share."""
 
 from __future__ import annotations
 
@@ -127,9 +128,28 @@ def test_bodies_are_named_by_integers_or_names():
     world = collide.World()
     for k in range(3):
         world.add(collide.Sphere(1), pose(t=(k, 0, 0)), name=f"ball {k}")
-    wrong = [1.9, 1.0, float("inf"), float("nan"), np.float64(1.0), None, True, np.True_, (1,), np.ones(2), [1], 10**400, b"ball 1"]
+    wrong = [
+        1.9,
+        1.0,
+        float("inf"),
+        float("nan"),
+        np.float64(1.0),
+        None,
+        True,
+        np.True_,
+        (1,),
+        np.ones(2),
+        [1],
+        10**400,
+        b"ball 1",
+    ]
     for body in wrong:
-        for ask in (world.remove, world.body, lambda body: world.set_pose(body, EYE), lambda body: world.allow(body, 2)):
+        for ask in (
+            world.remove,
+            world.body,
+            lambda body: world.set_pose(body, EYE),
+            lambda body: world.allow(body, 2),
+        ):
             with pytest.raises(UnknownBody):
                 ask(body)
     assert len(world) == 3
@@ -169,7 +189,9 @@ def test_equal_answers_are_equal_bytes_whatever_memory_held_before():
         union = next(shape for shape in shapes if isinstance(shape, collide.Compound))
         rows = [world.distances(0.5).rows, world.collisions().rows, world.query(box, EYE, 0.3).rows]
         rows += [rows[0][::2], rows[0][rows[0]["hit"]], np.concatenate(rows), rows[0][:3].copy(), rows[0][[0, 1]]]
-        rows += [collide.distance(A, B, EYE, X_WB, signed=False).rows for A in (box, mesh, union) for B in (box, mesh, union)]
+        rows += [
+            collide.distance(A, B, EYE, X_WB, signed=False).rows for A in (box, mesh, union) for B in (box, mesh, union)
+        ]
         rows += [collide.distance(A, box, EYE, X_WB[1], max_distance=0.2).rows for A in (box, mesh, union)]
         lists = collide.distance(plain, plain[::-1], X_WA[: len(plain)], X_WB[: len(plain)], signed=False)
         rows += [lists.rows, lists[2:5].rows, lists[3].rows]

@@ -17,7 +17,11 @@ from collide.transforms import pose
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 DEMO = next(
-    (folder for base in site.getsitepackages() if (folder := Path(base) / "cmeel.prefix/share/example-robot-data/robots").is_dir()),
+    (
+        folder
+        for base in site.getsitepackages()
+        if (folder := Path(base) / "cmeel.prefix/share/example-robot-data/robots").is_dir()
+    ),
     None,
 )
 
@@ -114,7 +118,9 @@ def test_renamed_keeps_the_kinematics():
     other = robot.renamed("left_")
     assert other.joint_names == ("left_turn", "left_slide") and other.states == {"up": {"left_turn": 0.5}}
     assert np.array_equal(other.link_poses([0.5, 0.2]), robot.link_poses([0.5, 0.2]))
-    assert [(a, b) for a, b, _ in other.disabled_pairs] == [("left_" + a, "left_" + b) for a, b, _ in robot.disabled_pairs]
+    assert [(a, b) for a, b, _ in other.disabled_pairs] == [
+        ("left_" + a, "left_" + b) for a, b, _ in robot.disabled_pairs
+    ]
 
 
 # --- configurations -------------------------------------------------------------------------------
@@ -161,7 +167,11 @@ def test_refused_values(values, message):
 
 @pytest.mark.parametrize(
     ("q", "message"),
-    [([1.0], r"one column for each of turn, slide; got \(1,\)"), ([math.nan, 0], r"q\[0\], joint turn, is nan"), ("up", "must be numbers")],
+    [
+        ([1.0], r"one column for each of turn, slide; got \(1,\)"),
+        ([math.nan, 0], r"q\[0\], joint turn, is nan"),
+        ("up", "must be numbers"),
+    ],
 )
 def test_refused_configurations(q, message):
     with pytest.raises(InvalidArgument, match=message):
@@ -178,15 +188,30 @@ def test_refused_configurations(q, message):
         (["a", "b"], [], r"2 links have no parent \(a, b\)"),
         (["a"], [Joint("j", "fixed", "a", "z")], 'joint "j": its child is link "z", which the robot does not have'),
         (["a", "b"], [Joint("j", "glide", "a", "b")], 'joint "j": unknown type "glide"; known are revolute'),
-        (["a", "b", "c"], [Joint("j", "fixed", "a", "c"), Joint("k", "fixed", "b", "c")], 'joint "k": link "c" has two parents'),
-        (["r", "a", "b"], [Joint("j", "fixed", "a", "b"), Joint("k", "fixed", "b", "a")], "the joints make a cycle, .*a.*b"),
+        (
+            ["a", "b", "c"],
+            [Joint("j", "fixed", "a", "c"), Joint("k", "fixed", "b", "c")],
+            'joint "k": link "c" has two parents',
+        ),
+        (
+            ["r", "a", "b"],
+            [Joint("j", "fixed", "a", "b"), Joint("k", "fixed", "b", "a")],
+            "the joints make a cycle, .*a.*b",
+        ),
         (["a"], [Joint("j", "fixed", "a", "a")], "cycle, a -> a"),
-        (["a", "b"], [Joint("j", "revolute", "a", "b", axis=(0, 0, 0))], r'joint "j": axis \[0.0, 0.0, 0.0\] has length 0'),
+        (
+            ["a", "b"],
+            [Joint("j", "revolute", "a", "b", axis=(0, 0, 0))],
+            r'joint "j": axis \[0.0, 0.0, 0.0\] has length 0',
+        ),
         (["a", "b"], [Joint("j", "revolute", "a", "b", mimic=Mimic("j", np.inf))], 'joint "j" mimic: multiplier inf'),
         (
             ["a", "b", "c", "d"],
-            [Joint("j", "revolute", "a", "b"), Joint("k", "revolute", "b", "c", mimic=Mimic("j", 1e200)),
-             Joint("l", "revolute", "c", "d", mimic=Mimic("k", 1e200))],
+            [
+                Joint("j", "revolute", "a", "b"),
+                Joint("k", "revolute", "b", "c", mimic=Mimic("j", 1e200)),
+                Joint("l", "revolute", "c", "d", mimic=Mimic("k", 1e200)),
+            ],
             'joint "l" mimic: along the chain to joint "j" its multiplier becomes inf',
         ),
         ([], [], "no links"),
@@ -200,7 +225,10 @@ def test_refused_trees(links, joints, message):
 def chain(*mimics: Mimic | None, kind: str = "revolute", **options) -> Robot:
     """A chain of joints j0, j1, ... about z, each 1 m above the last."""
     up = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]])
-    joints = [Joint(f"j{k}", kind, f"l{k}", f"l{k + 1}", up, np.array([1.0, 0, 0]), -2.0, 2.0, mimic) for k, mimic in enumerate(mimics)]
+    joints = [
+        Joint(f"j{k}", kind, f"l{k}", f"l{k + 1}", up, np.array([1.0, 0, 0]), -2.0, 2.0, mimic)
+        for k, mimic in enumerate(mimics)
+    ]
     return Robot("arm", [f"l{k}" for k in range(len(mimics) + 1)], joints, **options)
 
 
@@ -209,7 +237,11 @@ def chain(*mimics: Mimic | None, kind: str = "revolute", **options) -> Robot:
     [
         ((None, Mimic("gone", 2.0)), ("j0", "j1"), {"j1": 'it mimics joint "gone", which does not exist'}),
         ((Mimic("j0"), None), ("j0", "j1"), {"j0": "joints mimic each other in a circle, j0 -> j0"}),
-        ((Mimic("j1"), Mimic("j2"), Mimic("j0"), Mimic("j2", -1.0, 0.5)), ("j0", "j1", "j2"), dict.fromkeys(("j0", "j1", "j2"), "in a circle")),
+        (
+            (Mimic("j1"), Mimic("j2"), Mimic("j0"), Mimic("j2", -1.0, 0.5)),
+            ("j0", "j1", "j2"),
+            dict.fromkeys(("j0", "j1", "j2"), "in a circle"),
+        ),
     ],
 )
 def test_a_broken_mimic_joint_is_a_joint_of_its_own_and_noted(mimics, free, why):
@@ -217,7 +249,9 @@ def test_a_broken_mimic_joint_is_a_joint_of_its_own_and_noted(mimics, free, why)
     assert robot.joint_names == free and robot.notes[0] == "first" and len(robot.notes) == 1 + len(why)
     for note in robot.notes[1:]:
         joint = note.split('"')[1]
-        assert note.startswith(f'arm.urdf: joint "{joint}": ') and why.pop(joint) in note and "a joint of its own" in note
+        assert (
+            note.startswith(f'arm.urdf: joint "{joint}": ') and why.pop(joint) in note and "a joint of its own" in note
+        )
     q, notes = robot.configuration({name: 0.25 for name in free})
     assert notes == [] and robot.joint_value(free[-1], q) == 0.25
     if len(mimics) == 4:
@@ -233,10 +267,16 @@ def test_a_planar_joint_cannot_follow():
 def test_links_that_leave_the_range_of_poses_are_named():
     """By a mimic's multiplier, by values, by origins: an error with file, link and joint, and no warning of numpy's."""
     robot = chain(None, Mimic("j0", 1e308), kind="revolute", sources=["a.urdf"])
-    with pytest.raises(InvalidPose, match=r'^a\.urdf: robot arm: link "l2" stands at .*joint "j1", which follows j0, and at its value = inf'):
+    with pytest.raises(
+        InvalidPose,
+        match=r'^a\.urdf: robot arm: link "l2" stands at .*joint "j1", which follows j0, and at its value = inf',
+    ):
         robot.link_poses([[0.0], [100.0]])
     robot = chain(None, None, kind="prismatic")
-    with pytest.raises(InvalidPose, match=r'robot arm: link "l1" stands at \[1e\+60, 0\.0, 1\.0\].*joint "j0" and at its value = 1e\+60'):
+    with pytest.raises(
+        InvalidPose,
+        match=r'robot arm: link "l1" stands at \[1e\+60, 0\.0, 1\.0\].*joint "j0" and at its value = 1e\+60',
+    ):
         robot.link_poses([1e60, 1.0])
     far = np.eye(4)
     far[0, 3] = 7e49
@@ -305,7 +345,14 @@ def test_long_chains_need_no_recursion():
 
 def urdf_files() -> list[Path]:
     files = sorted((SHARED / "robots").glob("*/*.urdf")) if SHARED.is_dir() else []
-    names = ("panda_description", "ur_description", "talos_data", "tiago_description", "pr2_description", "allegro_hand_description")
+    names = (
+        "panda_description",
+        "ur_description",
+        "talos_data",
+        "tiago_description",
+        "pr2_description",
+        "allegro_hand_description",
+    )
     for name in names if DEMO else ():
         files += sorted((DEMO / name).rglob("*.urdf"))[:2]
     return files

@@ -28,7 +28,8 @@ from collide import (
 
 EYE = np.eye(4)
 SHAPES = [
-    Box(1, 1, 1), Sphere(0.5), Capsule(0.3, 1.0), Cylinder(0.5, 1.0), Ellipsoid(0.5, 0.4, 0.3), ConvexHull(np.eye(3), radius=0.1),
+    Box(1, 1, 1), Sphere(0.5), Capsule(0.3, 1.0), Cylinder(0.5, 1.0), Ellipsoid(0.5, 0.4, 0.3),
+    ConvexHull(np.eye(3), radius=0.1),
     Mesh(*surfaces.box()), Compound([(Box(1, 1, 1), pose((1, 0, 0))), (Sphere(0.5), EYE)]),
 ]  # fmt: skip
 
@@ -74,14 +75,17 @@ def test_a_margin_of_exactly_the_gap(gap):
 
 
 def test_turned_boxes_at_a_margin_of_their_gap():
-    """Where the gap is no double, margins on either side of its bracket and within it agree with integers on a grown box."""
+    """Where the gap is no double, margins on either side of its bracket and within it agree with integers on a grown
+    box."""
     open_ones = 0
     for X in poses(60, seed=2):
         r = collide.distance(Box(1, 1, 1), Box(1, 1, 1), EYE, X)
         if r.hit:
             continue
         for margin in {r.lower, r.distance, r.upper}:
-            grown = ConvexHull([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)], radius=margin)
+            grown = ConvexHull(
+                [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)], radius=margin
+            )
             expected = collide.collide(grown, Box(1, 1, 1), EYE, X)
             assert collide.collide(Box(1, 1, 1), Box(1, 1, 1), EYE, X, security_margin=margin) is expected
             open_ones += r.lower < r.upper
@@ -100,7 +104,10 @@ def test_lists_picks_threads_and_half_spaces():
     assert collide.collide(floor, Sphere(0.5), EYE, pose((0, 0, 0.75)), security_margin=0.25) is True
     below = float(np.nextafter(0.25, 0))
     assert collide.collide(floor, Box(1, 1, 1), EYE, pose((0, 0, 0.75)), security_margin=below) is False
-    for A, B in ((Sphere(0.5), Sphere(0.5)), (Capsule(0.25, 1), Sphere(0.75))):  # the radii and the margin have no sum in doubles
+    for A, B in (
+        (Sphere(0.5), Sphere(0.5)),
+        (Capsule(0.25, 1), Sphere(0.75)),
+    ):  # the radii and the margin have no sum in doubles
         assert collide.collide(A, B, EYE, pose((1.25, 0, 0)), security_margin=below) is False
         assert collide.collide(A, B, EYE, pose((1.25, 0, 0)), security_margin=0.25) is True
     assert collide.collide(floor, floor, EYE, pose(rpy=(0.1, 0, 0)), security_margin=0.1) is True
@@ -109,7 +116,10 @@ def test_lists_picks_threads_and_half_spaces():
 @pytest.mark.parametrize("margin", [-1.0, np.nan, np.inf, "0.1", None, 1e60, 1e-60, 10**400, [0.1], np.ones(2), 1j])
 def test_margins_that_are_none(margin):
     world = World()
-    for ask in (lambda: collide.collide(SHAPES[0], SHAPES[1], EYE, EYE, security_margin=margin), lambda: world.collides(security_margin=margin)):
+    for ask in (
+        lambda: collide.collide(SHAPES[0], SHAPES[1], EYE, EYE, security_margin=margin),
+        lambda: world.collides(security_margin=margin),
+    ):
         with pytest.raises(InvalidArgument, match="security_margin"):
             ask()
 

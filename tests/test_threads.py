@@ -107,7 +107,9 @@ def test_lists_with_meshes_and_unions_give_the_same_bits_in_threads(monkeypatch)
     A, B = ([shapes[k] for k in rng.integers(len(shapes), size=n)] for _ in range(2))
     X_WA, X_WB = (np.array([random_pose(rng, 1.2) for _ in range(n)]) for _ in range(2))
     share = workers._Rest.share
-    monkeypatch.setattr(workers._Rest, "share", lambda self, *given: used.add(threading.get_ident()) or share(self, *given))
+    monkeypatch.setattr(
+        workers._Rest, "share", lambda self, *given: used.add(threading.get_ident()) or share(self, *given)
+    )
     hits = collide.collide(A, B, X_WA, X_WB)
     assert 20 < hits.sum() < 180 and not used
     one = collide.distance(A, B, X_WA, X_WB, signed=False)
@@ -124,7 +126,11 @@ def test_lists_with_meshes_and_unions_give_the_same_bits_in_threads(monkeypatch)
             collide.collide(A, B, X_WA, X_WB, threads=threads)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 10**400, -(10**5000), True, 1.0, 2.5, "2", None, np.ones(2), float("inf")], ids=lambda value: type(value).__name__)
+@pytest.mark.parametrize(
+    "threads",
+    [0, -1, 10**400, -(10**5000), True, 1.0, 2.5, "2", None, np.ones(2), float("inf")],
+    ids=lambda value: type(value).__name__,
+)
 def test_numbers_of_threads_that_are_none_are_refused(threads):
     box, many = collide.Box((1, 1, 1)), np.tile(EYE, (3, 1, 1))
     collide.collide(box, box, EYE, EYE)  # prepared for single calls

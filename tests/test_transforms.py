@@ -43,7 +43,9 @@ def test_ordinary_quaternions_keep_their_bits():
         assert np.array_equal(pose(quat_xyzw=np.roll(q, -1)), pose(quat_wxyz=q))
 
 
-@pytest.mark.parametrize("q", [(0, 0, 0, 0), (np.nan, 0, 0, 1), (np.inf, 0, 0, 0), (1, 0, 0, 10**400), (1, 0, 0, 1j), ("1", 0, 0, 0)])
+@pytest.mark.parametrize(
+    "q", [(0, 0, 0, 0), (np.nan, 0, 0, 1), (np.inf, 0, 0, 0), (1, 0, 0, 10**400), (1, 0, 0, 1j), ("1", 0, 0, 0)]
+)
 def test_quaternions_that_are_none(q):
     for name in ("quat_wxyz", "quat_xyzw"):
         with pytest.raises(InvalidPose, match="quat"):

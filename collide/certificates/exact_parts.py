@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import parts_of
 from collide.numerics.exact_points import Point, cross, inner, moved, on_one_grid, placed
 
 IDENTITY = np.eye(4)
@@ -52,7 +53,7 @@ class ExactPart:
 
 def exact_parts(shape, X_WB: np.ndarray) -> list[ExactPart]:
     """The convex parts of a shape at a pose (4, 4), in their order."""
-    return [exact_part(packed, X_WB, X_BP) for packed, X_BP in shape.parts()]
+    return [exact_part(packed, X_WB, X_BP) for packed, X_BP in parts_of(shape)]
 
 
 def exact_part(packed: PackedConvex, X_WB: np.ndarray, X_BP: np.ndarray = IDENTITY) -> ExactPart:

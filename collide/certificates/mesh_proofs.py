@@ -11,6 +11,7 @@ from collide.certificates.convex_proofs import flaw_of_plane_proof, flaw_of_proo
 from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, has_exact_numbers
 from collide.certificates.winding_number import winding_number
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.parts import parts_of
 from collide.numerics.exact_points import minus, on_one_grid, placed
 
 
@@ -29,7 +30,7 @@ class ProofBody:
         if self.is_mesh:
             self.vertex_ids, self.has_certificates = np.unique(shape.faces), True
             return
-        parts = [] if shape.meshed else shape.parts()
+        parts = [] if shape.meshed else parts_of(shape)
         if parts:
             packed, X_BP = parts[0]
             self.kind, self._part = packed.kind, exact_part(packed, X)

@@ -14,6 +14,7 @@ from collide.contact.contact_rows import Contacts, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.mesh_contacts import surface_contacts
 from collide.errors import InvalidArgument
+from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_bodies import Question
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.shapes.compound import Compound
@@ -143,7 +144,7 @@ def _parts(shape: Shape, X: np.ndarray) -> list[tuple[Shape, np.ndarray, float]]
 
 
 def _reach(shape: Shape) -> float:
-    parts = shape.bounding_parts()
+    parts = bounding_parts_of(shape)
     return max(4.0 * (part.reach + part.radius) + float(np.abs(X[:3, 3]).sum()) for part, X in parts)
 
 

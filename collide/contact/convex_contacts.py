@@ -20,6 +20,7 @@ from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import body_of, hull_of
 from collide.lowering.packed_convex import CONE, CYLINDER, HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import convex_set_of
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.facets.facet_queries import NearPairs
 from collide.shapes.shape import Shape
@@ -36,7 +37,7 @@ _ERRORS = 64.0
 
 def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     """Rows for two shapes that are one convex set each, at single poses (4, 4). Raises UnsupportedQuery."""
-    packed_a, packed_b = A.parts()[0][0], B.parts()[0][0]
+    packed_a, packed_b = convex_set_of(A), convex_set_of(B)
     if HALFSPACE in (packed_a.kind, packed_b.kind) and packed_a.kind != packed_b.kind:
         if packed_a.kind == HALFSPACE:
             return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
@@ -81,16 +82,16 @@ def _ordered(
 def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     """Rows for a half-space A and anything but one: corners of B within the margin of the plane, or below it."""
     body = hull_of(body_of(B)) if B.meshed else B
-    packed = body.parts()[0][0]
+    packed = convex_set_of(body)
     row = _answer(A, body, X_WA, X_WB, margin)
     if row is None:
         return no_rows()
     n = row["normal"].copy()
     origin = row["point_a"]
-    error = _error(A.parts()[0][0], X_WA, packed, X_WB) + 8.0 * _U * float(np.abs(origin).max())
+    error = _error(convex_set_of(A), X_WA, packed, X_WB) + 8.0 * _U * float(np.abs(origin).max())
     shift = X_WB[:3, 3] - origin
     facets = np.array([[-1, -1]])
-    points = _nearest(row, A.parts()[0][0], packed, n, origin)
+    points = _nearest(row, convex_set_of(A), packed, n, origin)
     if packed.kind == POINTS:
         corners, numbers = _corners_of(B, packed)
         low = rotated(X_WB[:3, :3], corners) + shift

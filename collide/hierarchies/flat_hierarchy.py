@@ -20,7 +20,7 @@ _FEWEST = 4
 
 
 class FlatHierarchy(NamedTuple):
-    """The fields of `geometry.hierarchies.hierarchy.Hierarchy` that the walk reads."""
+    """The fields of `hierarchy.Hierarchy` that the walk reads."""
 
     points: np.ndarray
     birth: np.ndarray
@@ -89,12 +89,12 @@ def _corners(points: np.ndarray, hull: Hull) -> np.ndarray:
     while following[cycle[-1]] != cycle[0]:
         cycle.append(following[cycle[-1]])
     order = np.array(cycle)
-    before, own, after = points[np.roll(order, 1)], points[order], points[np.roll(order, -1)]
-    one, other = own - before, after - own
-    bend = np.abs(np.cross(one, other)).max(axis=1)
-    doubtful = ~(bend > 1e-10 * np.abs(one).max(axis=1) * np.abs(other).max(axis=1))
+    before, here, after = points[np.roll(order, 1)], points[order], points[np.roll(order, -1)]
+    into, out = here - before, after - here
+    bend = np.abs(np.cross(into, out)).max(axis=1)
+    doubtful = ~(bend > 1e-10 * np.abs(into).max(axis=1) * np.abs(out).max(axis=1))
     for k in np.flatnonzero(doubtful).tolist():
-        doubtful[k] = _in_line(before[k], own[k], after[k])
+        doubtful[k] = _in_line(before[k], here[k], after[k])
     return order[~doubtful]
 
 

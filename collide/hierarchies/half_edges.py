@@ -2,10 +2,12 @@
 
 Half-edge h = 3 t + e runs from corner e of triangle t to the next one, counter-clockwise seen
 from outside. ``corners[h]`` is where it starts, ``twins[h]`` the half-edge that runs back,
-``leaving[v]`` one that starts at vertex v. Triangles without use are chained through ``twins`` from ``state[FREE]``.
+``leaving[v]`` one that starts at vertex v. Free triangles are chained through ``twins`` from ``state[FREE]``.
 """
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,15 @@ from collide.kernels import kernel
 
 #: Places in the state: first free triangle or −1, triangles ever used.
 FREE, USED = 0, 1
+
+
+class HalfEdges(NamedTuple):
+    """A changing surface in kernels.   state : FREE, USED, and what `independent_sets` adds."""
+
+    corners: Any
+    twins: Any
+    leaving: Any
+    state: Any
 
 
 @kernel
@@ -28,15 +39,15 @@ def preceding(h):
 
 
 @kernel
-def new_triangle(mesh, state, a, b, c):
+def new_triangle(mesh, a, b, c):
     """First half-edge of a triangle a, b, c without neighbours."""
-    corners, twins, leaving = mesh
-    t = state[FREE]
+    corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
+    t = mesh.state[FREE]
     if t >= 0:
-        state[FREE] = twins[3 * t]
+        mesh.state[FREE] = twins[3 * t]
     else:
-        t = state[USED]
-        state[USED] += 1
+        t = mesh.state[USED]
+        mesh.state[USED] += 1
     h = 3 * t
     corners[h] = a
     corners[h + 1] = b
@@ -48,26 +59,25 @@ def new_triangle(mesh, state, a, b, c):
 
 
 @kernel
-def drop_triangle(mesh, state, t):
-    corners, twins, _ = mesh
+def drop_triangle(mesh, t):
+    corners, twins = mesh.corners, mesh.twins
     corners[3 * t] = -1
-    twins[3 * t] = state[FREE]
-    state[FREE] = t
+    twins[3 * t] = mesh.state[FREE]
+    mesh.state[FREE] = t
 
 
 @kernel
 def join(mesh, g, h):
     """Make two half-edges each other's twins."""
-    twins = mesh[1]
-    twins[g] = h
-    twins[h] = g
+    mesh.twins[g] = h
+    mesh.twins[h] = g
 
 
 @kernel
 def read_ring(mesh, v, ring, outer):
     """Degree of v; its neighbours counter-clockwise, and the half-edges beyond the rim: outer[k] runs from
     ring[k + 1] to ring[k]."""
-    corners, twins, leaving = mesh
+    corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
     first = leaving[v]
     h = first
     k = 0
@@ -81,21 +91,21 @@ def read_ring(mesh, v, ring, outer):
 
 
 @kernel
-def drop_star(mesh, state, v):
+def drop_star(mesh, v):
     """Free all triangles at v; their rim is left without neighbours."""
-    _, twins, leaving = mesh
+    twins, leaving = mesh.twins, mesh.leaving
     first = leaving[v]
     h = first
     while True:
         after = twins[preceding(h)]
-        drop_triangle(mesh, state, h // 3)
+        drop_triangle(mesh, h // 3)
         h = after
         if h == first:
             return
 
 
 @kernel
-def plan_hole(cloud, centres, ring, start, count, plan, stack):
+def plan_hole(cloud, ring, start, count, plan, stack):
     """Triangles of the convex surface over a ring of count ≥ 3 vertices, seen from where they run counter-clockwise.
 
     ring[start : start + count] in convex position, its edges and their chain on a convex body: the
@@ -116,7 +126,7 @@ def plan_hole(cloud, centres, ring, start, count, plan, stack):
         a = ring[start + i]
         c = ring[start + j]
         for m in range(i + 2, j):
-            sign = side(cloud, centres, a, ring[start + k], c, ring[start + m])
+            sign = side(cloud, a, ring[start + k], c, ring[start + m])
             if sign == 0:
                 return False
             if sign > 0:
@@ -125,7 +135,7 @@ def plan_hole(cloud, centres, ring, start, count, plan, stack):
         plan[3 * made + 1] = k
         plan[3 * made + 2] = j
         made += 1
-        # The longer chain waits: the stack stays short.
+        # The longer chain is pushed first: the stack stays short.
         if k - i >= j - k:
             depth = push(stack, depth, i, k)
             depth = push(stack, depth, k, j)
@@ -145,41 +155,41 @@ def push(stack, depth, i, j):
 
 
 @kernel
-def fill_hole(mesh, state, ring, start, count, outer, plan, waiting):
+def fill_hole(mesh, ring, start, count, outer, plan, open_edges):
     """Put the planned triangles in; outer[start + k] is the half-edge that is to be twin of ring k → k + 1.
 
-    waiting : room for ``count`` places: the half-edge from ring[i] to a farther ring vertex that still has no twin.
+    open_edges : ``count`` places: the half-edge from ring[i] to a farther ring vertex that still has no twin.
     """
     for made in range(count - 2):
         i = plan[3 * made]
         k = plan[3 * made + 1]
         j = plan[3 * made + 2]
-        h = new_triangle(mesh, state, ring[start + i], ring[start + k], ring[start + j])
+        h = new_triangle(mesh, ring[start + i], ring[start + k], ring[start + j])
         if made == 0:
             join(mesh, h + 2, outer[start + count - 1])
         else:
-            # The chains (i, j) that wait are nested or apart, and the one planned next ends where another begins:
+            # The chains (i, j) on the stack are nested or apart, and the one planned next ends where another begins:
             # its first place names it.
-            join(mesh, h + 2, waiting[i])
+            join(mesh, h + 2, open_edges[i])
         if k == i + 1:
             join(mesh, h, outer[start + i])
         else:
-            waiting[i] = h
+            open_edges[i] = h
         if j == k + 1:
             join(mesh, h + 1, outer[start + k])
         else:
-            waiting[k] = h + 1
+            open_edges[k] = h + 1
 
 
 @kernel
 def degree_of(mesh, v):
     """Degree of a vertex."""
-    _, twins, leaving = mesh
+    twins, leaving = mesh.twins, mesh.leaving
     first = np.int64(leaving[v])
     h = first
-    many = 0
+    degree = 0
     while True:
-        many += 1
+        degree += 1
         h = np.int64(twins[preceding(h)])
         if h == first:
-            return many
+            return degree

@@ -4,7 +4,7 @@
 
 Barba, Langerman, "Optimal detection of intersections between convex polyhedra", section 4: properties A1–A5
 and B1–B5. Levels count from 0 here: level 0 is P_1. Each level loses an independent set of vertices; in a bounded
-hierarchy, vertices of too large a degree are cut off (`cutting`), and their cut adds vertices, inside the hull.
+hierarchy, vertices of too large a degree are cut off (`vertex_cutting`), and their cut adds vertices, inside the hull.
 
 What the walk needs is Lemma 4.2 in this form: if level i + 1 lies in the closed half-space H⁺ and
 touches its plane in a vertex v, then at most one vertex of level i is strictly outside, and it is one of
@@ -48,7 +48,7 @@ LEAST_BOUND = 12
 class Hierarchy(NamedTuple):
     """Levels of polyhedra by rows of ``points``; v's data at a level stand in row ``row[v] + level - birth[v]``.
 
-    points : (N, 3) float64, those given, then vertices that cuts added, rounded into the level before.
+    points : (N, 3) float64, of the body, then vertices that cuts added, rounded into the level before.
     degree_bound : c, or 0 where degrees are not bounded.
     birth, last : (N,) int32, first and last level that has the vertex; −1 for a point in no level.
     parent : (N,) int32, for an added vertex the one that was cut off; else −1.
@@ -108,13 +108,14 @@ class Hierarchy(NamedTuple):
 
     def triangles(self, level: int) -> np.ndarray:
         """(f, 3) int32 triangles of a level, counter-clockwise seen from outside, each from its lowest corner."""
-        found = []
+        triangles = []
         for v in self.vertices(level).tolist():
             ring = self.neighbours_of(v, level)
             after = np.roll(ring, -1)
-            own = (ring > v) & (after > v)
-            found.append(np.stack([np.full(own.sum(), v, dtype=np.int32), ring[own], after[own]], axis=1))
-        return np.concatenate(found)
+            lowest = (ring > v) & (after > v)
+            corners = np.full(lowest.sum(), v, dtype=np.int32), ring[lowest], after[lowest]
+            triangles.append(np.stack(corners, axis=1))
+        return np.concatenate(triangles)
 
 
 def build_hierarchy(points: np.ndarray, hull: Hull, degree_bound: int = DEGREE_BOUND) -> Hierarchy:
@@ -122,7 +123,7 @@ def build_hierarchy(points: np.ndarray, hull: Hull, degree_bound: int = DEGREE_B
 
     degree_bound : c ≥ 12, what no degree exceeds from level 1 on (B3); 0 for a plain Dobkin-Kirkpatrick hierarchy.
         Neighbours of large degree are cut one level after the other, so the first few levels may still have some.
-        So may levels of hulls whose edges differ in length by ten orders of magnitude, see `cutting`.
+        So may levels of hulls whose edges differ in length by ten orders of magnitude, see `vertex_cutting`.
 
     Near-linear on most hulls, O(n log n). Quadratic on curves of unevenly spaced vertices that are all neighbours of two
     (a moment curve at logarithmic steps: 4 s for 10,000 vertices): what replaces a cut vertex is then wrapped at O(k) a
@@ -138,7 +139,7 @@ def build_hierarchy(points: np.ndarray, hull: Hull, degree_bound: int = DEGREE_B
 
 
 def hierarchy_of(cloud: Cloud, facets: Facets, degree_bound: int) -> Hierarchy:
-    """The hierarchy above a closed surface as `facets.true_facets` makes it."""
+    """The hierarchy above a closed surface as `true_facets.true_facets` makes it."""
     building = _Building(cloud, facets, degree_bound)
     while True:
         building.keep_level()
@@ -165,7 +166,7 @@ class _Building:
         self.blocked = np.zeros(len(self.leaving), dtype=np.int32)
         self.seen = np.full(len(triangles), -1, dtype=np.int32)
         self.parent = np.full(len(self.leaving), -1, dtype=np.int32)
-        self.kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.levels: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
     @property
     def _mesh(self) -> tuple[int, int, int, int, int]:
@@ -182,7 +183,7 @@ class _Building:
         write_level(
             *self._mesh, address_of(self.vertices), len(self.vertices), address_of(start), address_of(neighbours)
         )
-        self.kept.append((self.vertices, start, neighbours))
+        self.levels.append((self.vertices, start, neighbours))
 
     def next_level(self) -> None:
         """Cut off vertices of too large degree, none beside another, then remove others."""
@@ -201,12 +202,12 @@ class _Building:
         self.vertices = np.flatnonzero(self.leaving >= 0).astype(np.int32)
 
     def _thin(self, bound: int) -> None:
-        most = int(min(bound, self.degree.max()))
+        max_degree = int(min(bound, self.degree.max()))
         order = np.empty(len(self.vertices), dtype=np.int32)
-        scratch = np.empty(8 * most, dtype=np.int64)
+        scratch = np.empty(8 * max_degree, dtype=np.int64)
         thin(
             *self.cloud.addresses, self.cloud.count, *self._mesh[:4], address_of(self.vertices), len(self.vertices),
-            address_of(self.degree), address_of(self.blocked), address_of(order), bound, most, address_of(scratch),
+            address_of(self.degree), address_of(self.blocked), address_of(order), bound, max_degree, address_of(scratch),
             address_of(self.state),
         )  # fmt: skip
 
@@ -216,7 +217,7 @@ class _Building:
         if not len(large):
             return
         sizes = self.degree[large].astype(np.int64)
-        self._make_room(int(sizes.sum()) + 1)
+        self._reserve(int(sizes.sum()) + 1)
         scratch = np.empty(SCRATCH * int(sizes.max()), dtype=np.int64)
         for w in large[np.argsort(-sizes, kind="stable")].tolist():
             if self.blocked[w]:
@@ -224,21 +225,21 @@ class _Building:
             # Neighbours of a cut stay. Where they lie in one plane with the other anchors, new vertices must come.
             free = self._replace_anchor(w, self._neighbours(w))
             first = self.cloud.used
-            many = cut(
+            n_new = cut(
                 *self.cloud.addresses, self.cloud.exponent, self.cloud.count, *self._mesh[:4],
                 address_of(self.seen), address_of(self.degree), address_of(self.blocked), w, first, free,
                 address_of(scratch), address_of(self.state),
             )  # fmt: skip
-            if many < 0:
+            if n_new < 0:
                 continue
-            self.parent[first : first + many] = w
-            self.cloud.used += many
+            self.parent[first : first + n_new] = w
+            self.cloud.used += n_new
             self.state[REMOVED] += 1
-            self._replace_anchor(w, np.arange(first, first + many))
+            self._replace_anchor(w, np.arange(first, first + n_new))
 
-    def _make_room(self, added: int) -> None:
+    def _reserve(self, added: int) -> None:
         """Rows for that many more vertices, and triangles for them; each takes two."""
-        self.cloud.make_room(self.cloud.used + added)
+        self.cloud.reserve(self.cloud.used + added)
         more = len(self.cloud.scaled) - len(self.leaving)
         if more > 0:
             self.leaving = np.concatenate([self.leaving, np.full(more, -1, dtype=np.int32)])
@@ -256,15 +257,15 @@ class _Building:
         anchors = self.state[ANCHORS : ANCHORS + 4]
         if w not in anchors:
             return True
-        others = [int(v) for v in anchors if v != w]
-        found = first_off_plane(*self.cloud.addresses, *others, address_of(candidates), len(candidates))
-        if found >= 0:
-            anchors[anchors == w] = found
-        return found >= 0
+        remaining = [int(v) for v in anchors if v != w]
+        v = first_off_plane(*self.cloud.addresses, *remaining, address_of(candidates), len(candidates))
+        if v >= 0:
+            anchors[anchors == w] = v
+        return v >= 0
 
     def _neighbours(self, w: int) -> np.ndarray:
-        """Of a vertex, at the level last kept."""
-        vertices, start, neighbours = self.kept[-1]
+        """Of a vertex, at the last level written down."""
+        vertices, start, neighbours = self.levels[-1]
         at = int(np.searchsorted(vertices, w))
         return neighbours[start[at] : start[at + 1]].astype(np.int64)
 
@@ -273,9 +274,9 @@ class _Building:
         count, used = self.cloud.count, self.cloud.used
         points = np.delete(self.cloud.originals[:used], slice(count, count + CENTRES), axis=0)
         parent = np.delete(self.parent[:used], slice(count, count + CENTRES))
-        for ids in (parent, *(ids for vertices, _, neighbours in self.kept for ids in (vertices, neighbours))):
+        for ids in (parent, *(ids for vertices, _, neighbours in self.levels for ids in (vertices, neighbours))):
             ids[ids >= count + CENTRES] -= CENTRES
-        birth, last, *rest = by_vertex(self.kept, len(points), parent)
+        birth, last, *rest = by_vertex(self.levels, len(points), parent)
         parent[birth < 0] = -1  # new vertices that turned out not to be extreme
         return Hierarchy(points, self.bound, birth, last, parent, *rest)
 
@@ -283,14 +284,14 @@ class _Building:
 def _anchors(cloud: Cloud, vertices: np.ndarray, triangles: np.ndarray) -> list[int]:
     """Four vertices far apart that span space: they stay until the end, so that no level is flat."""
     points = cloud.scaled[vertices]
-    found = [int(np.argmin(points[:, int(np.argmax(np.ptp(points, axis=0)))]))]
-    found.append(int(np.argmax(np.square(points - points[found[0]]).sum(axis=1))))
-    along = points[found[1]] - points[found[0]]
-    normals = np.cross(along, points - points[found[0]])
-    found.append(int(np.argmax(np.square(normals).sum(axis=1))))
+    corners = [int(np.argmin(points[:, int(np.argmax(np.ptp(points, axis=0)))]))]
+    corners.append(int(np.argmax(np.square(points - points[corners[0]]).sum(axis=1))))
+    along = points[corners[1]] - points[corners[0]]
+    normals = np.cross(along, points - points[corners[0]])
+    corners.append(int(np.argmax(np.square(normals).sum(axis=1))))
     # Doubles may take three in line for far apart; three corners of a triangle never are.
-    for three in ([int(vertices[k]) for k in found], triangles[0].tolist()):
-        heights = np.abs(((points - points[found[0]]) * normals[found[2]]).sum(axis=1))
+    for three in ([int(vertices[k]) for k in corners], triangles[0].tolist()):
+        heights = np.abs(((points - points[corners[0]]) * normals[corners[2]]).sum(axis=1))
         candidates = vertices[np.argsort(-heights, kind="stable")].astype(np.int64)
         fourth = int(first_off_plane(*cloud.addresses, *three, address_of(candidates), len(candidates)))
         if fourth >= 0:
@@ -301,7 +302,7 @@ def _anchors(cloud: Cloud, vertices: np.ndarray, triangles: np.ndarray) -> list[
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def first_off_plane(scaled_at, originals_at, rows, work_at, digits_at, a, b, c, candidates_at, count):
     """The first candidate that is not in the plane of a, b, c; −1 where all are, or these are in line; exact."""
-    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, 0, 0)
     candidates = view_i64(candidates_at, count)
     for k in range(count):
         if exact_side(cloud, a, b, c, candidates[k]) != 0:

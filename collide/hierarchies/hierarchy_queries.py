@@ -19,12 +19,13 @@ from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
 from collide.hierarchies.walk import APART, MEETING, OPEN_MEETING
 from collide.hierarchies.walk_bodies import WalkBody
 from collide.lowering.packed_convex import POINTS
+from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.convex_queries import close, number_of_poses, settle_proposals
 from collide.pair_arguments import asked_poses, pose_batch
 from collide.results import PAIR_DTYPE, PairResult
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 
@@ -81,9 +82,9 @@ def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
     except AttributeError:
         pass
     name = type(shape).__name__
-    if not is_plain(shape):
+    if not is_single_convex(shape):
         raise UnsupportedQuery(f'{name}: algorithm="{algorithm}" takes one convex polytope, no union and no mesh')
-    packed = shape.parts()[0][0]
+    packed = convex_set_of(shape)
     if packed.kind != POINTS or packed.radius != 0.0:
         raise UnsupportedQuery(
             f'{name}: algorithm="{algorithm}" takes convex polytopes (ConvexHull without a radius, Box, HPolytope); '
@@ -165,7 +166,7 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
         sides = (A, body_a, X_WA), (B, body_b, X_WB)
         (P, body_p, X_WP), (R, body_r, X_WR) = reversed(sides) if exchanged else sides
         rows, rounds = run_walks(
-            body_p, body_r, P.parts()[0][0], R.parts()[0][0], np.broadcast_to(X_WP, (n, 4, 4)),
+            body_p, body_r, convex_set_of(P), convex_set_of(R), np.broadcast_to(X_WP, (n, 4, 4)),
             np.broadcast_to(X_WR, (n, 4, 4)), trace=trace,
         )  # fmt: skip
         depths = body_p.hierarchy.depth, body_r.depth_of_polar
@@ -194,7 +195,7 @@ def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     if settled.any():
         ids = np.flatnonzero(settled)
         proposed = rows[ids]
-        packed = [shape.parts()[0][0] for shape in (A, B)]
+        packed = [convex_set_of(shape) for shape in (A, B)]
         poses = pose_table(
             np.concatenate([X_WA, X_WB]), np.tile(np.eye(4), (2 * n, 1, 1)), np.repeat([p.reach for p in packed], n)
         )

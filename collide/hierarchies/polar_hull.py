@@ -7,7 +7,7 @@ polar of a body that R sticks out of. Here each point is drawn towards 0 by as m
 is further than a few units of the last place of R's size from R.
 
 Barba and Langerman work with real numbers and pass over this. A plane that separates P from R'
-separates it from R. A point of P and R' has yet to be tested against R: that is left to whoever walks.
+separates it from R. A point of P and R' has yet to be tested against R: `walk_proof` does that.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i32
 from collide.numerics import double_double as dd
 from collide.numerics.error_free import DD, two_sum
 
-#: The most a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
-_MOST_DRAWN = 2.0**-10
+#: How far a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
+_MAX_DRAWN = 2.0**-10
 #: A vertex with more facets than this is polar to a side that is better not left flat: see `_uneven`.
-_MANY, _SPREAD = 64, 8.0
+_LARGE_DEGREE, _SPREAD = 64, 8.0
 #: Sizes of a body (largest distance from the origin along an axis) whose polar has ordinary doubles.
 SMALLEST, LARGEST = 1e-60, 1e60
 
@@ -56,8 +56,8 @@ def polar_of_hull(
 ) -> PolarBody:
     """The polar of the hull of points (n, 3) about ``origin``, or about a point well inside, with its hierarchy.
 
-    Near-linear but for what `build_hierarchy` says. Raises ValueError for a hull without interior, for a needle or a pancake with no double
-    inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60 to 1e60.
+    Near-linear where `build_hierarchy` is. Raises ValueError for a hull without interior, for a needle or a pancake with no
+    double inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60 to 1e60.
     """
     if hull.dimension != 3:
         raise ValueError(f"the polar of a hull of dimension {hull.dimension} is not bounded; it has no interior")
@@ -138,10 +138,10 @@ def _uneven(triangles: np.ndarray, spans: np.ndarray) -> np.ndarray:
     different amounts, half of them most, a quarter half of that, and so on, leave degrees of the order of a logarithm.
     """
     degree = np.bincount(triangles.ravel(), minlength=spans.max() + 1)
-    many = (degree[spans] > _MANY).any(axis=1)
+    large = (degree[spans] > _LARGE_DEGREE).any(axis=1)
     levels = np.empty(len(spans), dtype=np.int32)
     write_levels(address_of(levels), len(levels))
-    return np.where(many, 1.0 + _SPREAD * 2.0**-levels, 1.0)
+    return np.where(large, 1.0 + _SPREAD * 2.0**-levels, 1.0)
 
 
 def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray, uneven: np.ndarray) -> np.ndarray:
@@ -154,13 +154,13 @@ def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: n
     """
     triples = np.ascontiguousarray(spans, dtype=np.int32)
     polar = np.empty((len(triples), 3))
-    sure = np.empty(len(triples), dtype=np.int32)
+    proven = np.empty(len(triples), dtype=np.int32)
     centre, reach = np.ascontiguousarray(origin), np.ascontiguousarray(extent)
     write_polar(
         address_of(cloud.originals), len(cloud.originals), address_of(triples), len(triples), address_of(centre),
-        address_of(reach), address_of(uneven), address_of(polar), address_of(sure),
+        address_of(reach), address_of(uneven), address_of(polar), address_of(proven),
     )  # fmt: skip
-    for k in np.flatnonzero(sure == 0).tolist():
+    for k in np.flatnonzero(proven == 0).tolist():
         polar[k] = _from_fractions(cloud.originals[triples[k]], centre, reach)
     if not np.isfinite(polar).all():
         raise ValueError("the hull is so thin, and so oblique, that its polar cannot be rounded into itself")
@@ -175,7 +175,7 @@ def _from_fractions(corners: np.ndarray, origin: np.ndarray, extent: np.ndarray)
     d = sum(x * y for x, y in zip(n, a))
     q = [x / d for x in n]
     drawn = Fraction(2) ** -50 * sum(Fraction(s) * abs(x) for s, x in zip(extent.tolist(), q))
-    if drawn > _MOST_DRAWN or max(map(abs, q)) > 2**1000:
+    if drawn > _MAX_DRAWN or max(map(abs, q)) > 2**1000:
         return np.full(3, np.nan)
     return np.array([float(x * (1 - drawn)) for x in q])
 
@@ -183,7 +183,7 @@ def _from_fractions(corners: np.ndarray, origin: np.ndarray, extent: np.ndarray)
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
 def touches_or_sees(scaled_at, originals_at, rows, work_at, digits_at, spans_at, count, row):
     """1 where a point is on the plane of some facet or above it."""
-    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, 0, 0)
     spans = view_i32(spans_at, 3 * count)
     for k in range(count):
         a, b, c = np.int64(spans[3 * k]), np.int64(spans[3 * k + 1]), np.int64(spans[3 * k + 2])
@@ -200,15 +200,15 @@ def write_levels(levels_at, count):
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_at, polar_at, sure_at):
-    """Polar points in pairs of doubles, drawn inside; ``sure`` is 0 where pairs do not suffice."""
+def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_at, polar_at, proven_at):
+    """Polar points in pairs of doubles, drawn inside; ``proven`` is 0 where pairs do not suffice."""
     points = view_f64(points_at, 3 * rows)
     spans = view_i32(spans_at, 3 * count)
     origin = view_f64(origin_at, 3)
     extent = view_f64(extent_at, 3)
     spread = view_f64(spread_at, count)
     polar = view_f64(polar_at, 3 * count)
-    sure = view_i32(sure_at, count)
+    proven = view_i32(proven_at, count)
     for k in range(count):
         a, b, c = 3 * np.int64(spans[3 * k]), 3 * np.int64(spans[3 * k + 1]), 3 * np.int64(spans[3 * k + 2])
         x, x_low, x_size = normal_part(points, a, b, c, 1, 2)
@@ -224,7 +224,7 @@ def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_a
         # Pairs: an error of 2⁻⁹⁶ times the terms' magnitudes is far more than theirs (see `orientation`).
         sizes = x_size + y_size + z_size
         reach = extent[0] + extent[1] + extent[2]
-        sure[k] = 0
+        proven[k] = 0
         if d > 0.0 and d_size * 2.0**-36 < d and sizes * 2.0**-36 < largest and d > 1e-250:
             qx, qy, qz = quotient(x, x_low, d, d_low), quotient(y, y_low, d, d_low), quotient(z, z_low, d, d_low)
             within = extent[0] * abs(qx) + extent[1] * abs(qy) + extent[2] * abs(qz)
@@ -232,7 +232,7 @@ def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_a
             polar[3 * k] = qx * (1.0 - drawn)
             polar[3 * k + 1] = qy * (1.0 - drawn)
             polar[3 * k + 2] = qz * (1.0 - drawn)
-            sure[k] = 1 if drawn <= _MOST_DRAWN else 0
+            proven[k] = 1 if drawn <= _MAX_DRAWN else 0
 
 
 @kernel

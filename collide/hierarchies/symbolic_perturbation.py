@@ -15,11 +15,28 @@ random order that leaves O(log k) triangles at a corner of a facet with k.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from collide.kernels import kernel
 from collide.numerics.orientation import one_of_four, orientation
 
 #: Points the perturbation moves vertices towards.
 CENTRES = 4
+
+
+class CloudView(NamedTuple):
+    """Points in kernels, as `true_facets.Cloud` has them.
+
+    scaled, originals : three doubles a row; scaled = originals · 2^−exponent.   work, digits : workspace of `orientation`.
+    centres : row of centre 0; the others follow it.   Where only exact tests are made, centres and exponent are not read.
+    """
+
+    scaled: Any
+    originals: Any
+    work: Any
+    digits: Any
+    centres: int
+    exponent: int
 
 
 @kernel
@@ -35,41 +52,35 @@ def rank_of(i):
 @kernel
 def exact_side(cloud, a, b, c, d):
     """1 where d lies above the plane of a, b, c (counter-clockwise from above), 0 on it, −1 below; exact."""
-    points, originals, work, digits = cloud
-    return orientation(points, originals, work, digits, a, b, c, d, -1)
+    return orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, a, b, c, d, -1)
 
 
 @kernel
-def side(cloud, centres, a, b, c, d):
-    """`exact_side` of the perturbed points; 0 only where the four are in line or two are the same.
-
-    centres : row of centre 0; the others follow it.
-    """
-    points, originals, work, digits = cloud
-    sign = orientation(points, originals, work, digits, a, b, c, d, -1)
+def side(cloud, a, b, c, d):
+    """`exact_side` of the perturbed points; 0 only where the four are in line or two are the same."""
+    sign = orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, a, b, c, d, -1)
     if sign != 0:
         return sign
-    return tie(cloud, centres, a, b, c, d)
+    return tie(cloud, a, b, c, d)
 
 
 @kernel
-def tie(cloud, centres, a, b, c, d):
+def tie(cloud, a, b, c, d):
     """`side` of four points in one plane."""
-    points, originals, work, digits = cloud
-    for centre in range(centres, centres + CENTRES):
+    for centre in range(cloud.centres, cloud.centres + CENTRES):
         before = 1 << 60
         for _ in range(4):
-            most = -1
+            largest = -1
             for corner in range(4):
                 rank = rank_of(one_of_four(corner, a, b, c, d))
-                if most < rank < before:
-                    most = rank
-            before = most
-            p = centre if rank_of(a) == most else a
-            q = centre if rank_of(b) == most else b
-            r = centre if rank_of(c) == most else c
-            s = centre if rank_of(d) == most else d
-            sign = orientation(points, originals, work, digits, p, q, r, s, -1)
+                if largest < rank < before:
+                    largest = rank
+            before = largest
+            p = centre if rank_of(a) == largest else a
+            q = centre if rank_of(b) == largest else b
+            r = centre if rank_of(c) == largest else c
+            s = centre if rank_of(d) == largest else d
+            sign = orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, p, q, r, s, -1)
             if sign != 0:
                 return sign
     return 0

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hierarchies.half_edges import following, preceding
-from collide.hierarchies.symbolic_perturbation import exact_side, rank_of, side
+from collide.hierarchies.symbolic_perturbation import CloudView, exact_side, rank_of, side
 from collide.hull.exact_hull import Hull
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
 from collide.numerics.orientation import DIGITS, WORK, one_of_four, survey
@@ -25,15 +25,15 @@ _FLIPS = 400
 
 
 class Cloud:
-    """Points for exact tests: as they are, scaled, and room for the sums; the centres of the perturbation.
+    """Points for exact tests: as they are and scaled, workspace for the sums; the centres of the perturbation.
 
-    originals, scaled : (room, 3). Rows: the points given, four centres, vertices added later.
+    originals, scaled : (rows, 3). Rows: the points, four centres, vertices added later.
     """
 
     def __init__(self, points: np.ndarray):
-        given = np.asarray(points, dtype=np.float64)
-        self.count = len(given)
-        self.originals = np.concatenate([given, _centres(given)])
+        points = np.asarray(points, dtype=np.float64)
+        self.count = len(points)
+        self.originals = np.concatenate([points, _centres(points)])
         self.scaled = np.empty_like(self.originals)
         self.work = np.zeros(WORK)
         self.digits = np.zeros(DIGITS, dtype=np.int64)
@@ -42,7 +42,7 @@ class Cloud:
         )
         self.used = len(self.scaled)
 
-    def make_room(self, rows: int) -> None:
+    def reserve(self, rows: int) -> None:
         """Have at least this many rows."""
         if rows > len(self.scaled):
             more = np.zeros((rows - len(self.scaled), 3))
@@ -51,7 +51,7 @@ class Cloud:
 
     def add(self, point: np.ndarray) -> int:
         """Row of one more point, for a test; the next one takes its place."""
-        self.make_room(self.used + 1)
+        self.reserve(self.used + 1)
         self.originals[self.used] = point
         self.scaled[self.used] = np.ldexp(point, -self.exponent)
         # It lies on no lattice, and may have small coordinates.
@@ -89,7 +89,7 @@ class Facets(NamedTuple):
 
     triangles : (f, 3) int32, the perturbed hull: closed, weakly convex, all corners strictly extreme.
     twins : (3 f,) int32, the half-edge that runs back along each, see `surface`.
-    spans : (m, 3) int32, for every true facet three points given, counter-clockwise, that span its plane.
+    spans : (m, 3) int32, for every true facet three of the points, counter-clockwise, that span its plane.
     """
 
     triangles: np.ndarray
@@ -102,17 +102,17 @@ def true_facets(cloud: Cloud, hull: Hull) -> Facets:
     triangles = np.ascontiguousarray(hull.facets, dtype=np.int32)
     twins = twins_of(triangles)
     patch = np.empty(len(triangles), dtype=np.int32)
-    waiting = np.empty(len(triangles), dtype=np.int32)
-    many = label_patches(
-        *cloud.addresses, address_of(triangles), address_of(twins), len(triangles), address_of(patch), address_of(waiting)
+    stack = np.empty(len(triangles), dtype=np.int32)
+    n_facets = label_patches(
+        *cloud.addresses, address_of(triangles), address_of(twins), len(triangles), address_of(patch), address_of(stack)
     )
-    if many == len(triangles):
+    if n_facets == len(triangles):
         return Facets(triangles, twins, triangles)
-    spans = _widest(cloud, triangles, patch, many)
+    spans = _widest(cloud, triangles, patch, n_facets)
     ranks = np.empty(cloud.count, dtype=np.int64)
     write_ranks(cloud.count, address_of(ranks))
     extreme = _where_three_meet(triangles, twins, patch, cloud.count)
-    made = _triangulated(triangles, twins, patch, many, extreme, ranks)
+    made = _triangulated(triangles, twins, patch, n_facets, extreme, ranks)
     return Facets(made, settled_twins(cloud, made), spans)
 
 
@@ -133,34 +133,34 @@ def _where_three_meet(triangles, twins, patch, count) -> np.ndarray:
     return np.bincount(triangles.ravel()[border], minlength=count) >= 3
 
 
-def _widest(cloud: Cloud, triangles, patch, many) -> np.ndarray:
+def _widest(cloud: Cloud, triangles, patch, n_facets) -> np.ndarray:
     """Of each patch the triangle of the largest area, in doubles."""
     a, b, c = (cloud.scaled[triangles[:, k]] for k in range(3))
     area = np.abs(np.cross(b - a, c - a)).sum(axis=1)
     order = np.lexsort((np.arange(len(area)), -area, patch))
-    first = np.searchsorted(patch[order], np.arange(many))
+    first = np.searchsorted(patch[order], np.arange(n_facets))
     return np.ascontiguousarray(triangles[order[first]])
 
 
-def _triangulated(triangles, twins, patch, many, extreme, ranks) -> np.ndarray:
+def _triangulated(triangles, twins, patch, n_facets, extreme, ranks) -> np.ndarray:
     """Triangles of all facets, from their borders."""
     border = np.empty(3 * len(triangles), dtype=np.int32)
-    start = np.zeros(many + 1, dtype=np.int64)
+    start = np.zeros(n_facets + 1, dtype=np.int64)
     strict = np.ascontiguousarray(extreme, dtype=np.uint8)
-    seen = np.zeros(many, dtype=np.uint8)
+    seen = np.zeros(n_facets, dtype=np.uint8)
     trace_borders(
-        address_of(triangles), address_of(twins), len(triangles), address_of(patch), many, address_of(strict),
+        address_of(triangles), address_of(twins), len(triangles), address_of(patch), n_facets, address_of(strict),
         len(strict), address_of(border), address_of(start), address_of(seen),
     )  # fmt: skip
     border = border[: start[-1]]
     size = np.diff(start)
-    owner = np.repeat(np.arange(many), size)
+    owner = np.repeat(np.arange(n_facets), size)
     order = np.ascontiguousarray(np.lexsort((-ranks[border], owner)))
     made = np.empty((int((size - 2).sum()), 3), dtype=np.int32)
-    left, right = np.empty(len(border), dtype=np.int64), np.empty(len(border), dtype=np.int64)
+    before, after = np.empty(len(border), dtype=np.int64), np.empty(len(border), dtype=np.int64)
     cut_ears(
-        address_of(border), address_of(start), many, address_of(order), address_of(left),
-        address_of(right), address_of(made), len(border),
+        address_of(border), address_of(start), n_facets, address_of(order), address_of(before),
+        address_of(after), address_of(made), len(border),
     )  # fmt: skip
     return made
 
@@ -182,9 +182,9 @@ def settled_twins(cloud: Cloud, triangles: np.ndarray) -> np.ndarray:
 
 def named_in(ids: np.ndarray, count: int) -> np.ndarray:
     """The ids below count that occur, ascending."""
-    found = np.zeros(count, dtype=bool)
-    found[ids.ravel()] = True
-    return np.flatnonzero(found)
+    occurs = np.zeros(count, dtype=bool)
+    occurs[ids.ravel()] = True
+    return np.flatnonzero(occurs)
 
 
 # --- kernels ------------------------------------------------------------------------------------
@@ -203,41 +203,42 @@ def write_ranks(count, ranks_at):
 
 
 @kernel
-def cloud_at(scaled_at, originals_at, rows, work_at, digits_at):
-    return (
+def cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, exponent):
+    """A `CloudView` of `Cloud.addresses`; centres and exponent 0 for exact tests alone."""
+    return CloudView(
         view_f64(scaled_at, 3 * rows), view_f64(originals_at, 3 * rows), view_f64(work_at, WORK),
-        view_i64(digits_at, DIGITS),
+        view_i64(digits_at, DIGITS), centres, exponent,
     )  # fmt: skip
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def label_patches(scaled_at, originals_at, rows, work_at, digits_at, corners_at, twins_at, count, patch_at, waiting_at):
+def label_patches(scaled_at, originals_at, rows, work_at, digits_at, corners_at, twins_at, count, patch_at, stack_at):
     """Number the triangles by the plane they lie in, neighbours in one plane alike; returns how many planes."""
-    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, 0, 0)
     corners = view_i32(corners_at, 3 * count)
     twins = view_i32(twins_at, 3 * count)
     patch = view_i32(patch_at, count)
-    waiting = view_i32(waiting_at, count)
+    stack = view_i32(stack_at, count)
     for t in range(count):
         patch[t] = -1
-    many = 0
+    n_planes = 0
     for first in range(count):
         if patch[first] >= 0:
             continue
-        patch[first] = many
-        waiting[0] = first
+        patch[first] = n_planes
+        stack[0] = first
         depth = 1
         while depth > 0:
             depth -= 1
-            t = np.int64(waiting[depth])
+            t = np.int64(stack[depth])
             for h in range(3 * t, 3 * t + 3):
                 g = np.int64(twins[h])
                 if patch[g // 3] < 0 and in_plane(cloud, corners, t, g):
-                    patch[g // 3] = many
-                    waiting[depth] = g // 3
+                    patch[g // 3] = n_planes
+                    stack[depth] = g // 3
                     depth += 1
-        many += 1
-    return many
+        n_planes += 1
+    return n_planes
 
 
 @kernel
@@ -249,22 +250,22 @@ def in_plane(cloud, corners, t, g):
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def trace_borders(corners_at, twins_at, count, patch_at, many, strict_at, points, border_at, start_at, seen_at):
+def trace_borders(corners_at, twins_at, count, patch_at, n_facets, strict_at, points, border_at, start_at, seen_at):
     """The strictly extreme vertices along the border of every patch, counter-clockwise, patch after patch."""
     corners = view_i32(corners_at, 3 * count)
     twins = view_i32(twins_at, 3 * count)
     patch = view_i32(patch_at, count)
     strict = view_u8(strict_at, points)
     border = view_i32(border_at, 3 * count)
-    start = view_i64(start_at, many + 1)
-    seen = view_u8(seen_at, many)
+    start = view_i64(start_at, n_facets + 1)
+    seen = view_u8(seen_at, n_facets)
     total = 0
     traced = 0
     for first in range(3 * count):
-        own = patch[first // 3]
-        if seen[own] != 0 or patch[twins[first] // 3] == own:
+        facet = patch[first // 3]
+        if seen[facet] != 0 or patch[twins[first] // 3] == facet:
             continue
-        seen[own] = 1
+        seen[facet] = 1
         start[traced] = total
         traced += 1
         h = first
@@ -273,37 +274,37 @@ def trace_borders(corners_at, twins_at, count, patch_at, many, strict_at, points
                 border[total] = corners[h]
                 total += 1
             h = following(h)
-            while patch[twins[h] // 3] == own:
+            while patch[twins[h] // 3] == facet:
                 h = following(np.int64(twins[h]))
             if h == first:
                 break
-    start[many] = total
+    start[n_facets] = total
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
-def cut_ears(border_at, start_at, many, order_at, left_at, right_at, made_at, total):
+def cut_ears(border_at, start_at, n_polygons, order_at, before_at, after_at, made_at, total):
     """Triangulate polygons by cutting their vertices off in a given order."""
     border = view_i32(border_at, total)
-    start = view_i64(start_at, many + 1)
+    start = view_i64(start_at, n_polygons + 1)
     order = view_i64(order_at, total)
-    left = view_i64(left_at, total)
-    right = view_i64(right_at, total)
-    made = view_i32(made_at, 3 * (total - 2 * many))
+    before = view_i64(before_at, total)
+    after = view_i64(after_at, total)
+    made = view_i32(made_at, 3 * (total - 2 * n_polygons))
     at = 0
-    for polygon in range(many):
+    for polygon in range(n_polygons):
         low = start[polygon]
         high = start[polygon + 1]
         for k in range(low, high):
-            left[k] = k - 1 if k > low else high - 1
-            right[k] = k + 1 if k < high - 1 else low
+            before[k] = k - 1 if k > low else high - 1
+            after[k] = k + 1 if k < high - 1 else low
         for k in range(low, high - 2):
             ear = order[k]
-            made[at] = border[left[ear]]
+            made[at] = border[before[ear]]
             made[at + 1] = border[ear]
-            made[at + 2] = border[right[ear]]
+            made[at + 2] = border[after[ear]]
             at += 3
-            right[left[ear]] = right[ear]
-            left[right[ear]] = left[ear]
+            after[before[ear]] = after[ear]
+            before[after[ear]] = before[ear]
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -315,7 +316,7 @@ def flip_until_convex(
     Only edges inside a strictly convex flat facet are ever concave; any two triangles there make a convex
     quadrilateral, and each flip lifts the perturbed surface, so that this ends.
     """
-    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, 0)
     corners = view_i32(corners_at, 3 * count)
     twins = view_i32(twins_at, 3 * count)
     stack = view_i64(stack_at, 6 * count)
@@ -328,7 +329,7 @@ def flip_until_convex(
         while depth > 0:
             depth -= 1
             h = stack[depth]
-            if not concave(cloud, centres, corners, twins, h):
+            if not concave(cloud, corners, twins, h):
                 continue
             flips += 1
             if flips > _FLIPS * count:
@@ -344,13 +345,13 @@ def flip_until_convex(
 
 
 @kernel
-def concave(cloud, centres, corners, twins, h):
+def concave(cloud, corners, twins, h):
     """Whether the corner beyond half-edge h lies above its triangle."""
     a = np.int64(corners[h])
     b = np.int64(corners[following(h)])
     c = np.int64(corners[preceding(h)])
     d = np.int64(corners[preceding(np.int64(twins[h]))])
-    return side(cloud, centres, a, b, c, d) > 0
+    return side(cloud, a, b, c, d) > 0
 
 
 @kernel

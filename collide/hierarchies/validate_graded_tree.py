@@ -40,12 +40,12 @@ def _check_facet_sets(tree: GradedTree, corners: np.ndarray) -> None:
     middles = centroids(corners)
     low, high = corners.min(axis=1), corners.max(axis=1)
     for k, row in enumerate(tree.nodes.tolist()):
-        own = tree.order[row[FIRST] : row[LAST]]
-        assert len(own) > 0, f"node {k} is empty"
+        facets = tree.order[row[FIRST] : row[LAST]]
+        assert len(facets) > 0, f"node {k} is empty"
         above = tree.nodes[row[PARENT], LEVEL] + 1 if k else 0
         for level in range(above, row[LEVEL] + 1):
             cell = np.array(row[CELL : CELL + 3]) >> (row[LEVEL] - level)
-            assert _belongs(tree, level, cell[None], middles[own], low[own], high[own]).all(), f"a facet not of node {k}"
+            assert _belongs(tree, level, cell[None], middles[facets], low[facets], high[facets]).all(), f"a facet not of node {k}"
     # The facets that hang from a node: outliers fit no child, others are alone in theirs.
     owner = tree.nodes[tree.owner]
     assert ((owner[:, FIRST] <= _places(tree)) & (_places(tree) < owner[:, LAST])).all(), "a leaf outside its node"

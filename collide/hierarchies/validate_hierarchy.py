@@ -34,10 +34,10 @@ def validate_hierarchy(points: np.ndarray, hierarchy: Hierarchy, bounded_from: i
     O(total size) for the combinatorics; inclusion tests take the new vertices of a level times its facets.
     """
     name = "B" if hierarchy.degree_bound else "A"
-    given = np.asarray(points, dtype=np.float64)
+    points = np.asarray(points, dtype=np.float64)
     levels = [_surface(hierarchy, level) for level in range(hierarchy.depth)]
-    _check_rows(hierarchy, given)
-    _check_ends(hierarchy, given, levels, name)
+    _check_rows(hierarchy, points)
+    _check_ends(hierarchy, points, levels, name)
     for level in range(hierarchy.depth - 1):
         _check_inclusion(hierarchy, levels, level, name)
         _check_independent(hierarchy, level, name)
@@ -54,21 +54,21 @@ def validate_hierarchy(points: np.ndarray, hierarchy: Hierarchy, bounded_from: i
 def _surface(hierarchy: Hierarchy, level: int) -> np.ndarray:
     """(f, 3) triangles of a level, after its neighbour lists were found to be those of one closed surface."""
     vertices = hierarchy.vertices(level).tolist()
-    found: set[tuple[int, int, int]] = set()
+    corners: set[tuple[int, int, int]] = set()
     for v in vertices:
         ring = hierarchy.neighbours_of(v, level).tolist()
         assert len(set(ring)) == len(ring) >= 3, f"rows: vertex {v} has a neighbour twice in level {level}"
-        found.update((v, a, b) for a, b in zip(ring, [*ring[1:], ring[0]]))
-    assert all((b, c, a) in found for a, b, c in found), f"rows: the rings of level {level} do not fit together"
-    own = sorted(t for t in found if t[0] == min(t))
-    return np.array(own, dtype=np.int32).reshape(-1, 3)
+        corners.update((v, a, b) for a, b in zip(ring, [*ring[1:], ring[0]]))
+    assert all((b, c, a) in corners for a, b, c in corners), f"rows: the rings of level {level} do not fit together"
+    lowest_first = sorted(t for t in corners if t[0] == min(t))
+    return np.array(lowest_first, dtype=np.int32).reshape(-1, 3)
 
 
-def _check_rows(hierarchy: Hierarchy, given: np.ndarray) -> None:
+def _check_rows(hierarchy: Hierarchy, points: np.ndarray) -> None:
     birth, last = hierarchy.birth, hierarchy.last
-    assert np.array_equal(hierarchy.points[: len(given)], given), "rows: the points given are not the first ones"
-    assert not birth[: len(given)].max(initial=0), "rows: a point given comes late"
-    assert (birth[len(given) :] != 0).all(), "rows: an added vertex is in level 0"
+    assert np.array_equal(hierarchy.points[: len(points)], points), "rows: the points are not the first ones"
+    assert not birth[: len(points)].max(initial=0), "rows: a point comes late"
+    assert (birth[len(points) :] != 0).all(), "rows: an added vertex is in level 0"
     for level in range(hierarchy.depth):
         expected = np.flatnonzero((birth >= 0) & (birth <= level) & (level <= last))
         assert np.array_equal(hierarchy.vertices(level), expected), f"rows: birth and last do not fit level {level}"
@@ -78,9 +78,9 @@ def _check_rows(hierarchy: Hierarchy, given: np.ndarray) -> None:
     assert (last[parents] == birth[late] - 1).all(), "rows: a parent does not leave when its new vertices come"
 
 
-def _check_ends(hierarchy: Hierarchy, given: np.ndarray, levels: list[np.ndarray], name: str) -> None:
+def _check_ends(hierarchy: Hierarchy, points: np.ndarray, levels: list[np.ndarray], name: str) -> None:
     first = hierarchy.vertices(0)
-    _named(f"{name}1: level 0 is not P", given, Hull(3, first, levels[0]))
+    _named(f"{name}1: level 0 is not P", points, Hull(3, first, levels[0]))
     assert len(hierarchy.vertices(hierarchy.depth - 1)) == 4, f"{name}1: the last level is no tetrahedron"
 
 
@@ -162,19 +162,19 @@ def _check_strictly_extreme(hierarchy: Hierarchy, triangles: np.ndarray, level: 
             if normal[0] * w[0] + normal[1] * w[1] + normal[2] * w[2] != 0:
                 bends[a] += 1
                 bends[b] += 1
-    flat = [v for v, many in bends.items() if many < 3]
+    flat = [v for v, n_bends in bends.items() if n_bends < 3]
     assert not flat, f"vertex {flat[0]} of level {level} is not strictly extreme"
 
 
 def _check_degrees(hierarchy: Hierarchy, bounded_from: int) -> None:
     for level in range(bounded_from, hierarchy.depth):
-        most = int(hierarchy.degrees(level).max())
-        assert most <= hierarchy.degree_bound, f"B3: level {level} has a vertex of degree {most}"
+        largest = int(hierarchy.degrees(level).max())
+        assert largest <= hierarchy.degree_bound, f"B3: level {level} has a vertex of degree {largest}"
 
 
 def _check_size(hierarchy: Hierarchy, name: str) -> None:
     count = int(hierarchy.sizes[0])
-    most = DEPTH_AT_MOST + DEPTH_PER_LOG * math.log2(count)
-    assert hierarchy.depth <= most, f"{name}5: {hierarchy.depth} levels for {count} vertices"
+    bound = DEPTH_AT_MOST + DEPTH_PER_LOG * math.log2(count)
+    assert hierarchy.depth <= bound, f"{name}5: {hierarchy.depth} levels for {count} vertices"
     total = int(hierarchy.sizes.sum())
     assert total <= SIZE_PER_VERTEX * count, f"{name}5: {total} vertices in all levels, {count} in the first"

@@ -23,6 +23,7 @@ import numpy as np
 
 from collide.hierarchies.cut_placement import (
     INSETS,
+    Cut,
     axis_of,
     difference,
     find_inner,
@@ -44,13 +45,14 @@ from collide.hierarchies.half_edges import (
     preceding,
     read_ring,
 )  # fmt: skip
-from collide.hierarchies.independent_sets import STATE, mesh_at
+from collide.hierarchies.independent_sets import mesh_at
 from collide.hierarchies.symbolic_perturbation import side
 from collide.hierarchies.true_facets import cloud_at
 from collide.hierarchies.vertex_insertion import insert_near
 from collide.kernels import entry, kernel, view_i32, view_i64
+from collide.numerics.vec3 import Vec3, add, dot
 
-#: Integers of workspace for each neighbour of the vertex: ring, outer, fresh, and the most any way of cutting takes.
+#: Integers of workspace for each neighbour of the vertex: ring, outer, fresh, and what either way of cutting takes.
 SCRATCH = 20
 
 
@@ -68,12 +70,11 @@ def cut(
 
     Returns how many rows are used, as many as w had neighbours; −1 where w had to stay.
     """
-    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at)
-    mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows)
+    cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, exponent)
+    mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows, state_at)
     seen = view_i32(seen_at, triangles)
     degree = view_i32(degree_at, rows)
     blocked = view_i32(blocked_at, rows)
-    state = view_i64(state_at, STATE)
     k = np.int64(degree[w])
     ring = view_i64(scratch_at, k)
     outer = view_i64(scratch_at + 8 * k, k)
@@ -82,95 +83,96 @@ def cut(
     read_ring(mesh, w, ring, outer)
     for j in range(k):
         fresh[j] = first + j
-    axis = axis_of(cloud, w, ring, k)
-    inner = first + k  # the row of s, behind the new vertices
-    provable = axis[3] > 0.0 and find_inner(cloud, exponent, w, ring, k, inner)
+    axis, nearest = axis_of(cloud.scaled, w, ring, k)
+    inner = first + k  # behind the new vertices
+    this = Cut(w, k, ring, outer, fresh, inner, axis, nearest)
+    provable = nearest > 0.0 and find_inner(cloud, w, ring, k, inner)
     done = False
     for attempt in range(INSETS if provable else 0):
-        if not done and place(cloud, exponent, w, ring, k, fresh, inner, axis, inset_of(attempt)):
-            done = strip_and_lid(cloud, centres, mesh, state, w, ring, outer, fresh, k, workspace)
+        if not done and place(cloud, this, inset_of(attempt)):
+            done = strip_and_lid(cloud, mesh, this, workspace)
     if not done and provable and may_go != 0:
-        done = one_by_one(
-            cloud, exponent, centres, mesh, state, seen, w, ring, outer, fresh, k, inner, axis, workspace
-        )
+        done = one_by_one(cloud, mesh, seen, this, workspace)
     if not done:
         return -1
     for j in range(k):
         blocked[ring[j]] = 1
         degree[ring[j]] = degree_of(mesh, ring[j])
-        if mesh[2][fresh[j]] >= 0:
+        if mesh.leaving[fresh[j]] >= 0:
             blocked[fresh[j]] = 1
             degree[fresh[j]] = degree_of(mesh, fresh[j])
     degree[w] = 0
-    mesh[2][w] = -1
+    mesh.leaving[w] = -1
     return k
 
 
 @kernel
-def strip_and_lid(cloud, centres, mesh, state, w, ring, outer, fresh, k, workspace):
+def strip_and_lid(cloud, mesh, cut, workspace):
     """Put the new vertices in the place of w, as a strip along the ring and a lid; False, and nothing changed, where
     that is not convex."""
-    left = view_i64(workspace, k)
-    right = view_i64(workspace + 8 * k, k)
+    k, fresh = cut.k, cut.fresh
+    before = view_i64(workspace, k)
+    after = view_i64(workspace + 8 * k, k)
     lid = view_i64(workspace + 16 * k, k)
     plan = view_i64(workspace + 24 * k, 3 * k)
     stack = view_i64(workspace + 48 * k, 2 * k)
-    waiting = view_i64(workspace + 64 * k, k)
+    open_edges = view_i64(workspace + 64 * k, k)
     made = view_i64(workspace + 72 * k, 3 * k)
-    if not plan_hole(cloud, centres, fresh, 0, k, plan, stack):
+    if not plan_hole(cloud, fresh, 0, k, plan, stack):
         return False
-    drop_star(mesh, state, w)
-    put_strip(cloud, centres, mesh, state, ring, outer, fresh, k, left, right, lid)
-    fill_hole(mesh, state, fresh, 0, k, lid, plan, waiting)
-    if convex_at_all(cloud, centres, mesh, outer, fresh, k) and all_extreme(cloud, mesh, fresh, k):
+    drop_star(mesh, cut.w)
+    put_strip(cloud, mesh, cut, before, after, lid)
+    fill_hole(mesh, fresh, 0, k, lid, plan, open_edges)
+    if convex_at_all(cloud, mesh, cut) and all_extreme(cloud, mesh, cut):
         return True
-    take_back(mesh, state, w, ring, outer, fresh, k, made)
+    take_back(mesh, cut, made)
     return False
 
 
 @kernel
-def one_by_one(cloud, exponent, centres, mesh, state, seen, w, ring, outer, fresh, k, inner, axis, workspace):
+def one_by_one(cloud, mesh, seen, cut, workspace):
     """Remove w, then insert the new vertices; those that are not strictly extreme then leave.
 
     False, and nothing changed, where one of them cannot be proven to be where it must, or the hole cannot be closed.
     """
-    least = shortest_part(cloud, w, ring, k, axis)
+    k, ring, fresh = cut.k, cut.ring, cut.fresh
+    least = shortest_part(cloud, cut)
     for j in range(k):
-        if not prove_new(cloud, exponent, w, ring, k, j, fresh[j], inner, axis, least):
+        if not prove_new(cloud, cut, j, least):
             return False
     plan = view_i64(workspace, 3 * k)
     stack = view_i64(workspace + 24 * k, 2 * k)
-    waiting = view_i64(workspace + 40 * k, k)
-    if not plan_hole(cloud, centres, ring, 0, k, plan, stack):
+    open_edges = view_i64(workspace + 40 * k, k)
+    if not plan_hole(cloud, ring, 0, k, plan, stack):
         return False
-    drop_star(mesh, state, w)
-    fill_hole(mesh, state, ring, 0, k, outer, plan, waiting)
+    drop_star(mesh, cut.w)
+    fill_hole(mesh, ring, 0, k, cut.outer, plan, open_edges)
     region = view_i64(workspace, 3 * k)
     rim = view_i64(workspace + 24 * k, 3 * k)
-    waiting = view_i64(workspace + 48 * k, 7 * k)
+    search = view_i64(workspace + 48 * k, 7 * k)
     step = coprime_step(k)
-    for turn in range(k):
-        j = (turn * step) % k  # next to none inserted just before: each sees few triangles
-        insert_near(cloud, centres, mesh, state, seen, fresh[j], ring[j], region, rim, waiting)
+    for number in range(k):
+        j = (number * step) % k  # next to none inserted just before: each sees few triangles
+        insert_near(cloud, mesh, seen, fresh[j], ring[j], region, rim, search)
     for j in range(k):
-        if mesh[2][fresh[j]] >= 0 and not surely_extreme(cloud, mesh, fresh[j]):
-            close_over(cloud, centres, mesh, state, fresh[j], k, workspace)
+        if mesh.leaving[fresh[j]] >= 0 and not proven_extreme(cloud, mesh, fresh[j]):
+            close_over(cloud, mesh, fresh[j], k, workspace)
     return True
 
 
 @kernel
-def close_over(cloud, centres, mesh, state, v, k, workspace):
+def close_over(cloud, mesh, v, k, workspace):
     """Remove v, which has at most 2 k neighbours."""
     ring = view_i64(workspace, 2 * k)
     outer = view_i64(workspace + 16 * k, 2 * k)
     plan = view_i64(workspace + 32 * k, 6 * k)
     stack = view_i64(workspace + 80 * k, 4 * k)
-    waiting = view_i64(workspace + 112 * k, 2 * k)
-    many = read_ring(mesh, v, ring, outer)
-    if plan_hole(cloud, centres, ring, 0, many, plan, stack):
-        drop_star(mesh, state, v)
-        fill_hole(mesh, state, ring, 0, many, outer, plan, waiting)
-        mesh[2][v] = -1
+    open_edges = view_i64(workspace + 112 * k, 2 * k)
+    degree = read_ring(mesh, v, ring, outer)
+    if plan_hole(cloud, ring, 0, degree, plan, stack):
+        drop_star(mesh, v)
+        fill_hole(mesh, ring, 0, degree, outer, plan, open_edges)
+        mesh.leaving[v] = -1
 
 
 @kernel
@@ -187,48 +189,52 @@ def coprime_step(k):
 
 
 @kernel
-def put_strip(cloud, centres, mesh, state, ring, outer, fresh, k, left, right, lid):
-    """The quadrilaterals between the ring and the new vertices, two triangles each."""
+def put_strip(cloud, mesh, cut, before, after, lid):
+    """The quadrilaterals between the ring and the new vertices, two triangles each.
+
+    before, after, lid : k half-edges each, out: of the quadrilaterals towards their neighbours and the new vertices.
+    """
+    k, ring, fresh = cut.k, cut.ring, cut.fresh
     for j in range(k):
         n = j + 1 if j + 1 < k else 0
         r0, r1, v0, v1 = ring[j], ring[n], fresh[j], fresh[n]
-        if side(cloud, centres, r0, r1, v0, v1) < 0:
-            h = new_triangle(mesh, state, r0, r1, v0)
-            g = new_triangle(mesh, state, v0, r1, v1)
+        if side(cloud, r0, r1, v0, v1) < 0:
+            h = new_triangle(mesh, r0, r1, v0)
+            g = new_triangle(mesh, v0, r1, v1)
             join(mesh, h + 1, g)
-            left[j], right[j], lid[j] = h + 2, g + 1, g + 2
+            before[j], after[j], lid[j] = h + 2, g + 1, g + 2
         else:
-            h = new_triangle(mesh, state, r0, r1, v1)
-            g = new_triangle(mesh, state, r0, v1, v0)
+            h = new_triangle(mesh, r0, r1, v1)
+            g = new_triangle(mesh, r0, v1, v0)
             join(mesh, h + 2, g)
-            left[j], right[j], lid[j] = g + 2, h + 1, g + 1
-        join(mesh, h, outer[j])
+            before[j], after[j], lid[j] = g + 2, h + 1, g + 1
+        join(mesh, h, cut.outer[j])
     for j in range(k):
-        join(mesh, right[j], left[j + 1 if j + 1 < k else 0])
+        join(mesh, after[j], before[j + 1 if j + 1 < k else 0])
 
 
 @kernel
-def bent_inwards(cloud, centres, mesh, h):
+def bent_inwards(cloud, mesh, h):
     """Whether the perturbed surface is strictly convex at half-edge h."""
-    corners, twins, _ = mesh
+    corners, twins = mesh.corners, mesh.twins
     a = np.int64(corners[h])
     b = np.int64(corners[following(h)])
     c = np.int64(corners[preceding(h)])
     d = np.int64(corners[preceding(np.int64(twins[h]))])
-    return side(cloud, centres, a, b, c, d) < 0
+    return side(cloud, a, b, c, d) < 0
 
 
 @kernel
-def convex_at_all(cloud, centres, mesh, outer, fresh, k):
+def convex_at_all(cloud, mesh, cut):
     """Whether the surface is convex at all edges of the new triangles."""
-    _, twins, leaving = mesh
-    for j in range(k):
-        if not bent_inwards(cloud, centres, mesh, outer[j]):
+    twins, leaving = mesh.twins, mesh.leaving
+    for j in range(cut.k):
+        if not bent_inwards(cloud, mesh, cut.outer[j]):
             return False
-        first = np.int64(leaving[fresh[j]])
+        first = np.int64(leaving[cut.fresh[j]])
         h = first
         while True:
-            if not bent_inwards(cloud, centres, mesh, h):
+            if not bent_inwards(cloud, mesh, h):
                 return False
             h = np.int64(twins[preceding(h)])
             if h == first:
@@ -237,35 +243,32 @@ def convex_at_all(cloud, centres, mesh, outer, fresh, k):
 
 
 @kernel
-def all_extreme(cloud, mesh, fresh, k):
-    """Whether all new vertices are surely extreme."""
-    for j in range(k):
-        if not surely_extreme(cloud, mesh, fresh[j]):
+def all_extreme(cloud, mesh, cut):
+    """Whether all new vertices are proven extreme."""
+    for j in range(cut.k):
+        if not proven_extreme(cloud, mesh, cut.fresh[j]):
             return False
     return True
 
 
 @kernel
-def surely_extreme(cloud, mesh, v):
+def proven_extreme(cloud, mesh, v):
     """Whether doubles show a plane through v with all of its neighbours strictly on one side."""
-    points = cloud[0]
-    corners, twins, leaving = mesh
-    x = y = z = 0.0
+    points = cloud.scaled
+    corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
+    normal = Vec3(0.0, 0.0, 0.0)
     first = np.int64(leaving[v])
     h = first
     while True:
-        nx, ny, nz = unit_normal(points, v, np.int64(corners[following(h)]), np.int64(corners[preceding(h)]))
-        x += nx
-        y += ny
-        z += nz
+        normal = add(normal, unit_normal(points, v, np.int64(corners[following(h)]), np.int64(corners[preceding(h)])))
         h = np.int64(twins[preceding(h)])
         if h == first:
             break
     while True:
-        dx, dy, dz = difference(points, v, np.int64(corners[following(h)]))
+        d = difference(points, v, np.int64(corners[following(h)]))
         # Three products and their sums: a few units of the last place of the terms.
-        margin = 2.0**-48 * (abs(x * dx) + abs(y * dy) + abs(z * dz)) + 2.0**-1000
-        if x * dx + y * dy + z * dz >= -margin:
+        margin = 2.0**-48 * (abs(normal.x * d.x) + abs(normal.y * d.y) + abs(normal.z * d.z)) + 2.0**-1000
+        if dot(normal, d) >= -margin:
             return False
         h = np.int64(twins[preceding(h)])
         if h == first:
@@ -273,10 +276,11 @@ def surely_extreme(cloud, mesh, v):
 
 
 @kernel
-def take_back(mesh, state, w, ring, outer, fresh, k, made):
-    """Put the star of w back in place of the new triangles."""
-    corners, twins, leaving = mesh
-    many = 0
+def take_back(mesh, cut, made):
+    """Put the star of w back in place of the new triangles. made : workspace for their numbers."""
+    corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
+    k, ring, fresh = cut.k, cut.ring, cut.fresh
+    n_made = 0
     for j in range(k):
         v = fresh[j]
         first = np.int64(leaving[v])
@@ -285,17 +289,17 @@ def take_back(mesh, state, w, ring, outer, fresh, k, made):
             # Once each: from the first new vertex among its corners.
             b, c = corners[following(h)], corners[preceding(h)]
             if not (fresh[0] <= b < v or fresh[0] <= c < v):
-                made[many] = h // 3
-                many += 1
+                made[n_made] = h // 3
+                n_made += 1
             h = np.int64(twins[preceding(h)])
             if h == first:
                 break
-    for j in range(many):
-        drop_triangle(mesh, state, made[j])
+    for j in range(n_made):
+        drop_triangle(mesh, made[j])
     for j in range(k):
         leaving[fresh[j]] = -1
-        h = new_triangle(mesh, state, w, ring[j], ring[j + 1 if j + 1 < k else 0])
-        join(mesh, h + 1, outer[j])
+        h = new_triangle(mesh, cut.w, ring[j], ring[j + 1 if j + 1 < k else 0])
+        join(mesh, h + 1, cut.outer[j])
         made[j] = h
     for j in range(k):
         join(mesh, made[j] + 2, made[j + 1 if j + 1 < k else 0])

@@ -1,4 +1,4 @@
-"""Vertices put into a convex surface one by one, by exact tests alone: what `cutting` falls back on.
+"""Vertices put into a convex surface one by one, by exact tests alone: what `vertex_cutting` falls back on.
 
 The triangles a new point lies above make a connected region; a fan from the point to its rim takes their place.
 """
@@ -13,29 +13,29 @@ from collide.kernels import kernel
 
 
 @kernel
-def sees(cloud, centres, mesh, t, v):
+def sees(cloud, mesh, t, v):
     """Whether v lies above triangle t."""
-    corners = mesh[0]
+    corners = mesh.corners
     a, b, c = np.int64(corners[3 * t]), np.int64(corners[3 * t + 1]), np.int64(corners[3 * t + 2])
-    return side(cloud, centres, a, b, c, v) > 0
+    return side(cloud, a, b, c, v) > 0
 
 
 @kernel
-def insert_near(cloud, centres, mesh, state, seen, v, near, region, rim, stack):
-    """Put v into the surface, found above a triangle at vertex ``near``; False where it is above none of them.
+def insert_near(cloud, mesh, seen, v, near, region, rim, stack):
+    """Put v, above a triangle at vertex ``near``, into the surface; False where it is above none of them.
 
-    seen : by triangle, the last vertex found above it.
-    region, rim, stack : room for as many entries as there are half-edges that v can see.
+    seen : by triangle, the last vertex that was above it.
+    region, rim, stack : as many entries as there are half-edges that v can see.
     Vertices that are no longer on the surface have −1 in ``leaving``.
     """
-    corners, twins, leaving = mesh
+    corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
     first = np.int64(leaving[near])
     h = first
-    while not sees(cloud, centres, mesh, h // 3, v):
+    while not sees(cloud, mesh, h // 3, v):
         h = np.int64(twins[preceding(h)])
         if h == first:
             return False
-    found = 1
+    n_seen = 1
     edges = 0
     region[0] = h // 3
     seen[h // 3] = v
@@ -48,25 +48,25 @@ def insert_near(cloud, centres, mesh, state, seen, v, near, region, rim, stack):
         t = g // 3
         if seen[t] == v:
             continue
-        if sees(cloud, centres, mesh, t, v):
+        if sees(cloud, mesh, t, v):
             seen[t] = v
-            region[found] = t
-            found += 1
+            region[n_seen] = t
+            n_seen += 1
             stack[depth], stack[depth + 1] = preceding(g), following(g)
             depth += 2
         else:
             rim[edges] = g
             edges += 1
-    for k in range(found):
+    for k in range(n_seen):
         for e in range(3 * region[k], 3 * region[k] + 3):
             leaving[corners[e]] = -1
-    for k in range(found):
-        drop_triangle(mesh, state, region[k])
+    for k in range(n_seen):
+        drop_triangle(mesh, region[k])
     before = np.int64(-1)
     start = np.int64(-1)
     for k in range(edges):
         g = rim[k]
-        h = new_triangle(mesh, state, np.int64(corners[following(g)]), np.int64(corners[g]), v)
+        h = new_triangle(mesh, np.int64(corners[following(g)]), np.int64(corners[g]), v)
         join(mesh, h, g)
         if k == 0:
             start = h

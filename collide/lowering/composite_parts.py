@@ -14,6 +14,7 @@ from collide.broadphase.bounding_boxes import boxes_of
 from collide.lowering.extents import extent_of
 from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
+from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
@@ -51,7 +52,7 @@ class Part(NamedTuple):
     @property
     def bound(self) -> PackedConvex:
         """A convex set that holds it, in its own frame."""
-        return self.shape.bounding_parts()[0][0]
+        return bounding_parts_of(self.shape)[0][0]
 
 
 class UnionParts:
@@ -66,7 +67,7 @@ class UnionParts:
         self.parts = [Part(s, *_rounded(X)) for s, X in _leaves(shape, None)]
         self.numbers = np.array([k for k, part in enumerate(self.parts) if not part.shape.meshed], dtype=np.int64)
         self.convex = _convex_part(shape)
-        bounds = shape.bounding_parts()
+        bounds = bounding_parts_of(shape)
         self._bounds, self._X_BP = [packed for packed, _ in bounds], np.array([X for _, X in bounds])
 
     @cached_property

@@ -19,6 +19,7 @@ import numpy as np
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import Body, made_body
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, PackedConvex
+from collide.lowering.parts import convex_set_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape
@@ -51,7 +52,7 @@ def enclosure_of(shape: Shape) -> Enclosure:
     try:
         return shape._surface
     except AttributeError:
-        packed = shape.parts()[0][0]
+        packed = convex_set_of(shape)
         outer, inner = _polytopes(shape, packed)
         point = inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
         made = Enclosure(_body(shape, outer, point), None if inner is None else _body(shape, inner, inner[:1]), packed)

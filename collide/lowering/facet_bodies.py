@@ -15,11 +15,12 @@ from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 
 
 class Body(NamedTuple):
@@ -66,14 +67,14 @@ def as_given(X: np.ndarray) -> PosesWithSlop:
 
 def is_halfspace(shape: Shape) -> bool:
     """Half-spaces have no facets: the hull of a mesh answers for it."""
-    return not shape.meshed and is_plain(shape) and shape.parts()[0][0].kind == HALFSPACE
+    return not shape.meshed and is_single_convex(shape) and convex_set_of(shape).kind == HALFSPACE
 
 
 def has_facets(shape: Shape) -> bool:
     """Whether a mesh, or a convex set whose surface is that of a hull of doubles, and a radius: `body_of` serves it."""
     if isinstance(shape, Mesh):
         return True
-    packed = shape.parts()[0][0]
+    packed = convex_set_of(shape)
     return packed.kind == POINTS and packed.slop == 0.0
 
 
@@ -141,7 +142,7 @@ def _one_of_each_part(mesh: Mesh) -> np.ndarray:
 
 
 def _of_convex(shape: Shape) -> Body:
-    packed = shape.parts()[0][0]
+    packed = convex_set_of(shape)
     hull = convex_hull(packed.points)
     tree = build_mesh_tree(packed.points, _facets(packed.points, hull))
     return made_body(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])

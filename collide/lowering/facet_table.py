@@ -10,6 +10,7 @@ import numpy as np
 
 from collide.kernels import address_of
 from collide.lowering.packed_convex import BLOCK, POINTS, PackedConvex, pack_points
+from collide.lowering.prepared_structures import coarse_address
 from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH
 from collide.numerics.lowest_bits import lowest_exponents
 
@@ -31,7 +32,7 @@ class FacetTable:
         self.ints[:k, ADDRESS] = first + self.coordinates.strides[0] * np.arange(k)
         self.ints[:k, LOWEST] = lowest_exponents(corners.reshape(k, 9))
         self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
-        coarse = packed.coarse.address if packed.coarse is not None else 0
+        coarse = coarse_address(packed)
         self.ints[k] = (
             packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest, 1,
             0, coarse,

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-import numpy as np
-
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import convex_set_of
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
-from collide.shapes.shape_set import ShapeSet
 
 
 class Kind(IntEnum):
@@ -45,7 +43,7 @@ def kind_of(shape: Shape) -> Kind:
 def _kind_of(shape: Shape) -> Kind:
     if isinstance(shape, Compound):
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
-    return Kind.MESH if shape.meshed else _kind_of_convex(shape.parts()[0][0])
+    return Kind.MESH if shape.meshed else _kind_of_convex(convex_set_of(shape))
 
 
 def _kind_of_convex(packed: PackedConvex) -> Kind:
@@ -54,12 +52,3 @@ def _kind_of_convex(packed: PackedConvex) -> Kind:
     if packed.slop != 0.0:
         return Kind.ROUNDED
     return Kind(min(len(packed.points), 3) - 1)
-
-
-def kinds_of(shape_set: ShapeSet) -> np.ndarray:
-    """(shapes,) kinds of a set's shapes."""
-    try:
-        return shape_set._kinds
-    except AttributeError:
-        shape_set._kinds = np.array([kind_of(shape) for shape in shape_set.shapes])
-        return shape_set._kinds

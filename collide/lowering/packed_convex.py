@@ -16,38 +16,25 @@ from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
 from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 __all__ = [
-    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "CoarsePoints", "PackedConvex", "on_cache_lines", "pack_curved",
+    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack_curved",
     "pack_halfspace", "pack_points",
 ]  # fmt: skip
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8
 
-#: So many points have a coarse look: twice as many as then stand for them.
-_FEWEST_COARSE = 64
 
+class PreparedStructures:
+    """What `prepared_structures.py` makes of the points when a query first needs it; shared by all copies of a packed set.
 
-class CoarsePoints:
-    """The few of a cloud (n, 3) that stand for all of it: `coarse_points.py`.
-
-    A kernel chooses them: imported when first asked for, since `verify` packs shapes and needs no kernel.
+    with_tree : whether a support tree may be made, if the points are many.   made : by name, what has been made.
     """
 
-    def __init__(self, points: np.ndarray):
-        self._points = points
-        self._blocks: list[np.ndarray] = []  # of two threads that ask at once both may make one: the first counts
+    __slots__ = ("made", "with_tree")
 
-    @property
-    def address(self) -> int:
-        """Of 4·COARSE doubles: x, y, z of each, and their ids as int64 bits."""
-        from collide.kernels import address_of
-        from collide.support.coarse_points import COARSE, choose_coarse
-
-        if not self._blocks:
-            block, points = on_cache_lines(4 * COARSE), np.ascontiguousarray(self._points)
-            choose_coarse(address_of(points), len(points), address_of(block))
-            self._blocks.append(_frozen(block))
-        return address_of(self._blocks[0])
+    def __init__(self, with_tree: bool):
+        self.with_tree = with_tree
+        self.made: dict[str, Any] = {}
 
 
 class PackedConvex(NamedTuple):
@@ -63,9 +50,7 @@ class PackedConvex(NamedTuple):
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.
-    coarse : a few of many points that span most of their hull, chosen when their address is first asked for; None for few
-        points.
-    tree : the points' support tree, made when its address is first asked for; None for few points.
+    prepared : what is made of the points when a query first needs it.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
         integers times 2 to it.
     content : digest of the numbers above; equal for equal sets, in every process. It orders the
@@ -79,25 +64,23 @@ class PackedConvex(NamedTuple):
     params: np.ndarray
     points: np.ndarray
     coordinates: np.ndarray
-    tree: Any
-    coarse: CoarsePoints | None
+    prepared: PreparedStructures
     lowest: int
     content: bytes
 
 
-def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, tree: Any = None) -> PackedConvex:
+def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, with_tree: bool = False) -> PackedConvex:
     """The hull of ``points`` (n, 3), swept by a ball of ``radius``.
 
-    tree : something with the ``address`` of the points' support tree (`support_tree.planted`).
+    with_tree : whether many points get a support tree when a query first needs it.
     """
     n = len(points)
     columns = on_cache_lines(3, -(-n // BLOCK) * BLOCK)
     columns[:, :n] = points.T
     columns[:, n:] = points[0][:, None]
     # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
-    coarse = CoarsePoints(points) if n >= _FEWEST_COARSE else None
     reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), tree, coarse)
+    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), with_tree)
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
@@ -110,13 +93,13 @@ def pack_halfspace(normal, offset: float) -> PackedConvex:
     return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
 
 
-def _packed(kind, radius, reach, slop, params, points, coordinates, tree=None, coarse=None) -> PackedConvex:
+def _packed(kind, radius, reach, slop, params, points, coordinates, with_tree=False) -> PackedConvex:
     row = np.zeros(4)
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
     lowest = int(lowest_exponents(points.ravel())) if len(points) else NO_BITS
-    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, tree, coarse, lowest, digest.digest())
+    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, PreparedStructures(with_tree), lowest, digest.digest())
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:

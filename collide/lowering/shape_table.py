@@ -12,6 +12,7 @@ import numpy as np
 
 from collide.kernels import address_of
 from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.prepared_structures import coarse_address, may_have_tree, support_tree_of
 
 # One row of integers a shape.
 KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)
@@ -48,13 +49,13 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, p.coarse.address if p.coarse is not None else 0
+            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, coarse_address(p)
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
         self.ints[:, RANK] = [order[p.content] for p in packed]
         self.addresses = address_of(self.ints), address_of(self.numbers)
-        self._without_tree = {k for k, p in enumerate(packed) if p.tree is not None}
+        self._without_tree = {k for k, p in enumerate(packed) if may_have_tree(p)}
 
     @property
     def planted(self) -> bool:
@@ -65,7 +66,7 @@ class ShapeTable:
         """Have the support trees of these rows, so far as their shapes are large enough for one."""
         if self._without_tree:
             for k in self._without_tree.intersection(np.unique(rows).tolist()):
-                self.ints[k, TREE] = self.packed[k].tree.address
+                self.ints[k, TREE] = support_tree_of(self.packed[k]).address
             self._without_tree.difference_update(rows.ravel().tolist())
 
 

@@ -26,8 +26,8 @@ from collide.mesh.bvh import (
     link_of,
     open_tree,
 )
-from collide.mesh.triangle import normal_of, triangle_at
-from collide.numerics.vec3 import Vec3, add, divide, dot, max_abs, put_vec3, sub, vec3_at
+from collide.mesh.triangle import range_along, sum_of_normals
+from collide.numerics.vec3 import Vec3, add, divide, dot, max_abs, put_vec3, vec3_at
 
 #: As in `build_bvh.py`: outward rounding to floats.
 _OUTWARD, _SMALLEST = 2.0**-22, 2.0**-120
@@ -74,10 +74,7 @@ def _normals_below(triangles, work, link):
         return vec3_at(work, at), int(work[at + 3]), int(work[at + 4])
     first = ~link >> 3
     last = first + (~link & 7)
-    total = Vec3(0.0, 0.0, 0.0)
-    for i in range(first, last):
-        total = add(total, normal_of(triangle_at(triangles, 9 * i)))
-    return total, first, last
+    return sum_of_normals(triangles, first, last), first, last
 
 
 @kernel
@@ -92,13 +89,7 @@ def _set_slab(tree, first, last, normal, slabs, at):
     slabs[at] = np.float32(normal.x)
     slabs[at + WIDTH] = np.float32(normal.y)
     slabs[at + 2 * WIDTH] = np.float32(normal.z)
-    n = float_column_at(slabs, at)
-    low = math.inf
-    high = -math.inf
-    for k in range(9 * first, 9 * last, 3):
-        height = dot(n, sub(vec3_at(tree.triangles, k), vec3_at(tree.numbers, CENTRE)))
-        low = min(low, height)
-        high = max(high, height)
+    low, high = range_along(float_column_at(slabs, at), tree.triangles, first, last, vec3_at(tree.numbers, CENTRE))
     scale = math.ldexp(1.0, int(-tree.header[EXPONENT]))
     low *= scale
     high *= scale

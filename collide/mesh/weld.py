@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64
+from collide.numerics.vec3 import equal_at
 
 #: Hashes are of 31 bits, so that no product leaves 63: plain Python and machine code agree.
 _MASK = (1 << 31) - 1
@@ -50,11 +51,7 @@ def first_rows(points_at, n, table_at, size, first_at):
             h = _mix(h, bits[3 * k + axis])
         slot = (h ^ (h << 7)) & (size - 1)
         row = table[slot]
-        while row >= 0 and not (
-            points[3 * row] == points[3 * k]
-            and points[3 * row + 1] == points[3 * k + 1]
-            and points[3 * row + 2] == points[3 * k + 2]
-        ):
+        while row >= 0 and not equal_at(points, 3 * row, 3 * k):
             slot = (slot + 1) & (size - 1)
             row = table[slot]
         if row < 0:

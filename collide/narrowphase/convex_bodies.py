@@ -12,13 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import UnionTable
+from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_queries
 from collide.narrowphase.composite.composite import UnionPair, run_unions
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.results import PAIR_DTYPE
-from collide.shapes.shape import Shape, is_plain
+from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked
 
 
@@ -71,27 +74,27 @@ def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, que
 
 def prepare_convex(A: Shape, B: Shape):
     """The pair made ready for single calls."""
-    if is_plain(A) and is_plain(B):
-        return convex_queries.SinglePair(ShapeTable([A.parts()[0][0], B.parts()[0][0]]))
-    return UnionPair(A.laid_out(), B.laid_out())
+    if is_single_convex(A) and is_single_convex(B):
+        return convex_queries.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    return UnionPair(layout_of(A), layout_of(B))
 
 
 def _one_part(shapes) -> bool:
-    return bool(shapes.shape_set.plain[shapes.rows].all()) if isinstance(shapes, Picked) else is_plain(shapes)
+    return bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all()) if isinstance(shapes, Picked) else is_single_convex(shapes)
 
 
 def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
     if isinstance(A, Picked):
-        return A.shape_set.table, np.stack([A.rows, B.rows], axis=1)
+        return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
     prepared = prepared_pair(A, B)
-    return (prepared.table if prepared else ShapeTable([A.parts()[0][0], B.parts()[0][0]])), None
+    return (prepared.table if prepared else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
 
 
 def _compound_table(A, B) -> tuple[UnionTable, np.ndarray | None]:
     """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
     if isinstance(A, Picked):
-        return A.shape_set.unions, np.stack([A.rows, B.rows], axis=1)
+        return tables_of(A.shape_set).compounds, np.stack([A.rows, B.rows], axis=1)
     prepared = prepared_pair(A, B)
-    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([A.laid_out(), B.laid_out()])), None
+    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([layout_of(A), layout_of(B)])), None
 

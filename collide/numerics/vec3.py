@@ -99,6 +99,12 @@ def put_vec3(values, at, a):
 
 
 @kernel(inline=True)
+def equal_at(values, i, j):
+    """Whether two vectors that stand at i and at j are equal."""
+    return values[i] == values[j] and values[i + 1] == values[j + 1] and values[i + 2] == values[j + 2]
+
+
+@kernel(inline=True)
 def column_at(coords, n, k):
     """Point k of n, kept as all x, then all y, then all z."""
     return Vec3(coords[k], coords[n + k], coords[2 * n + k])

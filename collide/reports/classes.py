@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.lowering.parts import bounding_parts_of
 from collide.results import UNDECIDED
 
 COLLIDING, SHALLOW, TOUCHING, NEAR = NAMES = ("colliding", "shallow", "touching", "near")
@@ -38,7 +39,7 @@ def body_sizes(bodies) -> np.ndarray:
 
 
 def _reach(shape) -> float:
-    parts = shape.bounding_parts()
+    parts = bounding_parts_of(shape)
     return max((packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in parts), default=0.0)
 
 

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape
-from collide.lowering.packed_convex import PackedConvex
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
-
-#: One product of two poses rounds each coordinate of a point by at most this many units in the
-#: last place of its terms: three products and three sums for the rotation, one more for the shift.
-_ULPS_PER_PRODUCT = 8
-_ULP = 2.0**-53
 
 
 class Compound(Shape):
@@ -54,7 +48,7 @@ class Compound(Shape):
     @property
     def convex(self) -> bool:  # type: ignore[override]
         """True for a compound of one convex shape."""
-        return not self.meshed and len(self.parts()) == 1
+        return len(self.items) == 1 and self.items[0][0].convex
 
     @property
     def meshed(self) -> bool:  # type: ignore[override]
@@ -67,26 +61,6 @@ class Compound(Shape):
     def _key(self) -> tuple:
         return tuple((shape, (X + 0.0).tobytes()) for shape, X in self.items)
 
-    def _pack(self):
-        return tuple(
-            _placed(packed, X_CS, X_SP) for shape, X_CS in self.items for packed, X_SP in shape.parts()
-        )
-
-    def bounding_parts(self):
-        """Convex sets that hold the union: its parts, and for a mesh one hull around it.
-
-        Returns
-        -------
-        tuple of (PackedConvex, (4, 4) float64)
-            As of `parts`.
-        """
-        if not self.meshed:
-            return self.parts()
-        if not hasattr(self, "_bounds"):
-            placed = ((packed, X_CS, X_SP) for shape, X_CS in self.items for packed, X_SP in shape.bounding_parts())
-            self._store(_bounds=tuple(_placed(*part) for part in placed))
-        return self._bounds
-
 
 def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
     if not isinstance(shape, Shape):
@@ -97,12 +71,3 @@ def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
     X = X[0].copy()
     X.flags.writeable = False
     return shape, X
-
-
-def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> tuple[PackedConvex, np.ndarray]:
-    """A part in the compound's frame, its slop grown by what the product of poses rounds."""
-    if np.array_equal(X_SP, np.eye(4)):
-        return packed, X_CS
-    X_CP = X_CS @ X_SP
-    scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()
-    return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP

@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.errors import InvalidShape
+from collide.lazy_modules import lazy_module
 from collide.log import log_duration
-from collide.lowering.packed_convex import pack_points
-from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
+from collide.shapes.shape import Shape, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from collide.hull import exact_hull, validate_hull
     from collide.hull.exact_hull import Hull
 
-# Hulls and support trees are kernels: imported where used, so that shapes can be made without a compiler.
-
-#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone,
-#: so that an answer does not depend on what was asked before.
-FEWEST_POINTS = 224
+if not TYPE_CHECKING:
+    exact_hull = lazy_module("collide.hull.exact_hull")
+    validate_hull = lazy_module("collide.hull.validate_hull")
 
 
 class ConvexHull(Shape):
@@ -47,13 +46,13 @@ class ConvexHull(Shape):
 
     Notes
     -----
-    Ids in results are rows of ``points`` as given. From `FEWEST_POINTS` points on, a hull gets a support tree, which
+    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support tree, which
     finds the extreme vertex in O(log n); it is built when a query first needs it (4 to 6 µs a point) and kept with the
     shape. Files and pickles hold the points alone: proofs rest on the tree, so it is built from them and never
     believed.
     """
 
-    __slots__ = ("_hull", "_tree", "faces", "points", "radius")
+    __slots__ = ("_hull", "faces", "points", "radius")
     _fields = ("points", "faces", "radius")
     points: np.ndarray
     faces: np.ndarray | None
@@ -78,14 +77,6 @@ class ConvexHull(Shape):
     def _from_fields(cls, points, faces, radius) -> ConvexHull:
         return cls(points, faces=faces, radius=radius)
 
-    def _pack(self):
-        if not hasattr(self, "_tree"):
-            from collide.support.lazy_support_tree import PlantedTree
-
-            large = len(self.points) >= FEWEST_POINTS
-            object.__setattr__(self, "_tree", PlantedTree(self.points) if large else None)
-        return alone(pack_points(self.points, self.radius, tree=self._tree))
-
     @property
     def hull(self) -> Hull:
         """The surface, exactly, computed when first needed in O(n log n).
@@ -93,11 +84,9 @@ class ConvexHull(Shape):
         ``dimension`` (3 solid, 2 flat, 1 straight, 0 a point), ``vertices`` and ``facets`` by rows of ``points``,
         facets counter-clockwise seen from outside.
         """
-        from collide.hull.exact_hull import convex_hull
-
         if not hasattr(self, "_hull"):
             with log_duration("convex hull of %d points made", len(self.points)):
-                hull = convex_hull(self.points)
+                hull = exact_hull.convex_hull(self.points)
             for array in (hull.vertices, hull.facets):
                 array.flags.writeable = False
             object.__setattr__(self, "_hull", hull)
@@ -113,8 +102,6 @@ class ConvexHull(Shape):
         InvalidShape
             With the defect and where it is.
         """
-        from collide.hull.validate_hull import validate_hull
-
         given = self.hull._replace(facets=self.faces) if self.faces is not None else None
         for what, surface in (("hull", self.hull), ("faces", given)):
             if surface is None:
@@ -123,7 +110,7 @@ class ConvexHull(Shape):
                 facets = surface.facets.astype(np.int32)
                 surface = surface._replace(facets=facets, vertices=np.unique(facets))
             try:
-                validate_hull(self.points, surface)
+                validate_hull.validate_hull(self.points, surface)
             except AssertionError as error:
                 raise InvalidShape(f"ConvexHull: {what}: {error}") from None
 

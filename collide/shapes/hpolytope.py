@@ -8,8 +8,7 @@ import numpy as np
 
 from collide.errors import InvalidShape, UnsupportedQuery
 from collide.hull.double_description import halfspace_vertices
-from collide.lowering.packed_convex import pack_points
-from collide.shapes.shape import Shape, alone, rows
+from collide.shapes.shape import Shape, rows
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
@@ -69,6 +68,3 @@ class HPolytope(Shape):
             raise InvalidShape(f"HPolytope: a vertex lies beyond {LARGEST:g} m; scale the scene")
         vertices.flags.writeable = False
         self._store(normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop)
-
-    def _pack(self):
-        return alone(pack_points(self.vertices, slop=self.slop))

@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidShape, UnsupportedQuery
+from collide.errors import InvalidShape
+from collide.lazy_modules import lazy_module
 from collide.log import log_duration
-from collide.lowering.packed_convex import pack_points
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
-from collide.shapes.shape import Shape, alone, facet_ids, positive, rows
+from collide.shapes.shape import Shape, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from collide.hull import exact_hull
+    from collide.mesh import build_bvh, mesh_survey, scaled_bvh
+    from collide.mesh import locality as local_stretch
     from collide.mesh.bvh import MeshTree
     from collide.mesh.locality import Locality
     from collide.mesh.mesh_survey import Survey
@@ -31,7 +34,12 @@ if TYPE_CHECKING:
         @property
         def faces(self) -> Any: ...
 
-# What looks at surfaces is kernels: imported where used.
+if not TYPE_CHECKING:
+    exact_hull = lazy_module("collide.hull.exact_hull")
+    build_bvh = lazy_module("collide.mesh.build_bvh")
+    local_stretch = lazy_module("collide.mesh.locality")
+    mesh_survey = lazy_module("collide.mesh.mesh_survey")
+    scaled_bvh = lazy_module("collide.mesh.scaled_bvh")
 
 
 class Mesh(Shape):
@@ -118,13 +126,9 @@ class Mesh(Shape):
         if not hasattr(self, "_tree"):
             with log_duration("box-tree of a mesh of %d facets made", len(self.faces)):
                 if self._copied is None:
-                    from collide.mesh.build_bvh import build_mesh_tree
-
-                    self._store(_tree=build_mesh_tree(self.vertices, self.faces))
+                    self._store(_tree=build_bvh.build_mesh_tree(self.vertices, self.faces))
                 else:
-                    from collide.mesh.scaled_bvh import scaled_tree
-
-                    self._store(_tree=scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
+                    self._store(_tree=scaled_bvh.scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree
 
     @property
@@ -134,9 +138,7 @@ class Mesh(Shape):
             used = self.vertices[np.unique(self.faces)]
             with log_duration("convex hull around a mesh of %d facets made", len(self.faces)):
                 if len(used) > _MANY:
-                    from collide.hull.exact_hull import convex_hull
-
-                    used = used[convex_hull(used).vertices]
+                    used = used[exact_hull.convex_hull(used).vertices]
                 self._store(_hull=ConvexHull(used))
         return self._hull
 
@@ -148,13 +150,11 @@ class Mesh(Shape):
     @property
     def survey(self) -> Survey:
         """Which facets meet where, welded corners, shells and their volumes: of `base`, for all its scaled copies."""
-        from collide.mesh.mesh_survey import survey_surface
-
         if self._copied is not None:
             return self._copied.survey
         if not hasattr(self, "_survey"):
             with log_duration("surface of a mesh of %d facets looked at", len(self.faces)):
-                survey = survey_surface(self.vertices, self.faces)
+                survey = mesh_survey.survey_surface(self.vertices, self.faces)
             spoilt = self.solid and _what_spoils(len(self.vertices), survey)
             if spoilt:
                 raise InvalidShape(spoilt)
@@ -219,10 +219,8 @@ class Mesh(Shape):
         O(n log n), a second for 437,645 vertices. J. Erickson, "Local polyhedra and geometric graphs", Computational
         Geometry 31 (2005), sections 2.1 and 8.
         """
-        from collide.mesh.locality import locality
-
         options = {} if progress is None else {"progress": progress}
-        return locality(self.vertices, self.faces, repeated=repeated, **options)
+        return local_stretch.locality(self.vertices, self.faces, repeated=repeated, **options)
 
     def save(self, path) -> None:
         """Write vertices, faces, ``solid`` and ``scale`` to an ``.npz`` file.
@@ -260,48 +258,6 @@ class Mesh(Shape):
             return cls._from_fields(arrays["vertices"], arrays["faces"], arrays["solid"], float(arrays["scale"]))
         except InvalidShape as error:
             raise InvalidShape(f"Mesh.load: {path}: {error}") from None
-
-    def _pack(self):
-        raise UnsupportedQuery(
-            "Mesh: a mesh is no union of convex parts, which this query needs. collide() and distance() of one mesh "
-            "and "
-            "another shape, and World, take it as it is; elsewhere ConvexHull(mesh.vertices) may do instead"
-        )
-
-    def bounding_parts(self):
-        """One convex set that holds all facets, of at most a few hundred points.
-
-        Returns
-        -------
-        tuple of (PackedConvex, (4, 4) float64)
-            One entry.
-        """
-        if not hasattr(self, "_bounds"):
-            used = np.zeros(len(self.vertices), dtype=bool)
-            used[self.faces] = True
-            self._store(_bounds=alone(pack_points(_around(self.vertices[used]))))
-        return self._bounds
-
-
-#: Points that are their own bounds; of more, boxes of so many cells along each axis hold them.
-_FEW, _CELLS = 512, 6
-
-
-def _around(points: np.ndarray) -> np.ndarray:
-    """Points (k, 3) whose hull holds the ones given, and is not much larger: few, or corners of boxes around groups."""
-    if len(points) <= _FEW:
-        return points
-    low, high = points.min(axis=0), points.max(axis=0)
-    with np.errstate(under="ignore"):
-        share = 0.5 * points - 0.5 * low, 0.5 * high - 0.5 * low
-    cell = np.minimum(share[0] / np.where(share[1] > 0.0, share[1], 1.0) * _CELLS, _CELLS - 1).astype(np.int64)
-    numbers = (cell[:, 0] * _CELLS + cell[:, 1]) * _CELLS + cell[:, 2]
-    order = np.argsort(numbers, kind="stable")
-    starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
-    lows = np.minimum.reduceat(points[order], starts)[:, None]
-    highs = np.maximum.reduceat(points[order], starts)[:, None]
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
-    return np.unique(np.where(corners, highs, lows).reshape(-1, 3), axis=0)
 
 
 #: Hulls of so many vertices are asked as they are: leaving out those inside takes a kernel of its own.

@@ -6,22 +6,12 @@ in metres (MuJoCo's "size" holds half lengths).
 
 from __future__ import annotations
 
-import itertools
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.errors import InvalidShape
-from collide.lowering.packed_convex import (
-    CONE,
-    CYLINDER,
-    ELLIPSOID,
-    pack_curved,
-    pack_halfspace,
-    pack_points,
-)
-from collide.shapes.shape import Shape, alone, positive, rows, scalar, three_lengths
+from collide.shapes.shape import Shape, positive, rows, scalar, three_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -48,9 +38,6 @@ class Sphere(Shape):
     def __init__(self, radius: float):
         self._store(radius=positive("Sphere", "radius", radius))
 
-    def _pack(self):
-        return alone(pack_points(np.zeros((1, 3)), self.radius))
-
 
 class Box(Shape):
     """A box centred at the origin of its frame, its edges along the axes.
@@ -74,10 +61,6 @@ class Box(Shape):
 
     def __init__(self, size: ArrayLike, y: float | None = None, z: float | None = None):
         self._store(size=three_lengths("Box", "size", size, y, z))
-
-    def _pack(self):
-        signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-        return alone(pack_points(signs * self.size))
 
 
 def _one_length(shape: str, length, height):
@@ -117,11 +100,6 @@ class Capsule(Shape):
             radius=positive("Capsule", "radius", radius), length=positive("Capsule", "length", length, zero=True)
         )
 
-    def _pack(self):
-        half = 0.5 * self.length
-        ends = np.array([(0.0, 0.0, -half), (0.0, 0.0, half)])[: 2 if half else 1]
-        return alone(pack_points(ends, self.radius))
-
 
 class Cylinder(Shape):
     """A solid cylinder along z, centred at the origin of its frame.
@@ -152,10 +130,6 @@ class Cylinder(Shape):
             radius=positive("Cylinder", "radius", radius), length=positive("Cylinder", "length", length)
         )
 
-    def _pack(self):
-        half = 0.5 * self.length
-        return alone(pack_curved(CYLINDER, (self.radius, half), math.hypot(self.radius, half)))
-
 
 class Cone(Shape):
     """A solid cone along z: its apex at +z·length/2, its base at −z·length/2.
@@ -184,10 +158,6 @@ class Cone(Shape):
         length = _one_length("Cone", length, height)
         self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
 
-    def _pack(self):
-        half = 0.5 * self.length
-        return alone(pack_curved(CONE, (self.radius, half), math.hypot(self.radius, half)))
-
 
 class Ellipsoid(Shape):
     """The ellipsoid {x : Σ (x_k / radii_k)² ≤ 1}.
@@ -211,9 +181,6 @@ class Ellipsoid(Shape):
 
     def __init__(self, radii: ArrayLike, y: float | None = None, z: float | None = None):
         self._store(radii=three_lengths("Ellipsoid", "radii", radii, y, z))
-
-    def _pack(self):
-        return alone(pack_curved(ELLIPSOID, tuple(self.radii), float(self.radii.max())))
 
 
 class Halfspace(Shape):
@@ -245,6 +212,3 @@ class Halfspace(Shape):
                 f"Halfspace: normal must have a length within [1e-6, 1e6] (1 is usual), got {length:g}"
             )
         self._store(normal=normal, offset=scalar("Halfspace", "offset", offset))
-
-    def _pack(self):
-        return alone(pack_halfspace(tuple(self.normal), self.offset))

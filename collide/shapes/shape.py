@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidShape
-from collide.lowering.packed_convex import PackedConvex
 from collide.transforms import LARGEST, SMALLEST
-
-if TYPE_CHECKING:
-    from collide.lowering.compound_table import LaidOut
 
 
 class Shape:
@@ -27,7 +23,9 @@ class Shape:
         "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
-    _parts: tuple[tuple[PackedConvex, np.ndarray], ...]
+    #: Convex parts, and sets that hold them (`lowering/parts.py`).
+    _parts: tuple
+    _bounds: tuple
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
@@ -39,12 +37,10 @@ class Shape:
     _topology: Any
     #: Its parts, as unions with meshes ask about them (`lowering/composite_parts.py`).
     _union: Any
-    #: Its parts in the rows that kernels of unions read.
-    _laid_out: LaidOut
+    #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
+    _laid_out: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
-    #: What `bounding_parts` gives, where that is not `parts`.
-    _bounds: tuple[tuple[PackedConvex, np.ndarray], ...]
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
@@ -83,65 +79,9 @@ class Shape:
         shown = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
         return f"{type(self).__name__}({shown})"
 
-    def parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
-        """The convex sets whose union this is, each with its (4, 4) pose in the shape's frame.
-
-        Packed when first needed and kept, since a shape never changes.
-
-        Returns
-        -------
-        tuple of (PackedConvex, (4, 4) float64)
-            One entry a convex part.
-        """
-        try:
-            return self._parts
-        except AttributeError:
-            object.__setattr__(self, "_parts", self._pack())
-            return self._parts
-
-    def bounding_parts(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
-        """Convex sets that hold this shape, for bounding boxes: its parts, or something larger and simpler.
-
-        Returns
-        -------
-        tuple of (PackedConvex, (4, 4) float64)
-            As of `parts`.
-        """
-        return self.parts()
-
-    def laid_out(self) -> LaidOut:
-        """Its bounding parts in the rows that kernels of unions read, made when first needed and kept.
-
-        Returns
-        -------
-        LaidOut
-            See `collide.lowering.compound_table`.
-        """
-        if not hasattr(self, "_laid_out"):
-            from collide.lowering.compound_table import lay_out
-
-            self._store(_laid_out=lay_out(self.bounding_parts()))
-        return self._laid_out
-
-    def _pack(self) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
-        raise TypeError(f"{type(self).__name__} cannot be asked about: derive it from Shape and define _pack")
-
-
-def alone(packed: PackedConvex) -> tuple[tuple[PackedConvex, np.ndarray], ...]:
-    """The parts of a shape that is one convex set in its own frame."""
-    return ((packed, IDENTITY),)
-
 
 IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
-
-
-def is_plain(shape: Shape) -> bool:
-    """Whether a shape is one convex set in its own frame."""
-    if shape.meshed:
-        return False
-    parts = shape.parts()
-    return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
 
 
 def _rebuild(cls, values):

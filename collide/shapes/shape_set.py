@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidShape
-from collide.shapes.shape import Shape, is_plain
-
-if TYPE_CHECKING:
-    from collide.lowering.compound_table import UnionTable
-    from collide.lowering.shape_table import ShapeTable
+from collide.shapes.shape import Shape
 
 
 class ShapeSet:
@@ -35,8 +29,8 @@ class ShapeSet:
         Where ``shapes`` is empty or holds what is no shape.
     """
 
-    #: Kinds of the shapes, once asked for (`lowering/kinds.py`).
-    _kinds: np.ndarray
+    #: What the engine makes of the shapes, once asked for (`lowering/shape_set_tables.py`).
+    _tables: object
 
     def __init__(self, shapes: Sequence[Shape]):
         try:
@@ -68,25 +62,6 @@ class ShapeSet:
                 f"ShapeSet: there are shapes 0 … {len(self) - 1}, not {numbers.min()} … {numbers.max()}"
             )
         return Picked(self, numbers.astype(np.int64))
-
-    @cached_property
-    def plain(self) -> np.ndarray:
-        """(shapes,) bool: which are one convex set in their own frame."""
-        return np.array([is_plain(shape) for shape in self.shapes])
-
-    @cached_property
-    def table(self) -> ShapeTable:
-        """What kernels read, a row a shape; of a union its first part and of a mesh its box, which nobody asks for."""
-        from collide.lowering.shape_table import ShapeTable
-
-        return ShapeTable([shape.bounding_parts()[0][0] for shape in self.shapes])
-
-    @cached_property
-    def unions(self) -> UnionTable:
-        """The same with all parts of each shape, a body a shape."""
-        from collide.lowering.compound_table import UnionTable
-
-        return UnionTable([shape.laid_out() for shape in self.shapes])
 
 
 class Picked(Sequence):

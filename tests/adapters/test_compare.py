@@ -201,7 +201,8 @@ def test_a_world_that_drops_a_pair_is_found_out(monkeypatch):
 
     def forgetful(self, max_distance=0.1):
         result = real(self, max_distance)
-        return type(result)(result.rows[1:], self.names)
+        result.rows = result.rows[1:]
+        return result
 
     monkeypatch.setattr(collide.World, "distances", forgetful)
     comparison = compare(scene(), ("exact",), max_distance=0.1)
@@ -251,7 +252,9 @@ def test_parts_of_a_compound_enter_exactly():
         other = pose(rng.normal(size=3) * 50)
         question = Question.from_pairs([(body, Sphere(0.25), X_WC, other)])
         told = protocol.engine("exact").answer(question).rows[0]["distance"]
-        centre = [sum((Fraction(X_WC[i, k]) * Fraction(X_CS[k, 3]) for k in range(3)), Fraction(X_WC[i, 3])) for i in range(3)]
+        centre = [
+            sum((Fraction(X_WC[i, k]) * Fraction(X_CS[k, 3]) for k in range(3)), Fraction(X_WC[i, 3])) for i in range(3)
+        ]
         squared = sum((c - Fraction(other[i, 3])) ** 2 for i, c in enumerate(centre))
         # the square root is right to the last digit where its neighbours' squares lie on either side
         gap, half = Fraction(told) + Fraction(1, 2), Fraction(np.spacing(told))
@@ -260,8 +263,15 @@ def test_parts_of_a_compound_enter_exactly():
     assert differing > 10, "poses that multiply out exactly show nothing"
 
 
-@pytest.mark.parametrize("options, status", [([], 0), (["--fail-on", "peer-wrong"], 1), (["--fail-on", "ours-wrong"], 0),
-                                             (["--fail-on", "peer-wrong", "--tolerance", "0.1"], 0)])
+@pytest.mark.parametrize(
+    "options, status",
+    [
+        ([], 0),
+        (["--fail-on", "peer-wrong"], 1),
+        (["--fail-on", "ours-wrong"], 0),
+        (["--fail-on", "peer-wrong", "--tolerance", "0.1"], 0),
+    ],
+)
 def test_the_command_can_fail_on_a_wrong_peer(monkeypatch, capsys, options, status):
     from collide import cli
 
@@ -269,4 +279,6 @@ def test_the_command_can_fail_on_a_wrong_peer(monkeypatch, capsys, options, stat
     asked = Scene("two", [can, SceneBody("ball", Sphere(0.1), pose((0.3, 0, 0)))])
     monkeypatch.setattr(collide.scenes, "load", lambda *paths, **options: asked)
     assert cli.main(["compare", "two.yaml", "--engines", "skewed", *options]) == status
-    assert ("1 wrong distance (1000 µm off at worst)" in " ".join(capsys.readouterr().out.split())) == ("--tolerance" not in options)
+    assert ("1 wrong distance (1000 µm off at worst)" in " ".join(capsys.readouterr().out.split())) == (
+        "--tolerance" not in options
+    )

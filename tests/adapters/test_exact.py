@@ -23,7 +23,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from collide.adapters.peers import exact
+from collide.adapters.peers import exact, exact_search
 
 IDENTITY = np.eye(3)
 ORIGIN = np.zeros(3)
@@ -561,8 +561,10 @@ def test_depth_of_bodies_apart_and_negative_radii_are_refused():
 
 
 def test_the_oracle_imports_nothing_but_the_standard_library():
-    tree = ast.parse(inspect.getsource(exact))
-    imported = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
-    imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level}
-    assert imported and {name.split(".")[0] for name in imported} <= sys.stdlib_module_names
-    assert not any(isinstance(node, ast.ImportFrom) and node.level for node in ast.walk(tree))
+    """And its own searches, of which the same holds."""
+    for module, own in ((exact, {exact_search.__name__}), (exact_search, set())):
+        tree = ast.parse(inspect.getsource(module))
+        imported = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+        imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level}
+        assert imported and {name.split(".")[0] for name in imported - own} <= sys.stdlib_module_names
+        assert not any(isinstance(node, ast.ImportFrom) and node.level for node in ast.walk(tree))

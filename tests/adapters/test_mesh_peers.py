@@ -1,4 +1,5 @@
-"""Meshes asked of every engine: the exact judge against a plainer one, what each peer is asked, insides as a class of their own."""
+"""Meshes asked of every engine: the exact judge against a plainer one, what each peer is asked, insides as a class of
+their own."""
 
 from __future__ import annotations
 
@@ -49,7 +50,9 @@ def test_facet_pairs_and_gaps_against_the_plain_reference():
         (v, f), (w, g), X, Y = soup(rng, 6), soup(rng, 5), grid_pose(rng), grid_pose(rng)
         A, B = exact_meshes.mesh_cells(v, f, False, X), exact_meshes.mesh_cells(w, g, False, Y)
         pairs = naive_triangles.facet_pairs(v, f, X, w, g, Y)
-        assert exact_meshes.facet_pairs(A, B) == pairs, f"case {k}: {v.tolist()}, {f.tolist()}, {w.tolist()}, {g.tolist()}"
+        assert exact_meshes.facet_pairs(A, B) == pairs, (
+            f"case {k}: {v.tolist()}, {f.tolist()}, {w.tolist()}, {g.tolist()}"
+        )
         verdict = exact_meshes.judge(A, B)
         assert verdict.hit == verdict.surfaces == bool(pairs)
         counts["meet" if pairs else "apart"] += 1
@@ -145,12 +148,20 @@ def test_only_solids_have_an_inside(name):
 
 def test_insides_are_a_class_of_their_own():
     bodies = [SceneBody("ring", RING, np.eye(4)), SceneBody("pip", Box((0.1, 0.2, 0.3)), pose((1, 0, 0)))]
-    bodies += [SceneBody("bar", Box((0.5, 0.5, 2.0)), pose((-1, 0.2, 0.0))), SceneBody("ball", Sphere(0.3), pose((0.1, 0, 0)))]
+    bodies += [
+        SceneBody("bar", Box((0.5, 0.5, 2.0)), pose((-1, 0.2, 0.0))),
+        SceneBody("ball", Sphere(0.3), pose((0.1, 0, 0))),
+    ]
     comparison = compare(Scene("s", bodies), engines=[present("fcl"), present("coal")], max_distance=1.0)
     assert comparison.ours_wrong == 0
     for name in ("fcl", "coal"):
         summary = comparison.summary(name)
-        assert summary.inside == 1 and summary.hit_disagreements == 0 and summary.wrong == 0 and summary.agreeing == summary.asked - 1 == 4
+        assert (
+            summary.inside == 1
+            and summary.hit_disagreements == 0
+            and summary.wrong == 0
+            and summary.agreeing == summary.asked - 1 == 4
+        )
     kinds = {(d.engine, d.kind, d.a, d.b) for d in comparison.disagreements}
     assert kinds == {("fcl", "inside", "ring", "pip"), ("coal", "inside", "ring", "pip")}
     assert all(d.exact_hit and d.exact_distance is None and not d.wrong for d in comparison.disagreements)
@@ -196,7 +207,9 @@ def test_a_reference_blind_for_insides_is_wrong(tmp_path, monkeypatch):
     assert blind.ours_wrong >= 1 and blind.summary("collide").wrong == 0 and blind.summary("collide").inside == 0
     free = [(RING, Box((0.5, 0.5, 0.5)), np.eye(4), np.eye(4))]
     assert compare(free, engines=["collide"], reference="full").ours_wrong >= 1
-    assert compare(free, engines=["full"]).ours_wrong == 0 and compare(free, engines=["full"]).summary("full").wrong == 1
+    assert (
+        compare(free, engines=["full"]).ours_wrong == 0 and compare(free, engines=["full"]).summary("full").wrong == 1
+    )
 
 
 def test_random_pairs_agree_or_are_judged():

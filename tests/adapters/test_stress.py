@@ -179,13 +179,17 @@ def test_gap_along_a_direction_is_at_most_the_distance():
         assert all(gap_along(case, rng.standard_normal(3)) <= truth(case).distance for _ in range(5))
         assert gap_along(case, (0, 0, 0)) is None and gap_along(case, (np.nan, 0, 1)) is None
     # Two swept points, the second straight above: exactly their distance less the radii.
-    above = case._replace(P=np.zeros((1, 3)), Q=np.zeros((1, 3)), t1=np.zeros(3), t2=np.array([0, 0, 4.0]), radius_a=1, radius_b=0.5)
+    above = case._replace(
+        P=np.zeros((1, 3)), Q=np.zeros((1, 3)), t1=np.zeros(3), t2=np.array([0, 0, 4.0]), radius_a=1, radius_b=0.5
+    )
     assert gap_along(above, (0, 0, 7.0)) == truth(above).distance == Decimal("2.5")
     assert gap_along(generate("halfspace_near", 1, 1)[0], (0, 0, 1)) is None
 
 
 def test_errors_are_parts_of_the_exact_value(monkeypatch):
-    (result,) = answered_by(monkeypatch, lambda r: r._replace(distance=1.01 * r.distance, upper=2 * r.upper), "rand_sep").families
+    (result,) = answered_by(
+        monkeypatch, lambda r: r._replace(distance=1.01 * r.distance, upper=2 * r.upper), "rand_sep"
+    ).families
     assert result.distance_error == pytest.approx(0.01, rel=1e-6) and result.depth_error is None
     assert 0 < result.distance_error_of_size
 
@@ -213,7 +217,9 @@ def test_half_space_distance_agrees_with_plain_arithmetic(index):
     assert float(distance) == pytest.approx(plain, abs=1e-14) and hit == (distance <= 0)
 
 
-@pytest.mark.parametrize(("height", "radius"), [(5.0, 5.0), (5.0, np.nextafter(5.0, 6)), (5.0, np.nextafter(5.0, 4)), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("height", "radius"), [(5.0, 5.0), (5.0, np.nextafter(5.0, 6)), (5.0, np.nextafter(5.0, 4)), (0.0, 0.0)]
+)
 def test_half_space_distance_is_exact_at_touching(height, radius):
     # normal (0, 3, 4) of length 5: the point stands exactly `height` above the plane
     case = generate("halfspace_near", 1, 0)[0]._replace(

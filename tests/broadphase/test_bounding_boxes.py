@@ -12,20 +12,24 @@ from naive_triangles import world_points
 
 import collide
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 
 EYE = np.eye(4)
 
 
 def box_of(shape: collide.Shape, X_WB: np.ndarray) -> np.ndarray:
-    (packed, X_BP), = shape.parts()
+    (packed, X_BP), = parts_of(shape)
     table = ShapeTable([packed])
     table.plant(np.zeros(1, dtype=np.int64))
-    return boxes_of(table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64))[0]
+    return boxes_of(
+        table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64)
+    )[0]
 
 
 def reaches(shape: collide.Shape, g, bound: Fraction) -> bool:
-    """Whether a curved shape's support value along g, in its own frame, is at most the bound: exactly, without roots."""
+    """Whether a curved shape's support value along g, in its own frame, is at most the bound: exactly, without
+    roots."""
     x, y, z = g
     if isinstance(shape, collide.Ellipsoid):
         square = sum((Fraction(r) * c) ** 2 for r, c in zip(shape.radii.tolist(), g))
@@ -40,7 +44,9 @@ def holds(shape: collide.Shape, X: np.ndarray, box) -> bool:
     if isinstance(shape, (collide.Ellipsoid, collide.Cylinder, collide.Cone)):
         for axis in range(3):
             g, t = [Fraction(v) for v in X[axis, :3].tolist()], Fraction(float(X[axis, 3]))
-            if not reaches(shape, g, Fraction(box[3 + axis]) - t) or not reaches(shape, [-v for v in g], t - Fraction(box[axis])):
+            if not reaches(shape, g, Fraction(box[3 + axis]) - t) or not reaches(
+                shape, [-v for v in g], t - Fraction(box[axis])
+            ):
                 return False
         return True
     points, radius = naive.corners(shape)
@@ -87,7 +93,7 @@ def test_parts_with_poses_of_their_own():
     for _ in range(20):
         hull = collide.ConvexHull(naive.hull_points(rng, 8))
         X_WB, X_BP = random_pose(rng, 1e6), random_pose(rng, 1e3)
-        (packed, _), = hull.parts()
+        (packed, _), = parts_of(hull)
         rows = pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows
         box = boxes_of(ShapeTable([packed]), rows, np.zeros(1, dtype=np.int64))[0].tolist()
         in_body = world_points(hull.points, X_BP)

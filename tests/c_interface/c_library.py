@@ -17,7 +17,9 @@ import collide
 from collide.kernels.library import library_path
 from collide.results import PAIR_DTYPE
 
-OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDLESS_DEPTH, UNSUPPORTED, NO_KERNELS = range(9)
+OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDLESS_DEPTH, UNSUPPORTED, NO_KERNELS = (
+    range(9)
+)
 TRUST_POSES, UNSIGNED = 1, 2
 
 
@@ -45,8 +47,12 @@ _TYPES = {
     "collide_workspace_free": [c_void_p],
     "collide_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p],
-    "collide_collide_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t)],
-    "collide_distance_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t)],
+    "collide_collide_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_distance_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
+    ],
     "collide_collide_each": [
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
     ],
@@ -169,10 +175,14 @@ class Asker:
 
     def collide(self, A: CShape, B: CShape, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)
-        status = library().collide_collide(self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit)
+        status = library().collide_collide(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit
+        )
         return status, bool(hit.value)
 
-    def distance(self, A: CShape, B: CShape, X_WA, X_WB, flags: int = 0, limit: float = math.inf) -> tuple[int, np.ndarray]:
+    def distance(
+        self, A: CShape, B: CShape, X_WA, X_WB, flags: int = 0, limit: float = math.inf
+    ) -> tuple[int, np.ndarray]:
         rows, X_WA, X_WB = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WA), _doubles(X_WB)
         status = library().collide_distance(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, limit, flags, rows.ctypes.data
@@ -181,7 +191,9 @@ class Asker:
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)
-        status = library().collide_mesh_collide(self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit)
+        status = library().collide_mesh_collide(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, hit
+        )
         return status, bool(hit.value)
 
     def mesh_gap(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, np.ndarray]:

@@ -1,7 +1,7 @@
 """The C interface: its answers are Python's, bit by bit, in one thread and in four; what Python refuses it refuses.
 
-Nothing here judges whether the answers are right: that is judged of Python's. Programs in C and C++ are built with the system's
-compilers and run.
+Nothing here judges whether the answers are right: that is judged of Python's. Programs in C and C++ are built with
+the system's compilers and run.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ import soak_pairs
 import collide
 from collide.kernels import mode
 from collide.kernels.library import library_path
+from collide.lowering.parts import convex_set_of, parts_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import PAIR_DTYPE, flipped
 
 if mode.MODE != mode.COMPILED:
@@ -34,7 +36,8 @@ if mode.MODE != mode.COMPILED:
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples" / "c"
 CONVEX = (
-    "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone", "ellipsoid",
+    "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone",
+    "ellipsoid",
 )  # fmt: skip
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
 
@@ -53,7 +56,9 @@ def compiler(*names: str) -> str:
 
 
 def run(*command, **options) -> str:
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False, timeout=300, **options)
+    done = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, check=False, timeout=300, **options
+    )
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
     return done.stdout
 
@@ -84,18 +89,25 @@ def test_rows_are_those_of_python(tmp_path):
     fields += '    printf("all %zu\\n", sizeof(collide_pair));\n'
     text = f'#include "collide.h"\n#include <stdio.h>\nint main(void) {{\n{fields}    return 0;\n}}\n'
     told = dict(line.split() for line in run(built(tmp_path, text)).splitlines())
-    assert told == {"all": str(PAIR_DTYPE.itemsize), **{name: str(PAIR_DTYPE.fields[name][1]) for name in PAIR_DTYPE.names}}
+    assert told == {
+        "all": str(PAIR_DTYPE.itemsize),
+        **{name: str(PAIR_DTYPE.fields[name][1]) for name in PAIR_DTYPE.names},
+    }
 
 
 def test_version_is_that_of_the_package():
     assert c.library().collide_version().decode() == collide.__version__
-    assert f'#define COLLIDE_VERSION "{collide.__version__}"' in (header_folder() / "collide.h").read_text(encoding="utf-8")
+    assert f'#define COLLIDE_VERSION "{collide.__version__}"' in (header_folder() / "collide.h").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_library_exports_its_headers_and_nothing_else():
     if not sys.platform.startswith("linux") or shutil.which("nm") is None:
         pytest.skip("nm of Linux tells the symbols")
-    headers = "".join((ROOT / "native" / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h"))
+    headers = "".join(
+        (ROOT / "native" / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h")
+    )
     declared = re.findall(r"^COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", headers, re.MULTILINE)
     exported = [line.split()[-1] for line in run("nm", "-D", "--defined-only", library_path()).splitlines()]
     assert sorted(exported) == sorted(declared)
@@ -124,7 +136,9 @@ def test_examples_are_built_by_make_and_run(tmp_path):
 
 
 def test_the_page_says_what_runs(tmp_path):
-    (snippet,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "c-interface.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    (snippet,) = re.findall(
+        r"```c\n(.*?)```", (ROOT / "docs" / "c-interface.md").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
     includes = "".join(f"#include <{name}>\n" for name in ("collide.h", "math.h", "stdio.h"))
     ending = '    printf("%.17g %d\\n", pair.distance, status);\n    return 0;\n'
     text = f"{includes}int main(void)\n{{\n{snippet}{ending}}}\n"
@@ -162,7 +176,8 @@ int main(void)
 #if defined(__x86_64__)
         if (way == 2) _mm_setcsr(_mm_getcsr() | 0x8040);
 #endif
-        if (collide_box(size, &shapes[0]) || collide_ellipsoid(radii, &shapes[1]) || collide_cone(0.1, 0.3, &shapes[2]) ||
+        if (collide_box(size, &shapes[0]) || collide_ellipsoid(radii, &shapes[1]) ||
+            collide_cone(0.1, 0.3, &shapes[2]) ||
             collide_hull(points, 300, 0.01, &shapes[3]) || collide_workspace_create(&workspace))
             return 1;
         for (i = 0; i < 4; i++)
@@ -189,7 +204,7 @@ int main(void)
 """
 
 
-# --- the same bits -----------------------------------------------------------------------------------------------------
+# --- the same bits --------------------------------------------------------------------------------
 
 
 @functools.cache
@@ -231,7 +246,7 @@ def _touching() -> list:
 def _extent(shape) -> np.ndarray:
     if isinstance(shape, collide.Capsule):
         return 2 * shape.radius + np.array([0.0, 0.0, shape.length])
-    return 2 * np.abs(shape.parts()[0][0].points).max(axis=0) + 2 * shape.parts()[0][0].radius
+    return 2 * np.abs(convex_set_of(shape).points).max(axis=0) + 2 * convex_set_of(shape).radius
 
 
 @functools.cache
@@ -320,7 +335,9 @@ def test_sets_and_limits_have_pythons_bits():
         wanted = collide.distance(A, B, X_WA, X_WB, **options).rows
         assert status == c.OK
         odd = [k for k in range(len(cases)) if rows[k].tobytes() != wanted[k].tobytes()]
-        assert not odd, f"{options}: {len(odd)} differ, the first: {drawn()[cases[odd[0]]][0]}: {rows[odd[0]]}, {wanted[odd[0]]}"
+        assert not odd, (
+            f"{options}: {len(odd)} differ, the first: {drawn()[cases[odd[0]]][0]}: {rows[odd[0]]}, {wanted[odd[0]]}"
+        )
         beyond = int(rows["beyond"].sum())
         assert beyond > 100 or "max_distance" not in options, f"{beyond} beyond the limit"
     hits = np.array([answers()[k][0] for k in cases])
@@ -363,14 +380,17 @@ def test_batches_of_a_pair_have_pythons_bits(still):
 
 
 def _tree_of(shape: c.CShape):
-    """(integers of the header, arrays) of a shape's support tree, read where kernels read it; None where there is none."""
+    """(integers of the header, arrays) of a shape's support tree, read where kernels read it; None where there is
+    none."""
     address = (ctypes.c_int64 * 8).from_address(shape.handle)[6]
     if address == 0:
         return None
     header = np.ctypeslib.as_array((ctypes.c_int64 * 13).from_address(address))
     n, _, nodes, entries, links = header[:5].tolist()
     sizes = {5: 4 * (nodes + 1), 6: 4 * entries, 7: 24 * entries, 8: 4 * (n + 1), 9: 4 * links, 10: 24, 12: 24 * n}
-    return [*header[:5].tolist(), int(header[11])], [ctypes.string_at(int(header[k]), size) for k, size in sizes.items()]
+    return [*header[:5].tolist(), int(header[11])], [
+        ctypes.string_at(int(header[k]), size) for k, size in sizes.items()
+    ]
 
 
 def _clouds() -> dict[str, np.ndarray]:
@@ -398,8 +418,8 @@ def test_support_trees_are_pythons():
     trees = 0
     for name, points in _clouds().items():
         shape = collide.ConvexHull(points)
-        packed, found = shape.parts()[0][0], _tree_of(c.CShape(shape))
-        tree = packed.tree.tree if packed.tree is not None else None
+        packed, found = convex_set_of(shape), _tree_of(c.CShape(shape))
+        tree = support_tree_of(packed).tree if may_have_tree(packed) else None
         if tree is None:
             assert found is None, name
             continue
@@ -452,7 +472,7 @@ def test_polytopes_of_halfspaces_are_pythons():
     for number in range(200):
         normals, offsets = _halfspaces(number)
         try:
-            packed = collide.HPolytope(normals, offsets).parts()[0][0]
+            packed = parts_of(collide.HPolytope(normals, offsets))[0][0]
         except collide.InvalidShape:
             packed = None
         status, handle = c.raw_shape("collide_hpolytope", normals, offsets, len(offsets))
@@ -468,7 +488,7 @@ def test_polytopes_of_halfspaces_are_pythons():
     assert 20 < refused < 180, refused
 
 
-# --- what is refused ---------------------------------------------------------------------------------------------------
+# --- what is refused ------------------------------------------------------------------------------
 
 _INF, _NAN = math.inf, math.nan
 #: (function, constructor in Python, arguments): numbers that make no shape, and some on the brink that do.
@@ -476,9 +496,11 @@ NUMBERS = [
     ("collide_sphere", collide.Sphere, radius) for radius in (0.0, -1.0, _NAN, _INF, 1e-51, 1e51, 1e-50, 1e50, 5e-324)
 ] + [
     (f"collide_{kind.__name__.lower()}", kind, pair) for kind in (collide.Capsule, collide.Cylinder, collide.Cone)
-    for pair in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (_NAN, 1.0), (1.0, _INF), (1e-50, 1e50), (1e50, 1e-51), (1.0, -0.0))
+    for pair in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (_NAN, 1.0), (1.0, _INF), (1e-50, 1e50),
+                 (1e50, 1e-51), (1.0, -0.0))
 ] + [
-    (f"collide_{name}", kind, np.array(three)) for name, kind in (("box", collide.Box), ("ellipsoid", collide.Ellipsoid))
+    (f"collide_{name}", kind, np.array(three)) for name,
+    kind in (("box", collide.Box), ("ellipsoid", collide.Ellipsoid))
     for three in ((1.0, 1.0, 0.0), (1.0, _NAN, 1.0), (-1.0, 1.0, 1.0), (1e50, 1e-50, 1.0), (1e51, 1.0, 1.0))
 ] + [
     ("collide_halfspace", collide.Halfspace, (np.array(normal), offset)) for normal, offset in (
@@ -503,7 +525,13 @@ def test_what_is_no_shape_is_refused_as_python_does():
         assert status == wanted and (handle is None) == (wanted != c.OK), (function, given, status)
         c.library().collide_shape_free(handle)
     assert 15 < refused < len(NUMBERS) - 5, refused
-    for point, radius in (((_NAN, 0, 0), 0.0), ((0, 0, 1e51), 0.0), ((1e-60, 0, 0), 0.0), ((1, 0, 0), -1.0), ((1, 0, 0), 1e-60)):
+    for point, radius in (
+        ((_NAN, 0, 0), 0.0),
+        ((0, 0, 1e51), 0.0),
+        ((1e-60, 0, 0), 0.0),
+        ((1, 0, 0), -1.0),
+        ((1, 0, 0), 1e-60),
+    ):
         array = np.array([point], dtype=float)
         with pytest.raises(collide.InvalidShape):
             collide.ConvexHull(array, radius=radius)

@@ -1,4 +1,5 @@
-"""Meshes of the C interface: solids, hits and gaps are Python's, bit by bit; what C does not answer is said to be unsupported."""
+"""Meshes of the C interface: solids, hits and gaps are Python's, bit by bit; what C does not answer is said to be
+unsupported."""
 
 from __future__ import annotations
 

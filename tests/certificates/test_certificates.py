@@ -106,7 +106,8 @@ def test_verifying_needs_no_kernel():
     asked = A, A, eye, X_WB, collide.distance(A, A, eye, X_WB)
     code = (
         "import sys, pickle, collide; asked = pickle.load(sys.stdin.buffer); collide.verify(*asked); "
-        "bad = [m for m in sys.modules if m.startswith(('numba', 'llvmlite', 'collide.narrowphase', 'collide.kernels'))]; "
+        "bad = [m for m in sys.modules if m.startswith(('numba', 'llvmlite', 'collide.narrowphase', "
+        "'collide.kernels'))]; "
         "assert not bad, bad"
     )
     subprocess.run([sys.executable, "-c", code], input=pickle.dumps(asked), check=True)

@@ -55,7 +55,8 @@ def test_what_does_not_belong_together_is_refused():
     r = collide.distance(box, box, EYE, np.array([EYE, collide.pose((2, 0, 0))]))
     for arguments in (
         (None, box, EYE, EYE, r), (box, [box], EYE, np.array([EYE] * 3), r), (box, box, EYE, np.array([EYE] * 3), r),
-        (box, box, EYE, EYE, True), (box, box, EYE, EYE, collide.collide(box, box, EYE, EYE)), ([box] * 3, box, EYE, EYE, r),
+        (box, box, EYE, EYE, True), (box, box, EYE, EYE, collide.collide(box, box, EYE, EYE)),
+        ([box] * 3, box, EYE, EYE, r),
     ):  # fmt: skip
         with pytest.raises(collide.InvalidArgument, match="certify"):
             collide.certify(*arguments)
@@ -102,7 +103,9 @@ def test_nearest_points_are_nearest():
 def test_nearest_vertex_pairs_agree_with_all_pairs():
     rng = rng_of("nearest vertex pairs")
     for _ in range(60):
-        A, B = ([tuple(p) for p in (rng.integers(-9, 10, (7, 3)) + shift).tolist()] for shift in ((0, 0, 0), (14, 3, 0)))
+        A, B = (
+            [tuple(p) for p in (rng.integers(-9, 10, (7, 3)) + shift).tolist()] for shift in ((0, 0, 0), (14, 3, 0))
+        )
         pairs = nearest_vertex_pairs(A, B, [(0, 0)])
         v, scale, _ = nearest_to_origin([tuple(a - b for a, b in zip(A[i], B[j])) for i, j in pairs])
         least = min(inner(v, a) for a in A) - max(inner(v, b) for b in B)
@@ -114,7 +117,14 @@ def test_winding_numbers_of_a_box():
     corners = np.array([[x, y, z] for x in (0, 4) for y in (0, 4) for z in (0, 4)])
     hull = collide.ConvexHull(corners.astype(float))
     faces = hull.hull.facets.tolist()
-    for point, number in (((1, 2, 3), 1), ((5, 1, 1), 0), ((2, 2, 4), 1), ((0, 0, 0), 1), ((-1, -1, -1), 0), ((4, 2, 0), 1)):
+    for point, number in (
+        ((1, 2, 3), 1),
+        ((5, 1, 1), 0),
+        ((2, 2, 4), 1),
+        ((0, 0, 0), 1),
+        ((-1, -1, -1), 0),
+        ((4, 2, 0), 1),
+    ):
         vertices = [tuple(p) for p in (corners - point).tolist()]
         assert winding_number(vertices, faces) == number, point
     turned_inside_out = [face[::-1] for face in faces]

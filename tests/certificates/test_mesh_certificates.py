@@ -20,7 +20,8 @@ def shapes(rng):
     unused = np.concatenate([box()[0], [[50.0, 50, 50]]]), box()[1]
     pool = [
         collide.Mesh(*box()), collide.Mesh(*block_ring()), collide.Mesh(*unused), collide.Mesh(*bumpy_sphere(60)),
-        collide.Mesh(box()[0], box()[1][2:]), collide.Box((0.5, 0.25, 0.5)), collide.ConvexHull(rng.normal(size=(9, 3)) * 0.3),
+        collide.Mesh(box()[0], box()[1][2:]), collide.Box((0.5, 0.25, 0.5)),
+        collide.ConvexHull(rng.normal(size=(9, 3)) * 0.3),
         collide.Sphere(0.25), collide.Capsule(0.125, 0.5), collide.Halfspace((0, 0, 1), -0.5),
     ]  # fmt: skip
     return pool[rng.integers(5)], pool[rng.integers(len(pool))]
@@ -48,7 +49,9 @@ def test_certificates_prove_what_is_said():
             continue
         seen[given[0].kind] += 1
         collide.verify(A, B, X_WA, X_WB, r)
-        assert json.loads(json.dumps(given)) == [[c.kind, c.part_a, c.part_b, [list(p) for p in c.pairs]] for c in given], where
+        assert json.loads(json.dumps(given)) == [
+            [c.kind, c.part_a, c.part_b, [list(p) for p in c.pairs]] for c in given
+        ], where
         away = X_WB.copy()
         away[:3, 3] += 40.0 if r.hit else 0.0
         if r.hit and not any(isinstance(S, collide.Halfspace) for S in (A, B)):
@@ -96,9 +99,12 @@ def test_one_inside_the_other():
 @pytest.mark.parametrize(
     "tampered",
     [
-        Certificate("together", 99, 0, ((0, 0),)), Certificate("together", 0, -1, ((0, 0),)), Certificate("together", 0, 0, ((7, 0),)),
-        Certificate("together", 0, 0, ()), Certificate("inside", 0, 0, ((-1, -1),)), Certificate("inside", 0, 0, ((-1, 99),)),
-        Certificate("inside", 0, 0, ((0, 1),)), Certificate("beside", 0, 0, ((0, 0),)), Certificate("together", 0, 0, ((0, 0),) * 5),
+        Certificate("together", 99, 0, ((0, 0),)), Certificate("together", 0, -1, ((0, 0),)),
+        Certificate("together", 0, 0, ((7, 0),)),
+        Certificate("together", 0, 0, ()), Certificate("inside", 0, 0, ((-1, -1),)),
+        Certificate("inside", 0, 0, ((-1, 99),)),
+        Certificate("inside", 0, 0, ((0, 1),)), Certificate("beside", 0, 0, ((0, 0),)),
+        Certificate("together", 0, 0, ((0, 0),) * 5),
     ],
 )  # fmt: skip
 def test_tampered(tampered):
@@ -133,7 +139,8 @@ def test_world_rows_have_them():
     [
         5, "x", [5], [None], ["together"], [("together", 0, 0)], [("together", 0, 0, 5)], [("together", 0, 0, [(0,)])],
         [("together", 0, 0, [(0, 1, 2)])], [("together", 0.5, 0, [(0, 0)])], [("together", None, "a", [(0, 0)])],
-        [("together", 0, 0, [(0.5, 0)])], [("inside", 0, 0, [(-1, "a")])], [("inside", 0, 0, [(-1, None)])], [("apart", 0, 0, None)],
+        [("together", 0, 0, [(0.5, 0)])], [("inside", 0, 0, [(-1, "a")])], [("inside", 0, 0, [(-1, None)])],
+        [("apart", 0, 0, None)],
         {"kind": "together"},
     ],
 )  # fmt: skip
@@ -158,6 +165,11 @@ def test_half_spaces_have_one_part():
 def test_verify_names_what_is_no_shape_and_no_result():
     mesh = collide.Mesh(*box())
     r = collide.distance(mesh, mesh, EYE, EYE)
-    for arguments in ((None, mesh, EYE, EYE, r), ([mesh], mesh, EYE, EYE, r), (mesh, mesh, EYE, EYE, None), (mesh, mesh, EYE, EYE, True)):
+    for arguments in (
+        (None, mesh, EYE, EYE, r),
+        ([mesh], mesh, EYE, EYE, r),
+        (mesh, mesh, EYE, EYE, None),
+        (mesh, mesh, EYE, EYE, True),
+    ):
         with pytest.raises(collide.InvalidArgument, match="must be a"):
             collide.verify(*arguments)

@@ -49,7 +49,8 @@ def gaps_along(P, Q, n) -> list[tuple[list[Fraction], Fraction]]:
 
 
 def away_from(P, p) -> float:
-    """How far a point of doubles is from the triangle P, about: the least distance from its plane, edges and corners."""
+    """How far a point of doubles is from the triangle P, about: the least distance from its plane, edges and
+    corners."""
     T = np.array([[float(x) for x in q] for q in P])
     p = np.asarray(p, dtype=float)
     n = np.cross(T[1] - T[0], T[2] - T[0])
@@ -80,7 +81,11 @@ def check_row(row, a, b, X_WA, X_WB, radii=(0.0, 0.0), nearest=False, tolerance=
     assert away_from(P, core_a) < tolerance, ("A", away_from(P, core_a))
     assert away_from(Q, core_b) < tolerance, ("B", away_from(Q, core_b))
     low, high = (Fraction(float(row[name])) + Fraction(sum(radii)) for name in ("lower", "upper"))
-    there = [g for place, g in gaps_along(P, Q, n.tolist()) if max(abs(float(x) - y) for x, y in zip(place, core_a)) < tolerance]
+    there = [
+        g
+        for place, g in gaps_along(P, Q, n.tolist())
+        if max(abs(float(x) - y) for x, y in zip(place, core_a)) < tolerance
+    ]
     slack = Fraction(1, 2**48) * (1 + abs(low))  # the normal's own length
     if any(low - slack <= g <= high + slack for g in there):
         return

@@ -6,7 +6,8 @@ import numpy as np
 
 
 def table(cells=7, size=2.0, thick=0.25, seed=None):
-    """A closed slab, its top at z = 0 cut into cells × cells × 2 facets; seed: their inner corners moved within the top."""
+    """A closed slab, its top at z = 0 cut into cells × cells × 2 facets; seed: their inner corners moved within the
+    top."""
     xs = np.linspace(-size / 2, size / 2, cells + 1)
     x, y = np.meshgrid(xs, xs)
     if seed is not None:
@@ -21,7 +22,9 @@ def table(cells=7, size=2.0, thick=0.25, seed=None):
             a, b, c, d = j * row + i, j * row + i + 1, (j + 1) * row + i, (j + 1) * row + i + 1
             faces += [(a, b, d), (a, d, c), (n + a, n + d, n + b), (n + a, n + c, n + d)]
     rim = [(k, k + 1) for k in range(cells)] + [(k * row + cells, (k + 1) * row + cells) for k in range(cells)]
-    rim += [(cells * row + k + 1, cells * row + k) for k in range(cells)] + [((k + 1) * row, k * row) for k in range(cells)]
+    rim += [(cells * row + k + 1, cells * row + k) for k in range(cells)] + [
+        ((k + 1) * row, k * row) for k in range(cells)
+    ]
     for a, b in rim:
         faces += [(n + a, n + b, b), (n + a, b, a)]
     return np.concatenate([top, top - (0, 0, thick)]), np.array(faces)
@@ -30,7 +33,16 @@ def table(cells=7, size=2.0, thick=0.25, seed=None):
 def gripper(width=1.0, wall=0.25, height=0.5, length=0.5):
     """A U: two jaws of inner distance ``width`` along x, open upwards, extruded along y. The gap's floor is z = 0."""
     w = width / 2
-    outline = [(-w - wall, -wall), (w + wall, -wall), (w + wall, height), (w, height), (w, 0), (-w, 0), (-w, height), (-w - wall, height)]
+    outline = [
+        (-w - wall, -wall),
+        (w + wall, -wall),
+        (w + wall, height),
+        (w, height),
+        (w, 0),
+        (-w, 0),
+        (-w, height),
+        (-w - wall, height),
+    ]
     caps = [(0, 1, 4), (0, 4, 5), (1, 2, 3), (1, 3, 4), (0, 5, 6), (0, 6, 7)]
     n = len(outline)
     vertices = [(x, y, z) for y in (-length / 2, length / 2) for x, z in outline]
@@ -44,7 +56,9 @@ def gripper(width=1.0, wall=0.25, height=0.5, length=0.5):
 def wedge(length=2.0, half=0.5, height=0.5):
     """A roof: its ridge along x at z = 0, 2·half wide at z = −height."""
     x = length / 2
-    vertices = np.array([(-x, 0, 0), (x, 0, 0), (-x, half, -height), (x, half, -height), (-x, -half, -height), (x, -half, -height)])
+    vertices = np.array(
+        [(-x, 0, 0), (x, 0, 0), (-x, half, -height), (x, half, -height), (-x, -half, -height), (x, -half, -height)]
+    )
     faces = np.array([(0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 5), (2, 5, 4), (0, 2, 4), (1, 5, 3)])
     return vertices, faces
 

@@ -21,12 +21,19 @@ def test_a_pair_of_shapes_a_pose():
     singles = [contacts(SHAPES[a], SHAPES[b], X[k], Y[k], margin=0.05) for k, (a, b) in enumerate(zip(i, j))]
     counts = [len(c) for c in singles]
     assert max(counts) > 1 and min(counts) == 0
-    for A, B in ((library[i], library[j]), ([SHAPES[k] for k in i], tuple(SHAPES[k] for k in j)), (library[i], [SHAPES[k] for k in j])):
+    for A, B in (
+        (library[i], library[j]),
+        ([SHAPES[k] for k in i], tuple(SHAPES[k] for k in j)),
+        (library[i], [SHAPES[k] for k in j]),
+    ):
         told = contacts(A, B, X, Y, margin=0.05)
         assert np.diff(told.starts).tolist() == counts
         assert all(told[k].rows.tobytes() == single.rows.tobytes() for k, single in enumerate(singles))
     one = contacts(SHAPES[0], library[j], EYE, Y, margin=0.05)
-    assert all(one[k].rows.tobytes() == contacts(SHAPES[0], SHAPES[j[k]], EYE, Y[k], margin=0.05).rows.tobytes() for k in range(n))
+    assert all(
+        one[k].rows.tobytes() == contacts(SHAPES[0], SHAPES[j[k]], EYE, Y[k], margin=0.05).rows.tobytes()
+        for k in range(n)
+    )
     assert len(contacts([], [], np.zeros((0, 4, 4)), EYE)) == 0
     assert len(contacts([SHAPES[0]], [SHAPES[1]], EYE, EYE).starts) == 2
 

@@ -29,7 +29,8 @@ def convex_pairs(rng):
             lambda: collide.Cone(0.3, 0.6), lambda: collide.Ellipsoid((0.2, 0.3, 0.5)),
             lambda: collide.HPolytope(np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 1]]]), [0.3] * 6 + [0.6]),
             lambda: collide.ConvexHull([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
-            lambda: collide.ConvexHull([[0.0, 0, -0.5], [0, 0, 0.5]], radius=0.1), lambda: collide.Halfspace((0, 0.6, 0.8), 0.1),
+            lambda: collide.ConvexHull([[0.0, 0, -0.5], [0, 0, 0.5]], radius=0.1),
+            lambda: collide.Halfspace((0, 0.6, 0.8), 0.1),
         ][rng.integers(11)]()  # fmt: skip
     while True:
         A, B = one(), one()
@@ -74,7 +75,8 @@ def test_convex_rows_are_what_they_promise():
 
 @pytest.mark.parametrize("height", [-1e-3, 0.0, 1e-3])
 def test_faces_over_each_other(height):
-    """A box on a box, a cylinder on its end and on its side, and hulls that are no meshes: as many corners as there are."""
+    """A box on a box, a cylinder on its end and on its side, and hulls that are no meshes: as many corners as there
+    are."""
     ground = collide.Box((2, 2, 0.5))
     for turn in (0.0, 0.3, 1.2):
         X_WB = collide.pose((0.1, 0.2, 0.5 + height), rpy=(0, 0, turn))
@@ -82,36 +84,66 @@ def test_faces_over_each_other(height):
         corners = world_corners(box((-0.25, -0.125, -0.25), (0.25, 0.125, 0.25))[0], X_WB)
         near(c.point_b, corners[corners[:, 2] < 0.4])
         assert np.abs(c.distance - height).max() < 1e-12
-        mesh = collide.contacts(collide.Mesh(*table(5)), collide.Box((0.5, 0.25, 0.5)), collide.pose((0, 0, 0.25)), X_WB, margin=2e-3)
+        mesh = collide.contacts(
+            collide.Mesh(*table(5)), collide.Box((0.5, 0.25, 0.5)), collide.pose((0, 0, 0.25)), X_WB, margin=2e-3
+        )
         near(mesh.point_b, c.point_b)
-    upright = collide.contacts(ground, collide.Cylinder(0.25, 0.5), EYE, collide.pose((0, 0, 0.5 + height)), margin=2e-3)
+    upright = collide.contacts(
+        ground, collide.Cylinder(0.25, 0.5), EYE, collide.pose((0, 0, 0.5 + height)), margin=2e-3
+    )
     assert len(upright) == 8 and np.abs(np.hypot(*upright.point_b[:, :2].T) - 0.25).max() < 1e-12
     lying = collide.pose((0, 0, 0.5 + height), R=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    near(collide.contacts(ground, collide.Cylinder(0.25, 0.5), EYE, lying, margin=2e-3).point_a, [(-0.25, 0, 0.25), (0.25, 0, 0.25)], 1e-7)
-    ball = collide.contacts(ground, collide.Ellipsoid((0.5, 0.25, 0.25)), EYE, collide.pose((0, 0, 0.5 + height)), margin=2e-3)
+    near(
+        collide.contacts(ground, collide.Cylinder(0.25, 0.5), EYE, lying, margin=2e-3).point_a,
+        [(-0.25, 0, 0.25), (0.25, 0, 0.25)],
+        1e-7,
+    )
+    ball = collide.contacts(
+        ground, collide.Ellipsoid((0.5, 0.25, 0.25)), EYE, collide.pose((0, 0, 0.5 + height)), margin=2e-3
+    )
     near(ball.point_a, [(0, 0, 0.25)], 1e-6)
 
 
 def test_compounds_are_asked_part_by_part():
     legs = [(collide.Box((0.25, 0.25, 0.5)), collide.pose((x, y, 0))) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
-    stool = collide.Compound([*legs, (collide.Compound([(collide.Box((1.5, 1.5, 0.25)), EYE)]), collide.pose((0, 0, 0.375)))])
+    stool = collide.Compound(
+        [*legs, (collide.Compound([(collide.Box((1.5, 1.5, 0.25)), EYE)]), collide.pose((0, 0, 0.375)))]
+    )
     for ground in (collide.Mesh(*table(6)), collide.Box((2, 2, 0.5)), collide.Halfspace((0, 0, 1), 0)):
         X_WA = collide.pose((0, 0, -0.25)) if isinstance(ground, collide.Box) else EYE
         c = collide.contacts(ground, stool, X_WA, collide.pose((0, 0, 0.25 - 1e-6)))
-        assert len(c) == 16 and len(c.patches) == 4 and sorted(set(c.part_b)) == [0, 1, 2, 3] and set(c.patch) == {0, 1, 2, 3}
-        assert np.abs(c.distance + 1e-6).max() < 1e-12 and (c.lower <= -1e-6 + 1e-16).all() and (c.upper >= -1e-6 - 1e-16).all()
+        assert (
+            len(c) == 16
+            and len(c.patches) == 4
+            and sorted(set(c.part_b)) == [0, 1, 2, 3]
+            and set(c.patch) == {0, 1, 2, 3}
+        )
+        assert (
+            np.abs(c.distance + 1e-6).max() < 1e-12
+            and (c.lower <= -1e-6 + 1e-16).all()
+            and (c.upper >= -1e-6 - 1e-16).all()
+        )
 
 
 def test_batches_are_single_calls():
     ground, cube = collide.Mesh(*table(5)), collide.Mesh(*box((-0.25,) * 3, (0.25,) * 3))
     rng = np.random.default_rng(1)
-    X_WBs = np.array([collide.pose((*rng.uniform(-0.5, 0.5, 2), rng.uniform(0.2, 0.4)), rpy=rng.uniform(-0.5, 0.5, 3)) for _ in range(12)])
+    X_WBs = np.array(
+        [
+            collide.pose((*rng.uniform(-0.5, 0.5, 2), rng.uniform(0.2, 0.4)), rpy=rng.uniform(-0.5, 0.5, 3))
+            for _ in range(12)
+        ]
+    )
     batch = collide.contacts(ground, cube, EYE, X_WBs, margin=0.05)
     assert len(batch.starts) == 13 and batch.starts[-1] == len(batch.rows) and batch.rows.dtype == CONTACT_DTYPE
     patches = 0
     for k in range(12):
         single = collide.contacts(ground, cube, EYE, X_WBs[k], margin=0.05)
-        assert single.rows.tobytes() == batch[k].rows.tobytes() == collide.contacts(ground, cube, EYE, X_WBs[k], margin=0.05).rows.tobytes()
+        assert (
+            single.rows.tobytes()
+            == batch[k].rows.tobytes()
+            == collide.contacts(ground, cube, EYE, X_WBs[k], margin=0.05).rows.tobytes()
+        )
         patches += len(single.patches)
     assert len(batch.patches) == patches > 0 and batch[-1].rows.tobytes() == batch[11].rows.tobytes()
     assert len(collide.contacts(ground, cube, EYE, X_WBs[:0])) == 0
@@ -132,10 +164,23 @@ def test_a_world_has_them_all():
     world.allow("box", "cube")
     assert len(world.contacts()) == 4 and set(world.contacts().names) == {("table", "box")}
     near_by = world.contacts(margin=0.01)
-    assert near_by.names.count(("table", "box")) == 4 and near_by.names.count(("table", "ball")) == 1 and len(near_by) == 5
-    own = collide.contacts(world.body("table").shape, world.body("ball").shape, world.body("table").X_WB, world.body("ball").X_WB, margin=0.01)
+    assert (
+        near_by.names.count(("table", "box")) == 4 and near_by.names.count(("table", "ball")) == 1 and len(near_by) == 5
+    )
+    own = collide.contacts(
+        world.body("table").shape,
+        world.body("ball").shape,
+        world.body("table").X_WB,
+        world.body("ball").X_WB,
+        margin=0.01,
+    )
     row = near_by.rows[4]
-    assert row["a"] == 0 and row["b"] == 2 and np.array_equal(row["point_b"], own.point_b[0]) and "5 contacts of 2 pairs" in repr(near_by)
+    assert (
+        row["a"] == 0
+        and row["b"] == 2
+        and np.array_equal(row["point_b"], own.point_b[0])
+        and "5 contacts of 2 pairs" in repr(near_by)
+    )
     assert len(world.contacts(margin=0.01, max_contacts=1)) == 2
     world.set_pose("ball", collide.pose((0, 0, 3)))
     assert len(world.contacts(margin=0.01)) == 4
@@ -150,8 +195,10 @@ def test_a_world_has_them_all():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"margin": -1.0}, "margin"), ({"margin": np.nan}, "margin"), ({"margin": np.inf}, "margin"), ({"margin": "far"}, "margin"),
-        ({"max_contacts": 0}, "max_contacts"), ({"max_contacts": 2.5}, "max_contacts"), ({"max_contacts": True}, "max_contacts"),
+        ({"margin": -1.0}, "margin"), ({"margin": np.nan}, "margin"), ({"margin": np.inf}, "margin"),
+        ({"margin": "far"}, "margin"),
+        ({"max_contacts": 0}, "max_contacts"), ({"max_contacts": 2.5}, "max_contacts"),
+        ({"max_contacts": True}, "max_contacts"),
     ],
 )  # fmt: skip
 def test_bad_arguments_are_named(options, message):
@@ -189,20 +236,29 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
     near(flat.point_a, [(x, y, 0) for x in (-1, 1) for y in (-1, 1)])
     monkeypatch.setattr("collide.contact.contact_facets.MAX_PAIRS", 100)
     c = collide.contacts(sheet, sheet, EYE, EYE)
-    assert len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
+    assert (
+        len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
+    )
     cubes = collide.Mesh(*box()), collide.Mesh(*box((-0.5,) * 3, (0.5,) * 3))
     assert len(collide.contacts(*cubes, EYE, collide.pose((0, 0, 1.5)))) == 4
 
 
-@pytest.mark.parametrize("shape", [collide.Cylinder(0.1, 0.2), collide.Cone(0.1, 0.2), collide.Ellipsoid((0.1, 0.2, 0.1))])
+@pytest.mark.parametrize(
+    "shape", [collide.Cylinder(0.1, 0.2), collide.Cone(0.1, 0.2), collide.Ellipsoid((0.1, 0.2, 0.1))]
+)
 @pytest.mark.parametrize("height", [0.105, 0.25, -0.5])
 def test_curved_shapes_against_meshes_have_one_row(shape, height):
     """Above the table, within it, and out of reach."""
     top, place = collide.Mesh(*table(6)), collide.pose((0.1, 0.2, height))
     r = collide.distance(top, shape, np.eye(4), place)
-    c, swapped = (collide.contacts(*asked, margin=0.1) for asked in ((top, shape, np.eye(4), place), (shape, top, place, np.eye(4))))
+    c, swapped = (
+        collide.contacts(*asked, margin=0.1)
+        for asked in ((top, shape, np.eye(4), place), (shape, top, place, np.eye(4)))
+    )
     assert len(c) == len(swapped) == (r.distance <= 0.1)
     if len(c):
         assert c.kind[0] == (TRANSLATION if r.hit else GAP) and c.distance[0] == r.distance and c.lower[0] == r.lower
-        assert c.upper[0] == r.upper and np.array_equal(c.normal[0], r.normal) and c.facet_b[0] == -1 and c.facet_a[0] >= 0
+        assert (
+            c.upper[0] == r.upper and np.array_equal(c.normal[0], r.normal) and c.facet_b[0] == -1 and c.facet_a[0] >= 0
+        )
         assert np.array_equal(swapped.normal[0], -c.normal[0]) and swapped.facet_a[0] == -1

@@ -21,7 +21,9 @@ def near(points, wanted, tolerance=1e-9):
     points, wanted = np.asarray(points), np.asarray(wanted)
     assert len(points) == len(wanted), f"{points.tolist()}\nwanted {wanted.tolist()}"
     off = np.abs(points[:, None] - wanted[None]).max(axis=2)
-    assert (off.min(axis=0) < tolerance).all() and (off.min(axis=1) < tolerance).all(), f"{points.tolist()}\nwanted {wanted.tolist()}"
+    assert (off.min(axis=0) < tolerance).all() and (off.min(axis=1) < tolerance).all(), (
+        f"{points.tolist()}\nwanted {wanted.tolist()}"
+    )
 
 
 def clears(a, b, X_WA, X_WB, c) -> bool:
@@ -34,7 +36,8 @@ def clears(a, b, X_WA, X_WB, c) -> bool:
 @pytest.mark.parametrize("as_mesh", [False, True])
 @pytest.mark.parametrize("solid", [True, False])
 @pytest.mark.parametrize(
-    ("height", "margin"), [(0.0, 0.0), (-1e-6, 0.0), (-1e-12, 0.0), (-0.01, 0.0), (1e-3, 0.01), (1e-9, 1e-6), (0.0, 0.05), (0.01, 0.01)]
+    ("height", "margin"),
+    [(0.0, 0.0), (-1e-6, 0.0), (-1e-12, 0.0), (-0.01, 0.0), (1e-3, 0.01), (1e-9, 1e-6), (0.0, 0.05), (0.01, 0.01)],
 )
 def test_a_box_on_a_table(height, margin, as_mesh, solid):
     """Four corners, the table's normal, nothing from the edges within the table."""
@@ -69,7 +72,9 @@ def test_the_same_anywhere():
         T, B = collide.Mesh(*table(5, seed=seed)), collide.Mesh(*BOX)
         X_SB = collide.pose((0.1, -0.05, 0.25 - 1e-5), rpy=(0, 0, rng.uniform(-3, 3)))
         c = collide.contacts(T, B, X_WS, X_WS @ X_SB)
-        assert len(c) == 4 and np.abs(c.normal - X_WS[:3, 2]).max() < 1e-12 and np.abs(c.distance + 1e-5).max() < 1e-12, seed
+        assert (
+            len(c) == 4 and np.abs(c.normal - X_WS[:3, 2]).max() < 1e-12 and np.abs(c.distance + 1e-5).max() < 1e-12
+        ), seed
         corners = world_corners(BOX[0], X_WS @ X_SB)
         near(c.point_b, corners[[k for k in range(8) if BOX[0][k, 2] < 0]])
 
@@ -146,14 +151,17 @@ def test_a_corner_on_a_table(height):
 
 
 def test_bumps_are_patches_of_their_own():
-    """A plate over two bumps, with a margin that takes in the tips only: two contacts; with a larger one still two patches."""
+    """A plate over two bumps, with a margin that takes in the tips only: two contacts; with a larger one still two
+    patches."""
     pyramid = np.array([(-0.25, -0.25, 0), (0.25, -0.25, 0), (0.25, 0.25, 0), (-0.25, 0.25, 0), (0, 0, 0.25)])
     faces = np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 2, 1), (0, 3, 2)])
     bumps = np.concatenate([pyramid - (0.5, 0, 0), pyramid - (-0.5, 0, 0)]), np.concatenate([faces, faces + 5])
     plate = box((-1, -1, 0.25), (1, 1, 0.5))
     for height in (1e-3, 0.0, -1e-3):
         for margin in (0.0, 0.01, 0.1):
-            c = collide.contacts(collide.Mesh(*bumps), collide.Mesh(*plate), EYE, collide.pose((0, 0, height)), margin=margin)
+            c = collide.contacts(
+                collide.Mesh(*bumps), collide.Mesh(*plate), EYE, collide.pose((0, 0, height)), margin=margin
+            )
             if height > margin:
                 assert not len(c)
                 continue
@@ -164,14 +172,19 @@ def test_bumps_are_patches_of_their_own():
     tilted = collide.pose((0, 0, 0), rpy=(0, 1e-3, 0))
     bumps[0][9, 2] += 0.01
     c = collide.contacts(collide.Mesh(*bumps), collide.Mesh(*plate), EYE, collide.pose((0, 0, 0.005)), margin=0.01)
-    assert np.abs(np.sort(c.patches["distance"]) - (-0.005, 0.005)).max() < 1e-12 and c.patches["kind"].tolist() == [OVERLAP, GAP]
+    assert np.abs(np.sort(c.patches["distance"]) - (-0.005, 0.005)).max() < 1e-12 and c.patches["kind"].tolist() == [
+        OVERLAP,
+        GAP,
+    ]
     assert len(collide.contacts(collide.Mesh(*bumps), collide.Mesh(*plate), EYE, tilted, margin=0.02).patches) == 2
 
 
 def test_swept_balls():
     ground = collide.Mesh(*table(6))
     for height in (-1e-3, 0.0, 1e-3):
-        ball = collide.contacts(ground, collide.Sphere(0.125), EYE, collide.pose((0.1, 0.2, 0.125 + height)), margin=0.002)
+        ball = collide.contacts(
+            ground, collide.Sphere(0.125), EYE, collide.pose((0.1, 0.2, 0.125 + height)), margin=0.002
+        )
         assert len(ball) == 1 and abs(ball.distance[0] - height) < 1e-12
         near(ball.point_a, [(0.1, 0.2, 0)])
         lying = collide.pose((0.1, 0.2, 0.125 + height), R=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
@@ -222,7 +235,9 @@ def test_a_few_of_many():
         assert len(few) == most and few.distance[0] == whole.distance.min()
         assert set(map(bytes, few.rows["point_b"])) <= set(map(bytes, whole.rows["point_b"]))
     four = collide.contacts(ground, prism, EYE, X_WB, margin=0.1, max_contacts=4).point_b[:, :2]
-    area = 0.5 * abs(sum(np.cross(np.append(p, 0), np.append(q, 0))[2] for p, q in zip(four, np.roll(four, -1, axis=0))))
+    area = 0.5 * abs(
+        sum(np.cross(np.append(p, 0), np.append(q, 0))[2] for p, q in zip(four, np.roll(four, -1, axis=0)))
+    )
     assert area > 0.9 * 0.5, "a square within the disc has half"
 
 
@@ -246,19 +261,26 @@ def test_any_size(scale):
         X_WC[:3, 3] *= scale
         own = collide.contacts(T, B, EYE, X_WB, margin=0.002)
         c = collide.contacts(T.scaled(scale), B.scaled(scale), EYE, X_WC, margin=0.002 * scale)
-        assert len(c) == 4 and np.abs(c.distance / scale - height).max() < 1e-12 and np.abs(c.normal - (0, 0, 1)).max() < 1e-12
+        assert (
+            len(c) == 4
+            and np.abs(c.distance / scale - height).max() < 1e-12
+            and np.abs(c.normal - (0, 0, 1)).max() < 1e-12
+        )
         if np.log2(scale) % 1 == 0:
             for name in ("point_a", "point_b", "distance"):
                 assert np.array_equal(c.rows[name], own.rows[name] * scale), name
 
 
 def test_one_point_a_contact():
-    c = collide.contacts(collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), np.eye(4), collide.pose((0.0, 0.0, 1.25)), margin=0.5)
+    c = collide.contacts(
+        collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), np.eye(4), collide.pose((0.0, 0.0, 1.25)), margin=0.5
+    )
     assert np.array_equal(c.point[:, 2], np.full(4, 0.625)) and c.point.shape == (4, 3) and (c.distance == 0.25).all()
 
 
 def test_next_to_a_hollow_edge_some_row_is_told():
-    """Nearer to the edge of two walls than rounding tells it from the edge: neither wall's nearest point looks like a local one."""
+    """Nearer to the edge of two walls than rounding tells it from the edge: neither wall's nearest point looks like a
+    local one."""
     walls = np.array([[-4.0, 0, 0], [4, 0, 0], [4, 4, 0], [-4, 4, 0], [4, 0, 4], [-4, 0, 4]])
     surface = collide.Mesh(walls, [[0, 1, 2], [0, 2, 3], [0, 4, 1], [0, 5, 4]], solid=False)
     X_WB = collide.pose((1, 1e-9, 1e-9))

@@ -1,4 +1,5 @@
-"""`collide.contacts` of random meshes, every row judged in rational arithmetic, and against `collide` and `distance`."""
+"""`collide.contacts` of random meshes, every row judged in rational arithmetic, and against `collide` and
+`distance`."""
 
 from __future__ import annotations
 
@@ -25,7 +26,10 @@ import collide
 from collide.contact.contact_rows import TRANSLATION
 
 POINT, LINE = np.zeros((1, 3)), np.array([[0, 0, -0.25], [0, 0, 0.25]])
-TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
 
 
 def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
@@ -33,7 +37,10 @@ def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
     P, Q = as_integers(*exact)
     scale = max(x.denominator for points in exact for p in points for x in p)
     return np.array(
-        [[float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()] for f in a[1].tolist()]
+        [
+            [float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()]
+            for f in a[1].tolist()
+        ]
     )
 
 
@@ -69,7 +76,8 @@ def solids_and_balls(rng):
     pool = [
         (collide.Mesh(*box()), *box(), 0.0), (collide.Mesh(*block_ring()), *block_ring(), 0.0),
         (collide.Mesh(*TETRAHEDRON), *TETRAHEDRON, 0.0),
-        (collide.Sphere(0.25), POINT, np.array([[0, 0, 0]]), 0.25), (collide.Capsule(0.125, 0.5), LINE, np.array([[0, 1, 1]]), 0.125),
+        (collide.Sphere(0.25), POINT, np.array([[0, 0, 0]]), 0.25),
+        (collide.Capsule(0.125, 0.5), LINE, np.array([[0, 1, 1]]), 0.125),
     ]  # fmt: skip
     return pool[rng.integers(3)], pool[rng.integers(len(pool))]
 
@@ -107,7 +115,8 @@ def nearly_touching(rng):
 
 
 FAMILIES = [
-    *map(surfaces, (random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case)), solids, solids_on_a_grid,
+    *map(surfaces, (random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case)), solids,
+    solids_on_a_grid,
     nearly_touching,
 ]  # fmt: skip
 

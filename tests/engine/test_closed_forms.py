@@ -242,7 +242,8 @@ def test_box_in_the_middle_of_a_box_leaves_by_the_nearest_face():
 def test_curved_shape_around_a_point(other):
     """The origin of each, as a small ball: as deep as the nearest face."""
     shape = {
-        "Cylinder": collide.Cylinder(0.5, 2.0), "Cone": collide.Cone(1.0, 2.0), "Ellipsoid": collide.Ellipsoid((1, 2, 3)),
+        "Cylinder": collide.Cylinder(0.5, 2.0), "Cone": collide.Cone(1.0, 2.0),
+        "Ellipsoid": collide.Ellipsoid((1, 2, 3)),
     }[other]  # fmt: skip
     depth = {"Cylinder": 0.5, "Cone": math.sin(math.atan2(1, 2)), "Ellipsoid": 1.0}[other]
     r = collide.distance(shape, collide.Sphere(0.125), EYE, EYE)

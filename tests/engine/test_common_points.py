@@ -1,4 +1,5 @@
-"""Without depths, bodies that meet are told a point of both: it lies on both, however thin, swept or barely touching they are."""
+"""Without depths, bodies that meet are told a point of both: it lies on both, however thin, swept or barely touching
+they are."""
 
 from __future__ import annotations
 
@@ -26,7 +27,9 @@ def test_points_of_swept_bodies_are_on_both():
     hits = 0
     for _ in range(150):
         A, B = (
-            collide.ConvexHull(rng.normal(size=(int(rng.integers(4, 80)), 3)), radius=float(rng.choice([0.0, 0.01, 0.5, 2.0])))
+            collide.ConvexHull(
+                rng.normal(size=(int(rng.integers(4, 80)), 3)), radius=float(rng.choice([0.0, 0.01, 0.5, 2.0]))
+            )
             for _ in range(2)
         )
         X_WB = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3.0, 3.0, 3))
@@ -38,7 +41,9 @@ def test_points_of_swept_bodies_are_on_both():
     assert hits > 100
 
 
-@pytest.mark.parametrize("family, worst", (("needles", 1e-9), ("plates", 1e-12), ("tiny_vs_huge", 1e-12), ("rand_pen", 1e-12)))
+@pytest.mark.parametrize(
+    "family, worst", (("needles", 1e-9), ("plates", 1e-12), ("tiny_vs_huge", 1e-12), ("rand_pen", 1e-12))
+)
 def test_points_of_thin_bodies_are_on_both(family, worst):
     """Weights in a tetrahedron as thin as rounding are worth nothing: one point lay 0.45 of the size outside."""
     hits = 0

@@ -250,7 +250,9 @@ def test_moving_by_the_distance_brings_to_touch(family):
             r = collide.distance(*case)
             moved = case.with_b_moved(-r.distance * r.normal)
             slack = FEW_ULPS * (naive.size(case) + float(np.abs(case.X_WA[:3, 3]).max()))
-            assert abs(naive.exact_distance(moved)) <= slack, f"still {float(naive.exact_distance(moved))} from touching"
+            assert abs(naive.exact_distance(moved)) <= slack, (
+                f"still {float(naive.exact_distance(moved))} from touching"
+            )
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -18,6 +18,7 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.results import flipped
 
@@ -106,7 +107,9 @@ def test_depths_on_which_peers_fail():
         assert r.lower <= truth <= r.upper and r.hit == record["hit"], (record["fam"], record["id"])
         if not r.certified:
             wide.append((record["fam"], record["id"], record["exact"][:12], r.distance, r.lower, r.upper))
-    assert len(wide) <= 12, f"{len(wide)} of 43: (family, id, exact, distance, lower, upper)\n" + "\n".join(map(str, wide))
+    assert len(wide) <= 12, f"{len(wide)} of 43: (family, id, exact, distance, lower, upper)\n" + "\n".join(
+        map(str, wide)
+    )
 
 
 def test_distances_of_thin_needles():
@@ -160,7 +163,7 @@ def test_depth_on_the_axis_of_a_curved_shape(shape, depth):
 @pytest.mark.parametrize("shape", [collide.Sphere(1), collide.Box((1, 1, 1)), collide.Capsule(1, 1)], ids=repr)
 def test_packed_points_cannot_be_written(shape):
     """Unions and worlds read them again at every query; Sphere, Box and Capsule hand out writable arrays."""
-    for packed, _ in shape.parts():
+    for packed, _ in parts_of(shape):
         assert not packed.points.flags.writeable
 
 
@@ -188,12 +191,20 @@ def test_a_turned_sphere_touches_as_one_that_is_not(rpy):
     """The rotation of a core at its frame's origin wrote its digits over the shift: 15 m of bracket, and inverted."""
     X = collide.pose(rpy=rpy)
     for A in (collide.Sphere(1.0), collide.ConvexHull([[0, 0, 0]] * 3, radius=1.0)):
-        for B in (collide.Box((2, 2, 2)), collide.ConvexHull(np.eye(3)[[0, 0, 1]] - [[2, 0, 0], [1, 0, 0], [1, 1, 0]], radius=0)):
+        for B in (
+            collide.Box((2, 2, 2)),
+            collide.ConvexHull(np.eye(3)[[0, 0, 1]] - [[2, 0, 0], [1, 0, 0], [1, 1, 0]], radius=0),
+        ):
             for x, expected in ((2.0, True), (np.nextafter(2.0, 9), False)):
                 Y = collide.pose((x, 0, 0))
                 for one, other, X_WA, X_WB in ((A, B, X, Y), (B, A, Y, X)):
                     r = collide.distance(one, other, X_WA, X_WB)
-                    assert r.hit is expected and collide.collide(one, other, X_WA, X_WB) is expected, (one, other, rpy, x)
+                    assert r.hit is expected and collide.collide(one, other, X_WA, X_WB) is expected, (
+                        one,
+                        other,
+                        rpy,
+                        x,
+                    )
                     assert r.lower <= r.distance <= r.upper and abs(r.distance) < 1e-15
                     collide.verify(one, other, X_WA, X_WB, r)
         spot = collide.Compound([(A, collide.pose((0.25, 0.5, 0), rpy=(1, 2, 3)))])
@@ -215,7 +226,10 @@ def test_frames_that_almost_coincide_prove_no_falsehood(shift):
 
 def test_tiny_axes_change_no_answer():
     rng = np.random.default_rng(31)
-    A, B = collide.ConvexHull(rng.normal(size=(20, 3))), collide.ConvexHull(rng.normal(size=(20, 3)) + np.array([1, 0, 0]))
+    A, B = (
+        collide.ConvexHull(rng.normal(size=(20, 3))),
+        collide.ConvexHull(rng.normal(size=(20, 3)) + np.array([1, 0, 0])),
+    )
     X = np.array([collide.pose(rng.normal(size=3) * 2, rpy=rng.uniform(-3, 3, 3)) for _ in range(400)])
     expected = collide.collide(A, B, EYE, X)
     assert 40 < expected.sum() < 360
@@ -271,11 +285,16 @@ def test_composed_poses_that_stretch_keep_their_bracket(stretch):
         r = collide.distance(spot, collide.Sphere(1e-12), X, collide.pose(at), check_poses=False)
         square = sum((Fraction(a) - e) ** 2 for a, e in zip(at.tolist(), exact))
         truth = float(square) ** 0.5 - 1e-12
-        assert r.lower <= truth + 1e-15 * gap and truth - 1e-15 * gap <= r.upper, (offset.tolist(), X.tolist(), at.tolist())
+        assert r.lower <= truth + 1e-15 * gap and truth - 1e-15 * gap <= r.upper, (
+            offset.tolist(),
+            X.tolist(),
+            at.tolist(),
+        )
 
 
 def test_a_sliver_does_not_leave_a_curved_overlap_without_proof():
-    """One facet of EPA's surface whose side doubles left open made a bracket of 22 % of the size, one run in a thousand."""
+    """One facet of EPA's surface whose side doubles left open made a bracket of 22 % of the size, one run in a
+    thousand."""
     rng = np.random.default_rng(7)
     wide = hits = 0
     for _ in range(3000):
@@ -390,8 +409,8 @@ def test_a_needle_of_a_facet_does_not_turn_the_normal_of_a_depth(scale):
 
 
 def test_a_facet_as_thin_as_rounding_proves_no_depth():
-    """A tiny box within a box: two vertices of a needle were not level themselves, two others were counted in their place, and
-    the depth 1.05 came out as 0.81, bracket and all."""
+    """A tiny box within a box: two vertices of a needle were not level themselves, two others were counted in their
+    place, and the depth 1.05 came out as 0.81, bracket and all."""
     X = np.array(
         [
             [-0.7985161689327858, -0.5419543924831456, 0.2620255033792149, -0.8478375655125645],

@@ -25,7 +25,8 @@ OPEN = Decimal(10) ** (2 - DIGITS)
 #: once uncertified: of planes that double-doubles do not tell apart, and edges that touch.
 MET = (("tiny_vs_huge", 5, 2), ("plates", 3, 5), ("near_pen", 0, 5), ("box_lattice", 7, 5), ("box_lattice", 11, 5),
        ("long_boxes", 0, 5), ("touch_ve", 3, 23), ("touch_1ulp", 0, 24), ("touch_tiny_step", 8, 23),
-       ("needles", 0, 104), ("needles", 3, 104), ("needles", 3, 108), ("needles", 9, 112), ("needles", 6, 115), ("needles", 7, 119),
+       ("needles", 0, 104), ("needles", 3, 104), ("needles", 3, 108), ("needles", 9, 112), ("needles", 6, 115),
+       ("needles", 7, 119),
        ("needles", 5, 12), ("needles", 3, 101), ("needles", 7, 114), ("needles", 3, 117), ("rot90", 6, 109),
        ("touch_tiny_step", 2, 108))  # fmt: skip
 
@@ -120,7 +121,9 @@ def test_unsigned_distances():
         assert np.array_equal(gaps.point_a[hit], gaps.point_b[hit])
         for k in np.flatnonzero(hit)[:6]:
             for shape, X in ((A, EYE), (B, X_WB[k])):
-                off = exact.signed_distance(gaps.point_a[[k]], EYE[:3, :3], EYE[:3, 3], shape.points, X[:3, :3], X[:3, 3])
+                off = exact.signed_distance(
+                    gaps.point_a[[k]], EYE[:3, :3], EYE[:3, 3], shape.points, X[:3, :3], X[:3, 3]
+                )
                 assert off < 1e-14, "the common point lies outside"
     half = collide.Halfspace((0, 0, 1), 0)
     r = collide.distance(half, half, EYE, EYE, signed=False)

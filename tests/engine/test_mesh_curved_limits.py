@@ -1,7 +1,9 @@
 """`max_distance` beside curved shapes: a small mesh between a shape and the polytope around it is seen.
 
-The engine puts a polytope around a cylinder, cone or ellipsoid and looks for facets near its surface. A mesh far smaller than
-the room between the two, and wholly within it, came no nearer to that surface than the limit, and was told to be beyond it.
+The engine puts a polytope around a cylinder, cone or ellipsoid and looks for facets near its surface. A mesh far
+smaller than
+the room between the two, and wholly within it, came no nearer to that surface than the limit, and was told to be
+beyond it.
 """
 
 from __future__ import annotations
@@ -76,9 +78,12 @@ def test_limits_change_nothing_but_what_is_beyond_them(kind, size):
 
 
 @pytest.mark.parametrize("size", (1e-20, 1e-12, 1e-6, 1.0))
-@pytest.mark.parametrize("shape", (collide.Ellipsoid((1, 1, 1)), collide.Cylinder(1e-15, 1e-15), collide.Box((1, 1, 1)), collide.Sphere(0.5)))
+@pytest.mark.parametrize(
+    "shape", (collide.Ellipsoid((1, 1, 1)), collide.Cylinder(1e-15, 1e-15), collide.Box((1, 1, 1)), collide.Sphere(0.5))
+)
 def test_limits_beyond_what_boxes_can_tell(shape, size):
-    """Boxes in floats reach 1e20 of the smaller body's sizes; limits beyond that were told to be exceeded by nearer bodies."""
+    """Boxes in floats reach 1e20 of the smaller body's sizes; limits beyond that were told to be exceeded by nearer
+    bodies."""
     part = small_mesh(size)
     asked = 0
     for far in (1e3, 1e10, 1e15, 1e20, 1e24, 1e30, 1e40):

@@ -13,8 +13,10 @@ BALL = collide.Mesh(*bumpy_sphere(120))
 SHAPES = {
     "solid": BALL, "surface": collide.Mesh(*box(), solid=False), "ring": collide.Mesh(*block_ring()),
     "sphere": collide.Sphere(0.4), "box": collide.Box((0.5, 0.6, 0.7)), "capsule": collide.Capsule(0.2, 0.5),
-    "cylinder": collide.Cylinder(0.3, 0.8), "cone": collide.Cone(0.3, 0.8), "ellipsoid": collide.Ellipsoid((0.3, 0.5, 0.2)),
-    "half-space": collide.Halfspace((0, 0, 1), 0.0), "hull": collide.ConvexHull(HULL), "rounded hull": collide.ConvexHull(HULL, radius=0.1),
+    "cylinder": collide.Cylinder(0.3, 0.8), "cone": collide.Cone(0.3, 0.8),
+    "ellipsoid": collide.Ellipsoid((0.3, 0.5, 0.2)),
+    "half-space": collide.Halfspace((0, 0, 1), 0.0), "hull": collide.ConvexHull(HULL),
+    "rounded hull": collide.ConvexHull(HULL, radius=0.1),
     "planes": collide.HPolytope(np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 1]]]), [0.3] * 6 + [0.6]),
     "union": collide.Compound([(collide.Box((1, 1, 1)), np.eye(4)), (collide.Sphere(0.5), collide.pose((1, 0, 0)))]),
     "union of meshes": collide.Compound([
@@ -39,7 +41,9 @@ def test_every_call(first, second):
         r = collide.distance(A, B, X, Y)
         assert hit == collide.collide(B, A, Y, X) == r.hit and r.lower <= r.distance <= r.upper, told
         assert (r.distance <= 0.0) == hit and abs(np.linalg.norm(r.normal) - 1.0) < 1e-9, told
-        assert collide.distance(A, B, X, Y, signed=False).hit == collide.distance(A, B, X, Y, max_distance=0.05).hit == hit, told
+        assert (
+            collide.distance(A, B, X, Y, signed=False).hit == collide.distance(A, B, X, Y, max_distance=0.05).hit == hit
+        ), told
         c = collide.contacts(A, B, X, Y, margin=0.05)
         assert (len(c) > 0) == (r.distance <= 0.05), told
         assert hit or not len(c) or abs(c.distance.min() - r.distance) < 1e-9, told

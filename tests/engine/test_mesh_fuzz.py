@@ -17,7 +17,10 @@ from surfaces import joined
 
 import collide
 
-TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
 
 
 def cube(low, high):
@@ -33,7 +36,9 @@ FAMILIES = {
     "ring": lambda rng: block_ring(),
     "hollow": lambda rng: joined(cube(-1, 1), turned_over(cube(-0.5, 0.5))),
     "overlapping": lambda rng: joined(cube(-1, 1), cube(0, 2)),
-    "onion": lambda rng: joined(cube(-1, 1), turned_over(cube(-0.75, 0.75)), cube(-0.5, 0.5), turned_over(cube(-0.25, 0.25))),
+    "onion": lambda rng: joined(
+        cube(-1, 1), turned_over(cube(-0.75, 0.75)), cube(-0.5, 0.5), turned_over(cube(-0.25, 0.25))
+    ),
     "open": lambda rng: (cube(-1, 1)[0], cube(-1, 1)[1][2:]),
     "tetrahedron": lambda rng: TETRAHEDRON,
     "soup": lambda rng: soup(rng, 6),
@@ -119,7 +124,10 @@ def test_everything_about_hard_pairs(part):
             radius = part * scale * ratio * float(rng.choice([0.5, 0.25, 0.1]))
             B, fb, solid = collide.ConvexHull(vb, radius=radius), collide.ConvexHull(vb).hull.facets.astype(int), True
         one, other = (va, fa, A.solid), (vb, fb, solid)
-        snippet = f"va, fa = {va.tolist()}, {fa.tolist()}\nvb, fb = {vb.tolist()}, {fb.tolist()}\nradius = {radius}\nX_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
+        snippet = (
+            f"va, fa = {va.tolist()}, {fa.tolist()}\nvb, fb = {vb.tolist()}, {fb.tolist()}\nradius = {radius}\n"
+            f"X_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
+        )
         snippet = f"case {case}\n{snippet}"
         hit, r = collide.collide(A, B, X, Y, check_poses=False), collide.distance(A, B, X, Y, check_poses=False)
         swapped = collide.distance(B, A, Y, X, check_poses=False)
@@ -146,7 +154,9 @@ def test_everything_about_hard_pairs(part):
             if case % 3 == 0 and not radius and r.lower < 0.0:  # the proven translation, or a hair more, parts them
                 ways_out += 1
                 tries = (Fraction(-r.lower) * (1 + Fraction(1, 10**k)) for k in (15, 13, 11, 9, 7))
-                assert not all(truth(one, other, X, moved(Y, [t * Fraction(v) for v in r.normal.tolist()])) for t in tries), snippet
+                assert not all(
+                    truth(one, other, X, moved(Y, [t * Fraction(v) for v in r.normal.tolist()])) for t in tries
+                ), snippet
     assert 0.35 < np.mean(told) < 0.9 and gaps >= 5 and within >= 1, (np.mean(told), gaps, within)
     assert open_ones <= 2 and (ways_out >= 3 or part == 1), (open_ones, ways_out)
 
@@ -172,7 +182,8 @@ def test_far_from_the_worlds_origin_nothing_is_lost():
 
 
 def test_collide_and_distance_agree_about_swept_balls():
-    """A bracket too wide to tell said "undecided, a hit" where a search no farther than the radius proves them apart."""
+    """A bracket too wide to tell said "undecided, a hit" where a search no farther than the radius proves them
+    apart."""
     onion = FAMILIES["onion"](None)
     A, B = collide.Mesh(onion[0] * 1e-9, onion[1]), collide.ConvexHull(onion[0] * 1e-18, radius=1e-19)
     X, Y = collide.pose((-1.25e-10, 1e8, -1e8)), collide.pose((1e-9, 1e8, -1e8))

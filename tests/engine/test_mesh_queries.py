@@ -1,4 +1,5 @@
-"""`collide` and `distance` of meshes, solids and surfaces, against each other and against convex shapes, judged exactly."""
+"""`collide` and `distance` of meshes, solids and surfaces, against each other and against convex shapes, judged
+exactly."""
 
 from __future__ import annotations
 
@@ -14,9 +15,13 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, facet_pairs, surface_distance, winding, world_points
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.mesh.validate_bvh import validate_mesh_tree
 
-TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
 
 
 def joined(*surfaces):
@@ -38,7 +43,8 @@ def meshes():
     """(shape, vertices, faces, solid, radius) of meshes."""
     overlapping = joined(box(), box((0, 0, 0), (2, 2, 2)))
     return [
-        (collide.Mesh(*given), *given, True, 0.0) for given in (box(), block_ring(), hollow_box(), overlapping, TETRAHEDRON)
+        (collide.Mesh(*given), *given, True, 0.0)
+        for given in (box(), block_ring(), hollow_box(), overlapping, TETRAHEDRON)
     ] + [(collide.Mesh(*given), *given, False, 0.0) for given in (soup(np.random.default_rng(5), 9), surface())]
 
 
@@ -124,7 +130,9 @@ def test_distances_are_bracketed_and_overlaps_come_apart():
         for X, Y in poses(rng, 3):
             r, swapped = collide.distance(A[0], B[0], X, Y), collide.distance(B[0], A[0], Y, X)
             assert np.array_equal(r.point_a, swapped.point_b) and (r.lower, r.upper) == (swapped.lower, swapped.upper)
-            assert r.distance == swapped.distance and np.array_equal(r.normal, 0.0 - swapped.normal), snippet(A, B, X, Y)
+            assert r.distance == swapped.distance and np.array_equal(r.normal, 0.0 - swapped.normal), snippet(
+                A, B, X, Y
+            )
             assert abs(np.linalg.norm(r.normal) - 1) < 1e-12 and r.lower <= r.distance <= r.upper
             assert np.abs(r.point_b - r.point_a - r.distance * r.normal).max() < 1e-13
             if r.hit:
@@ -193,7 +201,8 @@ def test_gaps_beyond_the_range_of_floats():
 
 
 def test_limits_in_a_notch():
-    """The hulls meet, the surfaces are beyond the limit: a ball's core is a point, and no smaller than others for that."""
+    """The hulls meet, the surfaces are beyond the limit: a ball's core is a point, and no smaller than others for
+    that."""
     corner = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
     vertices = np.array([[x, y, z] for z in (0, 1) for x, y in corner], dtype=np.float64)
     below = [[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 5, 4]]
@@ -202,14 +211,21 @@ def test_limits_in_a_notch():
     assert L.solid
     X_WB = collide.pose((1.5, 1.5, 0.5))
     tiny = L.scaled(2.0**-100)
-    for B, gap in ((collide.Sphere(0.25), 0.25), (collide.ConvexHull([[0, 0, 0]]), 0.5), (tiny, 0.5), (collide.Box((0.5,) * 3), 0.25)):
+    for B, gap in (
+        (collide.Sphere(0.25), 0.25),
+        (collide.ConvexHull([[0, 0, 0]]), 0.5),
+        (tiny, 0.5),
+        (collide.Box((0.5,) * 3), 0.25),
+    ):
         for limit in (0.0, 0.125, 0.1875, 0.5625, np.inf):
             for swapped in (False, True):
                 pair = (B, L, X_WB, np.eye(4)) if swapped else (L, B, np.eye(4), X_WB)
                 r = collide.distance(*pair, max_distance=limit)
                 said = f"collide.distance(*{pair}, max_distance={limit}) -> {r}"
                 assert not r.hit and r.lower - 2.0**-40 <= gap <= r.upper and r.distance > 0.0, said
-                assert B is tiny or (r.beyond and r.lower > limit if gap > limit else abs(r.distance - gap) < 2.0**-40), said
+                assert B is tiny or (
+                    r.beyond and r.lower > limit if gap > limit else abs(r.distance - gap) < 2.0**-40
+                ), said
     world = collide.World()
     world.add(L, np.eye(4), name="L")
     world.add(collide.Sphere(0.25), X_WB, name="ball")
@@ -280,7 +296,7 @@ def test_worlds_hold_meshes():
 def test_what_is_not_answered_is_refused_by_name():
     mesh = collide.Mesh(*box())
     with pytest.raises(collide.UnsupportedQuery, match="convex parts"):
-        collide.Compound([(mesh, np.eye(4))]).parts()
+        parts_of(collide.Compound([(mesh, np.eye(4))]))
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
     with pytest.raises(collide.InvalidPose):
         collide.collide(mesh, mesh, np.eye(4), mirror, check_poses=False)
@@ -294,7 +310,10 @@ def test_worlds_answer_as_pairs_do():
         world.add(shapes[k % len(shapes)], random_pose(rng, 2.0))
     bodies = [world.body(k) for k in range(30)]
     want = [
-        (a.id, b.id) for i, a in enumerate(bodies) for b in bodies[i + 1 :] if collide.collide(a.shape, b.shape, a.X_WB, b.X_WB)
+        (a.id, b.id)
+        for i, a in enumerate(bodies)
+        for b in bodies[i + 1 :]
+        if collide.collide(a.shape, b.shape, a.X_WB, b.X_WB)
     ]
     found = world.collisions()
     assert list(zip(found["a"].tolist(), found["b"].tolist())) == want and 20 < len(want) < 300
@@ -307,10 +326,12 @@ def test_worlds_answer_as_pairs_do():
 def test_convex_scenes_know_nothing_of_meshes():
     code = (
         "import sys, numpy as np, collide\n"
-        "A, B, X = collide.Box((1, 1, 1)), collide.ConvexHull(np.random.default_rng(0).normal(size=(500, 3))), np.eye(4)\n"
+        "A, B, X = collide.Box((1, 1, 1)), collide.ConvexHull(np.random.default_rng(0).normal(size=(500, 3))), "
+        "np.eye(4)\n"
         "collide.collide(A, B, X, X), collide.distance(A, B, X, X), collide.collide(A, B, X, np.stack([X, X]))\n"
         "world = collide.World(); world.add(A); world.add(B); world.collides(), world.collisions(), world.query(A, X)\n"
-        "print([name for name in sys.modules if 'collide.meshes' in name or 'triangles' in name or 'mesh_tree' in name])"
+        "print([name for name in sys.modules if 'collide.meshes' in name or 'triangles' in name or 'mesh_tree' in "
+        "name])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "[]"

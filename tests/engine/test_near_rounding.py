@@ -1,6 +1,8 @@
-"""What is said of bodies within rounding of touching: unit normals, points as far apart as the distance, one answer whoever asks.
+"""What is said of bodies within rounding of touching: unit normals, points as far apart as the distance, one answer
+whoever asks.
 
-Every random pair is moved until its gap or depth is between 1e-17 and 1e-8 of its size, where rounding decides what is seen.
+Every random pair is moved until its gap or depth is between 1e-17 and 1e-8 of its size, where rounding decides what
+is seen.
 """
 
 from __future__ import annotations
@@ -35,7 +37,10 @@ def pool(rng) -> dict[str, collide.Shape]:
         "hull": collide.ConvexHull(points),
         "rounded hull": collide.ConvexHull(points, radius=0.1),
         "compound": collide.Compound(
-            [(collide.Box((0.5, 0.5, 0.5)), collide.pose((0.1, 0.2, 0.3))), (collide.Sphere(0.3), collide.pose((0.3, 0.1, -0.3)))]
+            [
+                (collide.Box((0.5, 0.5, 0.5)), collide.pose((0.1, 0.2, 0.3))),
+                (collide.Sphere(0.3), collide.pose((0.3, 0.1, -0.3))),
+            ]
         ),
     }
 
@@ -56,7 +61,8 @@ def brought_near(A, B, X_WA, X_WB, gap: float) -> np.ndarray:
 
 
 def test_a_gap_of_a_few_ulps_beside_a_mesh_has_a_unit_normal():
-    """A box of triangles beside a box, turned about z: the points' difference, 5e-17 m long, told a normal of length 4.5."""
+    """A box of triangles beside a box, turned about z: the points' difference, 5e-17 m long, told a normal of length
+    4.5."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     mesh = meshed(corners)
     rng = naive.rng_of("unit normals")
@@ -77,7 +83,8 @@ def test_a_gap_of_a_few_ulps_beside_a_mesh_has_a_unit_normal():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_normals_points_and_margins_beside_rounding(seed):
-    """|normal| = 1; point_b − point_a = distance · normal; contacts at a margin agree with the bracket of the distance."""
+    """|normal| = 1; point_b − point_a = distance · normal; contacts at a margin agree with the bracket of the
+    distance."""
     rng = naive.rng_of("beside rounding", seed)
     shapes = pool(rng)
     names = list(shapes)
@@ -107,12 +114,15 @@ def test_normals_points_and_margins_beside_rounding(seed):
 
 @pytest.mark.parametrize("kind", ("Cylinder", "Cone"))
 def test_booleans_and_distances_never_contradict_each_other(kind):
-    """Hulls of 166 points all but touching round shapes: of some 2 pairs in 100, one search proved what the other left open."""
+    """Hulls of 166 points all but touching round shapes: of some 2 pairs in 100, one search proved what the other
+    left open."""
     rng = naive.rng_of("one answer", kind)
     contradictions, decided = [], 0
     for _ in range(40):
         points = rng.normal(size=(166, 3))
-        points *= np.exp(rng.uniform(np.log(0.2), np.log(3.0))) / np.linalg.norm(points, axis=1)[:, None] ** rng.integers(0, 2)
+        points *= np.exp(rng.uniform(np.log(0.2), np.log(3.0))) / np.linalg.norm(points, axis=1)[
+            :, None
+        ] ** rng.integers(0, 2)
         A = collide.ConvexHull(points)
         B = getattr(collide, kind)(1.0, np.exp(rng.uniform(np.log(0.1), np.log(3.0))))
         X_WA = pose(rng)
@@ -138,7 +148,8 @@ def test_booleans_and_distances_never_contradict_each_other(kind):
 
 
 def test_what_a_boolean_proves_a_distance_knows():
-    """The signs that are open are few, and a distance whose sign another search proved keeps its bracket around the truth."""
+    """The signs that are open are few, and a distance whose sign another search proved keeps its bracket around the
+    truth."""
     rng = naive.rng_of("another search")
     for _ in range(30):
         A, B = collide.ConvexHull(rng.normal(size=(166, 3))), collide.Cylinder(1.0, float(rng.uniform(0.1, 2.0)))

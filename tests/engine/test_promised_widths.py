@@ -1,6 +1,7 @@
 """The table of widths in docs/accuracy.md, held against the engine: what the page promises is read from the page.
 
-Every pair of kinds with a cylinder, cone or ellipsoid, with shapes and poses drawn here and nowhere else. Where a formula
+Every pair of kinds with a cylinder, cone or ellipsoid, with shapes and poses drawn here and nowhere else. Where a
+formula
 or a polytope gives the truth, brackets are judged by it, too: a ball, a ball's sweep along the axis, half-spaces.
 """
 
@@ -73,7 +74,9 @@ def pose_of(column: str, kind: str, reach: float, rng) -> np.ndarray:
     step = rng.uniform(0.02, 4.0 if kind == "half-space" else 1.3) * reach
     if column in ("gap", "depth"):
         return naive.pose(naive.rotation(rng), naive.unit(rng.normal(size=3)) * step)
-    X = naive.pose(np.diag([1.0, 1.0, 1.0] if rng.random() < 0.5 else [-1.0, 1.0, -1.0]), (0, 0, rng.choice([-1, 1]) * step))
+    X = naive.pose(
+        np.diag([1.0, 1.0, 1.0] if rng.random() < 0.5 else [-1.0, 1.0, -1.0]), (0, 0, rng.choice([-1, 1]) * step)
+    )
     if column == "gap nearly in line":
         tilt, shift, turn = 10.0 ** rng.uniform(-11, -1), 10.0 ** rng.uniform(-11, -1), rng.uniform(0, 2 * np.pi)
         c, s = math.cos(tilt), math.sin(tilt)
@@ -171,7 +174,11 @@ def test_half_spaces_by_the_formula():
             extent = math.hypot(*(B.radii * n))
         else:
             rim = B.radius * math.hypot(n[0], n[1])
-            extent = B.length / 2 * abs(n[2]) + rim if kind == "cylinder" else max(-n[2] * B.length / 2, n[2] * B.length / 2 + rim)
+            extent = (
+                B.length / 2 * abs(n[2]) + rim
+                if kind == "cylinder"
+                else max(-n[2] * B.length / 2, n[2] * B.length / 2 + rim)
+            )
         length = float(np.linalg.norm(n))
         truth = (float(np.dot(n, p)) - offset - extent) / length
         case = naive.Case(collide.Halfspace(n, offset), B, np.eye(4), naive.pose(t=p))

@@ -11,6 +11,7 @@ import pytest
 from naive import Case, pose, random_pose, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.narrowphase.bounds import EXACT_ERROR
 from collide.results import HOW
 
@@ -44,7 +45,7 @@ def keeps_order(case: Case, other: Case) -> bool:
     """Whether every pair of parts is worked on in the same order, which goes by a digest of the numbers."""
 
     def order(case):
-        parts_a, parts_b = ([packed.content for packed, _ in shape.parts()] for shape in (case.A, case.B))
+        parts_a, parts_b = ([packed.content for packed, _ in parts_of(shape)] for shape in (case.A, case.B))
         return [(a > b) - (a < b) for a in parts_a for b in parts_b]
 
     return order(case) == order(other)

@@ -1,7 +1,7 @@
 """Witness points of overlaps that are hard to weigh: `point_b − point_a = distance · normal`, each on its own body.
 
-Needles, plates, boxes that are flat but for a rounding, nested or nearly so. Judged by numpy over the vertices as posed;
-the brackets of some by 60 digits.
+Needles, plates, boxes that are flat but for a rounding, nested or nearly so. Judged by numpy over the vertices as
+posed; the brackets of some by 60 digits.
 """
 
 from __future__ import annotations
@@ -19,14 +19,19 @@ from collide.adapters.peers import exact
 
 KINDS = ("needle", "plate", "almost flat", "box", "thin", "prism")
 PAIRS = 500
-#: What is held, in units of the pair's size. Certified ones were met up to 5e-13; of the others the distance itself is off.
+#: What is held, in units of the pair's size. Certified ones were met up to 5e-13; of the others the distance itself is
+#: off.
 PROMISED, UNCERTIFIED = 1e-12, 1e-9
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 def vertices(rng, kind: str) -> np.ndarray:
     if kind == "needle":
-        return rng.normal(size=(rng.integers(4, 12), 3)) * [10.0 ** -rng.integers(1, 9), 10.0 ** -rng.integers(1, 9), 1.0]
+        return rng.normal(size=(rng.integers(4, 12), 3)) * [
+            10.0 ** -rng.integers(1, 9),
+            10.0 ** -rng.integers(1, 9),
+            1.0,
+        ]
     if kind == "plate":
         return rng.normal(size=(rng.integers(4, 14), 3)) * [1.0, 1.0, 10.0 ** -rng.integers(1, 12)]
     if kind == "almost flat":
@@ -86,7 +91,9 @@ def check(P, radius_a, Q, radius_b, X_WA, X_WB, rng, told):
     A, B = collide.ConvexHull(P, radius=radius_a), collide.ConvexHull(Q, radius=radius_b)
     r = collide.distance(A, B, X_WA, X_WB)
     shift = X_WB[:3, 3] - X_WA[:3, 3]
-    size = np.linalg.norm(P, axis=1).max() + np.linalg.norm(Q, axis=1).max() + np.linalg.norm(shift) + radius_a + radius_b
+    size = (
+        np.linalg.norm(P, axis=1).max() + np.linalg.norm(Q, axis=1).max() + np.linalg.norm(shift) + radius_a + radius_b
+    )
     size = max(size, np.abs(X_WA[:3, 3]).max(), np.abs(X_WB[:3, 3]).max())
     miss = np.abs(r.point_b - r.point_a - r.distance * r.normal).max() / size
     assert abs(np.linalg.norm(r.normal) - 1.0) < 1e-14, told

@@ -1,8 +1,8 @@
 """Witness points of overlapping curved bodies lie on their bodies, to half of what the bracket leaves open.
 
 Many ways out may be as short: a ball within a cone, two cones, a capsule at a cylinder's middle. The facets that EPA
-ends with are slivers then, and the point was taken from one that does not hold it: 0.8 m off a ball of 0.1 m, 77 m off a capsule
-in a cone of 315 m, some of them certified. Bodies are judged here by formulas of their own.
+ends with are slivers then, and the point was taken from one that does not hold it: 0.8 m off a ball of 0.1 m, 77 m
+off a capsule in a cone of 315 m, some of them certified. Bodies are judged here by formulas of their own.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import collide
+from collide.lowering.parts import convex_set_of
 
 
 def outside_box(half, p) -> float:
@@ -38,7 +39,8 @@ def segment_distance(q, a, b) -> float:
 
 
 def outside_ellipsoid(radii, p) -> float:
-    """Distance of a point from an ellipsoid: the nearest point is r² p / (r² + t), for the t that puts it on the surface."""
+    """Distance of a point from an ellipsoid: the nearest point is r² p / (r² + t), for the t that puts it on the
+    surface."""
     squares, p = radii * radii, np.asarray(p)
     if (p * p / squares).sum() <= 1.0:
         return 0.0
@@ -71,11 +73,17 @@ def log_uniform(rng, low: float, high: float) -> float:
 
 
 MAKERS = {
-    "cone": lambda rng: collide.Cone(log_uniform(rng, 0.1, 10), log_uniform(rng, 0.1, 10) * log_uniform(rng, 0.01, 100)),
-    "cylinder": lambda rng: collide.Cylinder(log_uniform(rng, 0.1, 10), log_uniform(rng, 0.1, 10) * log_uniform(rng, 0.01, 100)),
+    "cone": lambda rng: collide.Cone(
+        log_uniform(rng, 0.1, 10), log_uniform(rng, 0.1, 10) * log_uniform(rng, 0.01, 100)
+    ),
+    "cylinder": lambda rng: collide.Cylinder(
+        log_uniform(rng, 0.1, 10), log_uniform(rng, 0.1, 10) * log_uniform(rng, 0.01, 100)
+    ),
     "ellipsoid": lambda rng: collide.Ellipsoid(tuple(log_uniform(rng, 0.1, 10) for _ in range(3))),
     "sphere": lambda rng: collide.Sphere(log_uniform(rng, 0.01, 10)),
-    "capsule": lambda rng: collide.Capsule(log_uniform(rng, 0.1, 2), log_uniform(rng, 0.1, 10) * int(rng.integers(0, 2))),
+    "capsule": lambda rng: collide.Capsule(
+        log_uniform(rng, 0.1, 2), log_uniform(rng, 0.1, 10) * int(rng.integers(0, 2))
+    ),
     "box": lambda rng: collide.Box(tuple(log_uniform(rng, 0.1, 10) for _ in range(3))),
 }
 
@@ -124,7 +132,7 @@ def test_overlaps_of_curved_bodies(a, b):
         if not r.hit:
             continue
         told = f"{A} {B} X_WA=np.array({X_WA.tolist()}) X_WB=np.array({X_WB.tolist()})"
-        size = sum(float(np.linalg.norm(S.parts()[0][0].params[:3])) + S.parts()[0][0].reach for S in (A, B))
+        size = sum(float(np.linalg.norm(convex_set_of(S).params[:3])) + convex_set_of(S).reach for S in (A, B))
         off = off_bodies(A, B, X_WA, X_WB, r)
         hits += 1
         certified += r.certified

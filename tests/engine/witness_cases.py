@@ -1,7 +1,8 @@
-"""Overlaps whose witness points once missed, by up to half the size, or whose bracket did: written out, number by number.
+"""Overlaps whose witness points once missed, by up to half the size, or whose bracket did: written out, number by
+number.
 
-Each is vertices and radius of A, of B, and their poses: three rows of rotation and shift, in order. Most are a box that is off
-by some units in the last place, in another, turned alike.
+Each is vertices and radius of A, of B, and their poses: three rows of rotation and shift, in order. Most are a box
+that is off by some units in the last place, in another, turned alike.
 """
 
 from __future__ import annotations

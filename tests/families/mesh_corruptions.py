@@ -48,7 +48,9 @@ def spoil(rng: np.random.Generator, vertices: np.ndarray, faces: np.ndarray, kin
         refused = not len(f)
     elif kind == "duplicate facets":
         again = f[some]
-        f = np.concatenate([f, again if rng.random() < 0.5 else again[:, [1, 2, 0]] if rng.random() < 0.5 else again[:, ::-1]])
+        f = np.concatenate(
+            [f, again if rng.random() < 0.5 else again[:, [1, 2, 0]] if rng.random() < 0.5 else again[:, ::-1]]
+        )
     elif kind == "NaN vertices":
         v[points[0], rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf, 1e60])
         refused = True
@@ -83,7 +85,8 @@ def spoil(rng: np.random.Generator, vertices: np.ndarray, faces: np.ndarray, kin
 
 
 class Said(NamedTuple):
-    """outcome : "refused", "hit", "inside" (a hit by an inside alone) or "apart".   wrong : what is, in words; or nothing."""
+    """outcome : "refused", "hit", "inside" (a hit by an inside alone) or "apart".   wrong : what is, in words; or
+    nothing."""
 
     outcome: str
     solid: bool
@@ -161,7 +164,8 @@ def _probe(rng: np.random.Generator, mesh: Mesh):
 
 
 _BOX = np.array(
-    [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6],
+     [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
 )  # fmt: skip
 
 
@@ -208,5 +212,7 @@ def _volume(mesh: Mesh, proper: np.ndarray, ids: np.ndarray) -> Fraction:
     total = Fraction(0)
     for a, b, c in proper.tolist():
         p, q, r = points[a], points[b], points[c]
-        total += p[0] * (q[1] * r[2] - q[2] * r[1]) - p[1] * (q[0] * r[2] - q[2] * r[0]) + p[2] * (q[0] * r[1] - q[1] * r[0])
+        total += (
+            p[0] * (q[1] * r[2] - q[2] * r[1]) - p[1] * (q[0] * r[2] - q[2] * r[0]) + p[2] * (q[0] * r[1] - q[1] * r[0])
+        )
     return total

@@ -94,7 +94,8 @@ def touching_case(rng):
 
 
 def rounded_case(rng):
-    """B is only shifted and has its corners where A's are but for the rounding of the shift: coincidences in doubles."""
+    """B is only shifted and has its corners where A's are but for the rounding of the shift: coincidences in
+    doubles."""
     vertices, faces = soup(rng, 10)
     X = np.eye(4)
     Y = collide.pose(rng.normal(size=3))

@@ -44,7 +44,9 @@ def ball(rings=5, sides=9) -> tuple[np.ndarray, np.ndarray]:
     points = [(0.0, 0.0, 1.0)]
     for i in range(1, rings):
         t = np.pi * i / rings
-        points += [(np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)) for p in 2 * np.pi * np.arange(sides) / sides]
+        points += [
+            (np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)) for p in 2 * np.pi * np.arange(sides) / sides
+        ]
     points.append((0.0, 0.0, -1.0))
     last = len(points) - 1
 
@@ -54,7 +56,10 @@ def ball(rings=5, sides=9) -> tuple[np.ndarray, np.ndarray]:
     facets = [(0, name(1, j), name(1, j + 1)) for j in range(sides)]
     for i in range(1, rings - 1):
         for j in range(sides):
-            facets += [(name(i, j), name(i + 1, j), name(i + 1, j + 1)), (name(i, j), name(i + 1, j + 1), name(i, j + 1))]
+            facets += [
+                (name(i, j), name(i + 1, j), name(i + 1, j + 1)),
+                (name(i, j), name(i + 1, j + 1), name(i, j + 1)),
+            ]
     facets += [(last, name(rings - 1, j + 1), name(rings - 1, j)) for j in range(sides)]
     return np.array(points), np.array(facets)
 
@@ -173,7 +178,9 @@ def exact_volume(vertices, faces) -> Fraction:
     total = Fraction(0)
     for i, j, k in np.asarray(faces).tolist():
         a, b, c = points[i], points[j], points[k]
-        total += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+        total += (
+            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+        )
     return total / 6
 
 

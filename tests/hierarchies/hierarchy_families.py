@@ -24,8 +24,8 @@ def turned(points: np.ndarray) -> np.ndarray:
 def degree_doubling(rounds: int) -> np.ndarray:
     """Section 4's example: a tetrahedron with a vertex q; each round adds a vertex slightly above each facet at q.
 
-    (3·2^rounds + 1, 3), q first, at the origin, with all others as neighbours: they lie on the rays of a round cone. The
-    vertices of a round stand half-way between those before, half as far from q as the round before: in the
+    (3·2^rounds + 1, 3), q first, at the origin, with all others as neighbours: they lie on the rays of a round cone.
+    The vertices of a round stand half-way between those before, half as far from q as the round before: in the
     middle of a facet and above it by the sagitta of the cone, which is below all planes of other facets.
     """
     rows = [np.zeros((1, 3)), ring(3, -1.0)]
@@ -85,7 +85,8 @@ def families(n: int) -> dict[str, np.ndarray]:
         "sphere": sphere(n), "degree doubling": degree_doubling(rounds), "bipyramid": bipyramid(n),
         "bipyramid, turned": turned(bipyramid(n, 0.1)), "cone": cone(n), "cone, turned": turned(cone(n)),
         "prism": prism(n // 2), "prism, turned": turned(prism(n // 2)), "pancake, turned": turned(prism(n // 2, 1e-6)),
-        "needle, turned": turned(sphere(n) * [1.0, 1e-6, 1e-6]), "cube": cube_grid(4), "cube, turned": turned(cube_grid(4)),
+        "needle, turned": turned(sphere(n) * [1.0, 1e-6, 1e-6]), "cube": cube_grid(4),
+        "cube, turned": turned(cube_grid(4)),
         "moment curve": moment_curve(n), "arcs": arcs(n), "arcs, turned": turned(arcs(n)), "crowded": crowded(n),
     }  # fmt: skip
 

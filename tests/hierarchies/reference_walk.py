@@ -174,7 +174,10 @@ def game(P: list[Vector], Q: list[Vector]) -> tuple[Fraction, Vector, Vector]:
     shift = 1 - min(min(row) for row in rows)
     n = len(P)
     # Maximise Σ y, (M + shift) y ≤ 1, y ≥ 0, by the simplex method with Bland's rule.
-    table = [[c + shift for c in row] + [ONE if r == k else Fraction(0) for r in range(len(Q))] + [ONE] for k, row in enumerate(rows)]
+    table = [
+        [c + shift for c in row] + [ONE if r == k else Fraction(0) for r in range(len(Q))] + [ONE]
+        for k, row in enumerate(rows)
+    ]
     costs = [-ONE] * n + [Fraction(0)] * (len(Q) + 1)
     basis = [n + k for k in range(len(Q))]
     while True:
@@ -373,7 +376,9 @@ class Walk:
             assert in_hull(P_i.vertices(), self.x_star), "star: ρ(γ) ∈ P_i"
             assert all(dot(self.x_star, Q_j.points[q]) <= 1 for q in Q_j.ring if q != self.q_star), "star: γ"
             assert Q_j.points[self.q_star] in self.Q_star
-        assert all(in_hull(P_i.vertices(), p) for p in self.P_star) and all(in_hull(Q_j.vertices(), q) for q in self.Q_star)
+        assert all(in_hull(P_i.vertices(), p) for p in self.P_star) and all(
+            in_hull(Q_j.vertices(), q) for q in self.Q_star
+        )
 
 
 def _lowest(level: Level, z) -> int:
@@ -425,7 +430,8 @@ def _in_simplex(corners, x) -> bool:
         return False
     right = [dot(e, y) for e in edges]
     weights = [
-        _determinant([[right[r] if c == k else row[c] for c in range(len(edges))] for r, row in enumerate(gram)]) / whole
+        _determinant([[right[r] if c == k else row[c] for c in range(len(edges))] for r, row in enumerate(gram)])
+        / whole
         for k in range(len(edges))
     ]
     return min(weights) >= 0 and sum(weights) <= 1 and blend(weights, edges) == y

@@ -71,7 +71,8 @@ def test_polar_of_a_box_is_its_octahedron():
 
 
 def test_lemma_4_2_by_brute_force():
-    """Planes tangent to a level at random vertices: at most one vertex of the finer level beyond, and among those listed."""
+    """Planes tangent to a level at random vertices: at most one vertex of the finer level beyond, and among those
+    listed."""
     rng = np.random.default_rng(4)
     beyond_some = tangents = 0
     for name in ("sphere", "bipyramid", "prism, turned", "degree doubling", "cube", "arcs", "pancake, turned"):
@@ -180,7 +181,9 @@ def test_sizes_at_the_ends_of_doubles():
 
 
 def damaged(hierarchy: Hierarchy, **fields) -> Hierarchy:
-    copy = {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in hierarchy._asdict().items()}
+    copy = {
+        name: value.copy() if isinstance(value, np.ndarray) else value for name, value in hierarchy._asdict().items()
+    }
     for name, change in fields.items():
         copy[name] = change(copy[name]) if callable(change) else change
     return Hierarchy(**copy)
@@ -230,7 +233,8 @@ def appended(hierarchy: Hierarchy) -> Hierarchy:
         return ids + (ids >= count).astype(ids.dtype)
 
     return damaged(
-        hierarchy, points=put([0, 0, 3.0]), birth=put(-1), last=put(-1), parent=lambda p: put(-1)(shift(p)), row=put(-1),
+        hierarchy, points=put([0, 0, 3.0]), birth=put(-1), last=put(-1), parent=lambda p: put(-1)(shift(p)),
+        row=put(-1),
         neighbours=shift, removed=shift, level_vertices=shift,
     )  # fmt: skip
 

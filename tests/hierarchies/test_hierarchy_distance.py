@@ -1,7 +1,7 @@
 """Distances down the hierarchies, each proven in the test: the points are in the bodies, and a plane keeps these apart.
 
-The oracle is a pair of inequalities in numpy over all vertices and facets; it shares no code with the kernels. Counts of
-rounds are exact, and bounded by the product of the depths.
+The oracle is a pair of inequalities in numpy over all vertices and facets; it shares no code with the kernels. Counts
+of rounds are exact, and bounded by the product of the depths.
 """
 
 from __future__ import annotations
@@ -100,8 +100,9 @@ def test_levels_gone_down_grow_with_the_product_of_logarithms():
 
 
 def test_a_vertex_of_large_degree_in_the_body_itself_is_scanned_with_and_without_a_bound():
-    """Section 4's body, its large vertex nearest. Without a bound every level's list is scanned, n in all. With one only
-    the body itself has the vertex, but its star is scanned once: the text counts on a perturbation that makes P simple."""
+    """Section 4's body, its large vertex nearest. Without a bound every level's list is scanned, n in all. With one
+    only the body itself has the vertex, but its star is scanned once: the text counts on a perturbation that makes P
+    simple."""
     points = degree_doubling(9 if SIZE > 100 else 5)
     hull = convex_hull(points)
     ball = sphere(60)
@@ -113,7 +114,9 @@ def test_a_vertex_of_large_degree_in_the_body_itself_is_scanned_with_and_without
         assert 0.9 * len(points) < found.counters[3] < 2 * len(points) + 1000
 
 
-@pytest.mark.parametrize("family", ["rand_sep", "near_sep", "rand_pen", "boxes_rest", "needles", "cyl1000", "identical"])
+@pytest.mark.parametrize(
+    "family", ["rand_sep", "near_sep", "rand_pen", "boxes_rest", "needles", "cyl1000", "identical"]
+)
 def test_distances_of_the_public_call_are_proven(family):
     """`algorithm="dobkin-kirkpatrick"`: the proposal of the hierarchies, settled in integers to the last digit."""
     gaps = 0

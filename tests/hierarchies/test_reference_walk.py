@@ -48,7 +48,9 @@ def test_equal_to_the_oracle_with_all_invariants(kind):
         seen.update((r.space, r.case) for r in found.rounds)
         hits, walks = hits + truth, walks + 1
     assert walks > 40 and 0.15 < hits / walks < 0.85
-    assert {(space, case) for space in ("primal", "polar") for case in ("1", "2.1", "2.2")} <= set(seen) or kind == "flush", seen
+    assert {(space, case) for space in ("primal", "polar") for case in ("1", "2.1", "2.2")} <= set(
+        seen
+    ) or kind == "flush", seen
 
 
 def test_larger_bodies_go_deep():

@@ -19,6 +19,7 @@ from collide.hierarchies.hierarchy_queries import Walks, walk_body
 from collide.hierarchies.run_walk import no_walks, run_walks
 from collide.hierarchies.validate_walk import validate_rounds
 from collide.hierarchies.walk import APART, LOST, MEETING
+from collide.lowering.parts import convex_set_of
 from collide.scenes.families import HULLS, generate, names
 
 WALK = "barba-langerman"
@@ -95,7 +96,7 @@ def test_equal_to_the_default_on_many_poses():
         assert found.walked.mean() > 0.95
         assert 0.05 < found.hit.mean() < 0.95
         assert (found.rows["rounds"] <= found.depth_p + found.depth_q - 1).all()
-        packed = A.parts()[0][0], B.parts()[0][0]
+        packed = convex_set_of(A), convex_set_of(B)
         early, _ = run_walks(A._walk, B._walk, *packed, X_WA, X_WB, early=True)
         assert ((early["status"] == MEETING) == found.hit)[early["status"] >= APART].all()
         assert (early["rounds"] <= found.rows["rounds"]).all()

@@ -44,8 +44,12 @@ MUTATIONS = {
     "cones are not looked at": ("walk_steps.py", "t = min(t, before / (before - after))", "t = 1.0"),
     "case 1 in the primal space always": ("walk_steps.py", "if height + shift > 1.0:", "if height + shift > -1e300:"),
     "case 1 in the polar space always": ("walk_steps.py", "if -height <= 1.0:", "if -height <= 1e300:"),
-    "the vertex beyond is not looked for": ("packed_hierarchy.py", "        if lower < height:", "        if lower < -1e300:"),
-    "the star keeps the old plane": ("walk_steps.py", "put_vec3(state, Z_STAR, z)", "put_vec3(state, Z_STAR, vec3_at(state, Z_STAR))"),
+    "the vertex beyond is not looked for": (
+        "packed_hierarchy.py", "        if lower < height:", "        if lower < -1e300:",
+    ),
+    "the star keeps the old plane": (
+        "walk_steps.py", "put_vec3(state, Z_STAR, z)", "put_vec3(state, Z_STAR, vec3_at(state, Z_STAR))",
+    ),
 }  # fmt: skip
 
 

@@ -33,7 +33,8 @@ PUBLIC = {
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "Examples", "References", "See Also")
 #: Parameters that are lengths, whatever function has them: their description names the unit.
 LENGTHS = {
-    "radius", "length", "height", "size", "radii", "clearance", "max_distance", "margin", "security_margin", "min_depth",
+    "radius", "length", "height", "size", "radii", "clearance", "max_distance", "margin", "security_margin",
+    "min_depth",
     "tolerance_m",
 }  # fmt: skip
 #: Parameters that hold arrays: their description gives the shape.

@@ -47,7 +47,9 @@ def test_commands_that_pages_show_exist():
 def test_pages_are_listed():
     """docs/index.md leads to every page."""
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
-    missing = [page.name for page in (ROOT / "docs").glob("*.md") if page.name != "index.md" and f"]({page.name})" not in index]
+    missing = [
+        page.name for page in (ROOT / "docs").glob("*.md") if page.name != "index.md" and f"]({page.name})" not in index
+    ]
     assert not missing, f"docs/index.md does not list {missing}"
 
 

@@ -14,7 +14,10 @@ from reproduction import reproducing
 
 from collide.hull.double_description import halfspace_vertices
 
-SOURCE = "from collide.hull.double_description import halfspace_vertices\nimport numpy as np\nprint(halfspace_vertices(np.array({n}), np.array({b})))"
+SOURCE = (
+    "from collide.hull.double_description import halfspace_vertices\nimport numpy as np\n"
+    "print(halfspace_vertices(np.array({n}), np.array({b})))"
+)
 
 
 def corners_of(normals, offsets) -> set[tuple[Fraction, ...]]:
@@ -37,7 +40,10 @@ def random_planes(rng, kind: str) -> tuple[np.ndarray, np.ndarray]:
     keep = normals.any(axis=1)
     normals, offsets = normals[keep], offsets[keep]
     if kind == "boxed":
-        normals, offsets = np.concatenate([normals, np.eye(3), -np.eye(3)]), np.concatenate([offsets, rng.uniform(0.1, 1, 6)])
+        normals, offsets = (
+            np.concatenate([normals, np.eye(3), -np.eye(3)]),
+            np.concatenate([offsets, rng.uniform(0.1, 1, 6)]),
+        )
     if not len(normals):
         return np.eye(3)[:1], np.ones(1)
     return normals, offsets
@@ -67,7 +73,11 @@ def test_vertices(kind):
                 apart = min(sum(((x - y) ** 2 for x, y in zip(vertex, corner)), Fraction(0)) for corner in true)
                 assert apart <= Fraction(slop) ** 2
             seen["rounded"] += slop > 0.0
-    wanted = {"lattice": ("unbounded", "empty", "bounded"), "random": ("unbounded", "bounded", "rounded"), "boxed": ("bounded", "rounded")}
+    wanted = {
+        "lattice": ("unbounded", "empty", "bounded"),
+        "random": ("unbounded", "bounded", "rounded"),
+        "boxed": ("bounded", "rounded"),
+    }
     assert min(seen[what] for what in wanted[kind]) >= 5, seen
 
 

@@ -535,7 +535,9 @@ def test_bent_edges_are_rejected():
     """Any one quadrilateral of a convex surface turned to its other diagonal makes a dent, or zero area."""
     points = on_sphere(np.random.default_rng(10), 40)
     facets = convex_hull(points).facets
-    edges = {(int(row[k]), int(row[(k + 1) % 3])): (f, int(row[k - 1])) for f, row in enumerate(facets) for k in range(3)}
+    edges = {
+        (int(row[k]), int(row[(k + 1) % 3])): (f, int(row[k - 1])) for f, row in enumerate(facets) for k in range(3)
+    }
     done = 0
     for (a, b), (f, c) in edges.items():
         g, d = edges[b, a]

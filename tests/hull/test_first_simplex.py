@@ -33,7 +33,9 @@ def rank(points) -> int:
     for column in range(3):
         pivot = next((row for row in rows if row[column]), None)
         if pivot is not None:
-            rows = [[x - row[column] / pivot[column] * y for x, y in zip(row, pivot)] for row in rows if row is not pivot]
+            rows = [
+                [x - row[column] / pivot[column] * y for x, y in zip(row, pivot)] for row in rows if row is not pivot
+            ]
             found += 1
     return found
 
@@ -76,5 +78,12 @@ def test_dimensions(kind):
                 a, b, c, d = ([Fraction(x) for x in originals[3 * k : 3 * k + 3]] for k in corners)
                 assert determinant(*([x - y for x, y in zip(p, a)] for p in (d, b, c))) < 0
         seen[dimension] += 1
-    wanted = {"lattice": 3, "repeated": 0, "line": 1, "line but for an ulp": 2, "plane but for the least double": 3, "random": 3}
+    wanted = {
+        "lattice": 3,
+        "repeated": 0,
+        "line": 1,
+        "line but for an ulp": 2,
+        "plane but for the least double": 3,
+        "random": 3,
+    }
     assert seen[wanted[kind]] >= 10, seen

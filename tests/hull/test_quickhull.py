@@ -56,10 +56,22 @@ class Growing:
     def expand(self, i: int) -> None:
         f = self.owner[i]
         n_region, n_edges = Q.visible_region(
-            self.points, self.originals, self.work, self.digits, self.facets, self.planes, self.state, f, i, self.region, self.rim
+            self.points,
+            self.originals,
+            self.work,
+            self.digits,
+            self.facets,
+            self.planes,
+            self.state,
+            f,
+            i,
+            self.region,
+            self.rim,
         )
         seen = {g for g, triangle in self.alive().items() if self.is_above(i, triangle)}
-        assert set(map(int, self.region[:n_region])) == seen and n_region == len(seen), "a corner sees all facets it is above"
+        assert set(map(int, self.region[:n_region])) == seen and n_region == len(seen), (
+            "a corner sees all facets it is above"
+        )
         self.check_rim(n_edges, seen)
         self.orphans = [0] * self.n
         n_orphans = Q.gather(self.facets, self.following, self.region, n_region, i, self.orphans)
@@ -67,7 +79,9 @@ class Growing:
         self.owner[i] = -1
         for g in self.region[:n_region]:
             Q.free_facet(self.facets, self.state, int(g))
-        assert Q.build_fan(self.points, self.facets, self.planes, self.state, i, self.rim, n_edges, self.fan, self.starting)
+        assert Q.build_fan(
+            self.points, self.facets, self.planes, self.state, i, self.rim, n_edges, self.fan, self.starting
+        )
         self.n_fan = n_edges
         self.deal()
 
@@ -80,7 +94,8 @@ class Growing:
         assert found == true and len(found) == n_edges
 
     def check(self) -> None:
-        """Closed and convex so far; every point outside is in the list of one facet that it is above, others are inside."""
+        """Closed and convex so far; every point outside is in the list of one facet that it is above, others are
+        inside."""
         alive, edges = self.alive(), {}
         for f, triangle in alive.items():
             for e in range(3):
@@ -131,7 +146,9 @@ def test_wide_fans_are_searched_by_halving():
     angle = np.arange(60) * (2 * np.pi / 60)
     for _ in range(4):
         ring = np.column_stack([30 * np.cos(angle), 30 * np.sin(angle), 0.01 * rng.random(60)])
-        cloud = np.concatenate([ring, [[0.0, 0.0, -3.0]], [[0.0, 0.0, 1.0]], rng.normal(size=(40, 3)) * (9.0, 9.0, 1.0)])
+        cloud = np.concatenate(
+            [ring, [[0.0, 0.0, -3.0]], [[0.0, 0.0, 1.0]], rng.normal(size=(40, 3)) * (9.0, 9.0, 1.0)]
+        )
         hull = Growing(cloud)
         apex = 61
         for i in [*range(60), apex]:
@@ -142,7 +159,9 @@ def test_wide_fans_are_searched_by_halving():
         fan = [int(f) for f in hull.fan[: hull.n_fan]]
         for i in range(62, len(cloud)):
             above = [k for k, f in enumerate(fan) if hull.is_above(i, hull.alive()[f])]
-            place, sure = Q.locate(hull.points, hull.originals, hull.work, hull.digits, hull.facets, hull.state, hull.fan, len(fan), i)
+            place, sure = Q.locate(
+                hull.points, hull.originals, hull.work, hull.digits, hull.facets, hull.state, hull.fan, len(fan), i
+            )
             assert not sure or not above or place in above, cloud.tolist()
             seen["above" if above else "inside", bool(sure)] += 1
     assert seen["above", True] > 20, seen

@@ -1,7 +1,8 @@
-"""Answers of all kinds from seeds, as digests: the same bits are asked for however kernels were made, and wherever they run.
+"""Answers of all kinds from seeds, as digests: the same bits are asked for however kernels were made, and wherever
+they run.
 
-    python tests/kernels/answers_digest.py [pairs hulls meshes worlds]
-    {"mode": "compiled", "level": "v4", "digests": {"pairs": "5d41…", …}, "counts": {"pairs": [hits, asked], …}}
+python tests/kernels/answers_digest.py [pairs hulls meshes worlds]
+{"mode": "compiled", "level": "v4", "digests": {"pairs": "5d41…", …}, "counts": {"pairs": [hits, asked], …}}
 """
 
 from __future__ import annotations

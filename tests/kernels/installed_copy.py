@@ -23,7 +23,10 @@ def copied(to: Path) -> Path:
     shutil.copytree(PACKAGE, to / "collide", ignore=unwanted)
     for module in (collide.adapters, collide.scenes):  # elsewhere in a checkout
         shutil.copytree(
-            Path(module.__file__).parent, to / "collide" / module.__name__.split(".")[1], ignore=unwanted, dirs_exist_ok=True
+            Path(module.__file__).parent,
+            to / "collide" / module.__name__.split(".")[1],
+            ignore=unwanted,
+            dirs_exist_ok=True,
         )
     return to
 

@@ -1,4 +1,5 @@
-"""What makes machine code of kernels: the same bytes every time, and nothing that could fail unseen or would need Python."""
+"""What makes machine code of kernels: the same bytes every time, and nothing that could fail unseen or would need
+Python."""
 
 from __future__ import annotations
 
@@ -93,7 +94,9 @@ def test_kernels_compile_to_the_same_bytes():
     told = []
     for seed in ("1", "2"):
         environment = {**os.environ, "COLLIDE_JIT": "1", "PYTHONHASHSEED": seed}
-        done = subprocess.run([sys.executable, "-c", _CODE], env=environment, capture_output=True, text=True, check=False, timeout=300)
+        done = subprocess.run(
+            [sys.executable, "-c", _CODE], env=environment, capture_output=True, text=True, check=False, timeout=300
+        )
         assert done.returncode == 0, done.stderr
         told.append(done.stdout)
     assert told[0] == told[1] and told[0]

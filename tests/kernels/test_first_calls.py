@@ -1,4 +1,5 @@
-"""First calls: kernels are compiled or loaded while other threads use numba, are interrupted, or ask for the first time as well.
+"""First calls: kernels are compiled or loaded while other threads use numba, are interrupted, or ask for the first
+time as well.
 
 Each test forces the order that was met by chance, in a process of its own: what it is about ended in a crash.
 """
@@ -205,8 +206,8 @@ def test_two_first_calls_compile_once(tmp_path):
     assert run_just_in_time(ONCE, tmp_path) == "[8.0, 162.0] [['power']]\n"
 
 
-#: While an entry is compiled or loaded in one thread, another calls functions of its own for the first time. In numba's part
-#: it comes as far as numba's lock, elsewhere to the end.
+#: While an entry is compiled or loaded in one thread, another calls functions of its own for the first time. In
+#: numba's part it comes as far as numba's lock, elsewhere to the end.
 BESIDE = (
     NUMBAS
     + """
@@ -214,7 +215,8 @@ from numba.core.compiler_lock import global_compiler_lock
 
 inside, waiting, seen = threading.Event(), threading.Event(), []
 owner, name = {
-    "lowering": (front_end._Context, "post_lowering"), "machine code": (jit, "machine_code"), "loading": (object_cache, "_found"),
+    "lowering": (front_end._Context, "post_lowering"), "machine code": (jit, "machine_code"),
+    "loading": (object_cache, "_found"),
 }[sys.argv[1]]
 kept, acquire, mine = getattr(owner, name), type(global_compiler_lock).acquire, numbas_own()
 
@@ -368,7 +370,8 @@ from collide.narrowphase.facets import body_pairs
 mesh = collide.Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 union = collide.Compound([(collide.Sphere(1), np.eye(4)), (collide.Sphere(0.5), np.eye(4))])
 module, name, shape = {
-    "convex": (run, "_Workspace", collide.Sphere(1)), "union": (unions, "_SingleSpace", union), "mesh": (body_pairs, "Workspace", mesh),
+    "convex": (run, "_Workspace", collide.Sphere(1)), "union": (unions, "_SingleSpace", union),
+    "mesh": (body_pairs, "Workspace", mesh),
 }[sys.argv[1]]
 X, made, both, out = collide.pose((0.25, 0.5, 0)), [], threading.Barrier(2, timeout=200), [None] * 2
 Workspace = getattr(module, name)

@@ -1,4 +1,5 @@
-"""Eight doubles at once: every lane has the bits that doubles have, compiled and as plain Python, whatever its neighbours."""
+"""Eight doubles at once: every lane has the bits that doubles have, compiled and as plain Python, whatever its
+neighbours."""
 
 from __future__ import annotations
 
@@ -116,7 +117,23 @@ def _numbers() -> np.ndarray:
     x = rng.normal(size=(1000, IN, LANES)) * 2.0 ** rng.integers(-60, 60, size=(1000, IN, LANES))
     x[:300, 1::2] = x[:300, ::2] * rng.uniform(-1, 1, size=(300, IN // 2, LANES)) * 2.0**-54
     x[100:200, 4:6] = x[100:200, :2] * (1 + rng.integers(-3, 4, size=(100, 1, LANES)) * 2.0**-52)
-    odd = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.7e308, -1.7e308, 1 + 2**-52, 3.0, 2.0**-1000]
+    odd = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        np.inf,
+        -np.inf,
+        np.nan,
+        5e-324,
+        -5e-324,
+        2.2e-308,
+        1.7e308,
+        -1.7e308,
+        1 + 2**-52,
+        3.0,
+        2.0**-1000,
+    ]
     x[300:700] = rng.choice(odd, size=(400, IN, LANES))
     return x
 
@@ -147,7 +164,9 @@ def test_lanes_have_the_bits_of_doubles():
     eight, ones = _run(x)
     wrong = np.argwhere(_bits(eight) != _bits(ones))
     for k, lane, field in wrong[:1]:
-        raise AssertionError(f"number {field} of {x[k, :, lane].tolist()}: {eight[k, lane, field]!r}, not {ones[k, lane, field]!r}")
+        raise AssertionError(
+            f"number {field} of {x[k, :, lane].tolist()}: {eight[k, lane, field]!r}, not {ones[k, lane, field]!r}"
+        )
     assert np.isfinite(ones).mean() > 0.6
 
 
@@ -204,7 +223,8 @@ def _refine_one(question_at, out_at, n, parts):
 @pytest.mark.parametrize("parts", [1, 2])
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_gaps_eight_at_a_time_are_those_one_by_one(n, parts):
-    """The same source, compiled for doubles; questions are random, or have an edge that is nothing or a direction too."""
+    """The same source, compiled for doubles; questions are random, or have an edge that is nothing or a direction
+    too."""
     rng = np.random.default_rng(100 * n + parts)
     block = rng.normal(size=(at.QUESTION, LANES))
     block[at.POSE_B + 9] += 8.0
@@ -213,7 +233,9 @@ def test_gaps_eight_at_a_time_are_those_one_by_one(n, parts):
     block[at.PARALLELOGRAM] = rng.integers(0, 2, LANES)
     for edge in range(2):
         for part in range(2):
-            block[at.EDGES + at.EDGE * edge + at.PART * part + at.OF_A] = (1 - part) if parts == 2 else rng.integers(0, 2, LANES)
+            block[at.EDGES + at.EDGE * edge + at.PART * part + at.OF_A] = (
+                (1 - part) if parts == 2 else rng.integers(0, 2, LANES)
+            )
     block[at.EDGES : at.EDGES + 3, 5] = block[at.EDGES + 3 : at.EDGES + 6, 5]
     block[at.POSE_A : at.POSE_B + 12, 6] = block[at.CORNER_A : at.CORNER_B + 3, 6] = 0.0
     size = at.FEATURE + dd.STRIDE + at.ANSWER

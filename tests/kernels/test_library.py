@@ -1,6 +1,8 @@
-"""The library of kernels: the same bits on every level of processors, and what happens where it is not as the build left it.
+"""The library of kernels: the same bits on every level of processors, and what happens where it is not as the build
+left it.
 
-Copies of the installed package are damaged; processes of their own use them. A process that died, or answered wrongly, would
+Copies of the installed package are damaged; processes of their own use them. A process that died, or answered
+wrongly, would
 be the fault met: a library cut short ends the process that loads it, and one of other sources answers wrongly.
 """
 
@@ -21,8 +23,8 @@ HERE = Path(__file__).parent
 #: What digests are taken of: see answers_digest.py.
 KINDS = ("pairs", "hulls", "meshes", "worlds")
 
-#: Asks for a bounding box, the smallest of kernels, whose callee `support_vertex` stands in another file. A function, for
-#: tests that ask after something else.
+#: Asks for a bounding box, the smallest of kernels, whose callee `support_vertex` stands in another file. A function,
+#: for tests that ask after something else.
 BOX = """
 import json, sys
 import numpy as np
@@ -37,13 +39,18 @@ def box():
     poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
     return boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64)).round(6).tolist()
 """
-TOLD = BOX + "print(json.dumps({'box': box(), 'mode': mode.MODE, 'why': mode.WHY, 'at': collide.__file__, 'level': library.level}))"
+TOLD = (
+    BOX
+    + "print(json.dumps({'box': box(), 'mode': mode.MODE, 'why': mode.WHY, 'at': collide.__file__, 'level': "
+    "library.level}))"
+)
 RIGHT = [[-4, -5, -6, 1, 2, 3]]
 
 
 @pytest.fixture(scope="session")
 def compiled_cache(tmp_path_factory) -> Path:
-    """Where copies that have no library of use keep kernels compiled just in time: the first one compiles, the others load."""
+    """Where copies that have no library of use keep kernels compiled just in time: the first one compiles, the others
+    load."""
     return tmp_path_factory.mktemp("kernels")
 
 
@@ -135,7 +142,11 @@ def test_every_level_gives_the_same_bits():
 def test_a_level_that_does_not_exist_is_an_error_that_names_those_there_are(command):
     from collide.kernels import built
 
-    given = ["-c", "import collide; collide.Box((1, 1, 1)); import collide.kernels"] if command == "a query" else ["-m", "collide", "report", "workcell"]
+    given = (
+        ["-c", "import collide; collide.Box((1, 1, 1)); import collide.kernels"]
+        if command == "a query"
+        else ["-m", "collide", "report", "workcell"]
+    )
     done = child(given, environment(PACKAGE.parent, COLLIDE_CPU="v5"))
     assert done.returncode == (1 if command == "a query" else 2), done.stderr
     (line,) = (line for line in done.stderr.splitlines() if "COLLIDE_CPU='v5'" in line)
@@ -182,7 +193,8 @@ def harms(length: int) -> dict:
     return {
         "empty": lambda content: b"", "cut in half": lambda content: content[: length // 2],
         "one byte short": lambda content: content[:-1], "longer": lambda content: content + b"\0",
-        "a bit flipped": flipped, "another bit flipped": flipped, "its head flipped": lambda content: b"\x7eELF" + content[4:],
+        "a bit flipped": flipped, "another bit flipped": flipped,
+        "its head flipped": lambda content: b"\x7eELF" + content[4:],
     }  # fmt: skip
 
 
@@ -203,7 +215,11 @@ def test_what_is_damaged_is_not_loaded(site, ask, of):
 
 @pytest.mark.parametrize("of", ["library", "module", "built.py"])
 def test_what_is_missing_is_done_without(site, ask, of):
-    file = {"library": library_of(site), "module": glue_of(site), "built.py": site / "collide" / "kernels" / "built.py"}[of]
+    file = {
+        "library": library_of(site),
+        "module": glue_of(site),
+        "built.py": site / "collide" / "kernels" / "built.py",
+    }[of]
     file.unlink()
     told, _ = ask()
     assert told["mode"] == "just in time" and told["box"] == RIGHT
@@ -280,7 +296,11 @@ def test_without_library_and_numba_it_is_said_what_to_do(site, no_numba, harm):
         done = child(given, environment(site, no_numba))
         assert done.returncode in (1, 2), (done.returncode, done.stdout)
         last = done.stderr.strip().splitlines()[-1]
-        why = {"damaged": "damaged", "missing": "without compiled kernels", "other sources": "sources of kernels differ"}[harm]
+        why = {
+            "damaged": "damaged",
+            "missing": "without compiled kernels",
+            "other sources": "sources of kernels differ",
+        }[harm]
         assert why in last and "numba" in last and "pip install" in last, last
         assert "bug" not in last
 

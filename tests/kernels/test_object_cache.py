@@ -47,7 +47,9 @@ def kept(folder: Path) -> Path:
 
 def test_a_kernel_is_compiled_once_and_another_key_is_another_kernel(folder, caplog):
     assert not came_from_disk() and came_from_disk() and not list(folder.parent.parent.glob("*.o"))
-    assert not came_from_disk(key="another source", code=b"other code") and came_from_disk(key="another source", code=b"other code")
+    assert not came_from_disk(key="another source", code=b"other code") and came_from_disk(
+        key="another source", code=b"other code"
+    )
     assert not came_from_disk(name="collide.another", code=b"another") and came_from_disk()
     assert len(list(folder.iterdir())) == 3 and not caplog.records
 
@@ -173,7 +175,9 @@ def plant(file: Path, monkeypatch) -> bytes:
     """Replace a kept kernel by other code, with a digest that fits: whoever may write in the folder can do as much."""
     identities, digest, planted = [], object_cache._digest, b"planted code"
     with monkeypatch.context() as patch:
-        patch.setattr(object_cache, "_digest", lambda identity, code: identities.append(identity) or digest(identity, code))
+        patch.setattr(
+            object_cache, "_digest", lambda identity, code: identities.append(identity) or digest(identity, code)
+        )
         assert came_from_disk()
     file.write_bytes(digest(identities[0], planted) + planted)
     return planted
@@ -258,7 +262,12 @@ def test_a_group_may_write_where_it_is_the_user_alone(tmp_path, monkeypatch):
     place.mkdir()
     place.chmod(0o770)
     monkeypatch.setattr(pwd, "getpwuid", lambda _uid: SimpleNamespace(pw_name="ann"))
-    for name, members, alone in (("ann", [], True), ("ann", ["ann"], True), ("ann", ["bob"], False), ("staff", [], False)):
+    for name, members, alone in (
+        ("ann", [], True),
+        ("ann", ["ann"], True),
+        ("ann", ["bob"], False),
+        ("staff", [], False),
+    ):
         monkeypatch.setattr(grp, "getgrgid", lambda _gid, g=(name, members): SimpleNamespace(gr_name=g[0], gr_mem=g[1]))
         assert (why_distrusted(place) is None) == alone, (name, members)
 

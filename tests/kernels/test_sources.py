@@ -51,7 +51,9 @@ def test_the_list_follows_files_that_come_and_go_and_change_their_names(copy):
     with pytest.raises(FileNotFoundError):
         sources.fingerprint(names)
     scan.with_name("scan_again.py").rename(scan)
-    (copy / "narrowphase" / "new.py").write_bytes(b"from collide.kernels import entry\n\n\n@entry('int64()')\ndef new():\n    return 0\n")
+    (copy / "narrowphase" / "new.py").write_bytes(
+        b"from collide.kernels import entry\n\n\n@entry('int64()')\ndef new():\n    return 0\n"
+    )
     assert set(sources.kernel_sources()) - set(names) == {"narrowphase/new.py"}
 
 
@@ -70,7 +72,9 @@ def test_the_checksum_does_not_depend_on_ends_of_lines_or_on_the_place(copy, tmp
 def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch):
     """It is part of every start."""
     names, opened, kept = sources.kernel_sources(), [], builtins.open
-    monkeypatch.setattr(builtins, "open", lambda file, *given, **named: opened.append(str(file)) or kept(file, *given, **named))
+    monkeypatch.setattr(
+        builtins, "open", lambda file, *given, **named: opened.append(str(file)) or kept(file, *given, **named)
+    )
     sources.fingerprint(names)
     monkeypatch.undo()
     assert opened == [str(copy / name) for name in names]
@@ -114,7 +118,9 @@ def imported_by(module: str) -> set[str]:
     """Files of the package that Python loads for a module, by running it."""
     code = f"import sys, {module}\nfor m in list(sys.modules.values()): print(getattr(m, '__file__', None))"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(PACKAGE.parent)}
-    said = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60, check=True).stdout
+    said = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60, check=True
+    ).stdout
     files = (Path(line) for line in said.splitlines() if line.endswith(".py"))
     return {file.relative_to(PACKAGE).as_posix() for file in files if file.is_relative_to(PACKAGE)}
 
@@ -124,14 +130,27 @@ def test_an_edit_of_what_a_kernel_imports_makes_it_stale_and_no_other_does(tmp_p
     names = sorted(file.relative_to(site / "collide").as_posix() for file in (site / "collide").rglob("*.py"))
     _, found = hashes(site, names)
     boxes, pairs = ({name for name, stale in found.items() if stale[k]} for k in range(2))
-    assert {"broadphase/bounding_boxes.py", "support/support_mapping.py", "support/block_scan.py", "kernels/vectors.py"} <= boxes
+    assert {
+        "broadphase/bounding_boxes.py",
+        "support/support_mapping.py",
+        "support/block_scan.py",
+        "kernels/vectors.py",
+    } <= boxes
     assert {"narrowphase/convex_pairs.py", "narrowphase/epa/prove_facets.py", "numerics/double_double.py"} <= pairs
     assert not {"narrowphase/convex_pairs.py", "mesh/build_bvh.py"} & boxes
-    elsewhere = {name for name in names if name.split("/")[0] in ("world.py", "query.py", "manifolds", "reports", "meshes", "cli.py")}
+    elsewhere = {
+        name
+        for name in names
+        if name.split("/")[0] in ("world.py", "query.py", "manifolds", "reports", "meshes", "cli.py")
+    }
     assert not elsewhere & pairs
-    # `collide` itself, and rooms' own files, which import nothing that kernels use, may be missing; and what only decides how
-    # kernels run.
-    deciding = {f"kernels/{name}.py" for name in ("jit", "library", "mode", "plain", "sources", "object_cache")} | {"errors.py", "log.py", "cache_folder.py"}
+    # `collide` itself, and rooms' own files, which import nothing that kernels use, may be missing; and what only
+    # decides how kernels run.
+    deciding = {f"kernels/{name}.py" for name in ("jit", "library", "mode", "plain", "sources", "object_cache")} | {
+        "errors.py",
+        "log.py",
+        "cache_folder.py",
+    }
     for module, stale in (("collide.broadphase.bounding_boxes", boxes), ("collide.narrowphase.convex_pairs", pairs)):
         missing = {name for name in imported_by(module) - stale - deciding if not name.endswith("__init__.py")}
         assert not missing, f"{module} imports what its kernels' hash does not see: {sorted(missing)}"

@@ -44,11 +44,15 @@ def test_every_row_is_what_it_says():
         row, true = table.rows[k], product(X_WB[k], X_BP[k])
         assert table.exact(k) == true, kinds[k]
         if "identity" in (of_body, of_part):  # the numbers given, bit by bit
-            assert [Fraction(v) for v in row[:12].tolist()] == true and row[POSE_TERMS] == -1.0 and row[POSE_SLOP] == 0.0
+            assert (
+                [Fraction(v) for v in row[:12].tolist()] == true and row[POSE_TERMS] == -1.0 and row[POSE_SLOP] == 0.0
+            )
             continue
         with_terms += row[POSE_TERMS] >= 0.0
         off = [abs(Fraction(v) - t) for v, t in zip(row[:12].tolist(), true)]
-        assert sum(off[:3], off[9]) + sum(off[3:6], off[10]) + sum(off[6:9], off[11]) <= 3 * Fraction(float(row[POSE_SLOP])), kinds[k]
+        assert sum(off[:3], off[9]) + sum(off[3:6], off[10]) + sum(off[6:9], off[11]) <= 3 * Fraction(
+            float(row[POSE_SLOP])
+        ), kinds[k]
     assert with_terms == 9
 
 
@@ -71,7 +75,9 @@ def test_moved_poses_keep_their_slop(kind):
         reach = float(np.sqrt((points**2).sum(axis=1)).max()) * (1 + 1e-15)
         found, slop = moved_pose(X_WB, X_BP, np.full(4, reach))
         rows = pose_table(X_WB, np.repeat(X_BP[None], 4, axis=0), np.full(4, reach)).rows
-        assert np.array_equal(found[:, :3, :3].reshape(4, 9), rows[:, :9]) and np.array_equal(found[:, :3, 3], rows[:, 9:12])
+        assert np.array_equal(found[:, :3, :3].reshape(4, 9), rows[:, :9]) and np.array_equal(
+            found[:, :3, 3], rows[:, 9:12]
+        )
         for k in range(4):
             W, in_body = in_fractions(X_WB[k]), world_points(points, X_BP)
             for p, q in zip(world_points(points, found[k]), in_body):

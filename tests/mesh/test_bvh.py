@@ -43,7 +43,11 @@ def meshes():
     yield "huge", vertices * 1e40, faces
     mixed = np.concatenate([vertices * 1e3, vertices * 1e-12 + [500.0, 0.0, 0.0]])
     yield "millimicrons beside kilometres", mixed, np.concatenate([faces, faces + len(vertices)])
-    yield "all on one line", np.cumsum(rng.exponential(size=(300, 1)), axis=0) * [1.0, 2.0, 3.0], rng.integers(0, 300, (200, 3))
+    yield (
+        "all on one line",
+        np.cumsum(rng.exponential(size=(300, 1)), axis=0) * [1.0, 2.0, 3.0],
+        rng.integers(0, 300, (200, 3)),
+    )
     yield "ever smaller", 0.5 ** np.arange(600)[:, None] * rng.normal(size=(600, 3)), np.arange(600).reshape(200, 3)
 
 
@@ -95,7 +99,9 @@ def test_pickled_and_refused_where_it_is_none():
     tree = build_mesh_tree(vertices, faces)
     pickled = pickle.loads(pickle.dumps(tree))
     assert pickled.content == tree.content and pickled.address != tree.address
-    assert np.array_equal(all_hits(pickled, tree, np.eye(4), np.eye(4)).pairs, all_hits(tree, tree, np.eye(4), np.eye(4)).pairs)
+    assert np.array_equal(
+        all_hits(pickled, tree, np.eye(4), np.eye(4)).pairs, all_hits(tree, tree, np.eye(4), np.eye(4)).pairs
+    )
     links = tree.links()
     inner = np.argwhere((links > 0) & tree.used())[3]
     leaf = np.argwhere((links < 0) & tree.used())[3]
@@ -156,7 +162,9 @@ def test_eight_boxes_are_eight_boxes():
         node[24:48] = np.abs(node[24:48]) * np.float32(0.5)
         node[24:48].reshape(3, 8)[:, rng.random(8) < 0.2] = NOTHING
         slab, frame, probe = (rng.normal(size=k).astype(np.float32) for k in (SLAB, 9, NEAR_PROBE))
-        probe[[3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18]] = np.abs(probe[[3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18]])
+        probe[[3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18]] = np.abs(
+            probe[[3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18]]
+        )
         if case % 10 == 0:
             frame *= np.float32(10.0 ** rng.integers(-38, 38))
             probe[rng.integers(NEAR_PROBE)] = rng.choice([np.inf, 0.0, 1e30])

@@ -1,4 +1,5 @@
-"""Figures of trees over meshes, and how the walk's counts grow on the worst cases: the bounds that are proven, counted."""
+"""Figures of trees over meshes, and how the walk's counts grow on the worst cases: the bounds that are proven,
+counted."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 def test_figures_keep_their_bounds(name):
     rng = np.random.default_rng(3)
     vertices, faces = {
-        "box": box, "sphere": lambda: bumpy_sphere(2000), "soup": lambda: soup(rng, 400), "one facet": lambda: (np.eye(3), np.array([[0, 1, 2]])),
+        "box": box, "sphere": lambda: bumpy_sphere(2000), "soup": lambda: soup(rng, 400),
+        "one facet": lambda: (np.eye(3), np.array([[0, 1, 2]])),
     }[name]()  # fmt: skip
     mesh = collide.Mesh(vertices, faces, solid=False)
     figures = tree_figures(mesh)

@@ -16,8 +16,10 @@ from collide import InvalidShape, Mesh
 BASES = {"bumpy sphere": bumpy_sphere(120), "ring": block_ring(), "box": box()}
 #: Small and middling meshes of every sort: soups, open ones, several parts, STL, OBJ and Collada.
 SAMPLE = (
-    "duck.obj", "cube.obj", "plane.obj", "torus/torus_textured.obj", "teddy2_VHACD_CHs.obj", "sphere_smooth.obj", "random_urdfs/000/000.obj",
-    "random_urdfs/503/503.obj", "kuka_iiwa/meshes/link_0.stl", "franka_panda/meshes/collision/finger.obj", "table/table.obj",
+    "duck.obj", "cube.obj", "plane.obj", "torus/torus_textured.obj", "teddy2_VHACD_CHs.obj", "sphere_smooth.obj",
+    "random_urdfs/000/000.obj",
+    "random_urdfs/503/503.obj", "kuka_iiwa/meshes/link_0.stl", "franka_panda/meshes/collision/finger.obj",
+    "table/table.obj",
 )  # fmt: skip
 PER_MESH = 15
 
@@ -25,7 +27,9 @@ PER_MESH = 15
 def judged(name: str, vertices, faces, k: int, kind: str) -> corruptions.Said:
     """One case; what fails names it so that it can be asked again."""
     rng = np.random.default_rng([crc32(name.encode()), k])
-    said = corruptions.ask(rng, corruptions.spoil(rng, np.array(vertices, dtype=float), np.array(faces), kind), deep=k % 9 == 0)
+    said = corruptions.ask(
+        rng, corruptions.spoil(rng, np.array(vertices, dtype=float), np.array(faces), kind), deep=k % 9 == 0
+    )
     assert not said.wrong, f"judged({name!r}, …, {k}, {kind!r}): {said.wrong}"
     return said
 
@@ -53,7 +57,10 @@ def test_meshes_of_pybullet_data():
         found += 1
         parts = [(v, f) for _, v, f in read_triangles(root / name)[0] if len(f)]
         starts = np.cumsum([0, *(len(v) for v, _ in parts)])
-        vertices, faces = np.concatenate([v for v, _ in parts]), np.concatenate([f + s for (_, f), s in zip(parts, starts)])
+        vertices, faces = (
+            np.concatenate([v for v, _ in parts]),
+            np.concatenate([f + s for (_, f), s in zip(parts, starts)]),
+        )
         if len(faces) > 6000:
             continue
         for k in range(PER_MESH):
@@ -63,7 +70,9 @@ def test_meshes_of_pybullet_data():
             solids[said.solid] += said.outcome != "refused"
     assert found >= 6, f"pybullet_data has other meshes: {found} of {SAMPLE}"
     total = sum(outcomes.values())
-    assert outcomes["apart"] > total / 8 and outcomes["hit"] > total / 8 and outcomes["refused"] >= 2 * found - 4, outcomes
+    assert outcomes["apart"] > total / 8 and outcomes["hit"] > total / 8 and outcomes["refused"] >= 2 * found - 4, (
+        outcomes
+    )
     assert outcomes["inside"] >= 3 and min(solids.values()) > total / 10, (outcomes, solids)
 
 
@@ -89,7 +98,8 @@ def test_refusals_name_the_row(spoil, message):
 def test_solid_true_names_the_facets():
     vertices, faces = box()
     for spoilt, defect in (
-        (faces[1:], "open edges"), (np.concatenate([faces[:5], faces[5:6, ::-1], faces[6:]]), "inconsistent orientation"),
+        (faces[1:], "open edges"),
+        (np.concatenate([faces[:5], faces[5:6, ::-1], faces[6:]]), "inconsistent orientation"),
         (np.concatenate([faces, faces[3:4]]), "duplicate facets"), (faces[:, ::-1], "inside out"),
     ):  # fmt: skip
         with pytest.raises(InvalidShape, match=rf"{defect} \(.*facets? \d+"):

@@ -42,7 +42,9 @@ def all_pairs(vertices, faces, repeated=False) -> tuple[float, dict[int, list[fl
 def check(vertices, faces, repeated=False) -> None:
     found = collide.Mesh(vertices, faces, solid=False).locality(repeated=repeated)
     global_stretch, rows = all_pairs(vertices, faces, repeated)
-    repeat = f"\ncollide.Mesh({np.asarray(vertices).tolist()}, {np.asarray(faces).tolist()}).locality(repeated={repeated})"
+    repeat = (
+        f"\ncollide.Mesh({np.asarray(vertices).tolist()}, {np.asarray(faces).tolist()}).locality(repeated={repeated})"
+    )
     assert found.ids.tolist() == sorted(rows), repeat
     assert found.global_stretch == pytest.approx(global_stretch, rel=1e-14), repeat
     expected = np.array([rows[v] for v in sorted(rows)])
@@ -80,7 +82,12 @@ def all_pairs_has_edge(points, faces) -> bool:
 
 
 def test_known_surfaces():
-    for vertices, faces in (surfaces.box(), surfaces.torus(), surfaces.ball(), surfaces.joined(surfaces.box(), surfaces.ball())):
+    for vertices, faces in (
+        surfaces.box(),
+        surfaces.torus(),
+        surfaces.ball(),
+        surfaces.joined(surfaces.box(), surfaces.ball()),
+    ):
         check(vertices, faces)
         check(*surfaces.loosened(vertices, faces))
     cube = collide.Mesh(*surfaces.box()).locality()
@@ -145,7 +152,11 @@ def test_as_many_neighbours_as_are_kept():
 TABLE = {
     "teapot_1177.ply": (1177, "59.00", ["17.675", "12.325", "8.215", "6.519", "5.775", "4.916", "4.008"]),
     "bunny_35947.ply": (35947, "27.59", ["302.626", "8.818", "4.720", "4.096", "3.400", "2.718", "2.045"]),
-    "dragon_vrip.ply.gz": (437645, "315093.", ["80172.9", "35132.0", "991.039", "294.512", "68.046", "22.458", "21.611"]),
+    "dragon_vrip.ply.gz": (
+        437645,
+        "315093.",
+        ["80172.9", "35132.0", "991.039", "294.512", "68.046", "22.458", "21.611"],
+    ),
 }
 #: Our teapot has 4.003 where the paper prints 4.008; all its other figures agree.
 DIFFERENT = {("teapot_1177.ply", 10): 4.0027}
@@ -156,7 +167,9 @@ def from_file(name):
     if not MESHES.is_dir():
         pytest.skip("shared/data/meshes is not there")
     blob = (MESHES / name).read_bytes()
-    found = trimesh.load(io.BytesIO(gzip.decompress(blob) if name.endswith(".gz") else blob), file_type="ply", process=False)
+    found = trimesh.load(
+        io.BytesIO(gzip.decompress(blob) if name.endswith(".gz") else blob), file_type="ply", process=False
+    )
     return np.asarray(found.vertices, dtype=float), np.asarray(found.faces)
 
 
@@ -212,7 +225,11 @@ def test_the_command_prints_both_tables(files, capsys):
     for name in ("torus", "packed"):
         (line,) = (line for line in out.partition("DISTRIBUTION")[0].splitlines() if line.split()[:1] == [name])
         shown = line.split()[1:]
-        assert shown[0] == "84" and shown[1] == f"{found.global_stretch:.3f}" and shown[2] == f"{found.local_stretches[0]:.3f}"
+        assert (
+            shown[0] == "84"
+            and shown[1] == f"{found.global_stretch:.3f}"
+            and shown[2] == f"{found.local_stretches[0]:.3f}"
+        )
 
 
 def test_the_command_writes_json_and_a_plot(files, capsys):
@@ -232,7 +249,12 @@ def test_the_command_writes_json_and_a_plot(files, capsys):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("absent.ply", "no such file"), ("note.txt", "unknown mesh format"), ("cut.off.gz", "gzip"), ("points.off", "has no facets")],
+    [
+        ("absent.ply", "no such file"),
+        ("note.txt", "unknown mesh format"),
+        ("cut.off.gz", "gzip"),
+        ("points.off", "has no facets"),
+    ],
 )
 def test_the_command_refuses_in_one_line(files, capsys, name, words):
     (files / "note.txt").write_text("hello")

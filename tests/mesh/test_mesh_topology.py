@@ -12,6 +12,7 @@ import surfaces
 from naive import SHARED, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 from collide.mesh import mesh_survey as says
 from collide.mesh import mesh_topology as meet
 from collide.mesh import shell_nesting as nesting
@@ -113,7 +114,13 @@ def test_closed_surfaces_are_solids(name):
 
 
 def test_known_characteristics():
-    for name, euler in (("box", 2), ("ball", 2), ("torus", 0), ("two boxes at an edge", 3), ("two boxes at a vertex", 3)):
+    for name, euler in (
+        ("box", 2),
+        ("ball", 2),
+        ("torus", 0),
+        ("two boxes at an edge", 3),
+        ("two boxes at a vertex", 3),
+    ):
         assert collide.Mesh(*CLOSED[name]).report.euler == euler
     assert collide.Mesh(*CLOSED["two boxes at a vertex"]).report.shells == 2
 
@@ -154,13 +161,19 @@ def test_random_facets_over_few_vertices():
     rng = rng_of("soup")
     for k in range(300):
         n = int(rng.integers(3, 8))
-        check(rng.integers(0, 3, (n, 3)).astype(float) * 2.0 ** rng.integers(-60, 60), rng.integers(0, n, (1 + k % 14, 3)))
+        check(
+            rng.integers(0, 3, (n, 3)).astype(float) * 2.0 ** rng.integers(-60, 60), rng.integers(0, n, (1 + k % 14, 3))
+        )
 
 
 def test_welding_compares_numbers():
     rng = rng_of("weld")
     for n in (1, 2, 7, 300):
-        points = rng.integers(-1, 2, (n, 3)) * rng.choice([1.0, 1e-300, 5e-324, 1e50], (n, 3)) * rng.choice([1.0, -1.0], (n, 3))
+        points = (
+            rng.integers(-1, 2, (n, 3))
+            * rng.choice([1.0, 1e-300, 5e-324, 1e50], (n, 3))
+            * rng.choice([1.0, -1.0], (n, 3))
+        )
         first: dict = {}
         expected = [first.setdefault(tuple((p + 0.0).tolist()), k) for k, p in enumerate(points)]
         assert weld(points).tolist() == expected, points.tolist()
@@ -193,7 +206,9 @@ def test_nested_boxes_wind_as_often_as_they_enclose():
         survey = survey_surface(vertices, faces.astype(np.int32))
         expected = set()
         for k, (low, high) in enumerate(boxes):
-            around = sum(1 - 2 * turned[j] for j, (a, b) in enumerate(boxes) if j != k and (a <= low).all() and (high <= b).all())
+            around = sum(
+                1 - 2 * turned[j] for j, (a, b) in enumerate(boxes) if j != k and (a <= low).all() and (high <= b).all()
+            )
             if turned[k] and around < 1:
                 expected |= set(range(12 * k, 12 * k + 12))
         assert flagged(survey, says.INSIDE_OUT) == expected, snippet(vertices, faces)
@@ -231,11 +246,17 @@ def by_solid_angles(vertices, faces, point) -> int:
 
 @pytest.mark.parametrize("corners", [1, 3])
 def test_winding_numbers_are_those_of_solid_angles(corners):
-    """Around points, and around the middles of three; on a lattice, where rays and facets are as awkward as they come."""
+    """Around points, and around the middles of three; on a lattice, where rays and facets are as awkward as they
+    come."""
     rng = rng_of("winding", corners)
     seen = set()
     for k in range(150):
-        parts = [surfaces.torus(9, 5), surfaces.ball(), surfaces.box((-2, -2, -2), (2, 2, 2)), surfaces.box((-0.5, -0.5, -0.5), (0.5, 1.5, 0.5))]
+        parts = [
+            surfaces.torus(9, 5),
+            surfaces.ball(),
+            surfaces.box((-2, -2, -2), (2, 2, 2)),
+            surfaces.box((-0.5, -0.5, -0.5), (0.5, 1.5, 0.5)),
+        ]
         parts = [(v, f[:, ::-1] if rng.random() < 0.3 else f) for v, f in parts]
         vertices, faces = surfaces.joined(*parts)
         if k % 2:
@@ -289,7 +310,10 @@ def test_facets_without_area_are_found_exactly():
     for points in (line, off, [a, a + u, a + 3 * u]):
         check(np.array(points), [(0, 1, 2)])
         expected = surfaces.exact_area_is_zero(points, (0, 1, 2))
-        assert bool(flagged(survey_surface(np.array(points), np.array([[0, 1, 2]], dtype=np.int32)), says.NO_AREA)) == expected
+        assert (
+            bool(flagged(survey_surface(np.array(points), np.array([[0, 1, 2]], dtype=np.int32)), says.NO_AREA))
+            == expected
+        )
 
 
 # --- the class --------------------------------------------------------------------------------------
@@ -325,7 +349,10 @@ def turned_facet():
 def moebius():
     around = 8
     a = 2 * np.pi * np.arange(around) / around
-    inner, outer = (np.stack([(1 + s * np.cos(a / 2)) * np.cos(a), (1 + s * np.cos(a / 2)) * np.sin(a), s * np.sin(a / 2)], axis=1) for s in (-0.3, 0.3))
+    inner, outer = (
+        np.stack([(1 + s * np.cos(a / 2)) * np.cos(a), (1 + s * np.cos(a / 2)) * np.sin(a), s * np.sin(a / 2)], axis=1)
+        for s in (-0.3, 0.3)
+    )
     faces = []
     for i in range(around):
         b, d = (i + 1, around + i + 1) if i + 1 < around else (around, 0)
@@ -347,7 +374,9 @@ def moebius():
     ],
 )  # fmt: skip
 def test_no_solid_without_an_inside(mesh, name, facets):
-    with pytest.raises(collide.InvalidShape, match=rf"(?s)^Mesh: no inside can be told: .*{name}.*{facets}.* Repair the mesh"):
+    with pytest.raises(
+        collide.InvalidShape, match=rf"(?s)^Mesh: no inside can be told: .*{name}.*{facets}.* Repair the mesh"
+    ):
         collide.Mesh(*mesh, solid=True)
     taken = collide.Mesh(*mesh)
     assert not taken.solid and name in str(taken.report)
@@ -358,7 +387,10 @@ BAD = [
     (([(0, 0, 0), (1, 0, 0), (0, np.inf, 0)], [(0, 1, 2)]), r"Mesh: vertices\[2, 1\] is inf"),
     ((np.eye(3), np.zeros((0, 3), dtype=int)), r"Mesh: no facets: faces has shape \(0, 3\)"),
     ((np.eye(3), []), "Mesh: no facets"),
-    ((np.eye(3), [(0, 1, 2), (0, 1, 3)]), r"Mesh: faces\[1\] is \[0, 1, 3\], but there are vertices 0 … 2 \(1 such facet\)"),
+    (
+        (np.eye(3), [(0, 1, 2), (0, 1, 3)]),
+        r"Mesh: faces\[1\] is \[0, 1, 3\], but there are vertices 0 … 2 \(1 such facet\)",
+    ),
     ((np.eye(3), [(0, -1, 2)]), r"Mesh: faces\[0\] is \[0, -1, 2\]"),
     ((np.eye(3), [(0, 1, np.nan)]), r"Mesh: faces must be integers, got faces\[0, 2\] = nan"),
     ((np.eye(3), [(0, 1, 1.5)]), r"faces\[0, 2\] = 1.5"),
@@ -395,14 +427,19 @@ def test_a_value_like_other_shapes(tmp_path):
     vertices[0] = 9.0
     assert mesh.vertices[0, 0] != 9.0
     mesh.save(tmp_path / "torus.npz")
-    copies = [pickle.loads(pickle.dumps(mesh)), copy.copy(mesh), copy.deepcopy(mesh), collide.Mesh.load(tmp_path / "torus.npz")]
+    copies = [
+        pickle.loads(pickle.dumps(mesh)),
+        copy.copy(mesh),
+        copy.deepcopy(mesh),
+        collide.Mesh.load(tmp_path / "torus.npz"),
+    ]
     for other in copies:
         assert other == mesh and hash(other) == hash(mesh) and other.solid and str(other.report) == str(mesh.report)
         assert not other.vertices.flags.writeable
     assert mesh != collide.Mesh(mesh.vertices, mesh.faces, solid=False)
     assert mesh != collide.Mesh(mesh.vertices * 2, mesh.faces)
     with pytest.raises(collide.UnsupportedQuery, match="Mesh"):
-        mesh.parts()
+        parts_of(mesh)
 
 
 def test_what_is_pickled_keeps_its_word():

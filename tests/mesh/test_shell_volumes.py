@@ -24,7 +24,11 @@ def together(*meshes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     corners = np.concatenate([f + s for (_, f), s in zip(meshes, starts)]).astype(np.int32)
     shells = np.repeat(np.arange(len(meshes)), [len(f) for _, f in meshes]).astype(np.int32)
     order = rng_of("shuffled").permutation(len(corners))
-    return np.concatenate([v for v, _ in meshes]), np.ascontiguousarray(corners[order]), np.ascontiguousarray(shells[order])
+    return (
+        np.concatenate([v for v, _ in meshes]),
+        np.ascontiguousarray(corners[order]),
+        np.ascontiguousarray(shells[order]),
+    )
 
 
 def flattened(mesh, factor: float):
@@ -45,7 +49,8 @@ def test_volumes_and_signs():
     cube, sphere = box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)), bumpy_sphere(200)
     meshes = [
         cube, turned_over(cube), sphere, tilted(sphere, rng, 1e9), tilted(flattened(cube, 3e-16), rng, 0.3),
-        turned_over(tilted(flattened(cube, 3e-16), rng, 0.3)), flattened(cube, 0.0), flattened(sphere, 0.0), flattened(cube, 1e-300),
+        turned_over(tilted(flattened(cube, 3e-16), rng, 0.3)), flattened(cube, 0.0), flattened(sphere, 0.0),
+        flattened(cube, 1e-300),
     ]  # fmt: skip
     vertices, corners, shells = together(*meshes)
     volumes, signs = shell_volumes(vertices, Shells(corners, shells, len(meshes)))
@@ -101,6 +106,8 @@ def test_one_unit_for_all():
     values = np.array([[0.1, 5e-324], [0.0, -3.0]])
     whole = exact_integers(values)
     ratio = Fraction(int(whole[0, 0])) / Fraction(0.1)
-    assert [[Fraction(int(x)) for x in row] for row in whole] == [[ratio * Fraction(x) for x in row] for row in values.tolist()]
+    assert [[Fraction(int(x)) for x in row] for row in whole] == [
+        [ratio * Fraction(x) for x in row] for row in values.tolist()
+    ]
     scaled, exponent = scaled_to_one(values)
     assert 0.5 <= np.abs(scaled).max() < 1.0 and np.ldexp(scaled, exponent)[1].tolist() == [0.0, -3.0]

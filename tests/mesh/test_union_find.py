@@ -16,7 +16,8 @@ SOURCE = "n, joins = {n}, {joins}  # tests/mesh/test_union_find.py"
 
 
 def searched(n: int, joins) -> tuple[list[int], list[int], bool]:
-    """(lowest member of everything's class, which way up it is against that one, whether the joins agree), step by step."""
+    """(lowest member of everything's class, which way up it is against that one, whether the joins agree), step by
+    step."""
     across: list[list[tuple[int, int]]] = [[] for _ in range(n)]
     for i, j, against in joins:
         across[i].append((j, against))

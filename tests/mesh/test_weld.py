@@ -15,7 +15,9 @@ def by_dictionary(points: np.ndarray) -> list[int]:
     return [seen.setdefault(tuple(point), k) for k, point in enumerate((points + 0.0).tolist())]
 
 
-@pytest.mark.parametrize("kind", ["lattice", "all different", "all the same", "one apart by an ulp", "signed zeros", "huge and tiny"])
+@pytest.mark.parametrize(
+    "kind", ["lattice", "all different", "all the same", "one apart by an ulp", "signed zeros", "huge and tiny"]
+)
 def test_first_rows(kind):
     rng = rng_of("weld", kind)
     shares = []

@@ -54,7 +54,13 @@ def test_kernels_go_by_the_same_table():
 
 def test_each_shape_has_the_kind_of_its_points():
     shapes = one_of_each(rng_of("kinds"))
-    expected = {"Sphere": Kind.SPHERE, "Box": Kind.POLYTOPE, "Capsule": Kind.CAPSULE, "Halfspace": Kind.HALFSPACE, "Cone": Kind.CONE}
+    expected = {
+        "Sphere": Kind.SPHERE,
+        "Box": Kind.POLYTOPE,
+        "Capsule": Kind.CAPSULE,
+        "Halfspace": Kind.HALFSPACE,
+        "Cone": Kind.CONE,
+    }
     for name, kind in expected.items():
         assert kind_of(shapes[name]) is kind
     point = collide.ConvexHull([(1.0, 2.0, 3.0)], radius=0.5)

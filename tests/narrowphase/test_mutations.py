@@ -21,7 +21,8 @@ sys.path.insert(0, sys.argv[1])
 import collide
 assert collide.__file__.startswith(sys.argv[1]), collide.__file__
 from collide.adapters.peers.stress import run
-table = run(["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"], n=int(sys.argv[2]), seed=4)
+names = ["touch_vf", "touch_ff", "touch_1ulp", "boxes_flush", "swept_1ulp", "halfspace_touch", "near_pen"]
+table = run(names, n=int(sys.argv[2]), seed=4)
 print(table.wrong + table.failed, table.undecided)
 """
 
@@ -29,11 +30,15 @@ MUTATIONS = {
     "none": ("bounds.py", "", ""),
     "error bound a hundredth": ("bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.64 * 2.0**-53"),
     "a sign swapped": (
-        "exact/exact_directions.py", "    if side < 0:\n        reverse", "    if side > 0:\n        reverse",
+        "exact/exact_directions.py",
+        "    if side < 0:\n        reverse",
+        "    if side > 0:\n        reverse",
     ),
     "the exact stage skipped": ("exact/settle_hulls.py", "if view_u8(row_at, ROW)[HOW] != UNDECIDED:", "if True:"),
     "the exact half-space inverted": (
-        "exact/exact_halfspace.py", "return PlaneContact(TOUCHING if sign <= 0", "return PlaneContact(TOUCHING if sign < 0",
+        "exact/exact_halfspace.py",
+        "return PlaneContact(TOUCHING if sign <= 0",
+        "return PlaneContact(TOUCHING if sign < 0",
     ),
     "an error of a sum dropped": ("gap/precise_pair.py", "rest += x.low + error", "rest += x.low"),
 }
@@ -56,7 +61,8 @@ def test_mutation_is_noticed(name, tmp_path):
     assert old in text, f"{file} no longer contains {old!r}"
     source.write_text(text.replace(old, new, 1) if old else text, encoding="utf-8")
     run = subprocess.run(
-        [sys.executable, "-c", CHILD, str(tmp_path), "60" if "bound" in name else "8"], check=False, capture_output=True, text=True, cwd=tmp_path,
+        [sys.executable, "-c", CHILD, str(tmp_path), "60" if "bound" in name else "8"], check=False,
+        capture_output=True, text=True, cwd=tmp_path,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300,
     )  # fmt: skip
     assert run.returncode == 0, run.stderr[-2000:]

@@ -32,7 +32,11 @@ def in_kernels(X: np.ndarray, check: bool = True) -> tuple[bool, list[float]]:
 
 
 def damaged(rng) -> tuple[str, np.ndarray]:
-    X = random_pose(rng, 3.0) if rng.random() < 0.7 else pose(LATTICE_ROTATIONS[int(rng.integers(24))], rng.integers(-3, 4, 3))
+    X = (
+        random_pose(rng, 3.0)
+        if rng.random() < 0.7
+        else pose(LATTICE_ROTATIONS[int(rng.integers(24))], rng.integers(-3, 4, 3))
+    )
     kind = str(rng.choice(["none", "on the brink", "scaled", "mirror", "last row", "no number", "too far", "sheared"]))
     i, j = rng.integers(0, 3, 2)
     if kind == "on the brink":
@@ -61,7 +65,10 @@ def test_kernels_and_python_agree_on_what_a_pose_is():
             assert in_kernels(X)[0] == in_python(X)
         seen[kind, in_python(X)] += 1
     assert all(seen[kind, True] > 10 for kind in ("none", "on the brink", "scaled", "too far")), seen
-    assert all(seen[kind, False] > 10 for kind in ("on the brink", "scaled", "mirror", "last row", "no number", "too far", "sheared")), seen
+    assert all(
+        seen[kind, False] > 10
+        for kind in ("on the brink", "scaled", "mirror", "last row", "no number", "too far", "sheared")
+    ), seen
 
 
 def test_rows_of_poses():
@@ -71,7 +78,9 @@ def test_rows_of_poses():
         kind, X = damaged(rng)
         accepted, row = in_kernels(X, check=False)
         if not accepted:
-            assert kind in ("last row", "no number", "too far"), "of a matrix that need be no rotation only the size is asked"
+            assert kind in ("last row", "no number", "too far"), (
+                "of a matrix that need be no rotation only the size is asked"
+            )
             continue
         assert row[:9] == X[:3, :3].ravel().tolist() and row[9:12] == X[:3, 3].tolist()
         assert (row[POSE_SLOP], row[POSE_TERMS]) == (0.0, -1.0)

@@ -20,7 +20,9 @@ def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
     kinds = [kind for kind in naive.KINDS if kind != "Halfspace"]
     hits, long_way = [], []
     answer_batch = query.answer_batch
-    monkeypatch.setattr(query, "answer_batch", lambda *args, **named: (long_way.append(1), answer_batch(*args, **named))[1])
+    monkeypatch.setattr(
+        query, "answer_batch", lambda *args, **named: (long_way.append(1), answer_batch(*args, **named))[1]
+    )
     for kind_a, kind_b in combinations_with_replacement(kinds, 2):
         A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
         X, Y = (np.array([random_pose(rng, 0.8) for _ in range(12)]) for _ in range(2))

@@ -78,8 +78,8 @@ def test_leading_digits_keep_the_direction():
 
 
 def entry_by_candidates(triangle, origin, direction) -> Fraction | None:
-    """The least t ≥ 0 with origin + t·direction in the closed triangle: of all t at which something can begin, the least
-    whose point is in the triangle, judged by solving for it."""
+    """The least t ≥ 0 with origin + t·direction in the closed triangle: of all t at which something can begin, the
+    least whose point is in the triangle, judged by solving for it."""
     v = [E.minus(p, origin) for p in triangle]
     n = E.cross(E.minus(v[1], v[0]), E.minus(v[2], v[0]))
     slope = E.inner(n, direction)
@@ -103,7 +103,9 @@ def in_triangle(x, v) -> bool:
         return any(on_segment(x, v[i], v[j]) for i, j in ((0, 1), (1, 2), (2, 0)))
     if E.inner(n, E.minus(x, v[0])) != 0:
         return False
-    return all(E.inner(n, E.cross(E.minus(q, p), E.minus(x, p))) >= 0 for p, q in ((v[0], v[1]), (v[1], v[2]), (v[2], v[0])))
+    return all(
+        E.inner(n, E.cross(E.minus(q, p), E.minus(x, p))) >= 0 for p, q in ((v[0], v[1]), (v[1], v[2]), (v[2], v[0]))
+    )
 
 
 def on_segment(x, p, q) -> bool:
@@ -119,7 +121,9 @@ def test_where_rays_enter_triangles(size):
     rng = rng_of("enters", size)
     met = flat = at_once = 0
     for _ in range(3000):
-        origin, direction, *triangle = (tuple(int(x) for x in row) for row in rng.integers(-size, size + 1, size=(5, 3)))
+        origin, direction, *triangle = (
+            tuple(int(x) for x in row) for row in rng.integers(-size, size + 1, size=(5, 3))
+        )
         if rng.random() < 0.5:  # towards a point of the triangle, on an edge in half of the cases
             weights = rng.multinomial(4, [1 / 3] * 3) if rng.random() < 0.5 else rng.multinomial(4, [0.5, 0.5, 0.0])
             origin = tuple(4 * x for x in origin)
@@ -131,7 +135,10 @@ def test_where_rays_enter_triangles(size):
         if true is None:
             continue
         with reproducing(
-            "from collide.numerics.exact_points import enters; print(enters({t}, {o}, {d}))", t=triangle, o=origin, d=direction
+            "from collide.numerics.exact_points import enters; print(enters({t}, {o}, {d}))",
+            t=triangle,
+            o=origin,
+            d=direction,
         ):
             assert E.enters(triangle, origin, direction) == true
         met += 1

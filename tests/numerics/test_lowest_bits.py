@@ -11,7 +11,13 @@ from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
 
 
 def test_known_bits():
-    for values, lowest in (([0.0], NO_BITS), ([1.0, 0.0], 0), ([0.75, 8.0], -2), ([5e-324], -1074), ([2.0**1000, 3.0], 0)):
+    for values, lowest in (
+        ([0.0], NO_BITS),
+        ([1.0, 0.0], 0),
+        ([0.75, 8.0], -2),
+        ([5e-324], -1074),
+        ([2.0**1000, 3.0], 0),
+    ):
         assert lowest_exponents(np.array(values)) == lowest
 
 

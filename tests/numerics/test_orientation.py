@@ -54,7 +54,8 @@ def lattice(rng) -> np.ndarray:
 
 
 def of_all_sizes(rng) -> np.ndarray:
-    """Coordinates below what expansions can multiply without underflow, beside large ones; flat in half of the cases."""
+    """Coordinates below what expansions can multiply without underflow, beside large ones; flat in half of the
+    cases."""
     points = rng.integers(-2, 3, size=(4, 3)) * 2.0 ** rng.choice([-900, -600, 0], size=(4, 3))
     if rng.random() < 0.5:
         points[3] = points[0] + (points[1] - points[0])
@@ -69,7 +70,8 @@ def line_of_doubles(rng) -> np.ndarray:
 
 
 CLOUDS = {
-    "random": lambda rng: rng.normal(size=(4, 3)), "near a plane": near_a_plane, "lattice": lattice, "of all sizes": of_all_sizes,
+    "random": lambda rng: rng.normal(size=(4, 3)), "near a plane": near_a_plane, "lattice": lattice,
+    "of all sizes": of_all_sizes,
     "a line of doubles": line_of_doubles, "denormal": lambda rng: rng.integers(-2, 3, size=(4, 3)) * 5e-324,
 }  # fmt: skip
 
@@ -90,7 +92,9 @@ def test_sides_are_exact(kind):
             if axis < 0:
                 assert cloud.side(1, 2, 0, 3) == true and cloud.side(1, 0, 3, 2) == true
         seen[true] += 1
-    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= (20 if kind in ("lattice", "of all sizes", "denormal") else 0), seen
+    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= (20 if kind in ("lattice", "of all sizes", "denormal") else 0), (
+        seen
+    )
 
 
 def test_stages_agree_and_are_needed():
@@ -122,7 +126,8 @@ def test_stages_agree_and_are_needed():
 
 
 def test_lattices_are_settled_by_their_quantum():
-    """Of points on a lattice every determinant is a multiple of a known power of two, and one known to be smaller is 0."""
+    """Of points on a lattice every determinant is a multiple of a known power of two, and one known to be smaller is
+    0."""
     rng = rng_of("quantum")
     flat = 0
     for _ in range(300):
@@ -146,7 +151,9 @@ def test_scaling_is_by_a_power_of_two():
         points = np.array([(1.0, -3.0, 0.5), (0.25, 2.0, 3.0)]) * factor
         cloud = Cloud(points)
         assert 0.5 <= max(map(abs, cloud.points)) < 1.0
-        assert [Fraction(x) * Fraction(2) ** cloud.exponent for x in cloud.points] == [Fraction(x) for x in points.ravel().tolist()]
+        assert [Fraction(x) * Fraction(2) ** cloud.exponent for x in cloud.points] == [
+            Fraction(x) for x in points.ravel().tolist()
+        ]
 
 
 def test_no_overflow_of_differences():

@@ -1,4 +1,5 @@
-"""Small vectors: the sums in the order that error bounds and equal bits count on, and rotations that undo each other."""
+"""Small vectors: the sums in the order that error bounds and equal bits count on, and rotations that undo each
+other."""
 
 from __future__ import annotations
 

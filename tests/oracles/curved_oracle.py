@@ -273,7 +273,8 @@ def _with_plane(a: Body, b: Body) -> Bracket:
 
 
 def search_union(a: Body, b: Body, *, enough=_ZERO, guesses=()):
-    """(low, high, n) of two bodies of several cells: every pair that no box and no plane found so far puts farther apart."""
+    """(low, high, n) of two bodies of several cells: every pair that no box and no plane found so far puts farther
+    apart."""
     bounds = _box_gaps(a, b)
     for guess in guesses:
         _cull(bounds, a, b, np.asarray(guess, dtype=float))

@@ -146,14 +146,17 @@ def epa(a: Cell, b: Cell, seed: list, *, rough: bool) -> Found:
         if rough and facet[0] > 0:
             break
         goal = max(goal, facet[0])
-        if not hull.grow(facet) or hull.least - facet[0] <= max(FINE * size * Decimal("1e-3"), hull.least * Decimal("1e-20")):
+        if not hull.grow(facet) or hull.least - facet[0] <= max(
+            FINE * size * Decimal("1e-3"), hull.least * Decimal("1e-20")
+        ):
             break
     depth = shell_depth(hull.corners, list(hull.facets), size)
     return Found(-hull.least, -depth if depth is not None else _INF, hull.best_n, [])
 
 
 class _Surface:
-    """Triangles with corners in A ⊖ B, closed and convex but for rounding; `least` the lowest support seen, over |n|."""
+    """Triangles with corners in A ⊖ B, closed and convex but for rounding; `least` the lowest support seen, over
+    |n|."""
 
     def __init__(self, a: Cell, b: Cell, size: Decimal):
         self.a, self.b, self.size = a, b, size

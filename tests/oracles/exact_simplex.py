@@ -43,7 +43,8 @@ def solved(rows: list[list[Fraction]], right: list[Fraction]) -> list[Fraction] 
 
 
 def nearest_to_origin(points) -> Nearest:
-    """Of the hull of affinely dependent or independent points (n, 3), n small. The first of equals by number of corners."""
+    """Of the hull of affinely dependent or independent points (n, 3), n small. The first of equals by number of
+    corners."""
     corners = exact(points)
     best = None
     for count in range(1, min(len(corners), 4) + 1):

@@ -6,6 +6,7 @@ import numpy as np
 
 import collide
 from collide.kernels import address_of
+from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.posed_pair import ordered_pair
@@ -14,11 +15,12 @@ from collide.narrowphase.posed_pair import ordered_pair
 class PosedBodies:
     """The `OrderedPair` of A at X_WA and B at X_WB, and the buffers that it sees.
 
-    ordered, pair : as kernels have them; ``ordered.flip`` says whether B comes first.   error : of a bound in doubles [m].
+    ordered, pair : as kernels have them; ``ordered.flip`` says whether B comes first.   error : of a bound in doubles
+    [m].
     """
 
     def __init__(self, A: collide.Shape, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):
-        (packed_a, X_AP), (packed_b, X_BP) = (shape.parts()[0] for shape in (A, B))
+        (packed_a, X_AP), (packed_b, X_BP) = (parts_of(shape)[0] for shape in (A, B))
         self.table = ShapeTable([packed_a, packed_b])
         self.poses = pose_table(
             np.array([X_WA, X_WB]), np.array([X_AP, X_BP]), np.array([packed_a.reach, packed_b.reach])

@@ -15,5 +15,7 @@ def reproducing(source: str, **values):
     try:
         yield
     except Exception as error:
-        text = source.format(**{name: repr(value.tolist() if hasattr(value, "tolist") else value) for name, value in values.items()})
+        text = source.format(
+            **{name: repr(value.tolist() if hasattr(value, "tolist") else value) for name, value in values.items()}
+        )
         raise AssertionError(f"{type(error).__name__}: {error}\n\n{text}\n") from error

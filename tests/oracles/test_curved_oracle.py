@@ -58,7 +58,10 @@ def holds(found, truth: float, within: float = 1e-15) -> None:
         (Ellipsoid((1, 2, 3)), Sphere(1), (0, 5, 0), 2.0),
         (Ellipsoid((1, 2, 3)), Box((1, 1, 1)), (1.25, 0, 0), -0.25),
         (Box((1, 1, 1)), ConvexHull([[0, 0, 0]], radius=0.25), (0, 2, 0), 1.25),
-        (ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), (0.25, 0, 0), 0.0),
+        (
+            ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]]),
+            (0.25, 0, 0), 0.0,
+        ),
         (HPolytope(np.vstack([np.eye(3), -np.eye(3)]), np.ones(6)), Sphere(1), (0, 0, 3), 1.0),
         (Halfspace((0, 0, 2), 2), Cone(1, 2), (5, 5, 4), 2.0),
         (Halfspace((0, 0, 2), 2), Mesh(*TETRAHEDRON), (5, 5, 0.5), -0.5),
@@ -103,7 +106,9 @@ def test_brackets_are_narrow():
     """A wide bracket proves nothing: most convex pairs are known to 1e-15 of their size."""
     widths = []
     for number in range(150):
-        case = soak_pairs.draw(12, number, 1e6, ("sphere", "box", "hull", "swept hull", "cylinder", "cone", "ellipsoid"))
+        case = soak_pairs.draw(
+            12, number, 1e6, ("sphere", "box", "hull", "swept hull", "cylinder", "cone", "ellipsoid")
+        )
         found = bracket(case.A, case.B, case.X_WA, case.X_WB)
         widths.append(float(found.upper - found.lower) / soak_pairs.size_of(case))
     assert np.median(widths) < 1e-19 and np.mean(np.array(widths) < 1e-15) > 0.85, np.sort(widths)[::-10]

@@ -26,15 +26,37 @@ SHOWS = {
     "05_scene_file_to_report": ["COLLIDING", "HOW EACH ANSWER IS KNOWN", "as data: 1 collision"],
     "06_compare_with_fcl": ["pairs where collide is refuted: 0"],
     "07_many_large_hulls": ["pairs of pebbles meet", "proven", "saved and loaded: True; 20000 vertices"],
-    "08_meshes": ["solid: True", "inside the ring's hole: False", "inside its wall: True", "comes free", "the same tree: True", "clears part 0"],
-    "09_rays_and_overlays": ["shared area 1.000000000000000", "beside it: [True, True, False]", "inside: [True, True, False]", "itself: False True"],
-    "10_contacts": ["proven free", "a ball 1.00 mm above", "jaw 1 pushes along [-1.  0.  0.], 4 points", "box and ball"],
+    "08_meshes": [
+        "solid: True",
+        "inside the ring's hole: False",
+        "inside its wall: True",
+        "comes free",
+        "the same tree: True",
+        "clears part 0",
+    ],
+    "09_rays_and_overlays": [
+        "shared area 1.000000000000000",
+        "beside it: [True, True, False]",
+        "inside: [True, True, False]",
+        "itself: False True",
+    ],
+    "10_contacts": [
+        "proven free",
+        "a ball 1.00 mm above",
+        "jaw 1 pushes along [-1.  0.  0.], 4 points",
+        "box and ball",
+    ],
     "12_margins_and_names": [
-        "within 5 mm: [True, True, False]", "separating plane", "the bracket reaches to both sides of 0", "contacts of pair 1: 4",
+        "within 5 mm: [True, True, False]",
+        "separating plane",
+        "the bracket reaches to both sides of 0",
+        "contacts of pair 1: 4",
         "is that of the matrix: True",
     ],
     "11_meshes_in_scenes": [
-        "as it is: [('bracket', 'chip')]", "shell is a surface of 18 facets without an inside (open edges", "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
+        "as it is: [('bracket', 'chip')]",
+        "shell is a surface of 18 facets without an inside (open edges",
+        "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
     ],
 }
 

@@ -24,7 +24,9 @@ import collide
 ROOT = Path(__file__).resolve().parents[2]
 #: Folder of the repository → folder of the installed package.
 FOLDERS = {"collide": "collide", "adapters": "collide/adapters", "scenes": "collide/scenes"}
-LITTER = shutil.ignore_patterns("__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib")
+LITTER = shutil.ignore_patterns(
+    "__pycache__", "*.pyc", ".*", "_glue*", "built.py", "libcollide*", "pkgconfig", "include", "lib"
+)
 #: The backend that pyproject.toml asks for.
 SETUPTOOLS = 77
 
@@ -54,9 +56,19 @@ def _built(tree: Path, **environment: str) -> subprocess.CompletedProcess:
         if file.is_file() and not file.name.startswith("."):
             shutil.copy(file, tree)
     build = "from setuptools.build_meta import build_wheel; build_wheel('dist')"
-    own = {name: value for name, value in os.environ.items() if not name.startswith("COLLIDE_") and name != "NUMBA_DISABLE_JIT"}
+    own = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith("COLLIDE_") and name != "NUMBA_DISABLE_JIT"
+    }
     return subprocess.run(
-        [sys.executable, "-c", build], cwd=tree, env={**own, **environment}, check=False, capture_output=True, text=True, timeout=400
+        [sys.executable, "-c", build],
+        cwd=tree,
+        env={**own, **environment},
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=400,
     )
 
 
@@ -91,8 +103,12 @@ def _folder_files() -> set[str]:
         for folder, package in FOLDERS.items()
         for file in (ROOT / folder).rglob("*")
         if file.is_file() and file.suffix != ".pyc" and not any(part.startswith(".") for part in file.parts[-2:])
-    } - {f"{package}/{file.relative_to(ROOT / folder).as_posix()}" for folder, package in FOLDERS.items()
-         for file in (ROOT / folder).rglob("*") if MADE.fullmatch(f"{package}/{file.relative_to(ROOT / folder).as_posix()}")}
+    } - {
+        f"{package}/{file.relative_to(ROOT / folder).as_posix()}"
+        for folder, package in FOLDERS.items()
+        for file in (ROOT / folder).rglob("*")
+        if MADE.fullmatch(f"{package}/{file.relative_to(ROOT / folder).as_posix()}")
+    }
 
 
 # --- the wheel ----------------------------------------------------------------------------------
@@ -156,8 +172,8 @@ def test_library_leaves_nothing_open_but_the_c_library(wheel, tmp_path):
 
 
 def test_same_sources_give_the_same_bytes(wheel_file, tmp_path):
-    """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the object
-    files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""
+    """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the
+    object files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""
     again = tmp_path / "elsewhere"
     done = _built(again)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -201,7 +217,9 @@ def test_extras_that_errors_name_exist(metadata):
     extras = set(metadata.get_all("Provides-Extra"))
     for folder in FOLDERS:
         for file in (ROOT / folder).rglob("*.py"):
-            for named in re.findall(r"extra=[\"'](\w+)[\"']|collide-robotics\[([a-z]+)\]", file.read_text(encoding="utf-8")):
+            for named in re.findall(
+                r"extra=[\"'](\w+)[\"']|collide-robotics\[([a-z]+)\]", file.read_text(encoding="utf-8")
+            ):
                 assert (named[0] or named[1]) in extras, f"{file.name} names the extra {named}"
 
 

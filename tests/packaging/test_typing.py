@@ -71,8 +71,10 @@ def checked(tmp_path_factory):
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--follow-imports=silent", "--ignore-missing-imports", "--cache-dir", str(folder / "cache"), *files],
-        cwd=folder, env={**os.environ, "MYPYPATH": str(folder / "site")}, capture_output=True, text=True, check=False, timeout=300,
+        [sys.executable, "-m", "mypy", "--follow-imports=silent", "--ignore-missing-imports",
+         "--cache-dir", str(folder / "cache"), *files],
+        cwd=folder, env={**os.environ, "MYPYPATH": str(folder / "site")}, capture_output=True, text=True, check=False,
+        timeout=300,
     )  # fmt: skip
     assert done.returncode == 1, done.stdout + done.stderr
     return done.stdout.splitlines()

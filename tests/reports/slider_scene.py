@@ -22,7 +22,8 @@ def slider_scene() -> Scene:
     slider = Joint("lift", "prismatic", "carriage", "slider", axis=np.array([0, 0, 1.0]), lower=-1.0, upper=2.0)
     robot = Robot(
         "rail", ["base", "carriage", "slider"], [carriage, slider],
-        {"slider": [LinkShape(Box((0.2, 0.2, 0.2)), np.eye(4), None, "test")]}, states={"home": {"slide": 0.0}, "hit": {"slide": 0.6}},
+        {"slider": [LinkShape(Box((0.2, 0.2, 0.2)), np.eye(4), None, "test")]},
+        states={"home": {"slide": 0.0}, "hit": {"slide": 0.6}},
     )  # fmt: skip
     scene = Scene("rail", [
         SceneBody("floor", Box((4, 4, 0.1)), pose((0, 0, -0.35)), static=True),

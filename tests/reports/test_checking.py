@@ -98,7 +98,11 @@ def test_baselines_are_sorted_and_one_a_line(command, tmp_path):
     command(stacked(0.1, 0.3, 0.2), "check", "--write-baseline", known)
     text = known.read_text()
     data = json.loads(text)
-    assert data["schema"] == checking.SCHEMA and [entry["a"] for entry in data["collisions"]] == ["low 0", "low 1", "low 2"]
+    assert data["schema"] == checking.SCHEMA and [entry["a"] for entry in data["collisions"]] == [
+        "low 0",
+        "low 1",
+        "low 2",
+    ]
     assert len(text.splitlines()) == 8
     command(stacked(-0.1), "check", "--write-baseline", known)
     assert json.loads(known.read_text())["collisions"] == []
@@ -107,9 +111,11 @@ def test_baselines_are_sorted_and_one_a_line(command, tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [("{", "is not JSON"), ("[]", "neither a baseline"), ('{"schema": "other/1"}', "neither a baseline"),
-     ('{"schema": "collide-baseline/1"}', "damaged"), ('{"schema": "collide-baseline/1", "collisions": [{"a": 1}]}', "damaged"),
+     ('{"schema": "collide-baseline/1"}', "damaged"),
+     ('{"schema": "collide-baseline/1", "collisions": [{"a": 1}]}', "damaged"),
      ('{"schema": "collide-baseline/1", "collisions": [{"class": "x", "a": "b", "b": "c", "depth": 1}]}', "damaged"),
-     ('{"schema": "collide-baseline/1", "collisions": [{"class": "collision", "a": "b", "b": "c", "depth": "deep"}]}', "damaged"),
+     ('{"schema": "collide-baseline/1", "collisions": [{"class": "collision", "a": "b", "b": "c", "depth": "deep"}]}',
+      "damaged"),
      ('{"schema": "collide-report/3", "colliding": 4}', "damaged")],
 )  # fmt: skip
 def test_what_is_no_baseline_is_refused_before_the_work(command, tmp_path, text, words):
@@ -138,7 +144,9 @@ def test_junit_has_a_case_for_every_body(command, tmp_path):
     cases = suite.findall("testcase")
     assert [suites.get(k) for k in ("tests", "failures", "errors")] == ["7", "2", "0"]
     assert [suite.get(k) for k in ("name", "tests", "failures", "errors")] == ["stack", "7", "2", "0"]
-    failed = {case.get("name"): case.find("failure").get("message") for case in cases if case.find("failure") is not None}
+    failed = {
+        case.get("name"): case.find("failure").get("message") for case in cases if case.find("failure") is not None
+    }
     assert failed == {"low 0": "collision with high 0: 100 mm deep", "high 0": "collision with low 0: 100 mm deep"}
     assert cases[-1].get("name") == '<a> & "b"\\x1b'
     assert "touching with high 2" in next(case for case in cases if case.get("name") == "low 2").find("system-out").text
@@ -158,7 +166,9 @@ def test_junit_tells_what_is_not_known(tmp_path):
     from collide.reports import junit
 
     root = ET.fromstring("".join(junit.text([check])))
-    assert root.get("errors") == "2" and "with b is not known: no way" in root.find(".//testcase[@name='a']/error").get("message")
+    assert root.get("errors") == "2" and "with b is not known: no way" in root.find(".//testcase[@name='a']/error").get(
+        "message"
+    )
 
 
 # --- ignored pairs ------------------------------------------------------------------------------
@@ -225,7 +235,9 @@ def test_few_pairs_of_a_body_keep_a_row_each():
 def test_folding_tells_every_pair_once(seed):
     """Against a slow account of the same rule."""
     rng = np.random.default_rng(seed)
-    found = report.make(Scene("many", [SceneBody(f"b{k}", Sphere(1.0), pose(rng.uniform(-2.2, 2.2, 3))) for k in range(25)])).colliding
+    found = report.make(
+        Scene("many", [SceneBody(f"b{k}", Sphere(1.0), pose(rng.uniform(-2.2, 2.2, 3))) for k in range(25)])
+    ).colliding
     assert len(found) > 60
     folds, more = found.folded(4, 1000)
     assert more == 0 and sum(fold.size for fold in folds) == len(found)
@@ -242,11 +254,16 @@ def test_folding_tells_every_pair_once(seed):
 
 def test_contacts_meshes_and_notes_take_a_line_each():
     corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
-    extra = [SceneBody("solid", Mesh(corners, faces), pose((0, 50, 0))), SceneBody("sheet", Mesh(corners, faces[:3]), pose((0, 60, 0)))]
+    extra = [
+        SceneBody("solid", Mesh(corners, faces), pose((0, 50, 0))),
+        SceneBody("sheet", Mesh(corners, faces[:3]), pose((0, 60, 0))),
+    ]
     scene = stacked(*[0.0] * 20, extra=extra)
     scene.notes += ["joint a is outside its limits", "joint b is too"]
     lines = text_of(terminal.render(report.make(scene), width=120))
-    assert any(line.strip().startswith("touching  ") and "20 pairs, gap or overlap at most 0.000 mm" in line for line in lines)
+    assert any(
+        line.strip().startswith("touching  ") and "20 pairs, gap or overlap at most 0.000 mm" in line for line in lines
+    )
     assert any("2 as they are" in line and "sheet is a surface of 3 facets without an inside" in line for line in lines)
     assert any("2: joint a is outside its limits; …" in line for line in lines)
     assert len(lines) < 12 and not any("HOW EACH" in line or line.startswith("TIME") for line in lines)
@@ -271,7 +288,9 @@ def test_a_page_looks_at_few_pairs_of_many(monkeypatch):
     monkeypatch.setattr(pairs.Pair, "__init__", lambda self, *values: (made.append(1), real(self, *values))[1])
     rng = np.random.default_rng(0)
     ball = Sphere(1.0)
-    found = report.make(Scene("crowd", [SceneBody(f"ball {k}", ball, pose(rng.uniform(-0.4, 0.4, 3))) for k in range(150)]))
+    found = report.make(
+        Scene("crowd", [SceneBody(f"ball {k}", ball, pose(rng.uniform(-0.4, 0.4, 3))) for k in range(150)])
+    )
     terminal.render(found)
     assert len(found.colliding) == 150 * 149 // 2 and 0 < len(made) < 100
 
@@ -293,7 +312,8 @@ def test_geometry_is_enough_to_draw_every_body():
     corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
     scene = Scene("things", [
         SceneBody("one", ball, pose((1, 2, 3))), SceneBody("two", ball, pose((4, 5, 6), rpy=(0.1, 0.2, 0.3))),
-        SceneBody("floor", Halfspace((0, 0, 1), -2.0), pose(), static=True), SceneBody("part", Mesh(corners, faces), pose()),
+        SceneBody("floor", Halfspace((0, 0, 1), -2.0), pose(), static=True),
+        SceneBody("part", Mesh(corners, faces), pose()),
         SceneBody("both", Compound([(ball, pose((0, 0, 1))), (Box((1, 1, 1)), pose())]), pose((9, 9, 9))),
     ])  # fmt: skip
     data = json.loads(json.dumps(geometry.of_scene(scene), allow_nan=False))
@@ -306,7 +326,9 @@ def test_geometry_is_enough_to_draw_every_body():
     part = shapes[bodies["part"]["shape"]]
     assert (part["vertices"], part["faces"], part["parameters"]) == (corners, faces, {"solid": True})
     floor = shapes[bodies["floor"]["shape"]]
-    assert floor["parameters"] == {"normal": [0, 0, 1], "offset": -2.0} and np.ptp(np.array(floor["vertices"])[:, 0]) > 9
+    assert (
+        floor["parameters"] == {"normal": [0, 0, 1], "offset": -2.0} and np.ptp(np.array(floor["vertices"])[:, 0]) > 9
+    )
     both = shapes[bodies["both"]["shape"]]["parameters"]["items"]
     assert [item["kind"] for item in both] == ["Sphere", "Box"] and both[0]["X_CS"][2][3] == 1
 
@@ -315,7 +337,9 @@ def test_geometry_belongs_to_json(command, tmp_path):
     assert command(stacked(0.1), "report", "--geometry")[0] == 2
     assert command(stacked(0.1), "report", "--geometry", "--json", tmp_path / "r.json")[0] == 0
     data = json.loads((tmp_path / "r.json").read_text())
-    assert data["geometry"]["shapes"][0]["kind"] == "Box" and "geometry" not in json.loads(command(stacked(0.1), "report", "--json", "-")[1])
+    assert data["geometry"]["shapes"][0]["kind"] == "Box" and "geometry" not in json.loads(
+        command(stacked(0.1), "report", "--json", "-")[1]
+    )
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")

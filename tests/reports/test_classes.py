@@ -57,10 +57,15 @@ def test_parallel_faces_ten_millimetres_apart_never_touch():
 
 
 def test_fingers_nine_millimetres_apart_are_near_in_every_output():
-    finger, rng = Compound([(Box((0.02, 0.01, 0.05)), pose()), (Box((0.02, 0.012, 0.02)), pose((0, 0.001, 0.02)))]), np.random.default_rng(3)
+    finger, rng = (
+        Compound([(Box((0.02, 0.01, 0.05)), pose()), (Box((0.02, 0.012, 0.02)), pose((0, 0.001, 0.02)))]),
+        np.random.default_rng(3),
+    )
     for _ in range(20):
         R = random_rotation(rng)
-        made = report.make(scene_of((finger, posed(R, (0, 0, 0))), (finger, posed(R, R @ (0, 0.0205, 0)))), clearance=0.02)
+        made = report.make(
+            scene_of((finger, posed(R, (0, 0, 0))), (finger, posed(R, R @ (0, 0.0205, 0)))), clearance=0.02
+        )
         data = made.to_dict()
         assert (len(data["near"]), data["verdict"]["near"], data["verdict"]["touching"]) == (1, 1, 0)
         assert "touching" not in made.verdict() and data["near"][0]["distance"] == pytest.approx(0.0085, rel=1e-9)
@@ -76,7 +81,8 @@ def test_boxes_that_rest_or_overlap_a_little(size):
     at_rest = size / 2
     for z, expected in [
         (at_rest, "touching"), (math.nextafter(at_rest, 0), "touching"), (math.nextafter(at_rest, 9e9), "touching"),
-        (at_rest - rounding / 2, "touching"), (at_rest + rounding / 2, "touching"), (at_rest - 2 * rounding, "colliding"),
+        (at_rest - rounding / 2, "touching"), (at_rest + rounding / 2, "touching"),
+        (at_rest - 2 * rounding, "colliding"),
         (at_rest + 2 * rounding, "near"), (at_rest - 1e-6, "colliding"), (at_rest + 1e-6, "near"),
     ]:  # fmt: skip
         assert class_of((box, pose((0, 0, z))), floor) == expected, (size, z - at_rest, expected)
@@ -89,7 +95,20 @@ def test_a_picometre_at_a_metre_is_where_rounding_ends():
 
 def test_meshes_and_curved_shapes_follow_the_same_rule():
     corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, 8).T
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ]
     mesh = Mesh(corners, faces)
     assert mesh.solid
     table = Box((2, 2, 1)), pose((0, 0, -0.5))
@@ -103,7 +122,9 @@ def test_the_rule_looks_at_brackets_alone():
     """Rows of every argument and bracket: the class is what lower, upper and the rounding say."""
     rng = np.random.default_rng(5)
     rows = np.zeros(2000, PAIR_DTYPE)
-    ends = np.sort(10.0 ** rng.uniform(-18, 0, (2000, 2)) * rng.choice([-1.0, 0.0, 1.0], (2000, 2), p=[0.45, 0.1, 0.45]), axis=1)
+    ends = np.sort(
+        10.0 ** rng.uniform(-18, 0, (2000, 2)) * rng.choice([-1.0, 0.0, 1.0], (2000, 2), p=[0.45, 0.1, 0.45]), axis=1
+    )
     rows["lower"], rows["upper"] = ends.T
     rows["distance"] = ends.mean(axis=1)
     rows["how"] = rng.choice([PLANE, SIMPLEX, EXACT], 2000)

@@ -15,9 +15,25 @@ ROWS = [["collide", "0.1.0", "30 of 30", "", "", "0"], ["coal", "3.0", "30 of 30
 
 def dispute(kind="hit", **changes):
     return {
-        "engine": "coal", "kind": kind, "a": "table", "b": "panda_hand", "size": 1.0, "reference_hit": False,
-        "reference_distance": 2e-5, "hit": True, "distance": -1e-9, "exact_hit": False, "exact_distance": 2e-5,
-        "touching": False, "not_judged": "", "judged_by": "exact arithmetic", "off": None, "wrong": ["coal"], "proven": ["collide"], "note": "", **changes,
+        "engine": "coal",
+        "kind": kind,
+        "a": "table",
+        "b": "panda_hand",
+        "size": 1.0,
+        "reference_hit": False,
+        "reference_distance": 2e-5,
+        "hit": True,
+        "distance": -1e-9,
+        "exact_hit": False,
+        "exact_distance": 2e-5,
+        "touching": False,
+        "not_judged": "",
+        "judged_by": "exact arithmetic",
+        "off": None,
+        "wrong": ["coal"],
+        "proven": ["collide"],
+        "note": "",
+        **changes,
     }
 
 
@@ -68,7 +84,10 @@ def test_what_a_peer_got_wrong_is_in_the_first_line_with_the_amount():
 
 
 def test_wrong_distances_come_worst_first_and_say_who_judged():
-    disputes = [dispute("distance", distance=0.3, off=0.1), dispute("distance", a="shelf", distance=-0.9, off=0.9, judged_by="the proven bracket")]
+    disputes = [
+        dispute("distance", distance=0.3, off=0.1),
+        dispute("distance", a="shelf", distance=-0.9, off=0.9, judged_by="the proven bracket"),
+    ]
     lines = text_of(comparing.render(comparison(disputes), width=120))
     shelf, table = (next(k for k, line in enumerate(lines) if name in line.split()) for name in ("shelf", "table"))
     assert shelf < table and "900.000 mm" in lines[shelf] and lines[shelf].endswith("coal (by bracket)")

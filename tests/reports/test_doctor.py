@@ -41,7 +41,9 @@ def test_how_kernels_run_is_told(monkeypatch):
     told = {check.what: check for check in doctor.examine().installed}
     if mode.MODE == mode.COMPILED:
         assert told["kernels"].passed and f"level {library.level} of" in told["kernels"].answer
-        assert Path(told["library"].answer) == Path(collide.get_library()) and told["built by"].answer.startswith("numba ")
+        assert Path(told["library"].answer) == Path(collide.get_library()) and told["built by"].answer.startswith(
+            "numba "
+        )
     monkeypatch.setattr(mode, "MODE", mode.JUST_IN_TIME)
     monkeypatch.setattr(mode, "WHY", "this installation was built without compiled kernels")
     monkeypatch.setattr(library, "_built", lambda: None)

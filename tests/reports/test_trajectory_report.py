@@ -20,7 +20,11 @@ from collide.scenes.loaders.trajectories import Trajectory, read_trajectory
 
 
 def moving(*slides, times=None, **others) -> Trajectory:
-    return Trajectory("test", [{"slide": s, **{name: values[k] for name, values in others.items()}} for k, s in enumerate(slides)], times)
+    return Trajectory(
+        "test",
+        [{"slide": s, **{name: values[k] for name, values in others.items()}} for k, s in enumerate(slides)],
+        times,
+    )
 
 
 # --- sampling -----------------------------------------------------------------------------------
@@ -116,7 +120,9 @@ def test_few_pairs_are_asked_once_something_near_is_known(monkeypatch):
     """The limit of each question is the least clearance so far, not the whole scene."""
     asked = []
     real = collide.World.distances
-    monkeypatch.setattr(collide.World, "distances", lambda self, max_distance: asked.append(max_distance) or real(self, max_distance))
+    monkeypatch.setattr(
+        collide.World, "distances", lambda self, max_distance: asked.append(max_distance) or real(self, max_distance)
+    )
     follow(slider_scene(), moving(0, 0.45), resolution=0.01)
     assert len(asked) < 60 and max(asked[8:]) < 0.5 and asked[-1] <= 0.07
 
@@ -160,13 +166,18 @@ def test_yaml_as_moveit_prints_it(tmp_path):
 @pytest.mark.parametrize(
     "name, text, words",
     [
-        ("x.csv", "", "no waypoint"), ("x.csv", "slide\n", "no waypoint"), ("x.csv", "slide,slide\n0,1\n", "every column once"),
+        ("x.csv", "", "no waypoint"), ("x.csv", "slide\n", "no waypoint"),
+        ("x.csv", "slide,slide\n0,1\n", "every column once"),
         ("x.csv", "slide,lift\n0\n", "row 1.*1 values.*2 columns"), ("x.csv", "slide\nfar\n", "row 1 \"slide\".*'far'"),
         ("x.csv", "time,slide\nnan,0\n", "row 1 \"time\".*finite"), ("x.csv", "slide\ninf\n", "finite"),
-        ("x.json", json.dumps({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}), "several degrees of freedom"),
-        ("x.csv", "time,slide\n1,0\n0,1\n", "times must rise"), ("x.json", "[]", "no waypoint"), ("x.json", '{"a": 3}', "no trajectory"),
-        ("x.json", '{"joint_names": ["a"], "points": [{"positions": [1, 2]}]}', r"points\[0\].positions.*each of the 1"),
-        ("x.json", '{"a": [1, 2], "b": [1]}', "no trajectory"), ("x.json", '[{"a": "b"}]', r"\[0\].*number"), ("x.json", "3", "must be a mapping"),
+        ("x.json", json.dumps({"joint_trajectory": ROS, "multi_dof_joint_trajectory": {"points": [{}]}}),
+         "several degrees of freedom"),
+        ("x.csv", "time,slide\n1,0\n0,1\n", "times must rise"), ("x.json", "[]", "no waypoint"),
+        ("x.json", '{"a": 3}', "no trajectory"),
+        ("x.json", '{"joint_names": ["a"], "points": [{"positions": [1, 2]}]}',
+         r"points\[0\].positions.*each of the 1"),
+        ("x.json", '{"a": [1, 2], "b": [1]}', "no trajectory"), ("x.json", '[{"a": "b"}]', r"\[0\].*number"),
+        ("x.json", "3", "must be a mapping"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_file_is_named(tmp_path, name, text, words):
@@ -200,8 +211,10 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
     file.write_text('{"slide": 0.25}')
     scene = slider_scene()
     for words, expected in [
-        (["home"], [("home", 0.0)]), (["home,hit"], [("home", 0.0), ("hit", 0.6)]), (["hit", "home"], [("hit", 0.6), ("home", 0.0)]),
-        (["-0.5,0.1"], [("-0.5,0.1", -0.5)]), (["slide=0.7"], [("slide=0.7", 0.7)]), (["slide=0.7, lift=1"], [("slide=0.7, lift=1", 0.7)]),
+        (["home"], [("home", 0.0)]), (["home,hit"], [("home", 0.0), ("hit", 0.6)]),
+        (["hit", "home"], [("hit", 0.6), ("home", 0.0)]),
+        (["-0.5,0.1"], [("-0.5,0.1", -0.5)]), (["slide=0.7"], [("slide=0.7", 0.7)]),
+        (["slide=0.7, lift=1"], [("slide=0.7, lift=1", 0.7)]),
         ([f"home,{file}"], [("home", 0.0), (str(file), 0.25)]),
     ]:  # fmt: skip
         found = in_states(scene, words)
@@ -210,8 +223,10 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
 
 @pytest.mark.parametrize(
     "word, complaint",
-    [("0.1", "1 joint value given.*2 joints: slide, lift"), ("1,2,3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
-     ("swing=1", "unknown joint 'swing'"), ("away", "unknown state 'away'; it has home, hit"), ("home,away", "unknown state 'away'"),
+    [("0.1", "1 joint value given.*2 joints: slide, lift"),
+     ("1,2,3", "3 joint values"), ("slide=far", "joint slide.*'far'"),
+     ("swing=1", "unknown joint 'swing'"), ("away", "unknown state 'away'; it has home, hit"),
+     ("home,away", "unknown state 'away'"),
      ("slide=nan", "finite")],
 )  # fmt: skip
 def test_states_that_are_none_are_refused(word, complaint):
@@ -225,7 +240,11 @@ def test_states_that_are_none_are_refused(word, complaint):
 @pytest.fixture
 def command(monkeypatch, capsys):
     """``command(words...)`` runs one on the slider's scene; gives status, out and err."""
-    monkeypatch.setattr(collide.scenes, "load", lambda *paths, state=None, **options: slider_scene() if state is None else slider_scene().with_state(state))
+    monkeypatch.setattr(
+        collide.scenes,
+        "load",
+        lambda *paths, state=None, **options: slider_scene() if state is None else slider_scene().with_state(state),
+    )
 
     def run(*words):
         status = cli.main(list(words))
@@ -237,22 +256,32 @@ def command(monkeypatch, capsys):
 def test_a_trajectory_in_report_and_check(command, tmp_path):
     plan = tmp_path / "plan.csv"
     plan.write_text("time,slide\n0,0.2\n2,0.6\n")
-    status, out, err = command("report", "rail.yaml", "--trajectory", str(plan), "--resolution", "0.01", "--ignore", "crate,floor")
-    assert status == 0 and out.startswith("first collision at 77.5 % of the path (1.55 s): ") and "not certified in between" in " ".join(out.split())
+    status, out, err = command(
+        "report", "rail.yaml", "--trajectory", str(plan), "--resolution", "0.01", "--ignore", "crate,floor"
+    )
+    assert (
+        status == 0
+        and out.startswith("first collision at 77.5 % of the path (1.55 s): ")
+        and "not certified in between" in " ".join(out.split())
+    )
     status, out, err = command("check", "rail.yaml", "--trajectory", str(plan), "--ignore", "crate,floor")
     assert status == 1 and out.startswith("collision\tpost\tslider\t-0.1") and out.splitlines()[0].endswith(" s)")
     assert "not certified" in err
     plan.write_text("slide\n0.2\n0.4\n")
     status, out, err = command("check", "rail.yaml", "--trajectory", str(plan), "--ignore", "floor,crate")
     assert (status, out) == (0, "")
-    status, out, err = command("check", "rail.yaml", "--trajectory", str(plan), "--ignore", "floor,crate", "--state", "home,hit")
+    status, out, err = command(
+        "check", "rail.yaml", "--trajectory", str(plan), "--ignore", "floor,crate", "--state", "home,hit"
+    )
     assert status == 2 and "one state" in err
 
 
 def test_json_of_trajectories_and_states_is_what_the_schema_says(command, tmp_path):
     plan = tmp_path / "plan.csv"
     plan.write_text("slide\n0.2\n0.6\n")
-    _, out, _ = command("report", "rail.yaml", "--trajectory", str(plan), "--clearance", "20cm", "--geometry", "--json", "-")
+    _, out, _ = command(
+        "report", "rail.yaml", "--trajectory", str(plan), "--clearance", "20cm", "--geometry", "--json", "-"
+    )
     data = json.loads(out)
     validate(data)
     assert data["trajectory"]["first_collision"]["state"]["slide"] > MEETS and data["trajectory"]["certified"] is False

@@ -84,7 +84,9 @@ def test_a_contact_is_what_its_letters_say(kind):
             assert sizes[letter][0] <= count <= sizes[letter][1]
 
 
-@pytest.mark.parametrize("name", ["touch_vf", "touch_ee", "touch_ff", "touch_vv", "touch_ve", "boxes_exact", "swept_touch"])
+@pytest.mark.parametrize(
+    "name", ["touch_vf", "touch_ee", "touch_ff", "touch_vv", "touch_ve", "boxes_exact", "swept_touch"]
+)
 def test_touching_is_exact(name):
     cases = generate(name, 80, 11)
     for case in cases:
@@ -213,8 +215,19 @@ def test_degenerate_bodies_of_every_kind():
     for case in generate("degenerate", 60, 1):
         for points in (case.P, case.Q):
             distinct = len(np.unique(points, axis=0))
-            found.add("point" if len(points) == 1 else "segment" if len(points) == 2 else "doubled" if distinct < len(points)
-                      else "grid" if len(points) == 64 else "line" if np.linalg.matrix_rank(points - points[0]) == 1 else "solid")
+            found.add(
+                "point"
+                if len(points) == 1
+                else "segment"
+                if len(points) == 2
+                else "doubled"
+                if distinct < len(points)
+                else "grid"
+                if len(points) == 64
+                else "line"
+                if np.linalg.matrix_rank(points - points[0]) == 1
+                else "solid"
+            )
     assert found == {"point", "segment", "doubled", "grid", "line", "solid"}
 
 
@@ -293,7 +306,8 @@ def test_refused(name, n, options, message):
 def test_families_load_neither_the_engine_nor_the_oracle():
     code = (
         "import sys, collide.scenes.families as f; f.generate('touch_ee', 2, 1); "
-        "print(sorted(m for m in sys.modules if m.startswith(('numba', 'scipy', 'collide.adapters', 'collide.narrowphase'))))"
+        "print(sorted(m for m in sys.modules if m.startswith(('numba', 'scipy', 'collide.adapters', "
+        "'collide.narrowphase'))))"
     )
     result = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert result.stdout.strip() == "[]", result.stdout + result.stderr

@@ -94,7 +94,9 @@ def test_shapes(scene_of, shape, expected):
     ],
 )
 def test_poses(scene_of, given):
-    np.testing.assert_allclose(scene_of(bodies=[body(pose=given)]).bodies[0].X_WB, pose((1, 2, 3), rpy=(0.1, 0.2, 0.3)), atol=1e-15)
+    np.testing.assert_allclose(
+        scene_of(bodies=[body(pose=given)]).bodies[0].X_WB, pose((1, 2, 3), rpy=(0.1, 0.2, 0.3)), atol=1e-15
+    )
 
 
 def test_quaternions(scene_of):
@@ -126,7 +128,9 @@ def test_units(scene_of, unit, factor):
 
 def test_filters_and_allowed_pairs(scene_of):
     scene = scene_of(
-        bodies=[body(name="a", static=True, group=2, mask=5), body(name="b")], allow=[["a", "b"], ["b", "a", "glued"]], name="n"
+        bodies=[body(name="a", static=True, group=2, mask=5), body(name="b")],
+        allow=[["a", "b"], ["b", "a", "glued"]],
+        name="n",
     )
     a = scene.bodies[0]
     assert (a.static, a.group, a.mask, a.source.endswith('scene.json: bodies[0] "a"')) == (True, 2, 5, True)
@@ -137,14 +141,24 @@ def test_meshes_and_urdf_beside_the_scene(scene_of, tmp_path):
     pytest.importorskip("trimesh")
     (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="l"><collision><geometry><mesh filename="t.obj"/></geometry></collision></link></robot>'
+        '<robot name="r"><link name="l"><collision><geometry><mesh '
+        'filename="t.obj"/></geometry></collision></link></robot>'
     )
     scene = scene_of(
-        units="mm", bodies=[body({"mesh": {"file": "t.obj", "scale": [2, 1, 1]}})],
-        robots=[{"urdf": "r.urdf", "name": "left", "prefix": "l_", "base": "mobile"}, {"urdf": "r.urdf", "name": "right", "prefix": "r_"}],
+        units="mm",
+        bodies=[body({"mesh": {"file": "t.obj", "scale": [2, 1, 1]}})],
+        robots=[
+            {"urdf": "r.urdf", "name": "left", "prefix": "l_", "base": "mobile"},
+            {"urdf": "r.urdf", "name": "right", "prefix": "r_"},
+        ],
     )
     mug = scene.body("mug")
-    assert isinstance(mug.shape, Mesh) and mug.shape.vertices.max() == 2 and not mug.shape.solid and mug.approximation is None
+    assert (
+        isinstance(mug.shape, Mesh)
+        and mug.shape.vertices.max() == 2
+        and not mug.shape.solid
+        and mug.approximation is None
+    )
     hull = scene_of(bodies=[body({"mesh": {"file": "t.obj", "as": "hull"}})]).body("mug")
     assert hull.shape.points.max() == 1 and hull.approximation == "hull of 3 vertices of an open mesh"
     left = scene_of(robots=[{"urdf": "r.urdf", "meshes": "hull"}, {"urdf": "r.urdf", "prefix": "r_"}]).bodies
@@ -175,7 +189,9 @@ def test_a_named_state_for_a_robot(scene_of):
 
 def test_include(scene_of, tmp_path):
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts/in.json").write_text(json.dumps({"collide": 1, "units": "mm", "bodies": [body({"sphere": {"radius": 100}}, "inner")]}))
+    (tmp_path / "parts/in.json").write_text(
+        json.dumps({"collide": 1, "units": "mm", "bodies": [body({"sphere": {"radius": 100}}, "inner")]})
+    )
     scene = scene_of(include=["parts/in.json"], bodies=[body()], allow=[["mug", "inner"]])
     assert [b.name for b in scene.bodies] == ["inner", "mug"] and scene.bodies[0].shape == Sphere(0.1)
     assert len(scene.sources) == 2
@@ -195,42 +211,99 @@ BAD = {
     "body key": ({"bodies": [body(colour="red")]}, r"bodies\[0\]: unknown key 'colour'"),
     "no name": ({"bodies": [{"shape": BALL}]}, r"bodies\[0\]: 'name' is missing"),
     "no shape": ({"bodies": [{"name": "mug"}]}, r"bodies\[0\] \"mug\": 'shape' is missing"),
-    "duplicate": ({"bodies": [body(), body()]}, r'bodies\[1\] "mug": a body named "mug" exists already, from .*bodies\[0\]'),
-    "shape": ({"bodies": [body({"bx": {}})]}, r"\"mug\".shape: unknown shape 'bx' \(did you mean 'box'\?\); known shapes are box"),
+    "duplicate": (
+        {"bodies": [body(), body()]},
+        r'bodies\[1\] "mug": a body named "mug" exists already, from .*bodies\[0\]',
+    ),
+    "shape": (
+        {"bodies": [body({"bx": {}})]},
+        r"\"mug\".shape: unknown shape 'bx' \(did you mean 'box'\?\); known shapes are box",
+    ),
     "two shapes": ({"bodies": [body({**BALL, "box": {"size": [1, 1, 1]}})]}, "needs one shape"),
-    "shape key": ({"bodies": [body({"sphere": {"radios": 1}})]}, r"shape.sphere: unknown key 'radios' \(did you mean 'radius'\?\)"),
+    "shape key": (
+        {"bodies": [body({"sphere": {"radios": 1}})]},
+        r"shape.sphere: unknown key 'radios' \(did you mean 'radius'\?\)",
+    ),
     "missing number": ({"bodies": [body({"capsule": {"radius": 1}})]}, "shape.capsule: 'length' is missing"),
-    "negative": ({"bodies": [body({"sphere": {"radius": -1}})]}, r'bodies\[0\] "mug".shape.sphere: Sphere: radius must be > 0, got -1'),
+    "negative": (
+        {"bodies": [body({"sphere": {"radius": -1}})]},
+        r'bodies\[0\] "mug".shape.sphere: Sphere: radius must be > 0, got -1',
+    ),
     "NaN": ({"bodies": [body(pose={"xyz": [0, math.nan, 0]})]}, r'bodies\[0\] "mug".pose.xyz: must be finite numbers'),
     "text": ({"bodies": [body({"sphere": {"radius": "big"}})]}, "sphere.radius: must be a number, got 'big'"),
     "count": ({"bodies": [body(pose={"xyz": [0, 1]})]}, r"pose.xyz: must be 3 numbers, got \[0, 1\]"),
     "empty points": ({"bodies": [body({"hull": {"points": []}})]}, "hull.points: must be N × 3 numbers"),
     "NaN points": ({"bodies": [body({"hull": {"points": [[0, 0, math.nan]]}})]}, "hull.points: must be finite"),
-    "empty polytope": ({"bodies": [body({"hpolytope": {"normals": [[1, 0, 0], [-1, 0, 0]], "offsets": [0, -1]}})]}, "shape.hpolytope: HPolytope"),
-    "nested": ({"bodies": [body({"compound": [{"shape": {"sphere": {"radius": 0}}}]})]}, r"compound\[0\].shape.sphere: Sphere"),
+    "empty polytope": (
+        {"bodies": [body({"hpolytope": {"normals": [[1, 0, 0], [-1, 0, 0]], "offsets": [0, -1]}})]},
+        "shape.hpolytope: HPolytope",
+    ),
+    "nested": (
+        {"bodies": [body({"compound": [{"shape": {"sphere": {"radius": 0}}}]})]},
+        r"compound\[0\].shape.sphere: Sphere",
+    ),
     "empty compound": ({"bodies": [body({"compound": []})]}, '"mug".shape.compound: Compound: items is empty'),
     "two rotations": ({"bodies": [body(pose={"rpy": [0, 0, 0], "rpy_deg": [0, 0, 0]})]}, "pose: give one of rpy"),
-    "zero quaternion": ({"bodies": [body(pose={"quat_wxyz": [0, 0, 0, 0]})]}, r'"mug".pose: pose: a quaternion of length 0'),
-    "no rotation": ({"bodies": [body(pose={"matrix": (2 * np.eye(4)).tolist()})]}, '"mug".pose: matrix must end in the row'),
+    "zero quaternion": (
+        {"bodies": [body(pose={"quat_wxyz": [0, 0, 0, 0]})]},
+        r'"mug".pose: pose: a quaternion of length 0',
+    ),
+    "no rotation": (
+        {"bodies": [body(pose={"matrix": (2 * np.eye(4)).tolist()})]},
+        '"mug".pose: matrix must end in the row',
+    ),
     "mirror": ({"bodies": [body(pose={"matrix": np.diag([1, 1, -1, 1]).tolist()})]}, '"mug".pose: matrix mirrors'),
     "mask": ({"bodies": [body(mask=70000)]}, '"mug".mask: must be a whole number from 0 to 65535'),
     "static": ({"bodies": [body(static="no")]}, '"mug".static: must be true or false'),
-    "allow": ({"bodies": [body()], "allow": [["mug", "mugg"]]}, r"allow\[0\]: no body is called 'mugg' \(did you mean 'mug'\?\)"),
+    "allow": (
+        {"bodies": [body()], "allow": [["mug", "mugg"]]},
+        r"allow\[0\]: no body is called 'mugg' \(did you mean 'mug'\?\)",
+    ),
     "allow itself": ({"bodies": [body()], "allow": [["mug", "mug"]]}, "never tested against itself"),
     "mesh": ({"bodies": [body({"mesh": {"file": "gone.stl"}})]}, r'"mug".shape.mesh.file: cannot find "gone.stl"'),
     "mesh scale": ({"bodies": [body({"mesh": {"file": "x.stl", "scale": 0}})]}, "mesh.scale: must not be 0"),
     "no robot": ({"robots": [{}]}, r"robots\[0\]: give either urdf, a file, or robot"),
     "urdf": ({"robots": [{"urdf": "gone.urdf"}]}, r'robots\[0\].urdf: cannot find "gone.urdf"'),
-    "joint": ({"robots": [{"robot": ARM, "state": {"slid": 1}}]}, r"state: unknown joint 'slid' \(did you mean 'slide'\?\)"),
+    "joint": (
+        {"robots": [{"robot": ARM, "state": {"slid": 1}}]},
+        r"state: unknown joint 'slid' \(did you mean 'slide'\?\)",
+    ),
     "state": ({"robots": [{"robot": ARM, "state": "outt"}]}, r"state: unknown state 'outt' \(did you mean 'out'\?\)"),
-    "NaN state": ({"robots": [{"robot": ARM, "state": {"slide": math.nan}}]}, "state.slide: must be a finite number, got nan"),
+    "NaN state": (
+        {"robots": [{"robot": ARM, "state": {"slide": math.nan}}]},
+        "state.slide: must be a finite number, got nan",
+    ),
     "base": ({"robots": [{"robot": ARM, "base": "free"}]}, "base: must be one of fixed, mobile"),
-    "twice": ({"robots": [{"robot": ARM}, {"robot": ARM}]}, r"robots\[1\].*a body named \"base\" exists already.*prefix"),
-    "scene state": ({"robots": [{"robot": ARM}], "states": {"s": {"x": 1}}}, "states.s: scene scene: unknown joint 'x'"),
+    "twice": (
+        {"robots": [{"robot": ARM}, {"robot": ARM}]},
+        r"robots\[1\].*a body named \"base\" exists already.*prefix",
+    ),
+    "scene state": (
+        {"robots": [{"robot": ARM}], "states": {"s": {"x": 1}}},
+        "states.s: scene scene: unknown joint 'x'",
+    ),
     "tree": ({"robots": [{"robot": {**ARM, "joints": []}}]}, r"robots\[0\].robot: 3 links have no parent"),
-    "joint type": ({"robots": [{"robot": {**ARM, "joints": [{"name": "j", "type": "hinge", "parent": "a", "child": "b"}]}}]}, "type: must be one of revolute"),
-    "limits": ({"robots": [{"robot": {**ARM, "joints": [{"name": "j", "type": "revolute", "parent": "a", "child": "b", "limits": [1, 0]}]}}]}, "the lower limit is above"),
-    "link pair": ({"robots": [{"robot": {**ARM, "allow": [["base", "hnd"]]}}]}, r"unknown link 'hnd' \(did you mean 'hand'\?\)"),
+    "joint type": (
+        {"robots": [{"robot": {**ARM, "joints": [{"name": "j", "type": "hinge", "parent": "a", "child": "b"}]}}]},
+        "type: must be one of revolute",
+    ),
+    "limits": (
+        {
+            "robots": [
+                {
+                    "robot": {
+                        **ARM,
+                        "joints": [{"name": "j", "type": "revolute", "parent": "a", "child": "b", "limits": [1, 0]}],
+                    }
+                }
+            ]
+        },
+        "the lower limit is above",
+    ),
+    "link pair": (
+        {"robots": [{"robot": {**ARM, "allow": [["base", "hnd"]]}}]},
+        r"unknown link 'hnd' \(did you mean 'hand'\?\)",
+    ),
 }
 
 
@@ -278,7 +351,9 @@ def test_missing_file_and_folder(tmp_path):
 
 def test_yaml_numbers_with_exponents(tmp_path):
     pytest.importorskip("yaml")
-    (tmp_path / "s.yaml").write_text("collide: 1\nbodies:\n- {name: a, shape: {sphere: {radius: 1e-3}}, pose: {xyz: [-2E+1, .5, 1]}}\n")
+    (tmp_path / "s.yaml").write_text(
+        "collide: 1\nbodies:\n- {name: a, shape: {sphere: {radius: 1e-3}}, pose: {xyz: [-2E+1, .5, 1]}}\n"
+    )
     scene = load(tmp_path / "s.yaml")
     assert scene.bodies[0].shape == Sphere(0.001) and scene.bodies[0].X_WB[:3, 3].tolist() == [-20, 0.5, 1]
 
@@ -347,7 +422,10 @@ def test_scenes_together(scene_of, tmp_path):
 
 
 def test_world_has_the_bodies_and_pairs(scene_of):
-    scene = scene_of(robots=[{"robot": ARM, "state": "out"}], bodies=[body(pose={"xyz": [1.55, 0, 1]}), body(name="far", pose={"xyz": [9, 9, 9]})])
+    scene = scene_of(
+        robots=[{"robot": ARM, "state": "out"}],
+        bodies=[body(pose={"xyz": [1.55, 0, 1]}), body(name="far", pose={"xyz": [9, 9, 9]})],
+    )
     world = scene.world()
     assert sorted(world.names.values()) == ["base", "far", "hand", "mug"]
     assert world.collisions().names == [("hand", "mug")]
@@ -390,7 +468,19 @@ def test_panda_workbench():
         raise
     assert scene.notes == [] and len([b for b in scene.bodies if b.owner is None and not b.static]) >= 12
     kinds = {type(b.shape).__name__ for b in scene.bodies}
-    assert kinds == {"Halfspace", "Compound", "Box", "HPolytope", "Cylinder", "Sphere", "Capsule", "Cone", "Ellipsoid", "ConvexHull", "Mesh"}
+    assert kinds == {
+        "Halfspace",
+        "Compound",
+        "Box",
+        "HPolytope",
+        "Cylinder",
+        "Sphere",
+        "Capsule",
+        "Cone",
+        "Ellipsoid",
+        "ConvexHull",
+        "Mesh",
+    }
     result = scene.world().distances(max_distance=0.05)
     near = {frozenset(names): row for row, names in zip(result.rows, result.names)}
     dips = near[frozenset(("panda_leftfinger", "parcel"))]["distance"]

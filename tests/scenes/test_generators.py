@@ -53,7 +53,12 @@ def test_a_stack_rests():
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("cluter", {}, r"no generated scene is called 'cluter' \(did you mean 'clutter'\?\); there are accordions, chazelle, clutter, harpsicordia, stack, workcell"),
+        (
+            "cluter",
+            {},
+            (r"no generated scene is called 'cluter' \(did you mean 'clutter'\?\); there are accordions, chazelle, "
+            r"clutter, harpsicordia, stack, workcell"),
+        ),
         ("clutter", {"m": 3}, "clutter has no argument 'm'.*; it has n, density, static"),
         ("clutter", {"n": 0}, "n must be a whole number ≥ 1, got 0"),
         ("clutter", {"density": 0}, "density must lie within"),

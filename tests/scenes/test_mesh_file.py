@@ -52,7 +52,11 @@ def test_formats(tmp_path, suffix):
 
 def test_gltf_with_its_buffers(tmp_path):
     scene = trimesh.Scene()
-    scene.add_geometry(trimesh.creation.box((1, 1, 1)), node_name="left", transform=trimesh.transformations.translation_matrix((-2, 0, 0)))
+    scene.add_geometry(
+        trimesh.creation.box((1, 1, 1)),
+        node_name="left",
+        transform=trimesh.transformations.translation_matrix((-2, 0, 0)),
+    )
     scene.add_geometry(trimesh.creation.icosphere(1, 0.5), node_name="right")
     scene.export(tmp_path / "pair.gltf")
     for _ in range(2):  # read, then from the cache
@@ -115,7 +119,9 @@ def test_pieces_of_a_convex_mesh_are_its_hull(tmp_path):
 def test_messages_about_files_cut_short_and_numbers_out_of_range(tmp_path):
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "box.stl")
     (tmp_path / "cut.stl").write_bytes((tmp_path / "box.stl").read_bytes()[:-37])
-    with pytest.raises(SceneError, match=r"cut\.stl: its header says 12 facets, but the file holds 11\.26: it was cut short"):
+    with pytest.raises(
+        SceneError, match=r"cut\.stl: its header says 12 facets, but the file holds 11\.26: it was cut short"
+    ):
         load(tmp_path / "cut.stl")
     (tmp_path / "big.obj").write_text("v 0 0 0\nv 1e60 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(SceneError, match=r"big\.obj: Mesh: vertices\[1, 0\] is 1e\+60") as refusal:
@@ -128,7 +134,8 @@ def test_repeated_and_unused_vertices(tmp_path):
     vertices = np.concatenate([box.vertices, box.vertices, [(9, 9, 9)]])
     faces = np.concatenate([box.faces[:6], box.faces[6:] + 8])
     (tmp_path / "b.obj").write_text(
-        "".join(f"v {x} {y} {z}\n" for x, y, z in vertices) + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
+        "".join(f"v {x} {y} {z}\n" for x, y, z in vertices)
+        + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
     )
     file = mesh_loader.read_mesh(tmp_path / "b.obj")
     assert len(file.parts[0].points) == 8 and file.parts[0].closed
@@ -244,17 +251,21 @@ def test_warm_load_imports_no_mesh_library(tmp_path):
     pytest.importorskip("collada")
     l_shape().export(tmp_path / "l.dae")
     (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"><collision><geometry><mesh filename="l.dae"/></geometry></collision></link></robot>'
+        '<robot name="r"><link name="a"><collision><geometry><mesh '
+        'filename="l.dae"/></geometry></collision></link></robot>'
     )
     program = (
         "import json, sys\n"
         "import collide.scenes\n"
         "light = sorted({name.split('.')[0] for name in sys.modules})\n"
         "scene = collide.scenes.load(sys.argv[1])\n"
-        "print(json.dumps([light, sorted({name.split('.')[0] for name in sys.modules}), len(scene.bodies[0].shape.vertices)]))\n"
+        "print(json.dumps([light, sorted({name.split('.')[0] for name in sys.modules}), "
+        "len(scene.bodies[0].shape.vertices)]))\n"
     )
     for turn in ("cold", "warm"):
-        done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "r.urdf")], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", program, str(tmp_path / "r.urdf")], capture_output=True, text=True, check=True
+        )
         light, loaded, points = json.loads(done.stdout)
         assert points == 12
         assert not {"numba", "yaml", "trimesh", "scipy"} & set(light), "importing collide.scenes is light"

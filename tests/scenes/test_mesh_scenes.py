@@ -150,7 +150,9 @@ def test_the_scene_file_chooses(tmp_path):
     assert kinds == ["ConvexHull", "ConvexHull", "Mesh"], "what a shape says itself counts"
     scene["bodies"][1]["shape"]["mesh"]["as"] = "hulls"
     (tmp_path / "s.json").write_text(json.dumps(scene))
-    with pytest.raises(Exception, match=r"mesh\.as: must be one of mesh, hull, pieces, got 'hulls' \(did you mean 'hull'\?\)"):
+    with pytest.raises(
+        Exception, match=r"mesh\.as: must be one of mesh, hull, pieces, got 'hulls' \(did you mean 'hull'\?\)"
+    ):
         load(tmp_path / "s.json")
 
 
@@ -228,7 +230,9 @@ def test_own_hulls_against_fractions():
             vertices[moved] *= 1 + rng.choice([-1, 1]) * 2.0 ** -rng.integers(30, 53)
         vertices = vertices * [1.0, 1e-3, 0.3, 1e-40][k % 4]
         says = is_own_hull(vertices, faces)
-        assert says == supports_all(vertices, faces), f"case {k}: vertices = {vertices.tolist()}, faces = {faces.tolist()}"
+        assert says == supports_all(vertices, faces), (
+            f"case {k}: vertices = {vertices.tolist()}, faces = {faces.tolist()}"
+        )
         found.append(says)
     assert 20 <= sum(found) <= 100, sum(found)
 
@@ -244,7 +248,10 @@ def test_deep_touching_and_near_meshes_are_told_apart():
     vertices, faces = l_solid()
     L = Mesh(vertices, faces)
     scene = scene_of(
-        ("a", L, np.eye(4)), ("deep", L, pose((0.25, 0.0, 0.25))), ("on top", L, pose((0, 0, -1))), ("near", L, pose((0, 2.01, 0))),
+        ("a", L, np.eye(4)),
+        ("deep", L, pose((0.25, 0.0, 0.25))),
+        ("on top", L, pose((0, 0, -1))),
+        ("near", L, pose((0, 2.01, 0))),
     )
     r = report.make(scene, clearance=0.05)
     assert ("a", "deep") in [(p.a, p.b) for p in r.colliding]
@@ -273,7 +280,9 @@ def test_pairs_that_cannot_be_answered_are_listed_and_the_rest_is_answered(tmp_p
     L = Mesh(*l_solid())
     # The cylinder stands in the notch: hulls meet. The far one is answered by the hulls.
     scene = scene_of(
-        ("a", L, np.eye(4)), ("can", Cylinder(0.2, 0.5), pose((1, 1, 0.5))), ("far", Cylinder(0.2, 0.5), pose((9, 9, 0.5))),
+        ("a", L, np.eye(4)),
+        ("can", Cylinder(0.2, 0.5), pose((1, 1, 0.5))),
+        ("far", Cylinder(0.2, 0.5), pose((9, 9, 0.5))),
         ("b", Box((1, 1, 1)), pose((1, 0.9, 0.5))),
     )
     r = report.make(scene, clearance=0.01)
@@ -326,7 +335,9 @@ def test_a_links_hull_and_meshes_in_compounds_are_found():
     from collide.reports.mesh_notes import is_meshed, meshes_of
 
     L = Mesh(*l_solid())
-    both = Compound([(L, np.eye(4)), (Compound([(L.scaled(2.0), np.eye(4)), (Box((1, 1, 1)), np.eye(4))]), pose((1, 0, 0)))])
+    both = Compound(
+        [(L, np.eye(4)), (Compound([(L.scaled(2.0), np.eye(4)), (Box((1, 1, 1)), np.eye(4))]), pose((1, 0, 0)))]
+    )
     assert list(meshes_of(both)) == [L, L.scaled(2.0)] and is_meshed(both) and not is_meshed(Box((1, 1, 1)))
     assert np.array_equal(np.sort(L.convex_hull.points, axis=0), np.sort(L.vertices, axis=0))
 

@@ -80,8 +80,11 @@ def test_a_link_becomes_one_body(robot_of, tmp_path):
 
 
 def test_srdf_beside_in_the_neighbour_folder_given_and_refused(robot_of, tmp_path):
-    pairs = '<robot name="r"><disable_collisions link1="a" link2="c" reason="Never"/><disable_collisions link1="a" link2="x"/>' \
+    pairs = (
+        '<robot name="r"><disable_collisions link1="a" link2="c" reason="Never"/><disable_collisions link1="a" '
+        'link2="x"/>'
         '<group_state name="up" group="g"><joint name="j" value="0.5"/></group_state></robot>'
+    )
     parts = (link("a", BALL), link("b", BALL), link("c", BALL), joint("j", "a", "b", "revolute", LIMITS),
              joint("k", "b", "c", "continuous"))
     (tmp_path / "urdf").mkdir()
@@ -96,7 +99,9 @@ def test_srdf_beside_in_the_neighbour_folder_given_and_refused(robot_of, tmp_pat
     with pytest.raises(SceneError, match=r"gone\.srdf: no such file"):
         robot_of(*parts, srdf="gone.srdf")
     scene = load(tmp_path / "r.urdf", state="up")
-    assert scene.state == {"j": 0.5, "k": 0.0} and scene.notes[-1].endswith("no value given for k: 0 taken, or the limit nearest to 0")
+    assert scene.state == {"j": 0.5, "k": 0.0} and scene.notes[-1].endswith(
+        "no value given for k: 0 taken, or the limit nearest to 0"
+    )
 
 
 def test_deep_mimic(robot_of):
@@ -176,11 +181,19 @@ def test_missing_mesh_names_everything_and_can_be_skipped(robot_of, tmp_path):
     with pytest.raises(SceneError) as caught:
         robot_of(part)
     text = str(caught.value)
-    for expected in ("r.urdf", 'link "a" collision 1', "package://arm/gone.stl", str(tmp_path / "arm/gone.stl"), "--missing-meshes skip"):
+    for expected in (
+        "r.urdf",
+        'link "a" collision 1',
+        "package://arm/gone.stl",
+        str(tmp_path / "arm/gone.stl"),
+        "--missing-meshes skip",
+    ):
         assert expected in text
     robot = robot_of(part, missing_meshes="skip")
     assert len(robot.geometry["a"]) == 1
-    assert robot.notes == ['r.urdf: link "a" collision 1 has no collision mesh package://arm/gone.stl: that link is NOT checked by it']
+    assert robot.notes == [
+        'r.urdf: link "a" collision 1 has no collision mesh package://arm/gone.stl: that link is NOT checked by it'
+    ]
 
 
 def test_remote_files_are_not_fetched(robot_of):
@@ -225,7 +238,7 @@ def test_declared_leftovers_and_default_namespace(robot_of):
 
 
 BAD = {
-    "no name": ([ "<link/>"], 'link 0: <link> needs a name'),
+    "no name": (["<link/>"], "link 0: <link> needs a name"),
     "no link": ([""], "<robot>: has no <link>"),
     "xacro": (["<xacro:arm/>"], "expand it first"),
     "duplicate": ([link("a"), link("a")], r'link "a": the name is used twice \(links 0 and 1\)'),
@@ -233,18 +246,36 @@ BAD = {
     "cycle": ([link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")], "the joints make a cycle"),
     "unknown link": ([link("a"), joint("j", "a", "z")], 'joint "j": its child is link "z"'),
     "unknown type": ([link("a"), link("b"), joint("j", "a", "b", "bendy")], 'joint "j": unknown type "bendy"'),
-    "no child": ([link("a"), '<joint name="j" type="fixed"><parent link="a"/></joint>'], 'joint "j": needs <child link'),
-    "zero axis": ([link("a"), link("b"), joint("j", "a", "b", "continuous", '<axis xyz="0 0 0"/>')], r'joint "j": axis \[0.0, 0.0, 0.0\]'),
-    "NaN": ([link("a", collision('<box size="1 nan 1"/>'))], 'link "a": <box> size must be 3 finite numbers, got "1 nan 1"'),
+    "no child": (
+        [link("a"), '<joint name="j" type="fixed"><parent link="a"/></joint>'],
+        'joint "j": needs <child link',
+    ),
+    "zero axis": (
+        [link("a"), link("b"), joint("j", "a", "b", "continuous", '<axis xyz="0 0 0"/>')],
+        r'joint "j": axis \[0.0, 0.0, 0.0\]',
+    ),
+    "NaN": (
+        [link("a", collision('<box size="1 nan 1"/>'))],
+        'link "a": <box> size must be 3 finite numbers, got "1 nan 1"',
+    ),
     "count": ([link("a", collision('<box size="1 1"/>'))], '<box> size must be 3 finite numbers, got "1 1"'),
-    "text": ([link("a", collision('<sphere radius="${r}"/>'))], 'must be one finite number, got "\\${r}"; expand the xacro first'),
+    "text": (
+        [link("a", collision('<sphere radius="${r}"/>'))],
+        'must be one finite number, got "\\${r}"; expand the xacro first',
+    ),
     "negative": ([link("a", collision('<sphere radius="-1"/>'))], 'link "a": Sphere: radius must be > 0'),
-    "no attribute": ([link("a", collision('<cylinder radius="1"/>'))], '<cylinder> needs length='),
-    "origin": ([link("a", collision('<sphere radius="1"/>', '<origin xyz="0 0"/>'))], 'link "a": <origin> xyz must be 3 finite'),
+    "no attribute": ([link("a", collision('<cylinder radius="1"/>'))], "<cylinder> needs length="),
+    "origin": (
+        [link("a", collision('<sphere radius="1"/>', '<origin xyz="0 0"/>'))],
+        'link "a": <origin> xyz must be 3 finite',
+    ),
     "unknown shape": ([link("a", collision('<torus r="1"/>'))], "unknown shape <torus>; known are box"),
     "empty geometry": ([link("a", collision(""))], "needs <geometry> with one shape in it, found 0"),
     "two shapes": ([link("a", collision('<sphere radius="1"/><sphere radius="1"/>'))], "found 2"),
-    "zero scale": ([link("a", collision('<mesh filename="t.obj" scale="1 0 1"/>'))], 'scale must not be 0, got "1 0 1"'),
+    "zero scale": (
+        [link("a", collision('<mesh filename="t.obj" scale="1 0 1"/>'))],
+        'scale must not be 0, got "1 0 1"',
+    ),
     "no filename": ([link("a", collision("<mesh/>"))], "<mesh> needs a filename"),
     "broken": (["<link"], "is not well-formed XML"),
 }

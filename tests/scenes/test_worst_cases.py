@@ -57,8 +57,11 @@ def cross_beyond(points, f, g) -> bool:
         return meet(points[sides[0]], points[list(g)]) or meet(points[sides[1]], points[list(f)])
     (c,), (d,) = (set(f) - shared, set(g) - shared)
     a, b = sorted(shared)
-    return meet(points[[a, c]], points[[b, d]]) or meet(points[[b, c]], points[[a, d]]) or meet(points[[c]], points[list(g)]) or meet(
-        points[[d]], points[list(f)]
+    return (
+        meet(points[[a, c]], points[[b, d]])
+        or meet(points[[b, c]], points[[a, d]])
+        or meet(points[[c]], points[list(g)])
+        or meet(points[[d]], points[list(f)])
     )
 
 
@@ -100,7 +103,11 @@ def test_every_string_meets_every_other_in_one_point(name):
         on_saddle = [t[np.isclose(t[:, 2], t[:, 0] * t[:, 1], rtol=1e-12, atol=0.0)] for t in (a, b)]
         assert all(len(t) == 2 for t in on_saddle) and meet(*on_saddle), "they meet where the strings cross"
     for gap, count in ((2.0**-40, 0), (-(2.0**-40), None)):
-        lifted = [p for p in near_pairs(B, A, (0, 0, gap)) if meet(B.vertices[B.faces[p[0]]], A.vertices[A.faces[p[1]]], (0, 0, gap))]
+        lifted = [
+            p
+            for p in near_pairs(B, A, (0, 0, gap))
+            if meet(B.vertices[B.faces[p[0]]], A.vertices[A.faces[p[1]]], (0, 0, gap))
+        ]
         assert len(lifted) == count if count is not None else len(lifted) >= (2 * strings) ** 2
 
 
@@ -108,7 +115,9 @@ def test_strings_lie_on_the_saddle_exactly():
     for mesh, strings in ((harpsicordion(40, 20.0), 40), (accordion(33), 33), (chazelle(20), 20)):
         exactly = [p for p in mesh.vertices.tolist() if Fraction(p[2]) == Fraction(p[0]) * Fraction(p[1])]
         assert len(exactly) >= 2 * strings, "both ends of every string"
-        assert len({x for x, y, _ in exactly if y > 0}) >= strings and len({x for x, y, _ in exactly if y < 0}) >= strings
+        assert (
+            len({x for x, y, _ in exactly if y > 0}) >= strings and len({x for x, y, _ in exactly if y < 0}) >= strings
+        )
 
 
 @pytest.mark.parametrize(("strings", "stretch"), [(2, 6.0), (5, 6.0), (20, 8.0), (30, 10.0), (60, 25.0), (100, 100.0)])
@@ -210,14 +219,20 @@ def test_box_pairs_of_others_grow_like_the_square(make):
 
 def test_being_apart_saves_nothing():
     """Theorem 4.2: the boxes of strings that pass each other meet."""
-    for A, B in (harpsicordia(2000, 10.0)[:2], (accordion(64), below(accordion(64))), (chazelle(64), below(chazelle(64)))):
+    for A, B in (
+        harpsicordia(2000, 10.0)[:2],
+        (accordion(64), below(accordion(64))),
+        (chazelle(64), below(chazelle(64))),
+    ):
         assert box_pairs(A, B, 1e-12) > 0.95 * box_pairs(A, B)
 
 
 # --- as scenes --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "size"), [("harpsicordia", {"n": 200}), ("accordions", {"strings": 5}), ("chazelle", {"strings": 5})])
+@pytest.mark.parametrize(
+    ("name", "size"), [("harpsicordia", {"n": 200}), ("accordions", {"strings": 5}), ("chazelle", {"strings": 5})]
+)
 def test_generated_scenes(name, size):
     scene = generate(name, seed=3, gap=0.25, **size)
     upper, lower = scene.bodies
@@ -230,7 +245,8 @@ def test_generated_scenes(name, size):
 
 def test_numbers_that_make_none():
     for ask in (
-        lambda: harpsicordion(0), lambda: harpsicordion(3, 5.0), lambda: harpsicordion(3, math.nan), lambda: harpsicordion(2000, 6.0),
+        lambda: harpsicordion(0), lambda: harpsicordion(3, 5.0), lambda: harpsicordion(3, math.nan),
+        lambda: harpsicordion(2000, 6.0),
         lambda: accordion(True), lambda: chazelle("many"), lambda: harpsicordia(1000, 10.0, math.inf),
         lambda: harpsicordia(1000, 10.0, -1.0), lambda: harpsicordia(10**6, 10.0, 1e15),
     ):  # fmt: skip

@@ -11,6 +11,7 @@ import pytest
 from naive import Case, random_pose, rng_of
 
 import collide
+from collide.lowering.parts import parts_of
 
 EYE = np.eye(4)
 
@@ -59,7 +60,7 @@ def test_copies_are_equal_and_read_only(name, way):
     shape = shapes()[name]
     for used in (False, True):  # before and after a query has packed it
         if used:
-            shape.parts()
+            parts_of(shape)
         for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1) if way == "pickle" else (0,):
             other = {
                 "pickle": lambda p=protocol: pickle.loads(pickle.dumps(shape, p)),
@@ -105,7 +106,7 @@ def test_negative_zero_is_zero():
 def test_the_hash_does_not_need_what_a_query_builds():
     shape = shapes()["HPolytope"]
     before = hash(shape)
-    shape.parts()
+    parts_of(shape)
     assert hash(shape) == before
 
 

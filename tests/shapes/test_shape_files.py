@@ -1,6 +1,7 @@
 """Shapes in files and pickles: they come back as they were, and nothing in them is believed that proofs rest on.
 
-Every stored array is forged in every way below, with a right digest: what comes out is refused as no shape, or is the shape
+Every stored array is forged in every way below, with a right digest: what comes out is refused as no shape, or is the
+shape
 that its constructor makes of the same numbers, bit by bit. Arrays that older files carried besides change nothing.
 """
 
@@ -20,6 +21,8 @@ import surfaces
 
 import collide
 from collide import ConvexHull, InvalidShape, Mesh
+from collide.lowering.parts import convex_set_of
+from collide.lowering.prepared_structures import support_tree_of
 from collide.shapes.shape_files import _digest
 
 EYE = np.eye(4)
@@ -99,7 +102,11 @@ def test_files_and_pickles_bring_shapes_back(kind, tmp_path):
     shape = shapes()[kind]
     expected = answers(shape)
     shape.save(tmp_path / "file.npz")
-    for other in (type(shape).load(tmp_path / "file.npz"), type(shape).load(str(tmp_path / "file.npz")), pickle.loads(pickle.dumps(shape))):
+    for other in (
+        type(shape).load(tmp_path / "file.npz"),
+        type(shape).load(str(tmp_path / "file.npz")),
+        pickle.loads(pickle.dumps(shape)),
+    ):
         assert other == shape and answers(other) == expected
         assert getattr(other, "scale", 1.0) == getattr(shape, "scale", 1.0)
     assert copy.copy(shape) is shape and copy.deepcopy([shape])[0] is shape
@@ -137,9 +144,12 @@ def old_arrays(shape) -> dict[str, np.ndarray]:
         tree = shape.base.tree
         stamp = np.array([1, tree.exponent, tree.depth], dtype=np.int64)
         return {"mesh_tree": stamp, "mesh_nodes": tree.nodes, "mesh_order": tree.ids, "mesh_centre": tree.centre}
-    tree = shape._tree.tree
+    tree = support_tree_of(convex_set_of(shape)).tree
     names = ("nodes", "owners", "entries", "ring_starts", "ring", "list_coordinates")
-    return {"tree_support_tree": np.array([1, tree.flat, tree.depth]), **{f"tree_{name}": getattr(tree, name) for name in names}}
+    return {
+        "tree_support_tree": np.array([1, tree.flat, tree.depth]),
+        **{f"tree_{name}": getattr(tree, name) for name in names},
+    }
 
 
 @pytest.mark.parametrize("kind", ["mesh", "scaled mesh", "hull", "rounded hull"])
@@ -226,8 +236,12 @@ def damages(path):
         "an array besides": (changed("extra.npy", files[points]), "another format"),
         "an array less": (lambda: zipped(path, {k: v for k, v in files.items() if k != points}), "another format"),
         "a newer array format": (changed(points, files[points][:6] + b"\x03" + files[points][7:]), "another format"),
-        "encrypted": (lambda: [with_patch(path, b"PK\x01\x02", 8, 1), with_patch(path, b"PK\x03\x04", 6, 1)], "another format"),
-        "compression 99": (lambda: [with_patch(path, b"PK\x01\x02", 10, 99), with_patch(path, b"PK\x03\x04", 8, 99)], "another format"),
+        "encrypted": (
+            lambda: [with_patch(path, b"PK\x01\x02", 8, 1), with_patch(path, b"PK\x03\x04", 6, 1)], "another format",
+        ),
+        "compression 99": (
+            lambda: [with_patch(path, b"PK\x01\x02", 10, 99), with_patch(path, b"PK\x03\x04", 8, 99)], "another format",
+        ),
         "empty": (lambda: path.write_bytes(b""), r"scenes\.load"),
         "another kind": (lambda: path.write_bytes(b"solid ascii stl\nendsolid\n"), r"scenes\.load"),
         "half a file": (lambda: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]), "no file that"),
@@ -241,8 +255,10 @@ def header_of(array) -> bytes:
     return out.getvalue()
 
 
-KINDS = sorted(["compressed", "a huge array", "a negative array", "objects", "a header that is no header", "a header of code",
-    "cut short", "only magic", "nothing in it", "an array besides", "an array less", "a newer array format", "encrypted",
+KINDS = sorted(["compressed", "a huge array", ("a negative "
+"array"), "objects", "a header that is no header", "a header of code",
+    "cut short", "only magic", "nothing in it", "an array besides", "an array less", "a newer array format",
+    "encrypted",
     "compression 99", "empty", "another kind", "half a file", "another version"])  # fmt: skip
 
 
@@ -279,7 +295,9 @@ def test_any_flipped_byte_is_refused_or_harmless(tmp_path):
 def test_a_small_file_asks_for_little_memory(tmp_path):
     """A member of zeros, packed a thousand times smaller: refused by its header."""
     path = tmp_path / "bomb.npz"
-    np.savez_compressed(path, points=np.zeros((2_000_000, 3)), radius=np.array(0.0), format=np.array(1), digest=np.zeros(16, np.uint8))
+    np.savez_compressed(
+        path, points=np.zeros((2_000_000, 3)), radius=np.array(0.0), format=np.array(1), digest=np.zeros(16, np.uint8)
+    )
     assert path.stat().st_size < 100_000
     tracemalloc.start()
     for kind in (ConvexHull, Mesh):

@@ -125,14 +125,19 @@ def test_few_vertices_where_little_is_asked():
 
 
 def test_meshes_come_as_they_are():
-    corners, sides = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    corners, sides = (
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]],
+        [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+    )
     mesh = Mesh(corners, sides)
     found = collide.tessellate(mesh)
     assert np.array_equal(found.vertices, corners) and np.array_equal(found.faces, sides) and found.deviation == 0.0
 
 
 def test_compounds_are_their_parts_where_they_stand():
-    compound = Compound([(Box((1, 1, 1)), pose((5, 0, 0))), (Compound([(Sphere(0.5), pose((0, 3, 0)))]), pose((0, 0, 1)))])
+    compound = Compound(
+        [(Box((1, 1, 1)), pose((5, 0, 0))), (Compound([(Sphere(0.5), pose((0, 3, 0)))]), pose((0, 0, 1)))]
+    )
     vertices, faces = collide.tessellate(compound)
     parts = [collide.tessellate(Box((1, 1, 1))), collide.tessellate(Sphere(0.5))]
     assert volume(vertices, faces) == pytest.approx(sum(volume(*part) for part in parts))
@@ -160,8 +165,17 @@ def test_halfspaces_need_a_size():
     assert len(collide.tessellate(Compound([(floor, pose())]), size=1.0).faces) == 2
 
 
-@pytest.mark.parametrize("arguments", [{"tolerance": 0.0}, {"tolerance": -1}, {"tolerance": math.nan}, {"size": math.inf},
-                                       {"tolerance": "fine"}, {"tolerance": True}])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"tolerance": 0.0},
+        {"tolerance": -1},
+        {"tolerance": math.nan},
+        {"size": math.inf},
+        {"tolerance": "fine"},
+        {"tolerance": True},
+    ],
+)
 def test_what_is_no_length_is_refused_by_name(arguments):
     with pytest.raises(InvalidArgument, match=next(iter(arguments))):
         collide.tessellate(Sphere(1.0), **arguments)

@@ -4,8 +4,8 @@
     python tests/soak/soak.py --seed 1 --case 1234          one case again, with its code
 
 Pairs and poses are drawn in `soak_pairs.py`, what is asked of each is in `soak_judges.py`, and the truth comes from
-`curved_oracle.py`, which shares no code with the engine. Prints failures as they come, with code that asks again, and at
-the end how many there were of each promise and of each pair of kinds. Ends with status 1 where anything failed.
+`curved_oracle.py`, which shares no code with the engine. Prints failures as they come, with code that asks again, and
+at the end how many there were of each promise and of each pair of kinds. Ends with status 1 where anything failed.
 """
 
 from __future__ import annotations
@@ -67,10 +67,16 @@ class Tally:
     def summary(self) -> str:
         total, failed = sum(self.pairs.values()), sum(self.failed.values())
         lines = [
-            (f"{failed}/{total} pairs failed: {self.truths[False]} apart, {self.truths[True]} hits, {self.truths[None]} open; "
-            f"the oracle was as sharp as the engine in {self.told}"),
+            (
+                f"{failed}/{total} pairs failed: {self.truths[False]} apart, {self.truths[True]} hits, "
+                f"{self.truths[None]} open; "
+                f"the oracle was as sharp as the engine in {self.told}"
+            ),
             "",
-            *(f"{self.failed[kinds]:6d}/{count:<6d} {kinds[0]} | {kinds[1]}" for kinds, count in sorted(self.pairs.items())),
+            *(
+                f"{self.failed[kinds]:6d}/{count:<6d} {kinds[0]} | {kinds[1]}"
+                for kinds, count in sorted(self.pairs.items())
+            ),
             "",
         ]
         for promise, cases in sorted(self.promises.items(), key=lambda item: -len(item[1])):
@@ -80,7 +86,9 @@ class Tally:
         return "\n".join(lines if self.promises else [*lines, "no promise was broken"])
 
 
-def soak(seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs: int | None = None, say=print, save=None) -> Tally:
+def soak(
+    seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs: int | None = None, say=print, save=None
+) -> Tally:
     """Judge cases 0, 1, 2 … until the time is up or so many are judged."""
     tally, began, told = Tally(), time.monotonic(), time.monotonic()
     number, group = 0, []
@@ -104,7 +112,8 @@ def soak(seed: int, ratio: float, kinds, *, minutes: float = float("inf"), pairs
 def _group_code(seed: int, ratio: float, kinds, group) -> str:
     numbers = [case.number for case in group]
     return (
-        "import sys, numpy as np, collide as C; sys.path[:0] = ['tests/soak', 'tests/oracles']\nfrom soak_pairs import draw\n"
+        "import sys, numpy as np, collide as C; sys.path[:0] = ['tests/soak', 'tests/oracles']\nfrom soak_pairs "
+        "import draw\n"
         f"cases = [draw({seed}, k, {ratio!r}, {tuple(kinds)!r}) for k in {numbers}]\n"
     )
 

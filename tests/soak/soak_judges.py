@@ -24,7 +24,8 @@ from collide.results import FIELDS, HOW, flipped
 
 #: Of the size and of coordinates: what points of gaps and normals may be off by rounding; points of overlaps.
 FEW_ULPS, POINTS = 64 * 2.0**-53, 1e-12
-#: Points of bodies with a cylinder, cone or ellipsoid nearer than rounding: what the search for depths stops at, 2⁻³⁶ of the size.
+#: Points of bodies with a cylinder, cone or ellipsoid nearer than rounding: what the search for depths stops at, 2⁻³⁶
+#: of the size.
 CURVED_POINTS = 2.0**-36
 UNDECIDED = HOW.index("undecided")
 #: Poses of the ladder of booleans along the normal.
@@ -72,7 +73,9 @@ class Asked:
 
     @cached_property
     def one_convex(self) -> bool:
-        return all(len(pieces(s)) == 1 and not any(isinstance(p, collide.Mesh) for p in pieces(s)) for s in self.pair[:2])
+        return all(
+            len(pieces(s)) == 1 and not any(isinstance(p, collide.Mesh) for p in pieces(s)) for s in self.pair[:2]
+        )
 
     @cached_property
     def curved(self) -> bool:
@@ -135,7 +138,10 @@ def judge_bracket(asked: Asked) -> Iterator[Failure]:
         if r.how == UNDECIDED or (r.upper <= 0) != r.hit:
             yield asked.failed("certified proves the sign", "")
         elif wide is None or Decimal(r.upper) - Decimal(r.lower) > wide:
-            yield asked.failed("certified keeps the width promised", f"width {r.upper - r.lower:.3g}, promised {wide and float(wide):.3g}")
+            yield asked.failed(
+                "certified keeps the width promised",
+                f"width {r.upper - r.lower:.3g}, promised {wide and float(wide):.3g}",
+            )
 
 
 def judge_normal(asked: Asked) -> Iterator[Failure]:
@@ -160,10 +166,14 @@ def judge_points(asked: Asked) -> Iterator[Failure]:
     for name, shape, X in (("point_a", asked.case.A, asked.case.X_WA), ("point_b", asked.case.B, asked.case.X_WB)):
         away = curved_oracle.away_from(shape, X, getattr(r, name))
         rounding = CURVED_POINTS if asked.curved else POINTS
-        allowed = (rounding if r.certified else 1e-10) * asked.coordinates + (1 if r.certified else 4) * (r.upper - r.lower)
+        allowed = (rounding if r.certified else 1e-10) * asked.coordinates + (1 if r.certified else 4) * (
+            r.upper - r.lower
+        )
         if not away <= allowed:
             sure = "certified " if r.certified else "uncertified "
-            yield asked.failed(f"{sure}points lie on their bodies", f"{name} is off by {away:.3g}, allowed {allowed:.3g}")
+            yield asked.failed(
+                f"{sure}points lie on their bodies", f"{name} is off by {away:.3g}, allowed {allowed:.3g}"
+            )
 
 
 def judge_move(asked: Asked) -> Iterator[Failure]:
@@ -196,7 +206,11 @@ def judge_swapped(asked: Asked) -> Iterator[Failure]:
         return
     swapped = flipped(asked.engine.distance(B, A, X_WB, X_WA).rows)  # type: ignore[operator]
     if differ := same_bits(asked.r.rows, swapped, skip=("a", "b")):
-        yield asked.failed("swapped arguments, mirrored bits", f"differ: {differ}", "r, s = C.distance(A, B, X_WA, X_WB), C.distance(B, A, X_WB, X_WA)")
+        yield asked.failed(
+            "swapped arguments, mirrored bits",
+            f"differ: {differ}",
+            "r, s = C.distance(A, B, X_WA, X_WB), C.distance(B, A, X_WB, X_WA)",
+        )
     if asked.engine.collide(B, A, X_WB, X_WA) != asked.engine.collide(*asked.pair):  # type: ignore[operator]
         yield asked.failed("swapped booleans", "", "C.collide(A, B, X_WA, X_WB), C.collide(B, A, X_WB, X_WA)")
 
@@ -214,14 +228,24 @@ def judge_ladder(asked: Asked) -> Iterator[Failure]:
     # Depths of meshes take milliseconds each: gaps alone along the ladder.
     rows = asked.engine.distance(A, B, X_WA, X_WBs, signed=not meshed).rows  # type: ignore[operator]
     if not meshed and (differ := same_bits(asked.r.rows, rows[:1])):
-        yield asked.failed("batch and single, the same bits", f"differ: {differ}", f"X_WBs = np.repeat(X_WB[None], {RUNGS}, axis=0)\nr, s = C.distance(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WBs)")
+        yield asked.failed(
+            "batch and single, the same bits",
+            f"differ: {differ}",
+            f"X_WBs = np.repeat(X_WB[None], {RUNGS}, axis=0)\nr, s = C.distance(A, B, X_WA, X_WB), C.distance(A, B, "
+            f"X_WA, X_WBs)",
+        )
     hits = asked.engine.collide(A, B, X_WA, X_WBs)  # type: ignore[operator]
     if hits[0] != asked.engine.collide(*asked.pair):  # type: ignore[operator]
-        yield asked.failed("batch and single booleans", "", "C.collide(A, B, X_WA, X_WB), C.collide(A, B, X_WA, X_WB[None])")
+        yield asked.failed(
+            "batch and single booleans", "", "C.collide(A, B, X_WA, X_WB), C.collide(A, B, X_WA, X_WB[None])"
+        )
     wrong = (hits != rows["hit"]) & (rows["how"] != UNDECIDED)
     for k in np.flatnonzero(wrong)[:1]:
-        ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\nC.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB{', signed=False' if meshed else ''})"
-        found = f"{int(wrong.sum())} of {RUNGS}: collide {hits[k]}, distance in [{rows['lower'][k]!r}, {rows['upper'][k]!r}]"
+        signed = ", signed=False" if meshed else ""
+        ask = f"X_WB[:3, 3] = {X_WBs[k, :3, 3].tolist()!r}\n"
+        ask += f"C.collide(A, B, X_WA, X_WB), C.distance(A, B, X_WA, X_WB{signed})"
+        bracket = f"[{rows['lower'][k]!r}, {rows['upper'][k]!r}]"
+        found = f"{int(wrong.sum())} of {RUNGS}: collide {hits[k]}, distance in {bracket}"
         yield asked.failed("collide == distance.hit", found, ask)
 
 
@@ -233,8 +257,14 @@ def judge_unsigned(asked: Asked) -> Iterator[Failure]:
     if u.hit and u.how != UNDECIDED:
         if not u.distance == u.lower == u.upper == 0 or u.normal.any():
             yield asked.failed("signed=False of a hit is 0", f"{u.distance!r} in [{u.lower!r}, {u.upper!r}]", ask)
-    elif Decimal(u.lower) > max(truth.upper, Decimal(0)) or Decimal(u.upper) < truth.lower or not u.lower <= u.distance <= u.upper:
-        yield asked.failed("signed=False: lower <= truth <= upper", f"{u.distance!r} in [{u.lower!r}, {u.upper!r}]", ask)
+    elif (
+        Decimal(u.lower) > max(truth.upper, Decimal(0))
+        or Decimal(u.upper) < truth.lower
+        or not u.lower <= u.distance <= u.upper
+    ):
+        yield asked.failed(
+            "signed=False: lower <= truth <= upper", f"{u.distance!r} in [{u.lower!r}, {u.upper!r}]", ask
+        )
 
 
 # --- limits, margins, worlds -------------------------------------------------------------------------
@@ -244,8 +274,12 @@ def limits(asked: Asked, random) -> list[float]:
     """Limits about the distance, of its order, and of the sizes of the pair."""
     r, found = asked.r, []
     if r.distance > 0:
-        found.append(float(np.nextafter(max(float(asked.truth.upper), 0.0), math.inf)))  # the truth is within, if only just
-        found += [r.distance * f for f in (random.uniform(0.1, 0.99), 1 - 1e-9, 1 + 1e-9, random.uniform(1.01, 3), 10.0)]
+        found.append(
+            float(np.nextafter(max(float(asked.truth.upper), 0.0), math.inf))
+        )  # the truth is within, if only just
+        found += [
+            r.distance * f for f in (random.uniform(0.1, 0.99), 1 - 1e-9, 1 + 1e-9, random.uniform(1.01, 3), 10.0)
+        ]
     return [*found, 0.0, asked.S * 10.0 ** random.uniform(-12, 0.5)]
 
 
@@ -282,7 +316,11 @@ def judge_world(asked: Asked) -> Iterator[Failure]:
     text = "w = C.World(); w.add(A, X_WA); w.add(B, X_WB)\n"
     hits = world.collisions().rows
     if world.collides() != bool(len(hits)):
-        yield asked.failed("World.collides() == any collisions()", f"collides {world.collides()}, {len(hits)} rows", text + "w.collides(), len(w.collisions())")
+        yield asked.failed(
+            "World.collides() == any collisions()",
+            f"collides {world.collides()}, {len(hits)} rows",
+            text + "w.collides(), len(w.collisions())",
+        )
     if asked.hit is not None and bool(len(hits)) != asked.hit and not (len(hits) and hits["how"][0] == UNDECIDED):
         yield asked.failed("World.collisions() is right", f"{len(hits)} rows", text + "len(w.collisions())")
     for limit in limits(asked, np.random.default_rng([8, asked.case.number])):
@@ -295,7 +333,11 @@ def judge_world(asked: Asked) -> Iterator[Failure]:
         if len(rows):
             q = asked.engine.distance(A, B, X_WA, X_WB, max_distance=limit).rows  # type: ignore[operator]
             if differ := same_bits(rows, q, skip=("a", "b", "iterations")):
-                yield asked.failed("a World's row, the bits of distance", f"limit {limit!r}: {differ}", ask + f", C.distance(A, B, X_WA, X_WB, max_distance={limit!r}).rows")
+                yield asked.failed(
+                    "a World's row, the bits of distance",
+                    f"limit {limit!r}: {differ}",
+                    ask + f", C.distance(A, B, X_WA, X_WB, max_distance={limit!r}).rows",
+                )
 
 
 def judge_contacts(asked: Asked) -> Iterator[Failure]:
@@ -329,19 +371,27 @@ def _contact_failures(asked: Asked, rows) -> Iterator[tuple[str, str]]:
         for name, shape, X in (("point_a", asked.case.A, asked.case.X_WA), ("point_b", asked.case.B, asked.case.X_WB)):
             away = curved_oracle.away_from(shape, X, row[name])
             if not away <= 1e-9 * asked.coordinates + wide:
-                yield "contacts: points lie on their bodies", f"row {k}, {name}: off by {away:.3g}, distance {float(d)!r}"
+                yield (
+                    "contacts: points lie on their bodies",
+                    f"row {k}, {name}: off by {away:.3g}, distance {float(d)!r}",
+                )
 
 
 def judge_certificate(asked: Asked) -> Iterator[Failure]:
     """Where there is a certificate, it stands against all vertices in integers."""
-    if asked.random.uniform() < 0.7 or sum(len(getattr(p, "points", ())) for s in asked.pair[:2] for p in pieces(s)) > 100:
+    if (
+        asked.random.uniform() < 0.7
+        or sum(len(getattr(p, "points", ())) for s in asked.pair[:2] for p in pieces(s)) > 100
+    ):
         return
     if asked.r.certificate is None:
         return
     try:
         collide.verify(*asked.pair, asked.r)
     except collide.CertificateRefused as error:
-        yield asked.failed("certificates are accepted", str(error), "r = C.distance(A, B, X_WA, X_WB); C.verify(A, B, X_WA, X_WB, r)")
+        yield asked.failed(
+            "certificates are accepted", str(error), "r = C.distance(A, B, X_WA, X_WB); C.verify(A, B, X_WA, X_WB, r)"
+        )
 
 
 JUDGES = (
@@ -351,7 +401,8 @@ JUDGES = (
 
 
 class Judged(NamedTuple):
-    """failures : (promise, found, text).   apart, hit, open : the truth.   told : the oracle is as sharp as the engine."""
+    """failures : (promise, found, text).   apart, hit, open : the truth.   told : the oracle is as sharp as the
+    engine."""
 
     failures: list[Failure]
     truth: bool | None
@@ -368,15 +419,23 @@ def judge(case: Case, engine: Engine | None = None, judges=JUDGES) -> Judged:
         endless = curved_oracle.bracket(*pair)
         if endless.lower == -Decimal("inf") and engine.collide(*pair):  # type: ignore[operator]
             return Judged([], True, True)
-        return Judged([("only endless overlaps are refused", str(endless), question(case) + "C.distance(A, B, X_WA, X_WB)")], None, True)
+        return Judged(
+            [("only endless overlaps are refused", str(endless), question(case) + "C.distance(A, B, X_WA, X_WB)")],
+            None,
+            True,
+        )
     failures: list[Failure] = []
     for judge_one in judges:
         try:
             failures += judge_one(asked)
         except Exception as error:  # noqa: BLE001 whatever it is, it is a failure
-            failures.append((f"no exception in {judge_one.__name__}", f"{type(error).__name__}: {error}", question(case)))
+            failures.append(
+                (f"no exception in {judge_one.__name__}", f"{type(error).__name__}: {error}", question(case))
+            )
     width = asked.truth.upper - asked.truth.lower
-    return Judged(failures, asked.hit, width <= 2 * max(Decimal(asked.r.upper) - Decimal(asked.r.lower), Decimal(1e-15 * asked.S)))
+    return Judged(
+        failures, asked.hit, width <= 2 * max(Decimal(asked.r.upper) - Decimal(asked.r.lower), Decimal(1e-15 * asked.S))
+    )
 
 
 # --- many pairs at once ------------------------------------------------------------------------------
@@ -389,18 +448,32 @@ def judge_group(cases: list[Case], text: str, engine: Engine | None = None) -> I
     """
     engine = engine or Engine()
     cases = [c for c in cases if not all(isinstance(s, collide.Halfspace) for s in (c.A, c.B))]
-    columns = [c.A for c in cases], [c.B for c in cases], np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])
+    columns = (
+        [c.A for c in cases],
+        [c.B for c in cases],
+        np.array([c.X_WA for c in cases]),
+        np.array([c.X_WB for c in cases]),
+    )
     singles = np.concatenate([engine.distance(c.A, c.B, c.X_WA, c.X_WB).rows for c in cases])  # type: ignore[operator]
-    lists = "[c.A for c in cases], [c.B for c in cases], np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])"
+    lists = "[c.A for c in cases], [c.B for c in cases], "
+    lists += "np.array([c.X_WA for c in cases]), np.array([c.X_WB for c in cases])"
     for threads in (1, 2):
         rows = engine.distance(*columns, threads=threads).rows  # type: ignore[operator]
         if differ := same_bits(rows, singles):
             where = [c.number for c, one, other in zip(cases, rows, singles) if same_bits(one, other)]
-            yield f"lists of shapes in {threads} threads, the bits of singles", f"{differ} in cases {where}", text + f"C.distance({lists}, threads={threads})"
+            yield (
+                f"lists of shapes in {threads} threads, the bits of singles",
+                f"{differ} in cases {where}",
+                text + f"C.distance({lists}, threads={threads})",
+            )
     hits = engine.collide(*columns)  # type: ignore[operator]
     alone = np.array([engine.collide(c.A, c.B, c.X_WA, c.X_WB) for c in cases])  # type: ignore[operator]
     if (hits != alone).any():
-        yield "booleans of lists of shapes, those of singles", f"cases {[c.number for c in np.array(cases, dtype=object)[hits != alone]]}", text + f"C.collide({lists})"
+        yield (
+            "booleans of lists of shapes, those of singles",
+            f"cases {[c.number for c in np.array(cases, dtype=object)[hits != alone]]}",
+            text + f"C.collide({lists})",
+        )
     yield from _world_failures(cases, text, engine)
 
 
@@ -410,7 +483,8 @@ def _world_failures(cases: list[Case], text: str, engine: Engine) -> Iterator[Fa
     world = engine.World()  # type: ignore[operator]
     for shape, X in bodies:
         world.add(shape, X)
-    text += "w = C.World()\nfor c in cases:\n    for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)):\n        isinstance(s, C.Halfspace) or w.add(s, X)\n"
+    text += "w = C.World()\nfor c in cases:\n    for s, X in ((c.A, c.X_WA), (c.B, c.X_WB)):\n"
+    text += "        isinstance(s, C.Halfspace) or w.add(s, X)\n"
     limit = float(np.median([size_of(c) for c in cases])) * 0.1
     rows = world.distances(limit).rows
     found = {(int(row["a"]), int(row["b"])): row for row in rows}
@@ -424,7 +498,11 @@ def _world_failures(cases: list[Case], text: str, engine: Engine) -> Iterator[Fa
             elif q["lower"][0] > limit or same_bits(row, q, skip=("a", "b", "iterations")):
                 other.append((i, j))
     if lost or found:
-        yield "a World has the rows of its pairs", f"{told}; lost {lost}, of no pair {list(found)}", text + f"w.distances({limit!r}).rows"
+        yield (
+            "a World has the rows of its pairs",
+            f"{told}; lost {lost}, of no pair {list(found)}",
+            text + f"w.distances({limit!r}).rows",
+        )
     if other:
         yield "a World has the bits of its pairs", f"{told}; pairs {other}", text + f"w.distances({limit!r}).rows"
     if world.collides() != bool(len(world.collisions())):

@@ -1,4 +1,5 @@
-"""Random pairs of shapes for `soak.py`: every ordered pair of kinds, sizes far apart, poses near touching on purpose."""
+"""Random pairs of shapes for `soak.py`: every ordered pair of kinds, sizes far apart, poses near touching on
+purpose."""
 
 from __future__ import annotations
 
@@ -143,7 +144,9 @@ def _flat_hull(lengths, random):
     points[:, 2] = 0.0
     if random.uniform() < 0.3:
         points[:, 1] = 0.0
-    return collide.ConvexHull(points, radius=0.0 if random.uniform() < 0.6 or np.abs(points).max() == 0 else float(min(lengths) / 4))
+    return collide.ConvexHull(
+        points, radius=0.0 if random.uniform() < 0.6 or np.abs(points).max() == 0 else float(min(lengths) / 4)
+    )
 
 
 def _h_polytope(lengths, random):
@@ -168,7 +171,10 @@ def ball_facets(rings: int = 5, sides: int = 7):
     points = [(0.0, 0.0, -1.0)]
     for k in range(1, rings):
         z = -math.cos(math.pi * k / rings)
-        points += [(math.sqrt(1 - z * z) * math.cos(t), math.sqrt(1 - z * z) * math.sin(t), z) for t in np.arange(sides) * 2 * math.pi / sides]
+        points += [
+            (math.sqrt(1 - z * z) * math.cos(t), math.sqrt(1 - z * z) * math.sin(t), z)
+            for t in np.arange(sides) * 2 * math.pi / sides
+        ]
     points.append((0.0, 0.0, 1.0))
     top, faces = len(points) - 1, []
     for s in range(sides):
@@ -256,7 +262,9 @@ def source(shape) -> str:
     """Python text that makes a shape, with its exact numbers."""
     kind = type(shape).__name__
     if kind == "Compound":
-        return "C.Compound([" + ", ".join(f"({source(item)}, np.array({X.tolist()!r}))" for item, X in shape.items) + "])"
+        return (
+            "C.Compound([" + ", ".join(f"({source(item)}, np.array({X.tolist()!r}))" for item, X in shape.items) + "])"
+        )
     if kind == "Mesh":
         return f"C.Mesh({shape.vertices.tolist()!r}, {shape.faces.tolist()!r}, solid={bool(shape.solid)})"
     if kind == "ConvexHull":

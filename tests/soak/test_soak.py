@@ -1,4 +1,5 @@
-"""Some pairs of the soak, and that it notices a wrong engine. `python tests/soak/soak.py --minutes 5` judges many more."""
+"""Some pairs of the soak, and that it notices a wrong engine. `python tests/soak/soak.py --minutes 5` judges many
+more."""
 
 from __future__ import annotations
 
@@ -33,7 +34,9 @@ def test_pairs_of_all_kinds_keep_every_promise():
         truths[judged.truth] += 1
         sharp += judged.told
         for promise, found, _ in judged.failures:
-            failures.append(f"python tests/soak/soak.py --seed {seed} --case {number}   # {case.kinds}: {promise}: {found}")
+            failures.append(
+                f"python tests/soak/soak.py --seed {seed} --case {number}   # {case.kinds}: {promise}: {found}"
+            )
     assert not failures, "\n".join(failures)
     assert truths[True] >= PAIRS / 5 and truths[False] >= PAIRS / 3 and truths[None] <= PAIRS / 50
     assert sharp >= 0.9 * PAIRS, "the oracle is too coarse to judge the engine"
@@ -147,8 +150,15 @@ def test_a_wrong_boolean_is_noticed():
     noticed = 0
     for number in range(30):
         case = draw(22, number, RATIO)
-        engine = Engine(collide=lambda *a, **k: not np.any(collide.collide(*a, **k)) if np.ndim(a[3]) == 2 else ~collide.collide(*a, **k))
-        noticed += any("collide" in found[0] or "booleans" in found[0] for found in judge(case, engine, (soak_judges.judge_ladder,)).failures)
+        engine = Engine(
+            collide=lambda *a, **k: (
+                not np.any(collide.collide(*a, **k)) if np.ndim(a[3]) == 2 else ~collide.collide(*a, **k)
+            )
+        )
+        noticed += any(
+            "collide" in found[0] or "booleans" in found[0]
+            for found in judge(case, engine, (soak_judges.judge_ladder,)).failures
+        )
     assert noticed >= 27, noticed
 
 
@@ -178,7 +188,9 @@ def test_a_world_that_loses_a_pair_is_noticed():
 
     cases = [draw(24, number, RATIO, ("sphere", "box", "hull")) for number in range(15)]
     found = [judge(case, Engine(World=Forgetful), (soak_judges.judge_world,)).failures for case in cases]
-    assert sum(any(name == "World.distances holds all pairs within" for name, *_ in failures) for failures in found) >= 13
+    assert (
+        sum(any(name == "World.distances holds all pairs within" for name, *_ in failures) for failures in found) >= 13
+    )
 
 
 def test_many_bodies_at_once_and_a_batch_that_mixes_them_up_is_noticed():

@@ -26,7 +26,9 @@ def _scan_all(at_coordinates, size, start, stride, count, at_directions, n, way,
         if way == 1:
             index[i], value[i] = farthest(coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2])
         elif way == 2:
-            index[i], value[i] = farthest_listed(coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2])
+            index[i], value[i] = farthest_listed(
+                coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2]
+            )
         else:
             index[i], value[i] = farthest_one_by_one(
                 coordinates, start, stride, count, g[3 * i], g[3 * i + 1], g[3 * i + 2]
@@ -70,7 +72,8 @@ def check(coordinates, start, stride, count, directions):
         for name, (index, value) in zip(WAYS, got):
             assert (index[i], value[i].tobytes()) == (want[0], np.float64(want[1]).tobytes()), (
                 f"{name}: ({index[i]}, {value[i]!r}), not {want}: coordinates = "
-                f"np.array({coordinates.tolist()}); start, stride, count = {start}, {stride}, {count}; g = {direction.tolist()}"
+                f"np.array({coordinates.tolist()}); start, stride, count = {start}, {stride}, {count}; g = "
+                f"{direction.tolist()}"
             )
 
 

@@ -251,7 +251,8 @@ np.savez(sys.argv[2], ids=extreme_vertices(tree, given["directions"]), **parts)
 @pytest.mark.parametrize("name", ["small sphere", "sphere", "bipyramid"])
 def test_without_compilation_the_bits_are_the_same(name, tmp_path):
     points, facets = {
-        "small sphere": lambda: ellipsoid(100), "sphere": lambda: ellipsoid(400, seed=18), "bipyramid": lambda: bipyramid(250),
+        "small sphere": lambda: ellipsoid(100), "sphere": lambda: ellipsoid(400, seed=18),
+        "bipyramid": lambda: bipyramid(250),
     }[name]()  # fmt: skip
     tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
     directions = directions_for(points, facets, seed=19, each=10)

@@ -9,9 +9,11 @@ import pytest
 
 import collide
 from collide.errors import InvalidShape
+from collide.lowering import prepared_structures
+from collide.lowering.parts import convex_set_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
-from collide.shapes import convex_hull as hull_shape
 from collide.support import lazy_support_tree as planted
 from collide.support.support_tree import SupportTree, list_coordinates_of
 
@@ -26,12 +28,13 @@ def _ball(rng, n, axes=(1, 1, 1)):
 @pytest.fixture()
 def trees_everywhere(monkeypatch):
     """Every hull gets a support tree, however small, so that the hard families meet them."""
-    monkeypatch.setattr(hull_shape, "FEWEST_POINTS", 4)
+    monkeypatch.setattr(prepared_structures, "MIN_FOR_TREE", 4)
     monkeypatch.setattr(planted, "FEWEST_VERTICES", 4)
 
 
 def _planted(shape) -> bool:
-    return getattr(shape, "_tree", None) is not None and shape._tree.tree is not None
+    packed = convex_set_of(shape)
+    return may_have_tree(packed) and support_tree_of(packed).tree is not None
 
 
 @pytest.mark.parametrize("family", names())
@@ -42,16 +45,20 @@ def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
         A, B, X_WA, X_WB = case.shapes()
         with_trees = collide.distance(A, B, X_WA, X_WB)
         trees += _planted(A) + _planted(B)
-        plain = [collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)]
+        plain = [
+            collide.ConvexHull(S.points, radius=S.radius) if isinstance(S, collide.ConvexHull) else S for S in (A, B)
+        ]
         for S in plain:
             if isinstance(S, collide.ConvexHull):
-                object.__setattr__(S, "_tree", None)
+                convex_set_of(S).prepared.with_tree = False
         scanned = collide.distance(*plain, X_WA, X_WB)
         assert with_trees.hit == scanned.hit == collide.collide(A, B, X_WA, X_WB), case.snippet()
         assert max(with_trees.lower, scanned.lower) <= min(with_trees.upper, scanned.upper), case.snippet()
         if with_trees.certificate is not None:
             collide.verify(A, B, X_WA, X_WB, with_trees)
-    if not family.startswith(("box", "halfspace", "swept", "flat", "degenerate", "touch_scaled", "long", "padded", "tiny_m")):
+    if not family.startswith(
+        ("box", "halfspace", "swept", "flat", "degenerate", "touch_scaled", "long", "padded", "tiny_m")
+    ):
         assert trees >= 8, f"{trees} trees in {family}: the test no longer tests them"
 
 
@@ -61,8 +68,10 @@ def test_large_hulls_answer_as_scans_do(axes):
     A, B = (collide.ConvexHull(_ball(rng, 3000, axes)) for _ in range(2))
     scans = [collide.ConvexHull(S.points) for S in (A, B)]
     for S in scans:
-        object.__setattr__(S, "_tree", None)
-    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+        convex_set_of(S).prepared.with_tree = False
+    X_WB = np.array(
+        [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
+    )
     r, scanned = collide.distance(A, B, EYE, X_WB), collide.distance(*scans, EYE, X_WB)
     assert _planted(A) and _planted(B)
     assert 20 < r.hit.sum() < 280 and np.array_equal(r.hit, scanned.hit)
@@ -83,7 +92,11 @@ def test_large_hulls_that_touch_are_decided_exactly():
     B = collide.ConvexHull(slab)
     for z, expected in ((1.5, True), (np.nextafter(1.5, 2), False), (np.nextafter(1.5, 1), True)):
         r = collide.distance(A, B, EYE, collide.pose((0.25, -0.5, z)))
-        assert r.hit is expected and r.how == EXACT and collide.collide(A, B, EYE, collide.pose((0.25, -0.5, z))) is expected
+        assert (
+            r.hit is expected
+            and r.how == EXACT
+            and collide.collide(A, B, EYE, collide.pose((0.25, -0.5, z))) is expected
+        )
         collide.verify(A, B, EYE, collide.pose((0.25, -0.5, z)), r)
     mirrored = collide.ConvexHull(top * (1, 1, -1))
     r = collide.distance(A, mirrored, EYE, collide.pose((0, 0, 3)))
@@ -132,10 +145,10 @@ def test_large_clouds_without_volume(flatten):
 
 def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     A = collide.ConvexHull(_ball(np.random.default_rng(12), 2000))
-    A.parts()
-    assert A._tree._tree is None, "packing alone needs no tree"
+    own_tree = support_tree_of(convex_set_of(A))
+    assert own_tree._tree is None, "packing alone needs no tree"
     seen = []
-    threads = [threading.Thread(target=lambda: seen.append(A._tree.address)) for _ in range(8)]
+    threads = [threading.Thread(target=lambda: seen.append(own_tree.address)) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -145,9 +158,9 @@ def test_trees_are_made_once_when_first_needed_also_by_many_threads():
     B = collide.ConvexHull(A.points)
     world.add(B)
     world.add(B, collide.pose((50, 0, 0)))
-    assert not world.collides() and B._tree._tree is None, "nothing near: nothing to build"
+    assert not world.collides() and "tree" not in convex_set_of(B).prepared.made, "nothing near: nothing to build"
     world.add(collide.Sphere(0.5))
-    assert world.collides() and B._tree._tree is not None
+    assert world.collides() and support_tree_of(convex_set_of(B))._tree is not None
 
 
 def test_given_faces_are_checked_not_trusted():
@@ -179,8 +192,10 @@ def test_bad_proposals_cost_time_not_truth(axes):
     shuffled._tree = SupportTree(
         B.points, tree.flat, tree.depth, tree.nodes, tree.owners, entries, coordinates, tree.ring_starts, tree.ring
     )
-    object.__setattr__(B, "_tree", shuffled)
-    X_WB = np.array([collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)])
+    convex_set_of(B).prepared.made["tree"] = shuffled
+    X_WB = np.array(
+        [collide.pose(_ball(rng, 1)[0] * rng.uniform(0, 3 * max(axes)), rpy=rng.uniform(-3, 3, 3)) for _ in range(300)]
+    )
     good, bad = collide.distance(A, A, EYE, X_WB), collide.distance(A, B, EYE, X_WB)
     assert 30 < good.hit.sum() < 270
     assert np.array_equal(good.hit, bad.hit) and np.array_equal(collide.collide(A, B, EYE, X_WB), good.hit)

@@ -1,4 +1,5 @@
-"""Support trees against brute force in Python integers: settled answers are exact maxima, for every hull and direction."""
+"""Support trees against brute force in Python integers: settled answers are exact maxima, for every hull and
+direction."""
 
 from __future__ import annotations
 
@@ -46,7 +47,9 @@ def _settle_from(tree_at, points_at, n, starts_at, directions_at, m, out_at):
     out = view_f64(out_at, 4 * m)
     for i in range(m):
         if from_view[i] < 0:
-            _, out[4 * i + 1], out[4 * i + 2], out[4 * i + 3] = extreme_vertex(tree_at, g[3 * i], g[3 * i + 1], g[3 * i + 2])
+            _, out[4 * i + 1], out[4 * i + 2], out[4 * i + 3] = extreme_vertex(
+                tree_at, g[3 * i], g[3 * i + 1], g[3 * i + 2]
+            )
             continue
         out[4 * i] = settle_vertex(
             tree_at, int(from_view[i]), g[3 * i], g[3 * i + 1], g[3 * i + 2]
@@ -57,7 +60,9 @@ settle_from = entry("void(int64, int64, int64, int64, int64, int64, int64)")(_se
 
 
 @pytest.mark.own_kernels
-@pytest.mark.parametrize("name", ["sphere", "pancake", "prism", "bipyramid", "cone", "polygon", "gridded box", "gridded square", "lattice"])
+@pytest.mark.parametrize(
+    "name", ["sphere", "pancake", "prism", "bipyramid", "cone", "polygon", "gridded box", "gridded square", "lattice"]
+)
 def test_climbing_from_anywhere_is_exact(name):
     """From vertices that are far from right, apexes of thousands of neighbours and hubs of flat fans among them."""
     points, facets, tree = made(name)
@@ -81,7 +86,13 @@ def test_coordinates_come_with_the_vertex():
     directions = np.random.default_rng(5).normal(size=(200, 3))
     out, starts = np.zeros((200, 4)), np.full(200, -1.0)
     settle_from(
-        tree.address, address_of(tree.points), len(points), address_of(starts), address_of(directions), 200, address_of(out)
+        tree.address,
+        address_of(tree.points),
+        len(points),
+        address_of(starts),
+        address_of(directions),
+        200,
+        address_of(out),
     )
     assert np.array_equal(out[:, 1:], points[extreme_vertices(tree, directions, settled=False)])
 
@@ -110,7 +121,13 @@ def test_no_number_is_no_proof_and_no_endless_loop():
     starts, out = np.zeros(3), np.zeros((3, 4))
     directions = np.array([(np.nan, 1.0, 0.0), (np.inf, 1.0, 0.0), (1.0, np.nan, np.nan)])
     settle_from(
-        tree.address, address_of(tree.points), len(points), address_of(starts), address_of(directions), 3, address_of(out)
+        tree.address,
+        address_of(tree.points),
+        len(points),
+        address_of(starts),
+        address_of(directions),
+        3,
+        address_of(out),
     )
     assert (out[:, 0] == -1).all()
     with pytest.raises(ValueError, match="finite"):

@@ -1,4 +1,5 @@
-"""Points in shapes, decided exactly: against winding numbers in integers for meshes, definitions in fractions elsewhere."""
+"""Points in shapes, decided exactly: against winding numbers in integers for meshes, definitions in fractions
+elsewhere."""
 
 from __future__ import annotations
 
@@ -48,7 +49,12 @@ def test_solids_by_winding():
             got = collide.contains(mesh, X, points)
             for k, point in enumerate(points):
                 want = in_solid(vertices, faces, X, point)
-                assert got[k] == want == collide.contains(mesh, X, point), (vertices.tolist(), faces.tolist(), X.tolist(), point.tolist())
+                assert got[k] == want == collide.contains(mesh, X, point), (
+                    vertices.tolist(),
+                    faces.tolist(),
+                    X.tolist(),
+                    point.tolist(),
+                )
                 if collide.contains(collide.Mesh(vertices, faces, solid=False), X, point):
                     assert want
                 else:
@@ -76,7 +82,9 @@ CURVED = {
     "cone": (collide.Cone(1.0, 2.0), lambda x, y, z: abs(z) <= 1 and x * x + y * y <= ((1 - z) / 2) ** 2),
     "ellipsoid": (collide.Ellipsoid((0.5, 1, 2)), lambda x, y, z: 4 * x * x + y * y + z * z / 4 <= 1),
     "box": (collide.Box((1, 2, 3)), lambda x, y, z: 2 * abs(x) <= 1 and abs(y) <= 1 and 2 * abs(z) <= 3),
-    "capsule": (collide.Capsule(1.25, 2.0), lambda x, y, z: x * x + y * y + max(abs(z) - 1, 0) ** 2 <= Fraction(25, 16)),
+    "capsule": (
+        collide.Capsule(1.25, 2.0), lambda x, y, z: x * x + y * y + max(abs(z) - 1, 0) ** 2 <= Fraction(25, 16),
+    ),
     "corridor": (
         collide.HPolytope([[3, 1, 0], [-3, 0, 1], [0, 7, 1], [0, -1, 0], [1, 0, 3], [0, 0, -1]], [1, 1, 1, 1, 1, 1]),
         lambda x, y, z: 3 * x + y <= 1 and z - 3 * x <= 1 and 7 * y + z <= 1 and -y <= 1 and x + 3 * z <= 1 and -z <= 1,
@@ -90,7 +98,19 @@ def test_other_shapes_by_their_definition(name):
     rng = np.random.default_rng(list(CURVED).index(name))
     points = rng.uniform(-1.3, 1.3, (60, 3))
     # On and next to the surface: Pythagoras, and points pulled onto it.
-    exact = np.array([[0.75, 1, 0], [1, 0.75, 0.5], [1.25, 0, 0], [0, 0, 1.25], [0.5, 0, 0], [0, 0, 2], [0.25, 0.5, 0.5], [0, 0, 1], [0.3, 0.4, 0]])
+    exact = np.array(
+        [
+            [0.75, 1, 0],
+            [1, 0.75, 0.5],
+            [1.25, 0, 0],
+            [0, 0, 1.25],
+            [0.5, 0, 0],
+            [0, 0, 2],
+            [0.25, 0.5, 0.5],
+            [0, 0, 1],
+            [0.3, 0.4, 0],
+        ]
+    )
     points = np.concatenate([points, exact, exact * (1 + 2.0**-52), exact * (1 - 2.0**-52), -exact])
     got = collide.contains(shape, np.eye(4), points)
     want = [holds(*[Fraction(v) for v in p]) for p in points.tolist()]
@@ -117,7 +137,12 @@ def test_unions_and_batches():
 
 def test_what_is_refused():
     mesh = collide.Mesh(*box())
-    for points, words in (((0, np.nan, 0), "not finite"), ((1e51, 0, 0), "exceeds"), ((0, 0), r"\(3,\)"), (["x"] * 3, "numbers")):
+    for points, words in (
+        ((0, np.nan, 0), "not finite"),
+        ((1e51, 0, 0), "exceeds"),
+        ((0, 0), r"\(3,\)"),
+        (["x"] * 3, "numbers"),
+    ):
         with pytest.raises(InvalidArgument, match=words):
             collide.contains(mesh, np.eye(4), points)
     with pytest.raises(InvalidArgument, match="must be a shape"):

@@ -1,7 +1,7 @@
 """`contains` of unions on their surfaces: decided, never refused, and as exact fractions say.
 
-Points are put exactly on parts' surfaces where poses allow it (quarter turns, shifts that are sums of powers of two), and as near
-as rounding gets elsewhere, so that nested poses leave the engine's own proof open.
+Points are put exactly on parts' surfaces where poses allow it (quarter turns, shifts that are sums of powers of two),
+and as near as rounding gets elsewhere, so that nested poses leave the engine's own proof open.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ def random_pose(rng):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_points_on_the_surface_of_a_part(name):
-    """In unions, and unions of unions: the answer is that of exact fractions, and points moved well in or out follow."""
+    """In unions, and unions of unions: the answer is that of exact fractions, and points moved well in or out
+    follow."""
     shape, (rng, point) = SHAPES[name][0], (np.random.default_rng(sorted(SHAPES).index(name)), on_surface(name))
     inside = asked = 0
     for _ in range(12):
@@ -86,7 +87,10 @@ def test_exactly_on_the_surface(name):
     shape, point = SHAPES[name][0], on_surface(name)
     if name in ("sphere", "capsule", "cylinder", "cone", "ellipsoid"):
         point = point * 0 + {"cone": (0.5, 0, 0)}.get(name, (0.5, 0, 0))
-    Y, Z = pose((1, 2, 0.25), R=[[0, -1, 0], [1, 0, 0], [0, 0, 1]]), pose((0.5, 0, 8), R=[[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    Y, Z = (
+        pose((1, 2, 0.25), R=[[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        pose((0.5, 0, 8), R=[[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    )
     union = Compound([(Compound([(shape, Z), (Sphere(0.01), pose((99, 0, 0)))]), Y)])
     world = Y[:3, :3] @ (Z[:3, :3] @ point + Z[:3, 3]) + Y[:3, 3]
     assert contains(union, EYE, world) is True

@@ -74,7 +74,10 @@ def described(points):
     side = cross(n, first)
 
     def angle(p):
-        x, y = Fraction(inner(minus(p, centre), first), inner(first, first)), Fraction(inner(minus(p, centre), side), inner(side, side))
+        x, y = (
+            Fraction(inner(minus(p, centre), first), inner(first, first)),
+            Fraction(inner(minus(p, centre), side), inner(side, side)),
+        )
         # `side` is |n| times as long as `first`: other quadrants' order is the same.
         return np.arctan2(float(y) * float(inner(n, n)) ** 0.5, float(x))
 
@@ -130,7 +133,13 @@ def test_pieces_are_those_of_brute_force(name):
         A, B, X, Y = make(rng)
         A, B = (A[0], A[1][:8]), (B[0], B[1][:8])
         kinds += check(A, B, X, Y)
-    least = {"grid": (5, 5, 1), "flat": (0, 0, 5), "identical": (0, 5, 5), "degenerate": (5, 1, 0), "touching": (5, 0, 0)}
+    least = {
+        "grid": (5, 5, 1),
+        "flat": (0, 0, 5),
+        "identical": (0, 5, 5),
+        "degenerate": (5, 1, 0),
+        "touching": (5, 0, 0),
+    }
     assert (kinds[1:] >= least.get(name, (0, 1, 0))).all(), kinds
 
 
@@ -138,7 +147,11 @@ def polygon_triangulated(rng, n):
     """A triangulation of the square of side 4 with corners on a grid of 16ths: cut again and again."""
     triangles = [np.array([[0, 0], [4, 0], [4, 4.0]]), np.array([[0, 0], [4, 4], [0, 4.0]])]
     while len(triangles) < n:
-        k = int(np.argmax([abs((t[1] - t[0])[0] * (t[2] - t[0])[1] - (t[1] - t[0])[1] * (t[2] - t[0])[0]) for t in triangles]))
+        k = int(
+            np.argmax(
+                [abs((t[1] - t[0])[0] * (t[2] - t[0])[1] - (t[1] - t[0])[1] * (t[2] - t[0])[0]) for t in triangles]
+            )
+        )
         a, b, c = np.roll(triangles.pop(k), rng.integers(3), axis=0)
         middle = np.round((0.5 * a + 0.25 * b + 0.25 * c) * 64) / 64
         triangles += [np.array(t) for t in ((a, b, middle), (b, c, middle), (c, a, middle))]
@@ -181,7 +194,9 @@ def test_swapped_arguments_give_the_same_pieces():
         one, other = collide.overlay(A, B, X, Y), collide.overlay(B, A, Y, X)
         order = np.lexsort((other.pairs[:, 0], other.pairs[:, 1]))
         assert len(one.pairs) > 20 and np.array_equal(one.pairs, other.pairs[order][:, ::-1])
-        assert np.array_equal(one.kind, other.kind[order]) and np.allclose(one.size, other.size[order], rtol=1e-9, atol=1e-12)
+        assert np.array_equal(one.kind, other.kind[order]) and np.allclose(
+            one.size, other.size[order], rtol=1e-9, atol=1e-12
+        )
 
 
 def test_batches_and_shapes():
@@ -206,7 +221,9 @@ def test_facet_pairs_are_those_of_brute_force():
     for name in ("grid", "random", "flat", "degenerate"):
         for _ in range(4):
             A, B, X, Y = FAMILIES[name][0](rng)
-            corners = [[[p[v] for v in f] for f in m[1].tolist()] for m, Z in ((A, X), (B, Y)) for p in [world_points(m[0], Z)]]
+            corners = [
+                [[p[v] for v in f] for f in m[1].tolist()] for m, Z in ((A, X), (B, Y)) for p in [world_points(m[0], Z)]
+            ]
             want = [[i, j] for i, P in enumerate(corners[0]) for j, Q in enumerate(corners[1]) if triangles_meet(P, Q)]
             one, other = (collide.Mesh(*m, solid=False) for m in (A, B))
             got, first = collide.facet_pairs(one, other, X, Y), collide.facet_pairs(one, other, X, Y, first=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, has_facets, is_halfspace
+from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.body_pairs import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
@@ -92,7 +93,7 @@ def _size(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarra
     """(n,) of pairs of parts, as `narrowphase/bounds.py` has it."""
     size = np.sqrt(np.square(PB.X[:, :3, 3] - PA.X[:, :3, 3]).sum(axis=1))
     for shape in (A, B):
-        bound = shape.bounding_parts()[0][0]
+        bound = bounding_parts_of(shape)[0][0]
         size = size + (abs(float(bound.params[3])) if is_halfspace(shape) else bound.reach + bound.radius)
     return size
 

@@ -13,7 +13,7 @@ import numpy as np
 from collide.kernels import kernel
 from collide.mesh.box_overlap import PROBE
 from collide.mesh.bvh import CENTRE, EXPONENT, Box, box_at
-from collide.mesh.triangle import Triangle, normal_of, triangle_at
+from collide.mesh.triangle import Triangle, normal_of, range_along, sum_of_normals, triangle_at
 from collide.narrowphase.facets.filtered_triangles import TINY
 from collide.narrowphase.facets.posed_surfaces import FRAME_SIZE, FRAMES
 from collide.numerics.vec3 import Vec3, absolute, add, cross, divide, dot, max_abs, scale, sub, vec3_at
@@ -131,21 +131,14 @@ def _set_slab(placing, which, tree, run, probe):
     A box around a large triangle across its axes holds whole regions of a finer mesh: where leaves are compared with
     nodes, the slab culls those.
     """
-    begin = 9 * (run >> 3)
-    end = begin + 9 * (run & 7)
-    total = Vec3(0.0, 0.0, 0.0)
-    for at in range(begin, end, 9):
-        total = add(total, normal_of(triangle_at(tree.triangles, at)))
+    first = run >> 3
+    last = first + (run & 7)
+    total = sum_of_normals(tree.triangles, first, last)
     if not max_abs(total) > TINY:
         clear_slab(probe)
         return
     n = divide(total, max_abs(total))
-    low = math.inf
-    high = -math.inf
-    for at in range(begin, end, 3):
-        height = dot(n, sub(vec3_at(tree.triangles, at), vec3_at(tree.numbers, CENTRE)))
-        low = min(low, height)
-        high = max(high, height)
+    low, high = range_along(n, tree.triangles, first, last, vec3_at(tree.numbers, CENTRE))
     unit = math.ldexp(1.0, int(-tree.header[EXPONENT]))
     to_probe = FRAMES + FRAME_SIZE * which
     middle = dot(n, vec3_at(placing, to_probe + 9)) - 0.5 * (low + high) * unit

@@ -26,7 +26,7 @@ from collide.numerics.digits import (
     grid_of,
     lowest_bit,
 )
-from collide.numerics.vec3 import max_abs, sub, vec3_at
+from collide.numerics.vec3 import equal_at, max_abs, sub, vec3_at
 
 #: Digits of a coordinate at most: 2^2900 from the lowest bit to the highest. Coordinates below 1e50 that are
 #: products of two doubles never take more.
@@ -107,8 +107,9 @@ def sign3(pair, i, j, k, m):
         return -1
     choose_exact_frame(pair)
     if state[_EXACT_FRAME] == _IN_A and (
-        _equal(corners, i, j) or _equal(corners, i, k) or _equal(corners, i, m) or _equal(corners, j, k)
-        or _equal(corners, j, m) or _equal(corners, k, m) or _share_a_coordinate(corners, i, j, k, m)
+        equal_at(corners, 3 * i, 3 * j) or equal_at(corners, 3 * i, 3 * k) or equal_at(corners, 3 * i, 3 * m)
+        or equal_at(corners, 3 * j, 3 * k) or equal_at(corners, 3 * j, 3 * m) or equal_at(corners, 3 * k, 3 * m)
+        or _share_a_coordinate(corners, i, j, k, m)
     ):  # fmt: skip
         return 0
     _load_points(pair)
@@ -122,16 +123,6 @@ def sign3(pair, i, j, k, m):
         _component(digits, n, axis, _CROSS)
         add_product(digits, _DOT, _CROSS, 2 * n, _W + axis * n, n, 1)
     return carry(digits, _DOT, 3 * n)
-
-
-@kernel(inline=True)
-def _equal(corners, i, j):
-    """Whether two corners have equal coordinates, as doubles."""
-    return (
-        corners[3 * i] == corners[3 * j]
-        and corners[3 * i + 1] == corners[3 * j + 1]
-        and corners[3 * i + 2] == corners[3 * j + 2]
-    )
 
 
 @kernel(inline=True)
@@ -151,7 +142,7 @@ def shares_a_corner(pair):
         return False
     for i in range(3):
         for j in range(3, 6):
-            if _equal(pair.corners, i, j):
+            if equal_at(pair.corners, 3 * i, 3 * j):
                 return True
     return False
 
@@ -177,7 +168,7 @@ def sign2(pair, axis, i, j, k):
         return -1
     if corners[EXACT_ERROR] == 0.0 and (
         (yj == 0.0 and yk == 0.0) or (zj == 0.0 and zk == 0.0) or (yj == 0.0 and zj == 0.0)
-        or (yk == 0.0 and zk == 0.0) or (yj == yk and zj == zk and _equal(corners, j, k))
+        or (yk == 0.0 and zk == 0.0) or (yj == yk and zj == zk and equal_at(corners, 3 * j, 3 * k))
     ):  # fmt: skip
         return 0
     _load_points(pair)

@@ -268,9 +268,13 @@ def shift_between(XA, XB):
 
 
 @kernel(inline=True)
+def rotate_by_pose(X, a):
+    """R a, for a pose whose rows of R and t are four doubles each."""
+    return Vec3(dot(vec3_at(X, 0), a), dot(vec3_at(X, 4), a), dot(vec3_at(X, 8), a))
+
+
+@kernel(inline=True)
 def put_in_world(X, shift, points, at, out, to):
     """Three points, rotated by a pose X into the world's axes, and shifted."""
     for k in range(0, 9, 3):
-        p = vec3_at(points, at + k)
-        rotated = Vec3(dot(vec3_at(X, 0), p), dot(vec3_at(X, 4), p), dot(vec3_at(X, 8), p))
-        put_vec3(out, to + k, add(rotated, shift))
+        put_vec3(out, to + k, add(rotate_by_pose(X, vec3_at(points, at + k)), shift))

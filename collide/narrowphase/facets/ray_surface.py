@@ -19,13 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
-from collide.mesh.box_overlap import FRAME, PROBE, boxes_meeting
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, NUMBERS, REACH, WIDTH, TreeView, box_at, open_tree
-from collide.mesh.triangle import normal_of, put_triangle, triangle_at
+from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.mesh.box_overlap import boxes_meeting
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, REACH, WIDTH, box_at, open_tree
+from collide.mesh.triangle import normal_of, triangle_at
 from collide.narrowphase.facets.box_probes import clear_slab, put_floats
-from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE, invalidate_pose_cache
-from collide.narrowphase.facets.exact_triangles import MEET, ExactCall, ask_exactly
+from collide.narrowphase.facets.exact_triangles import MEET
 from collide.narrowphase.facets.filtered_triangles import (
     AMBIGUOUS,
     APART,
@@ -35,7 +34,18 @@ from collide.narrowphase.facets.filtered_triangles import (
     same_side,
     sign_error,
 )
-from collide.narrowphase.facets.posed_surfaces import ERROR, PLACING, Extent, M, extent_of, place, put_in_frame_of_a
+from collide.narrowphase.facets.posed_segment import (
+    BOXES,
+    COUNTERS,
+    SEGMENT_DOUBLES,
+    SEGMENT_FLOATS,
+    TRIANGLES,
+    PosedSegment,
+    ask_segment_exactly,
+    open_segment,
+    place_segment,
+)
+from collide.narrowphase.facets.posed_surfaces import ERROR, M
 from collide.narrowphase.facets.traversal import box_of_tree, make_traversal
 from collide.numerics.vec3 import (
     Vec3,
@@ -63,17 +73,13 @@ RAY_OF, FACET_OF, LOWER, VALUE, UPPER, OPEN = range(HIT)
 # Progress, integers: the ray, the hits found.
 AT_RAY, N_HITS = range(2)
 DONE, FULL, SINGULAR = range(3)
-# Counters, a row of integers a ray: boxes compared, triangles tested, of them decided exactly.
-_BOXES, _TRIANGLES, _EXACT = range(3)
-_COUNTERS = 3
 #: Hits that a leaf may add.
 _MAX_HITS = 8
-# Doubles of workspace besides a placing, corners, and the numbers and pose of the ray as a body. What changes on the
-# way: the least upper bound of t so far, and a bracket of t (3).
+# Doubles that change on the way: the least upper bound of t so far, and a bracket of t (3).
 _BEST, _BRACKET = 0, 1
-_CHANGING = PLACING + CORNERS + NUMBERS + 16
-DOUBLES = _CHANGING + 4
-FLOATS = 3 * FRAME + PROBE
+#: Doubles and floats of workspace: those of a segment, the ray's pose, and what changes.
+DOUBLES = SEGMENT_DOUBLES + 16 + 4
+FLOATS = SEGMENT_FLOATS
 
 _U = 2.0**-53
 _FLOAT_ERROR = 2.0**-19
@@ -109,11 +115,7 @@ class _Query(NamedTuple):
     hits : out, room for ``capacity``.   progress : as above.
     """
 
-    tree: TreeView
-    corners: np.ndarray
-    frame: np.ndarray
-    probe: np.ndarray
-    exact: ExactCall
+    segment: PosedSegment
     line: _Line
     along: Vec3
     height: float
@@ -126,16 +128,16 @@ class _Query(NamedTuple):
     hits: np.ndarray
     capacity: int
     progress: np.ndarray
-    counters: np.ndarray
 
 
 @kernel
-def _line_of(tree, placing, corners, ends):
+def _line_of(segment):
     """The ray's segment; ``last`` is below ``first`` where it clearly misses all boxes."""
+    tree, placing = segment.tree, segment.placing
     unit = math.ldexp(1.0, int(-tree.header[EXPONENT]))
     centre = vec3_at(tree.numbers, CENTRE)
-    direction = rotate(placing, M, vec3_at(ends, 3))
-    start = scale(unit, sub(vec3_at(corners, 9), centre))
+    direction = rotate(placing, M, vec3_at(segment.ends, 3))
+    start = scale(unit, sub(vec3_at(segment.corners, 9), centre))
     to_end = scale(unit, direction)
     size = max_abs(to_end)
     error = 8.0 * unit * placing[ERROR] + 2.0**-46 * (max(max_abs(start), max_abs(scale(unit, centre))) + size)
@@ -265,15 +267,14 @@ def _bracket_by_corners(triangles, a, corners, line, out):
 @kernel
 def _test_facet(query, a):
     """Add facet a to the hits where the ray meets it and may meet it first."""
-    triangles, corners, line, out = query.tree.triangles, query.corners, query.line, query.best
-    query.counters[_TRIANGLES] += 1
+    segment, line, out = query.segment, query.line, query.best
+    triangles, corners = segment.tree.triangles, segment.corners
+    segment.counters[TRIANGLES] += 1
     verdict = _meets(triangles, 9 * a, corners, line, out)
     if verdict == APART:
         return
     if verdict == AMBIGUOUS:
-        query.counters[_EXACT] += 1
-        put_triangle(corners, 0, triangle_at(triangles, 9 * a))
-        if ask_exactly(query.exact, MEET) == 0:
+        if ask_segment_exactly(segment, a, MEET) == 0:
             return
         if not _bracket(triangles, 9 * a, corners, line, out):
             _bracket_by_corners(triangles, 9 * a, corners, line, out)
@@ -282,7 +283,7 @@ def _test_facet(query, a):
         return
     at = HIT * query.progress[N_HITS]
     query.hits[at + RAY_OF] = query.ray
-    query.hits[at + FACET_OF] = query.tree.ids[a]
+    query.hits[at + FACET_OF] = segment.tree.ids[a]
     query.hits[at + LOWER] = max(t.x, 0.0)
     query.hits[at + VALUE] = min(max(t.y, 0.0), t.z)
     query.hits[at + UPPER] = max(t.z, 0.0)
@@ -311,20 +312,20 @@ def _visit_leaf(query, pair):
     for a in range(run >> 3, (run >> 3) + (run & 7)):
         _test_facet(query, a)
     if query.best[_BEST] < best:
-        _set_ends(query.line, max(min(1.0, query.best[_BEST]), query.line.first), query.probe)
+        _set_ends(query.line, max(min(1.0, query.best[_BEST]), query.line.first), query.segment.probe)
     return False
 
 
 @kernel(inline=True)
 def _open_box(query, pair, stack, top):
     """Push the children that the ray may meet, the one that begins first on top."""
-    keys = query.keys
-    query.counters[_BOXES] += 1
-    mask = boxes_meeting(query.tree.boxes, NODE * pair.link_a, query.frame, query.probe)
+    keys, segment = query.keys, query.segment
+    segment.counters[BOXES] += 1
+    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, segment.probe)
     base = top
     for slot in range(WIDTH):
         if (mask >> slot) & 1:
-            box = box_at(query.tree.boxes, WIDTH * pair.link_a + slot)
+            box = box_at(segment.tree.boxes, WIDTH * pair.link_a + slot)
             key = dot(query.along, box.centre) - dot(absolute(query.along), box.half)
             at = top
             while at > base and keys[at - 1] < key:
@@ -365,8 +366,9 @@ def _cast(query, stack):
 
 
 @kernel
-def _set_ray(ray, XB, numbers_b, ends):
-    """The ray as a body: its pose and numbers, and the corners 0, T d, T d of its segment; returns its exponent."""
+def _set_ray(ray, segment):
+    """The ray's segment, from 0 to T d where its origin is the frame's; returns the exponent of its unit."""
+    XB, numbers, ends = segment.XB, segment.numbers, segment.ends
     largest = 0.0
     for k in range(16):
         XB[k] = 1.0 if k % 5 == 0 else 0.0
@@ -375,8 +377,8 @@ def _set_ray(ray, XB, numbers_b, ends):
         ends[i] = 0.0
         ends[3 + i] = ray[3 + i] * ray[_T]
         ends[6 + i] = ends[3 + i]
-        numbers_b[CENTRE + i] = 0.0
-        numbers_b[REACH + i] = abs(ends[3 + i])
+        numbers[CENTRE + i] = 0.0
+        numbers[REACH + i] = abs(ends[3 + i])
         largest = max(largest, abs(ends[3 + i]))
     return 0 + math.frexp(largest)[1]  # 64 bits, as the exponents of trees
 
@@ -392,53 +394,40 @@ def cast_rays(
 
     Returns DONE, FULL or SINGULAR. Arguments are flat, as those of all entries.
     first_only : of each ray only those that may be met first, by their brackets of t.
-    hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : _COUNTERS integers a ray.
+    hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : COUNTERS integers a ray.
     """
     tree = open_tree(header_at)
     hits = view_f64(hits_at, HIT * capacity)
     progress = view_i64(progress_at, 2)
     stack = view_i64(stack_at, n_stack)
     keys = view_f64(stack_at + 8 * (n_stack + 16), n_stack)
-    placing = view_f64(doubles_at, PLACING)
-    corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
-    ends = view_f64(doubles_at + 8 * (PLACING + B_LOCAL_AT), 9)
-    numbers_b = view_f64(doubles_at + 8 * (PLACING + CORNERS), NUMBERS)
-    XB_at = doubles_at + 8 * (PLACING + CORNERS + NUMBERS)
-    XB = view_f64(XB_at, 16)
-    best = view_f64(doubles_at + 8 * _CHANGING, 4)
-    frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
-    frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
-    frame = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, FRAME)
-    probe = view_f32(doubles_at + 8 * DOUBLES + 12 * FRAME, PROBE)
-    state = view_i64(integers_at, STATE)
+    XB_at = doubles_at + 8 * SEGMENT_DOUBLES
+    best = view_f64(XB_at + 8 * 16, 4)
     for k in range(progress[AT_RAY], n):
         ray = view_f64(rays_at + 8 * RAY * k, RAY)
-        exponent = _set_ray(ray, XB, numbers_b, ends)
-        exact = ExactCall(exact_at, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at)
-        XA = view_f64(exact.XA_at, 16)
+        segment = open_segment(
+            tree, XA_at + 8 * step_a * k, XB_at, doubles_at, doubles_at + 8 * DOUBLES, integers_at, exact_at,
+            counters_at + 8 * COUNTERS * k,
+        )  # fmt: skip
         progress[AT_RAY] = k
-        if not place(extent_of(tree), XA, Extent(numbers_b, exponent), XB, placing, frame_a, frame_b):
+        if not place_segment(segment, _set_ray(ray, segment)):
             return SINGULAR
-        invalidate_pose_cache(state)
-        put_in_frame_of_a(placing, ends, 0, corners, 9)
-        line = _line_of(tree, placing, corners, ends)
+        line = _line_of(segment)
         if not line.first <= line.last:
             continue
-        _set_probe(line, frame, probe)
+        _set_probe(line, segment.frame_b, segment.probe)
         along = divide(line.to_end, line.size)
         height = dot(along, line.start)
         pace = dot(along, line.to_end)
         # Heights of boxes are sums of doubles and floats, rounded; the ray is off by its error.
         slack = 4.0 * line.box_error + 2.0**-40 * (abs(height) + pace + 4.0)
         best[_BEST] = ray[_LIMIT]
-        counters = view_i64(counters_at + 8 * _COUNTERS * k, _COUNTERS)
         query = _Query(
-            tree, corners, frame, probe, exact, line, along, height, pace, slack, keys, best, k, first_only, hits,
-            capacity, progress, counters,
+            segment, line, along, height, pace, slack, keys, best, k, first_only, hits, capacity, progress
         )  # fmt: skip
         if not _cast(query, stack):
-            for word in range(_COUNTERS):
-                counters[word] = 0
+            for word in range(COUNTERS):
+                segment.counters[word] = 0
             return FULL
     progress[AT_RAY] = n
     return DONE

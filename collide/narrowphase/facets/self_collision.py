@@ -33,7 +33,7 @@ from collide.narrowphase.facets.filtered_triangles import (
 from collide.narrowphase.facets.posed_surfaces import FRAMES, PLACING
 from collide.narrowphase.facets.posed_trees import MAX_FACET_PAIRS, PosedTrees, pose_trees
 from collide.narrowphase.facets.traversal import OF_B, make_traversal, opens_b, pair_of_trees, push_children, word_of
-from collide.numerics.vec3 import Vec3, add, cross, dot, max_abs, put_vec3, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, cross, dot, equal_at, max_abs, put_vec3, sub, vec3_at
 
 #: Doubles and floats of workspace: a placing, corners, and a pose that moves nothing.
 DOUBLES, FLOATS = PLACING + CORNERS + 16, 2 * FRAME + PROBE
@@ -67,21 +67,16 @@ class _Query(NamedTuple):
 
 
 @kernel(inline=True)
-def _equal(points, a, b):
-    return points[a] == points[b] and points[a + 1] == points[b + 1] and points[a + 2] == points[b + 2]
-
-
-@kernel(inline=True)
 def _common_corners(points, a, b):
     """(how many points are corners of both, which corner of a the last one is, and which of b)."""
     count = 0
     of_a = -1
     of_b = -1
     for j in range(3):
-        if (j > 0 and _equal(points, b, b + 3 * j)) or (j > 1 and _equal(points, b + 3, b + 3 * j)):
+        if (j > 0 and equal_at(points, b, b + 3 * j)) or (j > 1 and equal_at(points, b + 3, b + 3 * j)):
             continue
         for i in range(3):
-            if _equal(points, a + 3 * i, b + 3 * j):
+            if equal_at(points, a + 3 * i, b + 3 * j):
                 count += 1
                 of_a = i
                 of_b = j
@@ -121,11 +116,11 @@ def _opposite_meets(query, a, i, b):
     v = a + 3 * i
     p = a + 3 * ((i + 1) % 3)
     q = a + 3 * ((i + 2) % 3)
-    if _equal(points, p, v):
+    if equal_at(points, p, v):
         p = q
-    if _equal(points, q, v):
+    if equal_at(points, q, v):
         q = p
-    if _equal(points, p, v):
+    if equal_at(points, p, v):
         return False
     if _between(query, v, p, q):
         return _edge_meets(query, p, p, b) or _edge_meets(query, q, q, b)
@@ -212,7 +207,7 @@ def _uncommon_corner(points, a, b):
     for i in range(3):
         common = False
         for j in range(3):
-            common = common or _equal(points, a + 3 * i, b + 3 * j)
+            common = common or equal_at(points, a + 3 * i, b + 3 * j)
         if not common:
             return i
     return -1

@@ -31,7 +31,7 @@ from collide.mesh.bvh import (
     link_of,
     open_tree,
 )
-from collide.mesh.triangle import put_triangle, triangle_at
+from collide.mesh.triangle import put_triangle, range_along, triangle_at
 from collide.narrowphase.facets.box_probes import put_floats, set_probe
 from collide.narrowphase.facets.exact_corners import CORNERS
 from collide.narrowphase.facets.pair_heap import pop_heap, push_heap
@@ -44,6 +44,7 @@ from collide.narrowphase.facets.posed_surfaces import (
     is_swapped_order,
     put_in_frame_of_a,
     put_in_world,
+    rotate_by_pose,
     shift_between,
 )
 from collide.narrowphase.facets.posed_trees import PosedTrees, facets_meet, pose_trees
@@ -155,9 +156,7 @@ def _prepare(query, limit):
 
 @kernel
 def _centre_in_world(X, tree):
-    centre = vec3_at(tree.numbers, CENTRE)
-    rotated = Vec3(dot(vec3_at(X, 0), centre), dot(vec3_at(X, 4), centre), dot(vec3_at(X, 8), centre))
-    return add(rotated, Vec3(X[3], X[7], X[11]))
+    return add(rotate_by_pose(X, vec3_at(tree.numbers, CENTRE)), Vec3(X[3], X[7], X[11]))
 
 
 @kernel
@@ -234,12 +233,9 @@ def _set_direction(query, direction):
 @kernel(inline=True)
 def _gap_of_box(g, tree, slabs, unit, ref, link):
     """Least product of a box's contents with g, by the box and by its slab; of a leaf that of its corners."""
-    centre = vec3_at(tree.numbers, CENTRE)
     if link < 0:
-        low = math.inf
-        for k in range(9 * (~link >> 3), 9 * (~link >> 3) + 9 * (~link & 7), 3):
-            low = min(low, dot(g, sub(vec3_at(tree.triangles, k), centre)))
-        return low * unit
+        first = ~link >> 3
+        return unit * range_along(g, tree.triangles, first, first + (~link & 7), vec3_at(tree.numbers, CENTRE))[0]
     box = box_at(tree.boxes, ref)
     plain = dot(g, box.centre) - dot(absolute(g), box.half)
     at = SLAB * (ref >> 3) + (ref & 7)

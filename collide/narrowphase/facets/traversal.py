@@ -79,7 +79,7 @@ def pair_of_trees(query, word):
 @kernel(inline=True)
 def box_of_tree(query, word):
     """`pair_behind` of one tree: words are references."""
-    return BoxPair(word, 0, link_of(query.tree.links, word), -1)
+    return BoxPair(word, 0, link_of(query.segment.tree.links, word), -1)
 
 
 @kernel(inline=True)

@@ -16,22 +16,23 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
-from collide.mesh.box_overlap import FRAME, PROBE, boxes_meeting
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, NUMBERS, REACH, WIDTH, TreeView, open_tree
-from collide.mesh.triangle import put_triangle, triangle_at
+from collide.mesh.box_overlap import boxes_meeting
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, REACH, WIDTH, open_tree
 from collide.narrowphase.facets.box_probes import clear_slab, set_probe
-from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE, invalidate_pose_cache
-from collide.narrowphase.facets.exact_triangles import BACK, BY, FROM, PASS, THROUGH, UNCLEAR, ExactCall, ask_exactly
+from collide.narrowphase.facets.exact_triangles import BACK, BY, FROM, PASS, THROUGH, UNCLEAR
 from collide.narrowphase.facets.filtered_triangles import AMBIGUOUS, APART, segment_against_triangle
-from collide.narrowphase.facets.posed_surfaces import (
-    ERROR,
-    INVERSE_B,
-    PLACING,
-    Extent,
-    extent_of,
-    place,
-    put_in_frame_of_a,
+from collide.narrowphase.facets.posed_segment import (
+    BOXES,
+    COUNTERS,
+    SEGMENT_DOUBLES,
+    SEGMENT_FLOATS,
+    TRIANGLES,
+    PosedSegment,
+    ask_segment_exactly,
+    open_segment,
+    place_segment,
 )
+from collide.narrowphase.facets.posed_surfaces import ERROR, INVERSE_B
 from collide.narrowphase.facets.traversal import OF_B, any_pair, box_of_tree, make_traversal, push_children
 
 OUTSIDE, ON_SURFACE, INSIDE, UNDECIDED, SINGULAR = range(5)
@@ -39,27 +40,18 @@ OUTSIDE, ON_SURFACE, INSIDE, UNDECIDED, SINGULAR = range(5)
 LEAVING, ENTERING = BACK, THROUGH
 #: Segments tried for a point: along the axes of its frame, then off them.
 TRIES = 6 + 32
-# Counters, a row of integers a point: boxes compared, triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
-COUNTERS = 3
 # What a segment has passed so far, integers: facets from behind less those from the front; whether one was passed at an
 # edge or corner; whether it starts on the surface.
 _WINDING, _IS_UNCLEAR, _IS_ON_SURFACE = range(3)
-#: Doubles and floats of workspace: those of a segment's one box come last.
-DOUBLES = PLACING + CORNERS + NUMBERS
-FLOATS = 2 * FRAME + PROBE + NODE
+#: Doubles and floats of workspace: those of the segment's one box come last.
+DOUBLES = SEGMENT_DOUBLES
+FLOATS = SEGMENT_FLOATS + NODE
 
 
 class _Query(NamedTuple):
-    """One segment: corners 3 and 4, and the probe, seen from the tree.   passed : as above."""
+    """One segment.   passed : as above."""
 
-    tree: TreeView
-    placing: np.ndarray
-    corners: np.ndarray
-    frame: np.ndarray
-    probe: np.ndarray
-    exact: ExactCall
-    counters: np.ndarray
+    segment: PosedSegment
     passed: np.ndarray
 
 
@@ -70,8 +62,9 @@ def _pseudo_random(k):
 
 
 @kernel
-def _set_segment(tree, XA, XB, inverse_b, x, attempt, ends):
-    """From the point x of B's frame to beyond A's box: ends becomes both and the point again (9 doubles)."""
+def _set_ends(segment, x, attempt):
+    """From the point x of B's frame to beyond A's box."""
+    tree, XA, XB, ends = segment.tree, segment.XA, segment.XB, segment.ends
     # A's middle and reach in B's frame, roughly; whoever is beyond twice that is outside.
     size = math.ldexp(2.0, int(tree.header[EXPONENT]))
     stretch = 0.0
@@ -82,10 +75,10 @@ def _set_segment(tree, XA, XB, inverse_b, x, attempt, ends):
         for j in range(3):
             world += XA[4 * i + j] * tree.numbers[CENTRE + j]
             stretch += abs(XA[4 * i + j])
-        middle += inverse_b[3 * axis + i] * world
+        middle += segment.placing[INVERSE_B + 3 * axis + i] * world
     shrink = 0.0
     for k in range(9):
-        shrink = max(shrink, abs(inverse_b[k]))
+        shrink = max(shrink, abs(segment.placing[INVERSE_B + k]))
     reach = 4.0 * size * stretch * shrink
     sign = 1.0 if attempt % 6 < 3 else -1.0
     far = middle + sign * reach
@@ -103,8 +96,9 @@ def _set_segment(tree, XA, XB, inverse_b, x, attempt, ends):
 
 
 @kernel
-def _set_box_of_segment(ends, numbers, node):
-    """The box around the segment as the only one of a tree, whose numbers and node these become; its exponent."""
+def _set_box(segment, node):
+    """The box around the segment as the only one of a tree, whose node and numbers these become; its exponent."""
+    ends, numbers = segment.ends, segment.numbers
     largest = 0.0
     for i in range(3):
         numbers[CENTRE + i] = 0.5 * ends[i] + 0.5 * ends[3 + i]
@@ -121,14 +115,12 @@ def _set_box_of_segment(ends, numbers, node):
 
 
 @kernel
-def _how_passed(query, a):
+def _how_passed(segment, a):
     """How the segment passes facet a: BY, THROUGH, BACK, FROM or UNCLEAR; in doubles, else exactly."""
-    triangles, corners = query.tree.triangles, query.corners
-    verdict, above = segment_against_triangle(triangles, 9 * a, corners, 9, 12, query.placing[ERROR])
+    triangles, error = segment.tree.triangles, segment.placing[ERROR]
+    verdict, above = segment_against_triangle(triangles, 9 * a, segment.corners, 9, 12, error)
     if verdict == AMBIGUOUS:
-        query.counters[EXACT] += 1
-        put_triangle(corners, 0, triangle_at(triangles, 9 * a))
-        return ask_exactly(query.exact, PASS)
+        return ask_segment_exactly(segment, a, PASS)
     if verdict == APART:
         return BY
     return THROUGH if above else BACK
@@ -140,8 +132,8 @@ def _visit_leaf(query, pair):
     run = ~pair.link_a
     passed = query.passed
     for a in range(run >> 3, (run >> 3) + (run & 7)):
-        query.counters[TRIANGLES] += 1
-        how = _how_passed(query, a)
+        query.segment.counters[TRIANGLES] += 1
+        how = _how_passed(query.segment, a)
         if how == FROM:
             passed[_IS_ON_SURFACE] = 1
             return True
@@ -153,8 +145,9 @@ def _visit_leaf(query, pair):
 
 @kernel(inline=True)
 def _open_box(query, pair, stack, top):
-    query.counters[BOXES] += 1
-    mask = boxes_meeting(query.tree.boxes, NODE * pair.link_a, query.frame, query.probe)
+    segment = query.segment
+    segment.counters[BOXES] += 1
+    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, segment.probe)
     return push_children(stack, top, mask, WIDTH * pair.link_a, OF_B)
 
 
@@ -195,41 +188,28 @@ def points_inside(
     tree = open_tree(header_a_at)
     stack = view_i64(stack_at, n_stack)
     passed = view_i64(stack_at + 8 * n_stack, 3)
-    placing = view_f64(doubles_at, PLACING)
-    inverse_b = view_f64(doubles_at + 8 * INVERSE_B, 9)
-    corners = view_f64(doubles_at + 8 * PLACING, CORNERS)
-    ends = view_f64(doubles_at + 8 * (PLACING + B_LOCAL_AT), 9)
-    numbers_b = view_f64(doubles_at + 8 * (PLACING + CORNERS), NUMBERS)
-    frame_a = view_f32(doubles_at + 8 * DOUBLES, FRAME)
-    frame_b = view_f32(doubles_at + 8 * DOUBLES + 4 * FRAME, FRAME)
-    probe = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME, PROBE)
-    node = view_f32(doubles_at + 8 * DOUBLES + 8 * FRAME + 4 * PROBE, NODE)
-    state = view_i64(integers_at, STATE)
+    floats_at = doubles_at + 8 * DOUBLES
+    node = view_f32(floats_at + 4 * SEGMENT_FLOATS, NODE)
     answers = view_i64(answers_at, n)
     for k in range(n):
-        exact = ExactCall(
-            exact_at, doubles_at + 8 * PLACING, doubles_at, integers_at, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k
-        )
-        XA = view_f64(exact.XA_at, 16)
-        XB = view_f64(exact.XB_at, 16)
+        segment = open_segment(
+            tree, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k, doubles_at, floats_at, integers_at, exact_at,
+            counters_at + 8 * COUNTERS * k,
+        )  # fmt: skip
         x = view_f64(points_at + 8 * step_points * k, 3)
-        counters = view_i64(counters_at + 8 * COUNTERS * k, COUNTERS)
-        query = _Query(tree, placing, corners, frame_b, probe, exact, counters, passed)
         for i in range(3):
-            numbers_b[CENTRE + i] = x[i]
-            numbers_b[REACH + i] = abs(x[i])
-        if not place(extent_of(tree), XA, Extent(numbers_b, 0), XB, placing, frame_a, frame_b):
+            segment.numbers[CENTRE + i] = x[i]
+            segment.numbers[REACH + i] = abs(x[i])
+            segment.ends[i] = segment.ends[3 + i] = segment.ends[6 + i] = x[i]
+        if not place_segment(segment, 0):
             answers[k] = SINGULAR
             continue
-        invalidate_pose_cache(state)
         answers[k] = UNDECIDED
         for attempt in range(TRIES):
-            _set_segment(tree, XA, XB, inverse_b, x, attempt, ends)
-            exponent = _set_box_of_segment(ends, numbers_b, node)
-            place(extent_of(tree), XA, Extent(numbers_b, exponent), XB, placing, frame_a, frame_b)
-            put_in_frame_of_a(placing, ends, 0, corners, 9)
-            set_probe(placing, 1, node, 0, probe)
-            clear_slab(probe)
-            answers[k] = _winding(query, stack)
+            _set_ends(segment, x, attempt)
+            place_segment(segment, _set_box(segment, node))
+            set_probe(segment.placing, 1, node, 0, segment.probe)
+            clear_slab(segment.probe)
+            answers[k] = _winding(_Query(segment, passed), stack)
             if answers[k] != UNDECIDED:
                 break

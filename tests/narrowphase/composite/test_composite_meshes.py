@@ -20,7 +20,10 @@ from collide.lowering.composite_parts import union_of
 from collide.lowering.shape_table import moved_pose
 
 EYE = np.eye(4)
-TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+TETRAHEDRON = (
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
 #: (shape, vertices, faces, solid)
 BODIES = [
     (collide.Mesh(*block_ring()), *block_ring(), True),
@@ -86,7 +89,9 @@ def random_union(rng, poser, depth=2):
     items = []
     for _ in range(int(rng.integers(1, 3))):
         deeper = depth > 0 and rng.random() < 0.4
-        items.append((random_union(rng, poser, depth - 1) if deeper else BODIES[rng.integers(len(BODIES))], poser(rng, 1.5)))
+        items.append(
+            (random_union(rng, poser, depth - 1) if deeper else BODIES[rng.integers(len(BODIES))], poser(rng, 1.5))
+        )
     return items
 
 
@@ -120,7 +125,10 @@ def test_unions_answer_as_all_pairs_of_parts_do(poser):
         told.append(hit)
         swapped = collide.distance(other, one, Y, X)
         assert (swapped.distance, swapped.lower, swapped.upper) == (r.distance, r.lower, r.upper), case
-        assert np.array_equal(swapped.normal, 0.0 - r.normal) and (swapped.part_a, swapped.part_b) == (r.part_b, r.part_a), case
+        assert np.array_equal(swapped.normal, 0.0 - r.normal) and (swapped.part_a, swapped.part_b) == (
+            r.part_b,
+            r.part_a,
+        ), case
         if not hit:
             gaps += 1
             square = gap(A, B, X, Y)
@@ -174,14 +182,25 @@ def test_exact_products_are_answered_exactly_and_rounded_ones_within_their_round
 def test_half_spaces_and_unions():
     rng = rng_of("union and half-space")
     ground = collide.Halfspace((0.0, 0.0, 2.0), -1.0)
-    made = [(BODIES[0], any_pose(rng, 1.0)), ([(BODIES[1], any_pose(rng, 1.0))], any_pose(rng, 1.0)), (BODIES[3], any_pose(rng, 1.0))]
+    made = [
+        (BODIES[0], any_pose(rng, 1.0)),
+        ([(BODIES[1], any_pose(rng, 1.0))], any_pose(rng, 1.0)),
+        (BODIES[3], any_pose(rng, 1.0)),
+    ]
     union = shape_of(made)
     for z in (-3.0, 0.0, 1.0, 4.0, 30.0):
         X, Y = random_pose(rng, 0.5), EYE
         X[2, 3] = z
         r = collide.distance(union, ground, X, Y)
-        want = min(float(world_points(v, P)[k][2]) for v, _, _, P in leaves(made, exactly(X)) for k in range(len(v))) + 0.5
-        assert abs(r.distance - want) < 1e-13 and r.hit == (want <= 0) and r.lower <= want + 1e-15 and want - 1e-15 <= r.upper
+        want = (
+            min(float(world_points(v, P)[k][2]) for v, _, _, P in leaves(made, exactly(X)) for k in range(len(v))) + 0.5
+        )
+        assert (
+            abs(r.distance - want) < 1e-13
+            and r.hit == (want <= 0)
+            and r.lower <= want + 1e-15
+            and want - 1e-15 <= r.upper
+        )
         assert r.certified and collide.collide(ground, union, Y, X) == r.hit
     floor = collide.Compound([(ground, EYE), (BODIES[1][0], pose(t=(0, 0, 3.0)))])
     assert collide.collide(floor, BODIES[0][0], EYE, EYE)  # the ring stands on it
@@ -244,7 +263,11 @@ def test_identical_unions_at_any_order_of_poses():
     for spread in (0.5, 3.0, 6.0):
         X, Y = random_pose(rng, spread), random_pose(rng, spread)
         r, s = collide.distance(union, union, X, Y), collide.distance(union, union, Y, X)
-        assert r.distance == s.distance and np.array_equal(r.normal, 0.0 - s.normal) and np.array_equal(r.point_a, s.point_b)
+        assert (
+            r.distance == s.distance
+            and np.array_equal(r.normal, 0.0 - s.normal)
+            and np.array_equal(r.point_a, s.point_b)
+        )
     assert collide.collide(union, union, X, X)
 
 
@@ -317,7 +340,12 @@ def test_only_narrow_brackets_are_certified():
         for other in (cube, collide.Box((1, 1, 1)), collide.Sphere(0.5), plane, union):
             r = collide.distance(union, other, X, Y)
             size = 40.0
-            assert not r.hit and (not r.certified or r.upper - r.lower <= 2.0**-43 * size), (away, other, r.lower, r.upper)
+            assert not r.hit and (not r.certified or r.upper - r.lower <= 2.0**-43 * size), (
+                away,
+                other,
+                r.lower,
+                r.upper,
+            )
             told.append((away, bool(r.certified)))
     assert all(sure for away, sure in told if away == 0.0) and not any(sure for away, sure in told if away > 1e5), told
 
@@ -325,7 +353,10 @@ def test_only_narrow_brackets_are_certified():
 def test_curved_parts_inside_solids():
     """Their poses are rounded products, so that no polytope answers: a point inside does."""
     rng = rng_of("curved inside")
-    solid, hollow = collide.Mesh(*box()), collide.Mesh(*joined(box(), (box((-0.7,) * 3, (0.7,) * 3)[0], box()[1][:, ::-1])))
+    solid, hollow = (
+        collide.Mesh(*box()),
+        collide.Mesh(*joined(box(), (box((-0.7,) * 3, (0.7,) * 3)[0], box()[1][:, ::-1]))),
+    )
     for shape in (collide.Cylinder(0.05, 0.1), collide.Cone(0.05, 0.1), collide.Ellipsoid((0.05, 0.1, 0.02))):
         union = collide.Compound([(shape, any_pose(rng, 0.2))])
         X = any_pose(rng, 0.2)

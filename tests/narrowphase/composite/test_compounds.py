@@ -16,6 +16,7 @@ import collide
 from collide import batches, query
 from collide.kernels import address_of, entry, view_f64
 from collide.lowering.compound_table import PART, lay_out
+from collide.lowering.parts import convex_set_of, parts_of
 from collide.lowering.place_parts import place_part, write_terms
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
 from collide.narrowphase import convex_queries as run
@@ -150,7 +151,10 @@ def _asked(question) -> int:
 
 @pytest.mark.parametrize("ask", [collide.collide, collide.distance, _gap])
 def test_parts_far_away_are_not_asked(ask):
-    A, B = _row_of_boxes(64), collide.Compound([(collide.Box((0.2, 0.2, 0.2)), collide.pose((0, 0, 0.1 * k))) for k in range(2)])
+    A, B = (
+        _row_of_boxes(64),
+        collide.Compound([(collide.Box((0.2, 0.2, 0.2)), collide.pose((0, 0, 0.1 * k))) for k in range(2)]),
+    )
     rng = np.random.default_rng(8)
     X = np.array([collide.pose((2.0 * rng.integers(64), 0.0, rng.uniform(-1.5, 0.2))) for _ in range(200)])
     turned = np.array([collide.pose(rpy=(0.1, 0.2, 0.3))])
@@ -230,10 +234,12 @@ def test_parts_left_out_have_no_say():
     compared = 0
     for A, B, X_WA, X_WB in _pairs_of_unions():
         found = collide.distance(A, B, X_WA, X_WB).rows
-        every = np.array([_rows_of_part(*one, *other, X_WA, X_WB) for one in A.parts() for other in B.parts()])
+        every = np.array([_rows_of_part(*one, *other, X_WA, X_WB) for one in parts_of(A) for other in parts_of(B)])
         least = every["distance"].min(axis=0)
         apart = ~found["hit"]
-        assert (found["distance"][apart] == least[apart]).all() and (found["lower"][apart] == every["lower"].min(axis=0)[apart]).all()
+        assert (found["distance"][apart] == least[apart]).all() and (
+            found["lower"][apart] == every["lower"].min(axis=0)[apart]
+        ).all()
         assert (found["upper"] == every["upper"].min(axis=0)).all()
         assert (found["hit"] == every["hit"].any(axis=0)).all()
         compared += apart.sum()
@@ -263,11 +269,11 @@ def test_poses_of_parts_are_those_of_the_pose_table():
         X_BP = np.eye(4) if k == 1 else X_BP
         if k == 2:
             X_BP[0, 1], X_WB[1, 0] = 1e-170, 1e-170
-        expected = pose_table(X_WB[None], X_BP[None], np.array([part.parts()[0][0].reach]))
+        expected = pose_table(X_WB[None], X_BP[None], np.array([convex_set_of(part).reach]))
         body = pose_table(X_WB[None], np.eye(4)[None], np.zeros(1)).rows
         poses, terms = np.zeros((2, POSE)), np.zeros((2, TERM_ROW))
         poses[0], poses[0, POSE_STRETCH] = body[0], 1.0
-        laid_out = lay_out(((part.parts()[0][0], X_BP),)).parts
+        laid_out = lay_out(((convex_set_of(part), X_BP),)).parts
         placed(address_of(poses), address_of(laid_out), address_of(terms))
         assert poses[1, :POSE_TERMS].tobytes() == expected.rows[0, :POSE_TERMS].tobytes(), (k, X_WB, X_BP)
         assert (poses[1, POSE_TERMS] >= 0) == (expected.rows[0, POSE_TERMS] >= 0), (k, X_WB, X_BP)

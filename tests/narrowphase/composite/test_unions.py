@@ -88,7 +88,7 @@ def test_distance_of_unions_is_the_least_of_their_parts():
 
 
 def radius_around(shape: collide.Shape) -> float:
-    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in shape.parts())
+    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in parts_of(shape))
 
 
 def test_upper_bound_is_what_the_parts_need():
@@ -229,7 +229,8 @@ def test_gaps_alone_of_overlapping_unions_name_a_point_of_both():
     hits = []
     for _ in range(20):
         A, B = (
-            collide.Compound([(collide.Box(rng.uniform(0.2, 1, 3)), random_pose(rng, 0.5)) for _ in range(4)]) for _ in range(2)
+            collide.Compound([(collide.Box(rng.uniform(0.2, 1, 3)), random_pose(rng, 0.5)) for _ in range(4)])
+            for _ in range(2)
         )
         X_WA, X_WB = (np.array([random_pose(rng, 0.6) for _ in range(20)]) for _ in range(2))
         rows = collide.distance(A, B, X_WA, X_WB, signed=False).rows

@@ -42,7 +42,8 @@ class Surface:
         return k
 
     def slots(self) -> list[int]:
-        """Of the surface: what neighbours lead to. Where a patch is taken out around two vertices and more, slots are given up."""
+        """Of the surface: what neighbours lead to. Where a patch is taken out around two vertices and more, slots are
+        given up."""
         newest = len(self.corners) - 1
         waiting = [f for f in range(self.count) if newest in self.facets[E.FACET * f : E.FACET * f + 3]][:1] or [0]
         for f in waiting:
@@ -88,11 +89,14 @@ class Surface:
             assert self.facets[at] == i and self.facets[at + 1] == j
         vertices = {v for triangle in triangles.values() for v in triangle}
         assert len(vertices) - len(edges) // 2 + len(triangles) == 2
-        assert all(self.reaches[f] == math.inf for f in range(self.count) if f not in triangles), "a slot given up may be asked"
+        assert all(self.reaches[f] == math.inf for f in range(self.count) if f not in triangles), (
+            "a slot given up may be asked"
+        )
         assert not any(self.facets[E.FACET * f + E.MARKS] & E.SEEN for f in triangles), "a mark that stayed"
 
     def check_planes(self) -> None:
-        """Unit normals, outwards; no corner is nearer along one than said; clearances hold for the triangle, exactly."""
+        """Unit normals, outwards; no corner is nearer along one than said; clearances hold for the triangle,
+        exactly."""
         for f, triangle in self.triangles().items():
             *normal, distance = self.planes[E.PLANE * f : E.PLANE * f + E.PLANE].tolist()
             corners = [self.corners[v] for v in triangle]

@@ -64,8 +64,14 @@ def test_verdicts_are_exact(draw, boolean):
         with naive.reproducible(case):
             bodies, answer, ids = decided(case, boolean=boolean, rng=rng)
             true = naive.exact_distance(case)
-            assert answer.verdict == (TOUCHING if true <= 0 else SEPARATE) == (TOUCHING if naive.exact_hit(case) else SEPARATE)
-            assert all(0 <= ids[2 * k] < bodies.pair.A.n and 0 <= ids[2 * k + 1] < bodies.pair.B.n for k in range(answer.n))
+            assert (
+                answer.verdict
+                == (TOUCHING if true <= 0 else SEPARATE)
+                == (TOUCHING if naive.exact_hit(case) else SEPARATE)
+            )
+            assert all(
+                0 <= ids[2 * k] < bodies.pair.A.n and 0 <= ids[2 * k + 1] < bodies.pair.B.n for k in range(answer.n)
+            )
             if answer.cores_apart:
                 excess = Fraction(answer.excess.high) + Fraction(answer.excess.low)
                 assert (excess <= 0) == (answer.verdict == TOUCHING)

@@ -1,4 +1,5 @@
-"""Doubles switched off: every boolean of hulls and half-spaces from the exact stage alone, equal to the filtered one."""
+"""Doubles switched off: every boolean of hulls and half-spaces from the exact stage alone, equal to the filtered
+one."""
 
 from __future__ import annotations
 
@@ -27,11 +28,16 @@ def test_booleans_without_doubles_are_the_same(family, monkeypatch):
 
 
 def test_depths_without_doubles_are_the_same(monkeypatch):
-    """No surface has been grown then: all planes of both hulls are looked at, and the nearest is the one that EPA found."""
+    """No surface has been grown then: all planes of both hulls are looked at, and the nearest is the one that EPA
+    found."""
     rng = np.random.default_rng(29)
     asked = []
     for k in range(60):
-        A = collide.ConvexHull(rng.normal(size=(rng.integers(4, 13), 3))) if k % 3 else collide.Box(rng.uniform(0.3, 2.0, 3))
+        A = (
+            collide.ConvexHull(rng.normal(size=(rng.integers(4, 13), 3)))
+            if k % 3
+            else collide.Box(rng.uniform(0.3, 2.0, 3))
+        )
         B = collide.ConvexHull(rng.normal(size=(rng.integers(4, 13), 3)), radius=0.1 * (k % 4 == 0))
         X, Y = (collide.pose(rng.normal(size=3) * 0.25, rpy=rng.uniform(-3, 3, 3) * (k % 5 > 0)) for _ in range(2))
         asked.append((A, B, X, Y, collide.distance(A, B, X, Y)))

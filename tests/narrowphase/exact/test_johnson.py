@@ -50,7 +50,8 @@ def johnson(points, mask: int, j: int) -> int:
         return 1
     k = rest[0]
     return sum(
-        johnson(points, mask & ~(1 << j), i) * sum(x * (y - z) for x, y, z in zip(points[i], points[k], points[j])) for i in rest
+        johnson(points, mask & ~(1 << j), i) * sum(x * (y - z) for x, y, z in zip(points[i], points[k], points[j]))
+        for i in rest
     )
 
 
@@ -98,7 +99,9 @@ def test_nearest_subset(kind, n):
             weights = [simplex.delta(mask, i) for i in chosen]
             total = sum(weights)
             assert chosen and max(chosen) < n and min(weights) > 0
-            point = [sum(Fraction(w * simplex.points[i][axis], total) for w, i in zip(weights, chosen)) for axis in range(3)]
+            point = [
+                sum(Fraction(w * simplex.points[i][axis], total) for w, i in zip(weights, chosen)) for axis in range(3)
+            ]
             assert tuple(point) == true.point
             assert weights == [johnson(simplex.points, mask, i) for i in chosen]
             if mask < 8:

@@ -1,4 +1,5 @@
-"""Batches of pairs with a mesh: the bytes of single calls, whatever is culled, broadcast, swapped or shared among threads."""
+"""Batches of pairs with a mesh: the bytes of single calls, whatever is culled, broadcast, swapped or shared among
+threads."""
 
 from __future__ import annotations
 
@@ -67,7 +68,11 @@ def test_batches_are_single_calls_broadcast_and_swapped(partner):
                 asked_for = {"max_distance": limit, "signed": partner != "compound"}  # its depths take seconds
                 rows = collide.distance(A, B, X_WA, X_WB, **asked_for).rows
                 single_rows = [collide.distance(A, B, X, Y, **asked_for).rows[0] for X, Y in zip(X_WA, X_WB)]
-                assert all(row.tobytes() == want.tobytes() for row, want in zip(rows, single_rows)), (name, spread, limit)
+                assert all(row.tobytes() == want.tobytes() for row, want in zip(rows, single_rows)), (
+                    name,
+                    spread,
+                    limit,
+                )
                 swapped = collide.distance(B, A, X_WB, X_WA, **asked_for)
                 assert np.array_equal(swapped.rows["distance"], rows["distance"]), (name, spread, limit)
             n_hits, n_apart = n_hits + int(hits.sum()), n_apart + int((~hits).sum())
@@ -149,7 +154,11 @@ def test_poses_on_the_brink_of_the_tolerance_are_answered():
         except InvalidPose:
             continue
         n_accepted += 1
-        assert collide.collide(A, B, np.eye(4)[None], np.stack([np.eye(4), X[k], np.eye(4)])).tolist() == [True, want, True]
+        assert collide.collide(A, B, np.eye(4)[None], np.stack([np.eye(4), X[k], np.eye(4)])).tolist() == [
+            True,
+            want,
+            True,
+        ]
     assert 0 < n_accepted
 
 

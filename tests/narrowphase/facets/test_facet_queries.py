@@ -126,7 +126,8 @@ def test_far_apart_or_not_a_matrix_that_mirrors_is_refused():
 
 
 def test_balls_part_only_what_is_apart():
-    """Near to where two balls touch, at any distance from the origin, for matrices near and not so near to rotations."""
+    """Near to where two balls touch, at any distance from the origin, for matrices near and not so near to
+    rotations."""
     rng = np.random.default_rng(31)
     vb, fb = np.array([[-1.0, 0, 0], [1.0, 0, 0]]), np.array([[0, 1, 1]])  # a segment along x fills its ball
     A = build_mesh_tree(vb, fb)

@@ -24,7 +24,10 @@ def exact_distances(a, b, X_WA, X_WB) -> np.ndarray:
     P, Q = as_integers(*exact)
     scale = max(x.denominator for points in exact for p in points for x in p)
     return np.array(
-        [[float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()] for f in a[1].tolist()]
+        [
+            [float(squared_distance([P[v] for v in f], [Q[v] for v in g]) / scale**2) ** 0.5 for g in b[1].tolist()]
+            for f in a[1].tolist()
+        ]
     )
 
 
@@ -90,7 +93,8 @@ from collide.narrowphase.facets.facet_queries import facets_within
 found = []
 for a, b, X_WA, X_WB, reach in pickle.load(sys.stdin.buffer):
     A, B = collide.Mesh(*a, solid=False), collide.Mesh(*b, solid=False)
-    found.append(tuple(map(bytes, facets_within(A.tree, B.tree, X_WA, X_WB, reach, 1 << 20))) + (collide.contacts(A, B, X_WA, X_WB).rows.tobytes(),))
+    pairs = facets_within(A.tree, B.tree, X_WA, X_WB, reach, 1 << 20)
+    found.append((*map(bytes, pairs), collide.contacts(A, B, X_WA, X_WB).rows.tobytes()))
 pickle.dump(found, sys.stdout.buffer)
 """
 

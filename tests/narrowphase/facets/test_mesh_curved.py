@@ -148,7 +148,9 @@ def test_gaps_are_those_of_all_facets_one_by_one(kind):
         if r.hit:
             continue
         gaps += 1
-        rows = collide.distance([collide.ConvexHull(vertices[face]) for face in faces], [shape] * len(faces), [X] * len(faces), Y)
+        rows = collide.distance(
+            [collide.ConvexHull(vertices[face]) for face in faces], [shape] * len(faces), [X] * len(faces), Y
+        )
         assert rows.lower.min() <= r.upper and r.lower <= rows.upper.min(), snippet_of(mesh, shape, X, Y)
         assert abs(r.distance - rows.distance.min()) < 1e-9, snippet_of(mesh, shape, X, Y)
         assert rows.lower[r.part_a] <= r.upper
@@ -216,7 +218,8 @@ def test_touching_is_open_and_a_hair_beside_it_is_not():
     """A gap of 1e-9 is proven, an overlap too. Flat ends that touch are decided exactly, round sides are not: a hit."""
     mesh = collide.Mesh(*box())
     for shape, half in (
-        (collide.Cylinder(0.25, 0.5), 0.25), (collide.Cone(0.25, 0.5), 0.25), (collide.Ellipsoid((0.5, 0.75, 0.25)), 0.25),
+        (collide.Cylinder(0.25, 0.5), 0.25), (collide.Cone(0.25, 0.5), 0.25),
+        (collide.Ellipsoid((0.5, 0.75, 0.25)), 0.25),
     ):  # fmt: skip
         for shift, want in ((1e-9, False), (0.0, True), (-1e-9, True)):
             Y = pose(t=(0.125, 0.25, 1.0 + half + shift))
@@ -250,7 +253,11 @@ def test_far_tiny_and_huge():
         far = collide.distance(mesh, shape, X, Y)
         assert (near.lower, near.upper, near.hit) == (far.lower, far.upper, far.hit), kind
         away = collide.distance(mesh, shape, EYE, np.stack([pose(t=(x, 0, 0)) for x in (1e12, 1e25, 1e40)]))
-        assert not away.hit.any() and (np.abs(away.distance / [1e12, 1e25, 1e40] - 1) < 1e-9).all() and away.certified.all()
+        assert (
+            not away.hit.any()
+            and (np.abs(away.distance / [1e12, 1e25, 1e40] - 1) < 1e-9).all()
+            and away.certified.all()
+        )
     small, large = collide.Mesh(*box((-1e-9,) * 3, (1e-9,) * 3)), collide.Cylinder(1e3, 2e3)
     for z, want in ((1e3 + 1.0, False), (1e3 - 1.0, True), (1e3 + 3e-9, None)):
         r = collide.distance(small, large, pose(t=(10.0, 20.0, z)), EYE)
@@ -299,7 +306,9 @@ def exact_planes(points: np.ndarray):
         yield n, sum(x * y for x, y in zip(n, exact[a]))
 
 
-@pytest.mark.parametrize("sizes", [(1.0, 1.0, 1.0), (1e-9, 1e3, 0.1), (1e3, 1e-9, 7.0), (1e-40, 3e-41, 1e-40), (1e45, 1e40, 1e45 / 3)])
+@pytest.mark.parametrize(
+    "sizes", [(1.0, 1.0, 1.0), (1e-9, 1e3, 0.1), (1e3, 1e-9, 7.0), (1e-40, 3e-41, 1e-40), (1e45, 1e40, 1e45 / 3)]
+)
 def test_the_polytopes_hold_the_shapes_and_are_held_exactly(sizes):
     a, b = sizes[:2]
     for shape in (collide.Cylinder(a, b), collide.Cone(a, b), collide.Ellipsoid(sizes)):

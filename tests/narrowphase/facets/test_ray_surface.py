@@ -67,7 +67,8 @@ def brute_force(vertices, faces, X, o, d):
 
 
 def some_rays(rng, vertices, faces, X):
-    """Rays of every kind: at random, at and through corners and edges, along edges and in planes, from on the surface."""
+    """Rays of every kind: at random, at and through corners and edges, along edges and in planes, from on the
+    surface."""
     corners = vertices[faces] @ X[:3, :3].T + X[:3, 3]
     origins, directions = [], []
     for _ in range(3):
@@ -77,7 +78,9 @@ def some_rays(rng, vertices, faces, X):
         a, b, c = corners[rng.integers(len(corners))][rng.permutation(3)]
         aim = [a, (a + b) / 2, a / 2 + b / 4 + c / 4][rng.integers(3)]
         kind = rng.integers(4)
-        direction = [b - a, rng.normal(size=3), c - b, np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])][rng.integers(4)]
+        direction = [b - a, rng.normal(size=3), c - b, np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])][
+            rng.integers(4)
+        ]
         if not direction.any():
             direction = np.array([0.0, 0.0, 1.0])
         origins.append(aim - direction * [0.0, 1.0, 2.0, -0.5][kind])
@@ -119,7 +122,9 @@ def test_hits_are_those_of_brute_force(kind):
             vertices[:, 2] = 0.5
         if kind == "thin":
             vertices = np.round(vertices * 16) / 16
-            vertices[1::3] = vertices[::3] + (vertices[2::3] - vertices[::3]) * rng.choice([0.5, 0.25, 0.3, 1.0], (len(faces), 1))
+            vertices[1::3] = vertices[::3] + (vertices[2::3] - vertices[::3]) * rng.choice(
+                [0.5, 0.25, 0.3, 1.0], (len(faces), 1)
+            )
         scale = 10.0 ** rng.integers(-20, 20) if kind == "scaled" else 1.0
         X = right_angle_pose(rng) if rng.random() < 0.5 else random_pose(rng)
         origins, directions = some_rays(rng, vertices, faces, X)
@@ -140,7 +145,9 @@ def test_no_ray_slips_through_a_closed_mesh():
     corners = vertices[faces] @ X[:3, :3].T + X[:3, 3]
     centre = X[:3, 3]
     weights = rng.random((len(faces), 1))
-    aims = np.concatenate([corners[:, 0], weights * corners[:, 0] + (1 - weights) * corners[:, 1], rng.normal(size=(500, 3)) + centre])
+    aims = np.concatenate(
+        [corners[:, 0], weights * corners[:, 0] + (1 - weights) * corners[:, 1], rng.normal(size=(500, 3)) + centre]
+    )
     for sign in (1.0, -1.0):
         found = collide.raycast(mesh, X, np.broadcast_to(centre, aims.shape), sign * (aims - centre))
         assert found.hit.all()
@@ -180,7 +187,11 @@ def test_far_tiny_and_long_directions():
     assert far.hit and Fraction(far.lower) <= Fraction(1e40) - 1 <= Fraction(far.upper)
     slightly = collide.raycast(cube, np.eye(4), (1e40, 0.3, 0.1), (-1, 1e-30, 0))
     assert not slightly.hit  # 1e10 off by then
-    tiny = collide.Mesh(np.concatenate([box()[0] * 1e-12, [[1000.0, 0, 0], [1000, 1, 0], [1000, 0, 1]]]), [*box()[1], [8, 9, 10]], solid=False)
+    tiny = collide.Mesh(
+        np.concatenate([box()[0] * 1e-12, [[1000.0, 0, 0], [1000, 1, 0], [1000, 0, 1]]]),
+        [*box()[1], [8, 9, 10]],
+        solid=False,
+    )
     got = collide.raycast(tiny, np.eye(4), [(-5, 0, 0), (-5, 0.1, 0.1), (-5, 2e-12, 0)], (1, 0, 0))
     assert got.hit.tolist() == [True, True, True] and got.facet[1] == got.facet[2] == 12
 
@@ -268,7 +279,8 @@ def test_kernels_as_plain_python_say_the_same_bits():
     said = [
         subprocess.run(
             [sys.executable, "-c", CHILD], input=pickle.dumps((vertices, faces, poses, origins, directions)),
-            env={**os.environ, "NUMBA_DISABLE_JIT": plain}, cwd=Path(collide.__file__).parents[1], check=True, capture_output=True,
+            env={**os.environ, "NUMBA_DISABLE_JIT": plain}, cwd=Path(collide.__file__).parents[1], check=True,
+            capture_output=True,
         ).stdout
         for plain in ("0", "1")
     ]  # fmt: skip
@@ -290,7 +302,8 @@ def test_exact_settling_of_a_walk_that_sees_nothing():
 def test_empty_batches_of_poses_and_numbers_beyond_doubles():
     mesh, none = collide.Mesh(*box()), np.zeros((0, 3))
     for poses, origins, directions in (
-        (np.zeros((0, 4, 4)), none, none), (np.zeros((0, 4, 4)), np.zeros(3), np.ones(3)), (np.eye(4), none, np.ones(3)),
+        (np.zeros((0, 4, 4)), none, none), (np.zeros((0, 4, 4)), np.zeros(3), np.ones(3)),
+        (np.eye(4), none, np.ones(3)),
     ):  # fmt: skip
         for every in (False, True):
             r = collide.raycast(mesh, poses, origins, directions, all_hits=every)
@@ -298,7 +311,9 @@ def test_empty_batches_of_poses_and_numbers_beyond_doubles():
     beyond = 10**400
     for more in ({"max_distance": beyond}, {"origins_W": [beyond, 0, 0]}, {"directions_W": [beyond, 0, 0]}):
         with pytest.raises(collide.InvalidArgument):
-            collide.raycast(**{"shape": mesh, "X_WA": np.eye(4), "origins_W": np.zeros(3), "directions_W": np.ones(3), **more})
+            collide.raycast(
+                **{"shape": mesh, "X_WA": np.eye(4), "origins_W": np.zeros(3), "directions_W": np.ones(3), **more}
+            )
     with pytest.raises(collide.InvalidArgument):
         collide.contacts(mesh, mesh, np.eye(4), np.eye(4), margin=beyond)
     with pytest.raises(collide.InvalidPose):

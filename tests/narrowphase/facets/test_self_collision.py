@@ -51,7 +51,9 @@ def test_pairs_are_those_of_brute_force():
         faces = proper(vertices, faces)
         points = as_integers(world_points(vertices, np.eye(4)))[0]
         corners = [[points[v] for v in f] for f in faces.tolist()]
-        want = [(i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])]
+        want = [
+            (i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])
+        ]
         pairs, _ = self_hits(build_mesh_tree(vertices, faces))
         assert list(map(tuple, pairs.tolist())) == want, (case, vertices.tolist(), faces.tolist())
         found_pairs += len(want)
@@ -67,7 +69,9 @@ def test_tiny_meshes_far_away_and_facets_that_nearly_touch():
         vertices, faces = soup(rng, 16, 0.5) if case % 2 else grid(rng, 20, 3)
         offset, scale = rng.choice([0.0, 1.0, 1e6, 1e12]), 10.0 ** rng.integers(-14, 3)
         vertices = offset + vertices * scale
-        faces = faces[np.abs(np.cross(*(vertices[faces][:, 1:] - vertices[faces][:, :1]).transpose(1, 0, 2))).max(axis=1) > 0.0]
+        faces = faces[
+            np.abs(np.cross(*(vertices[faces][:, 1:] - vertices[faces][:, :1]).transpose(1, 0, 2))).max(axis=1) > 0.0
+        ]
         if not len(faces):
             continue
         points = as_integers(world_points(vertices, np.eye(4)))[0]
@@ -76,7 +80,9 @@ def test_tiny_meshes_far_away_and_facets_that_nearly_touch():
         faces, corners = faces[proper_ones], [corners[k] for k in proper_ones]
         if not len(faces):
             continue
-        want = [(i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])]
+        want = [
+            (i, j) for i in range(len(faces)) for j in range(i + 1, len(faces)) if shares_more(corners[i], corners[j])
+        ]
         pairs, _ = self_hits(build_mesh_tree(vertices, faces))
         assert list(map(tuple, pairs.tolist())) == want, (case, vertices.tolist(), faces.tolist())
         found_pairs, tested = found_pairs + len(want), tested + len(faces) ** 2 // 2
@@ -106,7 +112,9 @@ def test_crossings_folds_and_doubles_are_found():
 def test_many_pairs_are_not_lost():
     n = 120
     faces = np.arange(3 * n).reshape(n, 3)
-    vertices = (np.array([[1.0, 0, 0], [-1, 1, 0], [-1, -1, 0]])[None] + 0.01 * np.random.default_rng(1).normal(size=(n, 3, 3)))
+    vertices = np.array([[1.0, 0, 0], [-1, 1, 0], [-1, -1, 0]])[None] + 0.01 * np.random.default_rng(1).normal(
+        size=(n, 3, 3)
+    )
     vertices[::2] = vertices[::2, :, [2, 0, 1]]
     pairs, _ = self_hits(build_mesh_tree(vertices.reshape(-1, 3), faces))
     assert len(pairs) >= (n // 2) ** 2 and len(np.unique(pairs, axis=0)) == len(pairs)
@@ -116,10 +124,14 @@ def test_facets_without_area_are_what_their_corners_span():
     """In either order: a facet that is no more than a common edge or corner is no pair, a longer one is."""
     line = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [5, 5, 5], [2, 0, 0], [3, 0, 0], [-1, 0, 0]])
     for a, b, want in (
-        ([0, 1, 2], [0, 0, 1], False), ([0, 1, 2], [1, 0, 0], False), ([0, 1, 2], [0, 0, 0], False), ([0, 1, 2], [0, 3, 1], False),
-        ([0, 1, 2], [0, 3, 3], True), ([0, 1, 2], [0, 4, 4], False), ([0, 1, 2], [5, 1, 6], False), ([0, 1, 2], [7, 0, 5], True),
-        ([0, 1, 2], [7, 0, 7], False), ([2, 4, 0], [7, 0, 1], False), ([0, 3, 1], [0, 3, 3], False), ([0, 1, 5], [0, 1, 6], True),
-        ([0, 1, 5], [0, 1, 7], False), ([3, 1, 5], [0, 3, 5], False), ([0, 0, 1], [0, 1, 1], False), ([0, 1, 4], [0, 0, 3], True),
+        ([0, 1, 2], [0, 0, 1], False), ([0, 1, 2], [1, 0, 0], False), ([0, 1, 2], [0, 0, 0], False),
+        ([0, 1, 2], [0, 3, 1], False),
+        ([0, 1, 2], [0, 3, 3], True), ([0, 1, 2], [0, 4, 4], False), ([0, 1, 2], [5, 1, 6], False),
+        ([0, 1, 2], [7, 0, 5], True),
+        ([0, 1, 2], [7, 0, 7], False), ([2, 4, 0], [7, 0, 1], False), ([0, 3, 1], [0, 3, 3], False),
+        ([0, 1, 5], [0, 1, 6], True),
+        ([0, 1, 5], [0, 1, 7], False), ([3, 1, 5], [0, 3, 5], False), ([0, 0, 1], [0, 1, 1], False),
+        ([0, 1, 4], [0, 0, 3], True),
     ):  # fmt: skip
         for faces in ([a, b], [b, a], [a[::-1], b[1:] + b[:1]], [b[2:] + b[:2], a]):
             pairs, _ = self_hits(build_mesh_tree(line, np.array(faces)))
@@ -133,4 +145,6 @@ def test_the_order_of_facets_says_nothing():
         pairs, _ = self_hits(build_mesh_tree(vertices, faces))
         turned, _ = self_hits(build_mesh_tree(vertices, faces[::-1]))
         last = len(faces) - 1
-        assert sorted(map(tuple, pairs.tolist())) == sorted((last - j, last - i) for i, j in turned.tolist()), faces.tolist()
+        assert sorted(map(tuple, pairs.tolist())) == sorted((last - j, last - i) for i, j in turned.tolist()), (
+            faces.tolist()
+        )

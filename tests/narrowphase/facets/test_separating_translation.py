@@ -43,13 +43,16 @@ def test_cubes_come_apart_by_their_least_overlap():
         found = shortened(cubes_meet, X_WA, X_WB, known, AXES, [])
         assert least - 1e-12 <= found.length <= found.bound and found.bound <= found.length * (1 + 1e-12)
         assert abs(np.linalg.norm(found.normal) - 1.0) < 1e-12 and parts(cubes_meet, X_WA, X_WB, found), offset.tolist()
-        assert found.length <= 2.0 * least + 1e-9, "a length between the best and its half is tried in the best direction"
+        assert found.length <= 2.0 * least + 1e-9, (
+            "a length between the best and its half is tried in the best direction"
+        )
         exact += found.length <= 1.01 * least
     assert exact > 30, exact
 
 
 def test_nothing_longer_than_what_is_known():
-    """Where no direction offers less, the answer is what was known before; candidates that part are taken as they are."""
+    """Where no direction offers less, the answer is what was known before; candidates that part are taken as they
+    are."""
     X_WA, X_WB = pose(), pose(t=(0.25, 0.0, 0.0))
     known = SeparatingTranslation(0.75, 0.75, np.array([1.0, 0.0, 0.0]))
     sideways = np.array([[0.0, 1.0, 0.0]])

@@ -24,7 +24,8 @@ def test_all_pairs_are_those_of_brute_force(family):
         A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
         found = all_hits(A, B, X, Y)
         want = facet_pairs(va, fa, X, vb, fb, Y)
-        told = f"{family} {case}: va, fa, X, vb, fb, Y = {va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist()}"
+        asked = (va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist())
+        told = f"{family} {case}: va, fa, X, vb, fb, Y = {asked}"
         assert list(map(tuple, found.pairs.tolist())) == want, told
         first = first_hits(A, B, X, Y)
         assert len(first.pairs) == bool(want) and set(map(tuple, first.pairs.tolist())) <= set(want), told
@@ -51,7 +52,9 @@ def test_batches_are_their_poses_one_by_one():
         one = all_hits(A, B, Xs[k], Ys[k])
         assert np.array_equal(one.pairs, whole.pairs[begin:end]) and np.array_equal(one.counters[0], whole.counters[k])
     fixed = all_hits(A, B, Xs[3], Ys)
-    assert np.array_equal(fixed.pairs[fixed.starts[3] : fixed.starts[4]], whole.pairs[whole.starts[3] : whole.starts[4]])
+    assert np.array_equal(
+        fixed.pairs[fixed.starts[3] : fixed.starts[4]], whole.pairs[whole.starts[3] : whole.starts[4]]
+    )
 
 
 def test_nothing_is_lost_where_there_are_many_pairs():

@@ -50,7 +50,8 @@ def test_brackets_hold_the_distance(family):
         A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
         r = surface_distances(A, B, X, Y)
         square, pairs = surface_distance(va, fa, X, vb, fb, Y)
-        told = f"{family} {case}: va, fa, X, vb, fb, Y = {va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist()}"
+        asked = (va.tolist(), fa.tolist(), X.tolist(), vb.tolist(), fb.tolist(), Y.tolist())
+        told = f"{family} {case}: va, fa, X, vb, fb, Y = {asked}"
         lower, distance, upper = (Fraction(float(v[0])) for v in (r.lower, r.distance, r.upper))
         assert lower**2 <= square <= upper**2 and lower <= distance <= upper, told
         assert r.meets[0] == (square == 0), told

@@ -30,8 +30,14 @@ class Feature:
         self.X_WA, self.X_WB = (random_pose(rng, 0.0) for _ in range(2))
         if kind == "lattice":
             self.X_WA, self.X_WB = (pose(LATTICE_ROTATIONS[int(rng.integers(24))]) for _ in range(2))
-        self.X_WB[:3, 3] = np.array([0.0, 0.0, 3.0]) if kind == "lattice" else rng.normal(size=3) * (1e-6 if kind == "near" else 3.0)
-        draw = (lambda: rng.integers(-4, 5, size=(n, 3)) * 0.25) if kind == "lattice" else (lambda: rng.normal(size=(n, 3)))
+        self.X_WB[:3, 3] = (
+            np.array([0.0, 0.0, 3.0]) if kind == "lattice" else rng.normal(size=3) * (1e-6 if kind == "near" else 3.0)
+        )
+        draw = (
+            (lambda: rng.integers(-4, 5, size=(n, 3)) * 0.25)
+            if kind == "lattice"
+            else (lambda: rng.normal(size=(n, 3)))
+        )
         self.a, self.b = draw(), draw()
         self.of_a = rng.integers(0, 2, n).astype(bool)
         if parts == 1:  # the other vertex is the first's

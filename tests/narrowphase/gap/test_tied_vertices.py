@@ -94,7 +94,8 @@ def nearest_of(points):
 
 
 def weights_of(w, edges):
-    """(numerators of the edges' weights, their denominator > 0) of the foot of the origin, if all weights are above 0."""
+    """(numerators of the edges' weights, their denominator > 0) of the foot of the origin, if all weights are above
+    0."""
     n = len(edges)
     G = [[dot(a, b) for b in edges] for a in edges]
     right = [-dot(w, e) for e in edges]
@@ -300,7 +301,8 @@ def test_the_lowest_of_level_vertices(turned):
 
 @pytest.mark.own_kernels
 def test_a_vertex_in_the_middle_of_a_facet_is_left_open():
-    """All its neighbours are level, and edges do not lead to the other side. `quickhull` hardly makes any: this one does."""
+    """All its neighbours are level, and edges do not lead to the other side. `quickhull` hardly makes any: this one
+    does."""
     m = 20
     points = np.concatenate([prism(2 * m), [[0.0, 0.0, 0.5]]])
     k = np.arange(m)

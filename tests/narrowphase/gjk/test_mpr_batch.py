@@ -14,6 +14,7 @@ from naive import Case, pose, random_pose, rng_of
 
 import collide
 from collide.kernels import address_of, entry
+from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.gjk import mpr_batch as small_hulls
 from collide.narrowphase.gjk.mpr import ROUNDS
@@ -63,7 +64,7 @@ def asked(n: int, *words) -> list[Case]:
 
 def rows_of(cases: list[Case], limit: float = 0.0, boolean: bool = True) -> np.ndarray:
     """What portals alone make of the rows."""
-    packed = [shape.parts()[0][0] for case in cases for shape in (case.A, case.B)]
+    packed = [convex_set_of(shape) for case in cases for shape in (case.A, case.B)]
     table = ShapeTable(packed)
     X = np.stack([X for case in cases for X in (case.X_WA, case.X_WB)])
     poses = pose_table(X, np.tile(np.eye(4), (len(X), 1, 1)), np.array([p.reach for p in packed]))
@@ -180,7 +181,9 @@ def test_no_row_depends_on_its_neighbours():
 def test_few_pairs_and_other_shapes_are_left_alone():
     cases = [case for case in asked(60, "few") if abs(collide.distance(*case).distance) < 0.1]
     assert not decided(rows_of(cases[:2])).any()
-    rounded = [Case(collide.ConvexHull(c.A.points, radius=0.1), c.B, c.X_WA, c.X_WB) for c in cases if hasattr(c.A, "points")]
+    rounded = [
+        Case(collide.ConvexHull(c.A.points, radius=0.1), c.B, c.X_WA, c.X_WB) for c in cases if hasattr(c.A, "points")
+    ]
     large = collide.ConvexHull(naive.hull_points(rng_of("large"), 80))
     for others in (rounded, [c._replace(A=collide.Sphere(1.0)) for c in cases], [c._replace(A=large) for c in cases]):
         assert len(others) > 7 and not decided(rows_of(others)).any()
@@ -233,7 +236,8 @@ for boolean in (True, False):
 def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CHILD, *(str(Path(file).parent) for file in (__file__, naive.__file__))],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=300, check=False,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True,
+        timeout=300, check=False,
     )  # fmt: skip
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     rows, gaps = (rows_of(asked(40, "plain"), boolean=boolean) for boolean in (True, False))

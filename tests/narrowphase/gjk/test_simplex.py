@@ -107,7 +107,13 @@ def test_faces_in_sight_prove_what_they_leave_out(kind):
             if depth is None:
                 assert min(kept) == true
             seen["some left out" if faces != ALL_FACES else "all kept"] += 1
-    wanted = {"random": ["some left out"], "around the origin": ["inside", "some left out"], "far": ["some left out"], "lattice": ["some left out"], "thin": ["all kept"]}
+    wanted = {
+        "random": ["some left out"],
+        "around the origin": ["inside", "some left out"],
+        "far": ["some left out"],
+        "lattice": ["some left out"],
+        "thin": ["all kept"],
+    }
     assert all(seen[what] >= 10 for what in wanted[kind]), seen
 
 
@@ -162,7 +168,8 @@ def test_directions_across_features(n):
 
 @pytest.mark.parametrize("height", [1.0, 1e-5, 1e-12])
 def test_weights_of_an_enclosed_origin(height):
-    """Weights ≥ 0 of sum 1 whose point misses the origin by no more than is said, and by little even of thin tetrahedra."""
+    """Weights ≥ 0 of sum 1 whose point misses the origin by no more than is said, and by little even of thin
+    tetrahedra."""
     rng = rng_of("weigh enclosed", height)
     cases = 0
     while cases < 60:
@@ -174,7 +181,9 @@ def test_weights_of_an_enclosed_origin(height):
             weights = [0.0] * 4
             missed, size = S.weigh_enclosed(rows_of(corners), weights)
             assert min(weights) >= 0.0 and abs(sum(weights) - 1.0) <= 4 * ULP
-            by = sum(abs(sum(Fraction(w) * Fraction(float(c[axis])) for w, c in zip(weights, corners))) for axis in range(3))
+            by = sum(
+                abs(sum(Fraction(w) * Fraction(float(c[axis])) for w, c in zip(weights, corners))) for axis in range(3)
+            )
             assert by <= missed + 8 * ULP * size and missed <= 8 * ULP * size
     flat = corners_of(rng, 4, "random") * (1.0, 1.0, 0.0)
     assert S.weigh_enclosed(rows_of(flat), [0.0] * 4)[0] == math.inf

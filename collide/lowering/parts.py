@@ -1,0 +1,187 @@
+"""Any shape as convex parts, each with its pose in the shape's frame: what a shape is to the rest of the engine.
+
+One function a class says what its parts are. Parts are made when first asked for and kept with the shape, which never
+changes. No kernel is imported: `certificates.verify` reads parts, too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.lowering.packed_convex import (
+    CONE,
+    CYLINDER,
+    ELLIPSOID,
+    PackedConvex,
+    pack_curved,
+    pack_halfspace,
+    pack_points,
+)
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.hpolytope import HPolytope
+from collide.shapes.mesh import Mesh
+from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
+from collide.shapes.shape import IDENTITY, Shape
+
+#: A convex set and its (4, 4) pose in the shape's frame.
+Part = tuple[PackedConvex, np.ndarray]
+
+#: One product of two poses rounds each coordinate of a point by at most this many units in the
+#: last place of its terms: three products and three sums for the rotation, one more for the shift.
+_ULPS_PER_PRODUCT = 8
+_ULP = 2.0**-53
+#: Points of a mesh that are their own bounds; of more, boxes of so many cells along each axis hold them.
+_MAX_OWN_BOUNDS, _CELLS = 512, 6
+
+
+def parts_of(shape: Shape) -> tuple[Part, ...]:
+    """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes."""
+    try:
+        return shape._parts
+    except AttributeError:
+        shape._store(_parts=_rule_for(shape)(shape))
+        return shape._parts
+
+
+def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
+    """Convex sets that hold a shape: its parts, or something larger and simpler where meshes are in it. For culling."""
+    if not shape.meshed:
+        return parts_of(shape)
+    try:
+        return shape._bounds
+    except AttributeError:
+        bounds = _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
+        shape._store(_bounds=bounds)
+        return bounds
+
+
+def convex_set_of(shape: Shape) -> PackedConvex:
+    """The first, or only, convex part."""
+    return parts_of(shape)[0][0]
+
+
+def is_single_convex(shape: Shape) -> bool:
+    """Whether a shape is one convex set in its own frame."""
+    if shape.meshed:
+        return False
+    parts = parts_of(shape)
+    return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
+
+
+# --- one function a class -----------------------------------------------------------------------
+
+
+def _sphere(shape: Sphere) -> tuple[Part, ...]:
+    return _alone(pack_points(np.zeros((1, 3)), shape.radius))
+
+
+def _box(shape: Box) -> tuple[Part, ...]:
+    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+    return _alone(pack_points(signs * shape.size))
+
+
+def _capsule(shape: Capsule) -> tuple[Part, ...]:
+    half = 0.5 * shape.length
+    ends = np.array([(0.0, 0.0, -half), (0.0, 0.0, half)])[: 2 if half else 1]
+    return _alone(pack_points(ends, shape.radius))
+
+
+def _cylinder(shape: Cylinder) -> tuple[Part, ...]:
+    half = 0.5 * shape.length
+    return _alone(pack_curved(CYLINDER, (shape.radius, half), math.hypot(shape.radius, half)))
+
+
+def _cone(shape: Cone) -> tuple[Part, ...]:
+    half = 0.5 * shape.length
+    return _alone(pack_curved(CONE, (shape.radius, half), math.hypot(shape.radius, half)))
+
+
+def _ellipsoid(shape: Ellipsoid) -> tuple[Part, ...]:
+    return _alone(pack_curved(ELLIPSOID, tuple(shape.radii), float(shape.radii.max())))
+
+
+def _halfspace(shape: Halfspace) -> tuple[Part, ...]:
+    return _alone(pack_halfspace(tuple(shape.normal), shape.offset))
+
+
+def _convex_hull(shape: ConvexHull) -> tuple[Part, ...]:
+    return _alone(pack_points(shape.points, shape.radius, with_tree=True))
+
+
+def _hpolytope(shape: HPolytope) -> tuple[Part, ...]:
+    return _alone(pack_points(shape.vertices, slop=shape.slop))
+
+
+def _mesh(shape: Mesh) -> tuple[Part, ...]:
+    raise UnsupportedQuery(
+        "Mesh: a mesh is no union of convex parts, which this query needs. collide() and distance() of one mesh and "
+        "another shape, and World, take it as it is; elsewhere ConvexHull(mesh.vertices) may do instead"
+    )
+
+
+def _compound(shape: Compound, of_item: Callable[[Shape], tuple[Part, ...]] = parts_of) -> tuple[Part, ...]:
+    return tuple(_placed(packed, X_CS, X_SP) for item, X_CS in shape.items for packed, X_SP in of_item(item))
+
+
+_RULES: dict[type, Callable[..., tuple[Part, ...]]] = {
+    Sphere: _sphere,
+    Box: _box,
+    Capsule: _capsule,
+    Cylinder: _cylinder,
+    Cone: _cone,
+    Ellipsoid: _ellipsoid,
+    Halfspace: _halfspace,
+    ConvexHull: _convex_hull,
+    HPolytope: _hpolytope,
+    Mesh: _mesh,
+    Compound: _compound,
+}
+
+
+def _rule_for(shape: Shape) -> Callable[..., tuple[Part, ...]]:
+    for cls in type(shape).__mro__:
+        if cls in _RULES:
+            return _RULES[cls]
+    raise TypeError(f"{type(shape).__name__} cannot be asked about: derive it from one of collide's shapes")
+
+
+def _alone(packed: PackedConvex) -> tuple[Part, ...]:
+    return ((packed, IDENTITY),)
+
+
+def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
+    """A part in the compound's frame, its slop grown by what the product of poses rounds."""
+    if np.array_equal(X_SP, IDENTITY):
+        return packed, X_CS
+    X_CP = X_CS @ X_SP
+    scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()
+    return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP
+
+
+def _mesh_bounds(mesh: Mesh) -> tuple[Part, ...]:
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces] = True
+    return _alone(pack_points(_points_around(mesh.vertices[used])))
+
+
+def _points_around(points: np.ndarray) -> np.ndarray:
+    """Points (k, 3) whose hull holds the ones given, and is not much larger: few, or corners of boxes around groups."""
+    if len(points) <= _MAX_OWN_BOUNDS:
+        return points
+    low, high = points.min(axis=0), points.max(axis=0)
+    with np.errstate(under="ignore"):
+        share = 0.5 * points - 0.5 * low, 0.5 * high - 0.5 * low
+    cell = np.minimum(share[0] / np.where(share[1] > 0.0, share[1], 1.0) * _CELLS, _CELLS - 1).astype(np.int64)
+    numbers = (cell[:, 0] * _CELLS + cell[:, 1]) * _CELLS + cell[:, 2]
+    order = np.argsort(numbers, kind="stable")
+    starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+    lows = np.minimum.reduceat(points[order], starts)[:, None]
+    highs = np.maximum.reduceat(points[order], starts)[:, None]
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
+    return np.unique(np.where(corners, highs, lows).reshape(-1, 3), axis=0)
