@@ -92,15 +92,18 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 #: Public functions under other names than those of the modules that have them.
-_RENAMED = {"get_include": ("collide.kernels.library", "include_folder"), "get_library": ("collide.kernels.library", "library_path")}
+_RENAMED = {
+    "get_include": ("collide.kernels.library", "include_folder"),
+    "get_library": ("collide.kernels.library", "library_path"),
+}
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts", "ConvexHull",
-    "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
-    "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError", "SelfCollisions", "Shape",
-    "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains",
-    "distance", "facet_pairs", "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify",
-    "walk",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
+    "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument",
+    "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot",
+    "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World",
+    "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify", "walk",
 ]
 
 
@@ -114,8 +117,8 @@ if not TYPE_CHECKING:  # checkers are to know the names above, and no others
             return import_module(f"collide.{name}")
         if name not in _HOME and name not in _RENAMED:
             raise AttributeError(f"module 'collide' has no attribute {name!r}")
-        module, own = _RENAMED.get(name) or (_HOME[name], name)
-        value = getattr(import_module(module), own)
+        module, attribute = _RENAMED.get(name) or (_HOME[name], name)
+        value = getattr(import_module(module), attribute)
         globals()[name] = value
         return value
 

@@ -14,8 +14,8 @@ from collide.errors import InvalidArgument
 #: The name of the default narrowphase.
 DEFAULT = "gjk"
 
-#: Query → name of the algorithm → module and function. A function takes (A, B, X_WA, X_WB, check_poses), those of distances
-#: also ``signed``, and returns what the query does.
+#: Query → name of the algorithm → module and function. A function takes (A, B, X_WA, X_WB, check_poses), those of
+#: distances also ``signed``, and returns what the query does.
 _ALGORITHMS = {
     "collide": {"barba-langerman": ("collide.hierarchies.hierarchy_queries", "collide_by_walk")},
     "distance": {"dobkin-kirkpatrick": ("collide.hierarchies.hierarchy_queries", "distance_by_descent")},
@@ -29,9 +29,9 @@ def named_algorithm(query: str, name: object) -> Callable | None:
     """
     if name is None or (isinstance(name, str) and name == DEFAULT):
         return None
-    found = _ALGORITHMS[query].get(name) if isinstance(name, str) else None
-    if found is None:
+    place = _ALGORITHMS[query].get(name) if isinstance(name, str) else None
+    if place is None:
         names = " or ".join(f'"{known}"' for known in (DEFAULT, *_ALGORITHMS[query]))
         raise InvalidArgument(f"algorithm must be {names}, got {name!r}")
-    module, function = found
+    module, function = place
     return getattr(import_module(module), function)

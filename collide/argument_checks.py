@@ -1,8 +1,8 @@
 """Numbers, arrays and file paths as callers hand them in, read in one way: what is no number is refused by name.
 
-Anything that holds real numbers will do: Python's own, fractions and decimals, numpy's of any width, nested sequences, objects
-with ``__array__``. Not complex numbers (a part would be lost), masked entries (they would be unmasked), text, dates and
-times, None. A number too large for a double is refused as one that is not finite, not as an overflow.
+Anything that holds real numbers will do: Python's own, fractions and decimals, numpy's of any width, nested sequences,
+objects with ``__array__``. Not complex numbers (a part would be lost), masked entries (they would be unmasked), text,
+dates and times, None. A number too large for a double is refused as one that is not finite, not as an overflow.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from collide.errors import CollideError, InvalidArgument
 #: Array kinds that are read as they are; objects are read one by one.
 _REAL = "fiub"
 _KINDS = {
-    "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text", "O": "objects",
+    "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text",
+    "O": "objects",
 }  # fmt: skip
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
@@ -30,12 +31,18 @@ def describe(value: Any) -> str:
     """A value as an error message shows it: short, numpy's numbers as numbers."""
     with contextlib.suppress(Exception):  # whoever's __repr__ fails is told by type
         return _SHORT.repr(value.item() if isinstance(value, (np.number, np.bool_)) else value)
-    return f"an integer of some {int(value.bit_length() * 0.30103)} digits" if isinstance(value, int) else f"a {type(value).__name__}"
+    return (
+        f"an integer of some {int(value.bit_length() * 0.30103)} digits"
+        if isinstance(value, int)
+        else f"a {type(value).__name__}"
+    )
 
 
 def number(value: Any) -> float | None:
     """A real number as a double, infinite where it is too large for one; None where it is no number."""
-    if isinstance(value, (str, bytes, bytearray, complex, np.complexfloating, np.timedelta64, np.datetime64, np.character)):
+    if isinstance(
+        value, (str, bytes, bytearray, complex, np.complexfloating, np.timedelta64, np.datetime64, np.character)
+    ):
         return None
     if _is_masked(value) or (isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in _REAL + "O")):
         return None
@@ -75,19 +82,24 @@ def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.n
     what : "Box: size", for messages.   wanted : the shape that is asked for, for messages.
     Raises ``error`` for what does not consist of real numbers. Whether they are finite is the caller's to ask.
     """
-    found = plain_array(what, value, wanted, error)
-    if found.dtype == np.float64:
-        return found
-    if found.dtype.kind in _REAL:
-        return found.astype(np.float64)
-    if found.dtype.kind != "O":
-        raise error(f"{what} must be real numbers {wanted}, got {_KINDS.get(found.dtype.kind, found.dtype)}: {describe(value)}")
-    read = [number(entry) for entry in found.ravel().tolist()]
+    numbers_given = plain_array(what, value, wanted, error)
+    if numbers_given.dtype == np.float64:
+        return numbers_given
+    if numbers_given.dtype.kind in _REAL:
+        return numbers_given.astype(np.float64)
+    if numbers_given.dtype.kind != "O":
+        raise error(
+            f"{what} must be real numbers {wanted}, got {_KINDS.get(numbers_given.dtype.kind, numbers_given.dtype)}: "
+            f"{describe(value)}"
+        )
+    read = [number(entry) for entry in numbers_given.ravel().tolist()]
     if None in read:
         k = read.index(None)
-        where = list(map(int, np.unravel_index(k, found.shape))) if found.ndim else ""
-        raise error(f"{what}{where} must be a real number (all of it {wanted}), got {describe(found.ravel()[k])}")
-    return np.array(read, dtype=np.float64).reshape(found.shape)
+        where = list(map(int, np.unravel_index(k, numbers_given.shape))) if numbers_given.ndim else ""
+        raise error(
+            f"{what}{where} must be a real number (all of it {wanted}), got {describe(numbers_given.ravel()[k])}"
+        )
+    return np.array(read, dtype=np.float64).reshape(numbers_given.shape)
 
 
 def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
@@ -98,7 +110,9 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
         return np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         # numpy's own words for rows of different lengths are long, and tell no more
-        raise error(f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {describe(value)}") from None
+        raise error(
+            f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {describe(value)}"
+        ) from None
 
 
 def _is_masked(value: Any) -> bool:

@@ -99,7 +99,7 @@ def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
 
 
 def _pairs_together(A, B) -> np.ndarray | None:
-    """(n,) numbers of the poses, those of the same two shapes one after another; None where they are all of one pair."""
+    """(n,) numbers of the poses, those of the same two shapes one after another; None where all are of one pair."""
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 

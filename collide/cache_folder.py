@@ -12,7 +12,7 @@ from pathlib import Path
 #: are the user's by their access lists.
 TRUST = hasattr(os, "geteuid")
 #: As many links as the system itself follows.
-_MOST_LINKS = 40
+_MAX_LINKS = 40
 
 
 def cache_folder(*parts: str) -> Path:
@@ -21,9 +21,9 @@ def cache_folder(*parts: str) -> Path:
     ``COLLIDE_CACHE_DIR`` if set; else the platform's place: ``%LOCALAPPDATA%``,
     ``~/Library/Caches``, ``$XDG_CACHE_HOME`` or ``~/.cache``.
     """
-    chosen = os.environ.get("COLLIDE_CACHE_DIR")
-    if chosen:
-        return Path(chosen).expanduser().joinpath(*parts)
+    folder_named = os.environ.get("COLLIDE_CACHE_DIR")
+    if folder_named:
+        return Path(folder_named).expanduser().joinpath(*parts)
     home = Path(os.path.expanduser("~"))
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
@@ -45,23 +45,25 @@ def why_distrusted(folder: Path) -> str | None:
     """Who else may decide what a folder holds: "… may be written by others", or None where nobody may.
 
     Looked at is every folder and link on the way: each must belong to this user, or to the owner of the machine, and be
-    writable to nobody else. Of a folder with the sticky bit, like /tmp, everyone may fill it and only owners move what is
-    in it, so it may stand on the way, but not be the folder itself. What does not exist yet is passed over.
+    writable to nobody else. Of a folder with the sticky bit, like /tmp, everyone may fill it and only owners move what
+    is in it, so it may stand on the way, but not be the folder itself. What does not exist yet is passed over.
     """
     if not TRUST:
         return None
     owners = {0, os.geteuid(), os.stat("/").st_uid}  # who has the root folder has all there is
-    for place, found, is_last in _way_to(folder):
-        if found.st_uid not in owners:
-            return f"{place} belongs to another user (id {found.st_uid})"
-        shared = _others_may_write(found) and (is_last or not found.st_mode & stat.S_ISVTX)
-        if shared and not stat.S_ISLNK(found.st_mode):  # of a link the mode says nothing
-            return f"{place} may be written by others (mode {stat.S_IMODE(found.st_mode):o})"
+    for place, status, is_last in _way_to(folder):
+        if status.st_uid not in owners:
+            return f"{place} belongs to another user (id {status.st_uid})"
+        shared = _others_may_write(status) and (is_last or not status.st_mode & stat.S_ISVTX)
+        if shared and not stat.S_ISLNK(status.st_mode):  # of a link the mode says nothing
+            return f"{place} may be written by others (mode {stat.S_IMODE(status.st_mode):o})"
     return None
 
 
-def _others_may_write(found: os.stat_result) -> bool:
-    return bool(found.st_mode & stat.S_IWOTH) or (bool(found.st_mode & stat.S_IWGRP) and not _is_own_group(found.st_gid))
+def _others_may_write(status: os.stat_result) -> bool:
+    return bool(status.st_mode & stat.S_IWOTH) or (
+        bool(status.st_mode & stat.S_IWGRP) and not _is_own_group(status.st_gid)
+    )
 
 
 def _is_own_group(group: int) -> bool:
@@ -70,10 +72,10 @@ def _is_own_group(group: int) -> bool:
     import pwd
 
     try:
-        name, found = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
+        name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:
         return False
-    return found.gr_name == name and set(found.gr_mem) <= {name}
+    return entry.gr_name == name and set(entry.gr_mem) <= {name}
 
 
 def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
@@ -87,17 +89,17 @@ def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
             at = at.parent
             continue
         try:
-            found = os.lstat(at / part)
+            status = os.lstat(at / part)
         except (FileNotFoundError, NotADirectoryError):
             return
-        if stat.S_ISLNK(found.st_mode):
-            yield at / part, found, False
+        if stat.S_ISLNK(status.st_mode):
+            yield at / part, status, False
             links += 1
-            if links > _MOST_LINKS:
+            if links > _MAX_LINKS:
                 raise OSError(f"{folder}: too many links")
             target = Path(os.readlink(at / part))
             waiting += reversed(target.parts[1:] if target.is_absolute() else target.parts)
             at = Path(target.anchor) if target.is_absolute() else at
         else:
             at = at / part
-            yield at, found, not waiting
+            yield at, status, not waiting

@@ -26,19 +26,19 @@ def brief(value: object) -> str:
     return cut(_SHORT.repr(value), LONGEST_VALUE)
 
 
-def cut(text: str, most: int = LONGEST_VALUE) -> str:
-    """A text with its middle left out where it is longer than ``most`` characters."""
-    if len(text) <= most:
+def cut(text: str, max_length: int = LONGEST_VALUE) -> str:
+    """A text with its middle left out where it is longer than ``max_length`` characters."""
+    if len(text) <= max_length:
         return text
-    left, right = most * 3 // 4 - 2, most // 4 - 1
-    return f"{text[:left]}...{text[-right:]}"
+    head, tail = max_length * 3 // 4 - 2, max_length // 4 - 1
+    return f"{text[:head]}...{text[-tail:]}"
 
 
-def listing(names: Iterable[object], most: int = 30) -> str:
+def listing(names: Iterable[object], max_names: int = 30) -> str:
     """Names separated by commas, each cut where it is long; of many the first."""
     names = list(names)
-    shown = ", ".join(cut(str(name)) for name in names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+    listed = ", ".join(cut(str(name)) for name in names[:max_names])
+    return listed if len(names) <= max_names else f"{listed} and {len(names) - max_names} more"
 
 
 class _Short(reprlib.Repr):

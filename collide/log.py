@@ -1,8 +1,8 @@
-"""What the library says about its own work, by ``logging.getLogger("collide")``: what is slow, and what is done behind a call.
+"""What the library logs about its own work, by ``logging.getLogger("collide")``: what is slow, and done behind a call.
 
-INFO: kernels compiled or loaded, trees, surveys, hulls and tables made, each with its size and seconds. WARNING: what should be
-looked at, such as a cache that cannot be kept. Quiet by default: without a handler Python prints warnings alone.
-``logging.basicConfig(level=logging.INFO)`` shows the rest.
+INFO: kernels compiled or loaded, trees, surveys, hulls and tables made, each with its size and seconds. WARNING: what
+should be looked at, such as a cache that cannot be kept. Quiet by default: without a handler Python prints warnings
+alone. ``logging.basicConfig(level=logging.INFO)`` shows the rest.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from collide.transforms import poses_as_given
 
 
 def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Shapes checked, poses as batches (n, 4, 4) or (1, 4, 4) whose entries are still to be checked; whether one pair is meant."""
+    """Shapes checked; poses as batches (n, 4, 4) or (1, 4, 4), entries not yet checked; whether it is a single pair."""
     X_WA, single_a = pose_batch(X_WA, "X_WA")
     X_WB, single_b = pose_batch(X_WB, "X_WB")
     counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
@@ -22,19 +22,23 @@ def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
             counts[name] = len(side)
             single = False
         elif not isinstance(side, Shape):
-            raise InvalidArgument(f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(side)}")
+            raise InvalidArgument(
+                f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(side)}"
+            )
     wanted = max(counts.values()) if min(counts.values()) else 0
     for name, count in counts.items():
         if count != wanted and (count != 1 or name in "AB"):
-            told = ", ".join(f"{other} {n}" for other, n in counts.items())
+            lengths = ", ".join(f"{argument} {n}" for argument, n in counts.items())
             kind = InvalidPose if name.startswith("X") else InvalidArgument
-            raise kind(f"lengths do not match: {told}; batches must be equally long, or a single pose")
+            raise kind(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
     return X_WA, X_WB, single
 
 
 def _is_sequence(side) -> bool:
     """Whether it is shapes, one a pose."""
-    return isinstance(side, Picked) or (isinstance(side, (list, tuple)) and all(isinstance(shape, Shape) for shape in side))
+    return isinstance(side, Picked) or (
+        isinstance(side, (list, tuple)) and all(isinstance(shape, Shape) for shape in side)
+    )
 
 
 def pose_batch(X, name: str) -> tuple[np.ndarray, bool]:

@@ -37,8 +37,8 @@ _TOUCHING = 0.0
 
 @overload
 def collide(
-    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, security_margin: float = ..., check_poses: bool = ..., threads: int = ...,
-    axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
+    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, security_margin: float = ..., check_poses: bool = ...,
+    threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
 ) -> bool: ...  # fmt: skip
 @overload
 def collide(
@@ -61,28 +61,48 @@ def collide(
 
     Parameters
     ----------
-    A, B : shapes; or sequences of shapes, one a pose (a list, or picked from a `ShapeSet`), and then X_WA and
-        X_WB are batches of that length.
-    X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4); a single pose goes with every
-        pose of the other's batch. ``(R, t)`` tuples and scipy's rotations are accepted (`transforms.as_poses`).
-    security_margin : [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the
-        distance, and where the margin lies within it by growing one body (`security_margin.py`): exactly between polytopes and
+    A, B : Shape, or sequence of Shape
+        Two shapes; or, one a pose, sequences of shapes (a list, or picked from a `ShapeSet`): X_WA and X_WB are then
+        batches of that length.
+    X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
+        Poses of A and B in the world W [m]; a single pose goes with every pose of the other's batch. ``(R, t)`` tuples
+        and scipy's rotations are accepted (`transforms.as_poses`).
+    security_margin : float
+        [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the distance,
+        and where the margin lies within it by growing one body (`security_margin.py`): exactly between polytopes and
         balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
-    check_poses : refuse matrices that are no rotation.
-    threads : answer a batch in this many threads; the answers are the same bits.
-    axes : warm start, float64 (N, 3): for each pose an axis that may part the bodies, zeros where none is
-        known. Tried first, and replaced where the bodies are apart by an axis that does: hand the same
-        array to the next call, when they have moved a little. It can only save time; answers are the same.
-    algorithm : "gjk" (or None), the default; or "barba-langerman", for two convex polytopes and one thread: the walk
-        along bounded hierarchies, in O(log n + log m) rounds (docs/barba-langerman.md). The answers are the same;
-        the default is faster. The hierarchies are built when first asked for, and kept with the shapes.
+    check_poses : bool
+        Refuse matrices that are no rotation.
+    threads : int
+        Answer a batch in at most so many threads; the answers are the same bits.
+    axes : (N, 3) float64, optional
+        Warm start: for each pose an axis that may separate the bodies, zeros where none is known. Tried first, and
+        replaced where the bodies are apart by an axis that does: hand the same array to the next call, when they have
+        moved a little. It can only save time; answers are the same.
+    algorithm : str, optional
+        "gjk" (or None), the default; or "barba-langerman", for two convex polytopes and one thread: the walk along
+        bounded hierarchies, in O(log n + log m) rounds (docs/barba-langerman.md). The answers are the same; the default
+        is faster. The hierarchies are built when first needed, and kept with the shapes.
 
     Returns
     -------
-    bool for single poses, bool[N] otherwise. Touching is a hit; where rounding leaves the sign
-    open (`PairResult.how` is "undecided"), the answer is True.
+    bool, or (N,) bool
+        bool for single poses. Touching is a hit; where rounding leaves the sign open (`PairResult.how` is "undecided"),
+        the answer is True.
 
-    Raises InvalidPose, InvalidArgument; UnsupportedQuery for shapes that the algorithm does not serve.
+    Raises
+    ------
+    InvalidArgument
+        Where arguments are no shapes, lengths do not match, or options do not go together.
+    InvalidPose
+        Naming the pose of the batch that is no rigid transform.
+    UnsupportedQuery
+        For shapes that the algorithm does not serve.
+
+    Notes
+    -----
+    GJK (Gilbert, Johnson and Keerthi 1988) with proven bounds, in O(log n + log m) a round from 224 vertices on, after
+    Dobkin and Kirkpatrick; integers where doubles leave the sign open. Pairs with meshes walk two box-trees.
     """
     if algorithm is None and axes is None and security_margin is _TOUCHING and type(threads) is int and threads == 1:
         try:
@@ -129,8 +149,8 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     wanted = (length_of(A, B, X_WA, X_WB), 3)
     if not isinstance(axes, np.ndarray) or axes.dtype != np.float64 or axes.shape != wanted:
-        given = f"{axes.dtype} {axes.shape}" if isinstance(axes, np.ndarray) else type(axes).__name__
-        raise InvalidArgument(f"axes must be a float64 array {wanted}, one row a pose, got {given}")
+        got = f"{axes.dtype} {axes.shape}" if isinstance(axes, np.ndarray) else type(axes).__name__
+        raise InvalidArgument(f"axes must be a float64 array {wanted}, one row a pose, got {got}")
     if not (axes.flags.c_contiguous and axes.flags.writeable and np.isfinite(axes).all()):
         raise InvalidArgument("axes must be contiguous, writeable and finite: it is read and updated in place")
     if len(axes) and np.abs(axes).max() > _LONGEST_AXIS:
@@ -141,8 +161,8 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 
 @overload
 def distance(
-    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ..., check_poses: bool = ...,
-    threads: int = ..., algorithm: str | None = ...,
+    A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
+    check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
 ) -> PairResult[Single]: ...  # fmt: skip
 @overload
 def distance(
@@ -165,21 +185,41 @@ def distance(
 
     Parameters
     ----------
-    A, B, X_WA, X_WB, check_poses, threads : as in `collide`.
-    max_distance : [m], ≥ 0. Beyond it only a proven lower bound is worked out, and ``beyond`` is set.
-    signed : False where gaps are all that is wanted: bodies that meet are then at distance 0, with a zero normal
-        and a bracket that is 0, too, unless the sign is open. How deep they overlap is not worked out, which saves
-        most of the time of overlapping pairs.
-    algorithm : "gjk" (or None), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no
-        max_distance: gaps are found down bounded hierarchies, and settled in integers. The same numbers to their
-        last digit, and slower (docs/barba-langerman.md).
+    A, B : Shape, or sequence of Shape
+        As of `collide`.
+    X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
+        Poses of A and B in the world W [m], as of `collide`.
+    max_distance : float
+        [m], ≥ 0. Beyond it only a proven lower bound is computed, and ``beyond`` is set.
+    signed : bool
+        False where gaps are all that is wanted: bodies that meet are then at distance 0, with a zero normal and a
+        bracket that is 0, too, unless the sign is open. Depths are not computed, which saves most of the time of
+        overlapping pairs.
+    check_poses, threads
+        As of `collide`.
+    algorithm : str, optional
+        "gjk" (or None), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no max_distance:
+        gaps are found down bounded hierarchies, and settled in integers. The same numbers to their last digit, and
+        slower (docs/barba-langerman.md).
 
     Returns
     -------
-    PairResult : scalars for single poses, arrays with a leading N otherwise.
+    PairResult
+        Scalars for single poses, arrays with a leading N otherwise. Lengths in metres, vectors in W.
 
-    Raises InvalidPose, InvalidArgument; UnsupportedQuery where the depth has no end (half-space in
-    half-space).
+    Raises
+    ------
+    InvalidArgument
+        As of `collide`, and for a max_distance that is negative or NaN.
+    InvalidPose
+        Naming the pose of the batch that is no rigid transform.
+    UnsupportedQuery
+        Where the depth is unbounded (half-space in half-space), or the algorithm does not serve the shapes.
+
+    Notes
+    -----
+    GJK for gaps, their last digits in double-doubles; EPA (van den Bergen 2001) for depths. Where a body is not convex,
+    an overlap is minus the length of a translation that is proven to separate the bodies.
     """
     limit = checks.limit("max_distance", max_distance)
     answer = named_algorithm("distance", algorithm)

@@ -14,21 +14,23 @@ from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 
 #: As many threads as anybody may ask for: more than one can start are never started.
-_MOST = 2**31 - 1
+_MAX_INT = 2**31 - 1
 #: What takes nobody knows how long is shared only if this much of it is left [s] when the caller has begun alone.
 _ALONE = 50e-3
 #: And then in pieces that last at least so long, and at most [s]: each piece costs about a millisecond besides.
 _SHORTEST, _LONGEST = 20e-3, 100e-3
-#: Threads that wait for each other, for Python's lock say, are as fast as one, and cost more. This many times as fast as
-#: one, counted by the processor's time they get, they must be, or the helpers stop.
+#: Threads that wait for each other, for Python's lock say, are as fast as one, and cost more. This many times as fast
+#: as one, counted by the processor's time they get, they must be, or the helpers stop.
 _GAIN = 1.3
 
 
 def check_threads(threads) -> int:
     """A number of threads, as an integer. Raises InvalidArgument."""
     number = checks.integer("threads", threads, 1)
-    if number > _MOST:
-        raise InvalidArgument(f"threads must be an integer from 1 to {_MOST}; more than there are processors cannot help")
+    if number > _MAX_INT:
+        raise InvalidArgument(
+            f"threads must be an integer from 1 to {_MAX_INT}; more than there are processors cannot help"
+        )
     return number
 
 
@@ -51,18 +53,18 @@ def share(pieces: Iterable, work: Callable[[Any], None], workers: int) -> None:
 
 
 def share_if_it_helps(n: int, work: Callable[[slice], None], workers: int) -> None:
-    """As `share` of n > 0 units, of which nobody knows how long they take and whether two threads can work on them at once.
+    """As `share` of n > 0 units, where it is unknown how long they take and whether threads can work at once.
 
     The caller begins alone, with a sixteenth, and goes on alone if there is little. A helper that finds itself waiting
     rather than at work leaves the rest to the others: no helper, no pieces.
     """
     rest = _Rest(n)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     work(rest.take(-(-n // 16)))  # type: ignore[arg-type]
-    pace = max(time.perf_counter() - begun, 1e-9) / (n - rest.left)
-    if pace * rest.left < _ALONE:
-        if rest.left:
-            work(rest.take(rest.left))  # type: ignore[arg-type]
+    pace = max(time.perf_counter() - start, 1e-9) / (n - rest.remaining)
+    if pace * rest.remaining < _ALONE:
+        if rest.remaining:
+            work(rest.take(rest.remaining))  # type: ignore[arg-type]
         return
     rest.helpers = workers - 1
 
@@ -87,23 +89,23 @@ class _Rest:
     """What is left of n units, handed out from the front."""
 
     def __init__(self, n: int):
-        self.left, self._n, self._lock = n, n, threading.Lock()
+        self.remaining, self._n, self._lock = n, n, threading.Lock()
         self.helpers = 0
 
-    def take(self, many: int) -> slice | None:
+    def take(self, n_wanted: int) -> slice | None:
         """The next so many units, or as many as are left; None where none are."""
         with self._lock:
-            if not self.left:
+            if not self.remaining:
                 return None
-            first = self._n - self.left
-            self.left -= min(many, self.left)
-            return slice(first, self._n - self.left)
+            first = self._n - self.remaining
+            self.remaining -= min(n_wanted, self.remaining)
+            return slice(first, self._n - self.remaining)
 
     def share(self, pace: float, workers: int) -> slice | None:
         """The next piece for one of so many threads: ever smaller ones, where a unit takes ``pace`` seconds."""
         if not self.helpers:
             return self.take(self._n)
-        fair = self.left // (2 * workers)
+        fair = self.remaining // (2 * workers)
         return self.take(max(int(min(max(fair, _SHORTEST / pace), _LONGEST / pace)), 1))
 
     def drop(self) -> None:
@@ -111,17 +113,19 @@ class _Rest:
         self.take(self._n)
 
 
-def _in_threads(help_out: Callable[[], None], own: Callable[[], Any], leave: Callable[[], None], workers: int) -> None:
-    """Run ``own`` here and ``help_out`` in workers − 1 threads; ``leave`` makes all of them come to their end."""
+def _in_threads(
+    help_out: Callable[[], None], own_work: Callable[[], Any], leave: Callable[[], None], workers: int
+) -> None:
+    """Run ``own_work`` here and ``help_out`` in workers − 1 threads; ``leave`` makes all of them come to their end."""
     at_work: list[Future] = []
     try:
         try:
             at_work.extend(_pool(workers - 1).submit(help_out) for _ in range(workers - 1))
         except RuntimeError:  # no more threads are to be had, or Python is ending: this one does what is left
             pass
-        own()
-        for one in at_work:
-            one.result()
+        own_work()
+        for helper in at_work:
+            helper.result()
     finally:  # after an error as well nobody writes into the caller's arrays any more
         leave()
         wait(at_work)
@@ -130,14 +134,14 @@ def _in_threads(help_out: Callable[[], None], own: Callable[[], Any], leave: Cal
 def pieces_of(n: int, workers: int, fewest: int) -> list[slice]:
     """What is handed out of n at a time: ever smaller shares of what is left, none smaller than pays.
 
-    A piece costs some 30 µs beside its answers. Large ones first, there are few; small ones last, no thread waits long for
-    the others, though a core may be somebody else's now and then.
+    A piece costs some 30 µs beside its answers. Large ones first, there are few; small ones last, no thread waits long
+    for the others, though a core may be somebody else's now and then.
     """
     pieces, done = [], 0
     while done < n:
-        left = n - done
-        most = max(left // fewest, 1)  # so many pieces can be made of it
-        share = -(-left // most) if most <= workers else max(left // (2 * workers), fewest)
+        remaining = n - done
+        max_pieces = max(remaining // fewest, 1)  # so many pieces can be made of it
+        share = -(-remaining // max_pieces) if max_pieces <= workers else max(remaining // (2 * workers), fewest)
         pieces.append(slice(done, done + share))
         done += share
     return pieces

@@ -48,18 +48,31 @@ SMALLEST = 1e-50
 
 
 def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=None) -> Pose:
-    """A (4, 4) pose from a translation [m] and one of four descriptions of a rotation.
+    """A (4, 4) pose from a translation and one of four descriptions of a rotation.
 
     Parameters
     ----------
-    xyz : (3,) translation [m].
-    rpy : (3,) roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them.
-    quat_wxyz : (4,) quaternion, scalar first, of any length but 0; normalised here, because a quaternion file
-        format carries rounded digits and means the rotation.
-    quat_xyzw : the same, scalar last, as ROS and scipy have it.
-    R : (3, 3) rotation, used as it stands; or what gives one by ``as_matrix()``, as scipy's Rotation does.
+    xyz : (3,) array_like, float64
+        Translation [m].
+    rpy : (3,) array_like, optional
+        Roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them.
+    quat_wxyz : (4,) array_like, optional
+        Quaternion, scalar first, of any length but 0; normalised here, because a quaternion in a file carries rounded
+        digits and means the rotation.
+    quat_xyzw : (4,) array_like, optional
+        The same, scalar last, as ROS and scipy have it.
+    R : (3, 3) array_like, optional
+        Rotation, used as it stands; or what gives one by ``as_matrix()``, as scipy's Rotation does.
 
-    Raises InvalidPose.
+    Returns
+    -------
+    (4, 4) float64
+        The homogeneous matrix.
+
+    Raises
+    ------
+    InvalidPose
+        Where numbers have another shape, are not finite or make no rotation, or two rotations are given.
     """
     if sum(option is not None for option in (rpy, quat_wxyz, quat_xyzw, R)) > 1:
         raise InvalidPose("pose: give at most one of rpy, quat_wxyz, quat_xyzw and R")
@@ -168,8 +181,8 @@ def _to_floats(X, name: str) -> np.ndarray:
 
 def _from_object(X, name: str) -> np.ndarray:
     matrix = _matrix_of(X)
-    found = _to_floats(matrix, name)
-    return found if matrix is X or found.shape[-2:] != (3, 3) else _from_tuple((found, np.zeros(3)), name)
+    array = _to_floats(matrix, name)
+    return array if matrix is X or array.shape[-2:] != (3, 3) else _from_tuple((array, np.zeros(3)), name)
 
 
 def _from_tuple(X: tuple, name: str) -> np.ndarray:
@@ -199,7 +212,7 @@ def _check_rotations(X: np.ndarray, name: str) -> None:
 
 #: So far from a rotation a matrix may be that is accepted without the check by `_check_rotations`, which rounds
 #: otherwise.
-_SURE = 0.5 * ROTATION_TOLERANCE
+_SAFE_TOLERANCE = 0.5 * ROTATION_TOLERANCE
 #: Poses checked together: their entries stay in the cache.
 _TOGETHER = 1024
 _FLOAT64 = np.dtype(np.float64)
@@ -211,12 +224,12 @@ def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:
     return (
         last == [0.0, 0.0, 0.0, 1.0]
         and -LARGEST <= x <= LARGEST and -LARGEST <= y <= LARGEST and -LARGEST <= z <= LARGEST
-        and -_SURE <= a * a + d * d + g * g - 1.0 <= _SURE
-        and -_SURE <= b * b + e * e + h * h - 1.0 <= _SURE
-        and -_SURE <= c * c + f * f + i * i - 1.0 <= _SURE
-        and -_SURE <= a * b + d * e + g * h <= _SURE
-        and -_SURE <= a * c + d * f + g * i <= _SURE
-        and -_SURE <= b * c + e * f + h * i <= _SURE
+        and -_SAFE_TOLERANCE <= a * a + d * d + g * g - 1.0 <= _SAFE_TOLERANCE
+        and -_SAFE_TOLERANCE <= b * b + e * e + h * h - 1.0 <= _SAFE_TOLERANCE
+        and -_SAFE_TOLERANCE <= c * c + f * f + i * i - 1.0 <= _SAFE_TOLERANCE
+        and -_SAFE_TOLERANCE <= a * b + d * e + g * h <= _SAFE_TOLERANCE
+        and -_SAFE_TOLERANCE <= a * c + d * f + g * i <= _SAFE_TOLERANCE
+        and -_SAFE_TOLERANCE <= b * c + e * f + h * i <= _SAFE_TOLERANCE
         and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.5
     )  # fmt: skip
 
@@ -224,10 +237,10 @@ def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:
 def _are_surely_poses(batch: np.ndarray) -> bool:
     """Whether all matrices (N, 4, 4) are; about 50 ns each."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return all(_block_is_sure(batch[k : k + _TOGETHER]) for k in range(0, len(batch), _TOGETHER))
+        return all(_is_surely_rigid(batch[k : k + _TOGETHER]) for k in range(0, len(batch), _TOGETHER))
 
 
-def _block_is_sure(block: np.ndarray) -> bool:
+def _is_surely_rigid(block: np.ndarray) -> bool:
     columns = np.ascontiguousarray(block.reshape(-1, 16).T)
     (a, b, c), (d, e, f), (g, h, i) = columns[0:3], columns[4:7], columns[8:11]
     worst = np.abs(a * a + d * d + g * g - 1.0)
@@ -237,7 +250,7 @@ def _block_is_sure(block: np.ndarray) -> bool:
         np.maximum(worst, np.abs(product), out=worst)
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     return bool(
-        worst.max() <= _SURE and determinant.min() > 0.5 and np.abs(columns[3:12:4]).max() <= LARGEST
+        worst.max() <= _SAFE_TOLERANCE and determinant.min() > 0.5 and np.abs(columns[3:12:4]).max() <= LARGEST
         and not columns[12:15].any() and (columns[15] == 1.0).all()
     )  # fmt: skip
 

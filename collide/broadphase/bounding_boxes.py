@@ -17,12 +17,14 @@ from collide.lowering.shape_table import (
     PADDED,
     PARAMS,
     POSE,
+    POSE_SLOP,
     RADIUS,
     REACH,
     SLOP,
     TREE,
     ShapeTable,
 )
+from collide.numerics.vec3 import Vec3, column_at, dot, neg, vec3_at
 from collide.support.support_mapping import settled_vertex, support
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
@@ -31,35 +33,29 @@ _OUTWARD = 32 * 2.0**-53
 
 
 @kernel
-def _proven(kind, coordinates, n, m, params, at, tree, gx, gy, gz):
-    """`support`, of a support tree the vertex that is farthest for certain."""
-    k, x, y, z, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, gx, gy, gz)
+def _farthest_point(kind, coordinates, n, m, params, at, tree, g):
+    """The core point farthest in direction g (`support`); with a support tree, that of the proven vertex."""
+    vertex, x, y, z, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, g.x, g.y, g.z)
     if tree != 0:
-        k = settled_vertex(coordinates, n, m, tree, k, gx, gy, gz)
-        return k, coordinates[k], coordinates[m + k], coordinates[2 * m + k]
-    return k, x, y, z
+        return column_at(coordinates, m, settled_vertex(coordinates, n, m, tree, vertex, g.x, g.y, g.z))
+    return Vec3(x, y, z)
 
 
 @kernel
 def _bound(ints, numbers, poses, coordinates, s, p, axis):
-    """(low, high) of one posed convex set along a world axis."""
+    """(low, high) of shape s at pose row p along a world axis [m], rounded outwards."""
     at = NUMBERS * s
+    row = vec3_at(poses, POSE * p + 3 * axis)  # of the rotation: the axis in the shape's frame
+    t = poses[POSE * p + 9 + axis]
     kind = ints[INTS * s + KIND]
-    rx = poses[POSE * p + 3 * axis]
-    ry = poses[POSE * p + 3 * axis + 1]
-    rz = poses[POSE * p + 3 * axis + 2]
     n = ints[INTS * s + COUNT]
     m = ints[INTS * s + PADDED]
-    t = poses[POSE * p + 9 + axis]
     tree = ints[INTS * s + TREE]
-    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, rx, ry, rz)
-    high = (x * rx + y * ry + z * rz) + t
-    _, x, y, z = _proven(kind, coordinates, n, m, numbers, at + PARAMS, tree, -rx, -ry, -rz)
-    low = (x * rx + y * ry + z * rz) + t
-    row = math.sqrt(rx * rx + ry * ry + rz * rz)
+    high = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, row), row) + t
+    low = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, neg(row)), row) + t
     radius = numbers[at + RADIUS]
-    out = radius + numbers[at + SLOP] + poses[POSE * p + 12]
-    out += _OUTWARD * (row * numbers[at + REACH] + abs(t) + radius)
+    out = radius + numbers[at + SLOP] + poses[POSE * p + POSE_SLOP]
+    out += _OUTWARD * (math.sqrt(dot(row, row)) * numbers[at + REACH] + abs(t) + radius)
     return low - out, high + out
 
 

@@ -11,6 +11,7 @@ from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
 from collide.errors import InvalidArgument
+from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 
@@ -62,7 +63,7 @@ def check_question(caller: str, A, B, r) -> None:
     """Raises InvalidArgument where a sequence A or B holds what is no shape, or r is no result."""
     for name, shapes in (("A", A), ("B", B)):
         for shape in shapes:
-            if not (hasattr(shape, "meshed") and hasattr(shape, "parts")):
+            if not isinstance(shape, Shape):
                 raise InvalidArgument(
                     f"{caller}: {name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}"
                 )

@@ -27,7 +27,7 @@ class Cut(NamedTuple):
     """A vertex that is to be cut off.
 
     w : the vertex.   k : its degree.   ring, outer : k each, its neighbours and the half-edges beyond them (`read_ring`).
-    fresh : k rows for new vertices, in a run.   inner : the row of s.
+    fresh : k rows for new vertices, in a run.   inside : the row of s.
     axis : a direction in which all neighbours are ahead of w.   nearest : how far the nearest is along it; −1 for no axis.
     """
 
@@ -36,7 +36,7 @@ class Cut(NamedTuple):
     ring: Any
     outer: Any
     fresh: Any
-    inner: int
+    inside: int
     axis: Vec3
     nearest: float
 
@@ -120,8 +120,8 @@ def within(cloud, w, r, beside, s, x):
 
 
 @kernel
-def find_inner(cloud, w, ring, k, inner):
-    """Write s: the middle of w and three of its neighbours, in row ``inner``; False where none is strictly inside."""
+def find_inner(cloud, w, ring, k, inside):
+    """Write s: the middle of w and three of its neighbours, in row ``inside``; False where none is strictly inside."""
     points = cloud.scaled
     for shift in range(4):
         a = ring[shift % k]
@@ -129,8 +129,8 @@ def find_inner(cloud, w, ring, k, inner):
         c = ring[(shift + 2 * k // 3) % k]
         quarter = add(scale(0.25, vec3_at(points, 3 * w)), scale(0.25, vec3_at(points, 3 * a)))
         s = add(add(quarter, scale(0.25, vec3_at(points, 3 * b))), scale(0.25, vec3_at(points, 3 * c)))
-        write_point(cloud, inner, s)
-        if within(cloud, w, a, b, c, inner):
+        write_point(cloud, inside, s)
+        if within(cloud, w, a, b, c, inside):
             return True
     return False
 
@@ -161,13 +161,13 @@ def put_new(cloud, cut, j, move):
     Returns whether it is in a tetrahedron of w, ring[j], a neighbour of that, and s, and not on the surface; exact.
     """
     points, ring, w, v = cloud.scaled, cut.ring, cut.w, cut.fresh[j]
-    to_inner = difference(points, w, cut.inner)
+    to_inner = difference(points, w, cut.inside)
     d = difference(points, w, ring[j])
     part = _DEPTH * cut.nearest / dot(cut.axis, d) * (1.0 + _DOME * math.ldexp(1.0, -twos(j)))
     write_point(cloud, v, add(vec3_at(points, 3 * w), add(scale(part, d), scale(move, to_inner))))
     after = ring[j + 1 if j + 1 < cut.k else 0]
     before = ring[j - 1 if j > 0 else cut.k - 1]
-    return within(cloud, w, ring[j], after, cut.inner, v) or within(cloud, w, ring[j], before, cut.inner, v)
+    return within(cloud, w, ring[j], after, cut.inside, v) or within(cloud, w, ring[j], before, cut.inside, v)
 
 
 @kernel

@@ -93,9 +93,9 @@ def _linked(modules: Iterable[bytes], target: Target, machine) -> llvm.ModuleRef
         if target.function_passes:
             _simplify(module, machine)
         whole.link_in(module)
-    for own, name in _OF_C.items():
-        if any(function.name == own for function in whole.functions):
-            whole.get_function(own).name = name
+    for kernel, name in _OF_C.items():
+        if any(function.name == kernel for function in whole.functions):
+            whole.get_function(kernel).name = name
     return whole
 
 

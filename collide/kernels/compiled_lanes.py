@@ -25,8 +25,8 @@ class _Lanes(types.Type):
     def __init__(self):
         super().__init__(name="Lanes")
 
-    def can_convert_from(self, _context, other):
-        return Conversion.safe if other == types.float64 else None
+    def can_convert_from(self, _context, source_type):
+        return Conversion.safe if source_type == types.float64 else None
 
 
 class _Mask(types.Type):
@@ -54,8 +54,8 @@ class _MaskModel(models.PrimitiveModel):
 def _splat(builder: ir.IRBuilder, scalar):
     kind = ir.VectorType(scalar.type, LANES)
     nothing = ir.Constant(kind, ir.Undefined)
-    one = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+    first_lane = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first_lane, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
 @lower_cast(types.float64, lanes)

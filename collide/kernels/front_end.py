@@ -97,10 +97,10 @@ class _Typing(typing.Context):
             return super().resolve_function_type(func, args, kws)
         key = func, args
         if key not in self._known:
-            found = super().resolve_function_type(func, args, kws)
-            if found is None:
+            resolved = super().resolve_function_type(func, args, kws)
+            if resolved is None:
                 return None
-            self._known[key] = found
+            self._known[key] = resolved
         return self._known[key]
 
 
@@ -189,14 +189,14 @@ class Lowered:
 
 def _all_called(library: _Library) -> list[_Library]:
     """A library, those that it calls, and those that they call in turn, each once."""
-    found: dict[_Library, None] = {}
+    reached: dict[_Library, None] = {}
     waiting = [library]
     while waiting:
-        one = waiting.pop()
-        if one not in found:
-            found[one] = None
-            waiting += reversed(one._linking_libraries)
-    return list(found)
+        current = waiting.pop()
+        if current not in reached:
+            reached[current] = None
+            waiting += reversed(current._linking_libraries)
+    return list(reached)
 
 
 def c_function_type(context, arguments: tuple, result: types.Type) -> ir.FunctionType:
@@ -214,8 +214,8 @@ def _c_function(name: str, compiled, context) -> bytes:
     native = ir.Function(module, context.call_conv.get_function_type(result, arguments), description.llvm_func_name)
     made = ir.Function(module, c_function_type(context, arguments, result), name)
     builder = ir.IRBuilder(made.append_basic_block("entry"))
-    given = [context.data_model_manager[kind].from_data(builder, value) for kind, value in zip(arguments, made.args)]
-    status, value = context.call_conv.call_function(builder, native, result, arguments, given)
+    values = [context.data_model_manager[kind].from_data(builder, value) for kind, value in zip(arguments, made.args)]
+    status, value = context.call_conv.call_function(builder, native, result, arguments, values)
     with builder.if_then(status.is_error, likely=False):
         builder.call(ir.Function(module, ir.FunctionType(ir.VoidType(), []), FAILED), [])
     if result == types.none:
@@ -229,7 +229,7 @@ def native_call(signature: str):
     """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
     arguments, result = sigutils.normalize_signature(signature)
 
-    def make(_context, address, given):
+    def make(_context, address, values):
         def codegen(context, builder, _signature, args):
             manager = context.data_model_manager
             unpacked = [

@@ -62,10 +62,10 @@ class Entry:
     def _make(self) -> Callable:
         with _compiling:
             if self._ready is None:
-                begun = time.perf_counter()
+                start = time.perf_counter()
                 self._address = _placed(self.__name__, self._object())
                 self._ready = self._c_function()
-                log.info("kernel %s compiled or loaded: %.3f s", self.__name__, time.perf_counter() - begun)
+                log.info("kernel %s compiled or loaded: %.3f s", self.__name__, time.perf_counter() - start)
             return self._ready
 
     def _object(self) -> bytes:
@@ -78,7 +78,7 @@ class Entry:
             code.add(self.__name__, self.function, self.signature)
             return machine_code(code.names, code.modules, _here())
 
-        return object_cache.kept(f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled)
+        return object_cache.kept_or_made(f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled)
 
     def _c_function(self) -> Callable:
         arguments, result = sigutils.normalize_signature(self.signature)

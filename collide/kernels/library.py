@@ -72,7 +72,18 @@ def about() -> dict[str, str]:
 
 
 def library_path() -> str:
-    """Where libcollide stands, whether or not this process uses it. Raises FileNotFoundError where there is none."""
+    """The file of libcollide, whether or not this process uses it.
+
+    Returns
+    -------
+    str
+        Inside the installed package.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where the package was installed without its library.
+    """
     built = _built()
     if built is None:
         raise FileNotFoundError(f"there is no libcollide: {_UNBUILT}")
@@ -80,7 +91,18 @@ def library_path() -> str:
 
 
 def include_folder() -> str:
-    """Where collide.h stands. Raises FileNotFoundError where there is no library."""
+    """Folder of ``collide.h``, for ``cc -I``.
+
+    Returns
+    -------
+    str
+        Inside the installed package.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where the package was installed without its library.
+    """
     library_path()
     return _path("include")
 
@@ -105,8 +127,8 @@ def _fits(built: Any) -> bool:
 
 
 def _library_of(files: dict) -> str:
-    (found,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
-    return found
+    (name_of_library,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
+    return name_of_library
 
 
 def _path(name: str) -> str:

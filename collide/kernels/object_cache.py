@@ -29,7 +29,7 @@ _DIGEST = hashlib.sha256().digest_size
 _REMEDY = "they are compiled again in every process. Set COLLIDE_CACHE_DIR to a folder"
 
 
-def kept(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
+def kept_or_made(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
     """The object file of this key: as it was kept, else what ``compiled`` gives, which is kept.
 
     name : for people who look into the folder.   key : all that the machine code depends on.
@@ -39,7 +39,7 @@ def kept(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
         return compiled()
     identity = repr((_VERSION, name, key)).encode()
     file = folder / f"{name}.{hashlib.sha256(identity).hexdigest()[:16]}.o"
-    code = _found(file, identity)
+    code = _read_kept(file, identity)
     if code is None:
         code = compiled()
         try:
@@ -71,7 +71,7 @@ def _folder() -> Path | None:
     return folder
 
 
-def _found(file: Path, identity: bytes) -> bytes | None:
+def _read_kept(file: Path, identity: bytes) -> bytes | None:
     """The code in a file, None where there is none to be used."""
     try:
         content = _read(file)
@@ -96,8 +96,8 @@ def _read(file: Path) -> bytes | None:
     """What a file holds, None where there is none. Raises PermissionError where somebody else may have written it."""
     try:
         with open(file, "rb") as opened:
-            found = os.fstat(opened.fileno())
-            if TRUST and (found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) & 0o022):
+            status = os.fstat(opened.fileno())
+            if TRUST and (status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o022):
                 raise PermissionError("others may have written it")
             return opened.read()
     except FileNotFoundError:

@@ -37,8 +37,8 @@ else:
         def asked(X_WA, X_WB):
             if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
                 return None
-            said = entry(address_of(header), address_of(X_WA), address_of(X_WB))
-            return None if said < 0 else bool(said)
+            status = entry(address_of(header), address_of(X_WA), address_of(X_WB))
+            return None if status < 0 else bool(status)
 
         return asked
 
@@ -46,8 +46,8 @@ else:
         def asked(X_WA, X_WB, out, flag):
             if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
                 return None
-            said = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
-            return None if said < 0 else bool(said)
+            status = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
+            return None if status < 0 else bool(status)
 
         return asked
 

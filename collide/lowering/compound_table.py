@@ -86,9 +86,9 @@ class UnionTable:
         self.most = 2 * int(self.counts.max())
         self.addresses = *self.table.addresses, *map(address_of, (self._parts, self._bodies, self._balls))
 
-    def plant(self, which: np.ndarray | None) -> None:
+    def build_trees(self, which: np.ndarray | None) -> None:
         """Have the support trees of these bodies; of bodies 0 and 1 without."""
-        if self.table.planted:
+        if self.table.is_built:
             return
         used = [0, 1] if which is None else np.unique(which).tolist()
-        self.table.plant(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))
+        self.table.build_trees(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))

@@ -27,7 +27,7 @@ from collide.shapes.shape import Shape
 #: Corners of the rings around an axis, and times the facets of an icosahedron are cut in four.
 _SIDES, _CUTS = 32, 2
 #: Beyond what the geometry asks, relative.
-_CLEAR = 1e-12
+_MARGIN = 1e-12
 
 
 class Enclosure(NamedTuple):
@@ -70,12 +70,12 @@ def _polytopes(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarr
     """Corners (n, 3) of a solid polytope around a shape, and of one within."""
     if packed.kind in (CYLINDER, CONE):
         radius, half = packed.params[:2].tolist()
-        return _turned(radius * (1 + _CLEAR) / np.cos(np.pi / _SIDES), half, packed.kind), _turned(
-            radius * (1 - _CLEAR), half, packed.kind
+        return _turned(radius * (1 + _MARGIN) / np.cos(np.pi / _SIDES), half, packed.kind), _turned(
+            radius * (1 - _MARGIN), half, packed.kind
         )
     if packed.kind == ELLIPSOID:
         points, least = _ball()
-        return points * ((1 + _CLEAR) / least) * packed.params[:3], points * (1 - _CLEAR) * packed.params[:3]
+        return points * ((1 + _MARGIN) / least) * packed.params[:3], points * (1 - _MARGIN) * packed.params[:3]
     return _around(packed), _within(shape, packed)
 
 
@@ -129,9 +129,9 @@ def _within(shape: Shape, packed: PackedConvex) -> np.ndarray | None:
 def _in_all(shape: HPolytope, points: np.ndarray) -> bool:
     """Whether points are in all half-spaces: by doubles where these tell, in fractions where they do not."""
     terms = shape.normals[:, None] * points[None]
-    clear = terms.sum(axis=2) + 2.0**-48 * np.abs(terms).sum(axis=2) <= shape.offsets[:, None] - 2.0**-1000
+    inside = terms.sum(axis=2) + 2.0**-48 * np.abs(terms).sum(axis=2) <= shape.offsets[:, None] - 2.0**-1000
     return all(
         sum(Fraction(a) * Fraction(x) for a, x in zip(shape.normals[i].tolist(), points[j].tolist()))
         <= Fraction(float(shape.offsets[i]))
-        for i, j in np.argwhere(~clear).tolist()
+        for i, j in np.argwhere(~inside).tolist()
     )

@@ -42,5 +42,5 @@ class FacetTable:
         self.packed = [_FACET] * k + [packed]
         self.addresses = address_of(self.ints), address_of(self.numbers)
 
-    def plant(self, rows: np.ndarray) -> None:
+    def build_trees(self, rows: np.ndarray) -> None:
         """Shapes asked about here are scanned: none is large enough for a support tree."""

@@ -109,9 +109,9 @@ def on_cache_lines(*shape: int) -> np.ndarray:
     points takes a quarter longer.
     """
     size = math.prod(shape)
-    room = np.empty(size + BLOCK - 1)
-    first = -(room.ctypes.data // room.itemsize) % BLOCK
-    return room[first : first + size].reshape(shape)
+    block = np.empty(size + BLOCK - 1)
+    first = -(block.ctypes.data // block.itemsize) % BLOCK
+    return block[first : first + size].reshape(shape)
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

@@ -51,7 +51,7 @@ def run_pairs(
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-    table.plant(shape_of[pairs])
+    table.build_trees(shape_of[pairs])
     tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
     depths = depths and not boolean
     done = 0
@@ -131,7 +131,7 @@ def run_poses(
     depths : of rows: whether it is wanted how deep overlaps are.
     """
     n = len(out)
-    table.plant(np.arange(2) if which is None else which)
+    table.build_trees(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)
     done = 0
@@ -221,7 +221,7 @@ class SinglePair:
     """
 
     def __init__(self, table: ShapeTable):
-        table.plant(np.arange(2))
+        table.build_trees(np.arange(2))
         self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
         header = self._space.header_of(table)
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)

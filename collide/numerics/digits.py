@@ -43,7 +43,7 @@ def grid_of(exponent):
 
 
 @kernel
-def clear(digits, at, n):
+def set_zero(digits, at, n):
     for k in range(n):
         digits[at + k] = 0
 

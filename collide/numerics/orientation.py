@@ -24,7 +24,7 @@ import math
 
 from collide.kernels import kernel
 from collide.numerics import double_double as dd
-from collide.numerics.digits import BITS, add_double, add_product, carry, clear, grid_of, lowest_bit
+from collide.numerics.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit, set_zero
 from collide.numerics.error_free import DD, two_product, two_sum
 
 #: Doubles in ``work``: two numbers, nine differences in two parts, a minor (≤ 16) and a determinant (≤ 192).
@@ -262,10 +262,10 @@ def by_digits(originals, digits, a, b, c, d, axis):
     n = (highest - BITS * grid) // BITS + 2
     minor = 9 * n
     total = 11 * n
-    clear(digits, total, 3 * n)
+    set_zero(digits, total, 3 * n)
     for cell in range(9):
         at = cell * n
-        clear(digits, at, n)
+        set_zero(digits, at, n)
         if cell >= 6 and axis >= 0:
             digits[at] = 1 if cell == 6 + axis else 0
         else:
@@ -279,7 +279,7 @@ def by_digits(originals, digits, a, b, c, d, axis):
     for k in range(3):
         i = ((k + 1) % 3) * n
         j = ((k + 2) % 3) * n
-        clear(digits, minor, 2 * n)
+        set_zero(digits, minor, 2 * n)
         add_product(digits, minor, i, n, j + 3 * n, n, 1)
         add_product(digits, minor, j, n, i + 3 * n, n, -1)
         carry(digits, minor, 2 * n)

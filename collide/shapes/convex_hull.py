@@ -102,8 +102,8 @@ class ConvexHull(Shape):
         InvalidShape
             With the defect and where it is.
         """
-        given = self.hull._replace(facets=self.faces) if self.faces is not None else None
-        for what, surface in (("hull", self.hull), ("faces", given)):
+        given_surface = self.hull._replace(facets=self.faces) if self.faces is not None else None
+        for what, surface in (("hull", self.hull), ("faces", given_surface)):
             if surface is None:
                 continue
             if what == "faces":

@@ -137,7 +137,7 @@ class Mesh(Shape):
         if not hasattr(self, "_hull"):
             used = self.vertices[np.unique(self.faces)]
             with log_duration("convex hull around a mesh of %d facets made", len(self.faces)):
-                if len(used) > _MANY:
+                if len(used) > _MAX_HULL_POINTS:
                     used = used[exact_hull.convex_hull(used).vertices]
                 self._store(_hull=ConvexHull(used))
         return self._hull
@@ -261,7 +261,7 @@ class Mesh(Shape):
 
 
 #: Hulls of so many vertices are asked as they are: leaving out those inside takes a kernel of its own.
-_MANY = 512
+_MAX_HULL_POINTS = 512
 
 #: Changes whenever files written before would be read wrongly.
 _FILE_FORMAT = 1

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collide.mesh.mesh_survey import Survey
 
 #: Facet numbers shown of each defect; `Defect.facets` has them all.
-_SHOWN = 6
+_MAX_LISTED = 6
 
 
 class Defect(NamedTuple):
@@ -64,10 +64,10 @@ class MeshReport(NamedTuple):
 
 
 def _numbers(facets: np.ndarray) -> str:
-    shown = ", ".join(str(f) for f in facets[:_SHOWN].tolist())
-    if len(facets) > _SHOWN:
-        return f"facets {shown}, … ({len(facets)} in all)"
-    return f"facet{'s' * (len(facets) != 1)} {shown}"
+    listed = ", ".join(str(f) for f in facets[:_MAX_LISTED].tolist())
+    if len(facets) > _MAX_LISTED:
+        return f"facets {listed}, … ({len(facets)} in all)"
+    return f"facet{'s' * (len(facets) != 1)} {listed}"
 
 
 def find_defects(survey: Survey) -> tuple[Defect, ...]:
@@ -94,12 +94,12 @@ def find_defects(survey: Survey) -> tuple[Defect, ...]:
         (meet.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
         (says.NO_AREA, False, "no area", "corners on one line"),
     ]
-    found = [
+    defects = [
         Defect(name, np.flatnonzero(survey.flags & bit), spoils, meaning)
         for bit, spoils, name, meaning in kinds
         if (survey.flags & bit).any()
     ]
-    return tuple(sorted(found, key=lambda defect: not defect.spoils))
+    return tuple(sorted(defects, key=lambda defect: not defect.spoils))
 
 
 def make_report(vertices: int, solid: bool, survey: Survey) -> MeshReport:

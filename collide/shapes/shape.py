@@ -35,7 +35,7 @@ class Shape:
     _surface: Any
     #: Which facets of that share corners, for contacts (`contact/contact_facets.py`).
     _topology: Any
-    #: Its parts, as unions with meshes ask about them (`lowering/composite_parts.py`).
+    #: Its parts, as unions with meshes ask about them (`narrowphase/composite/composite_parts.py`).
     _union: Any
     #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
     _laid_out: Any
@@ -76,8 +76,8 @@ class Shape:
         return hash((type(self).__name__, self._key()))
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
-        return f"{type(self).__name__}({shown})"
+        fields = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
+        return f"{type(self).__name__}({fields})"
 
 
 IDENTITY = np.eye(4)
@@ -146,10 +146,10 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
 
 def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
-    shown = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
-    array = np.array(checks.array(f"{shape}: {field}", value, shown, InvalidShape), order="C")
+    expected = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
+    array = np.array(checks.array(f"{shape}: {field}", value, expected, InvalidShape), order="C")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
-        raise InvalidShape(f"{shape}: {field} must have shape {shown}, got {array.shape}")
+        raise InvalidShape(f"{shape}: {field} must have shape {expected}, got {array.shape}")
     if array.shape[0] == 0:
         raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
     bad = ~(np.abs(array) <= LARGEST)
@@ -173,10 +173,10 @@ def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.n
     outside = ((array < 0) | (array >= n)).any(axis=1)
     if outside.any():
         row = int(np.argmax(outside))
-        many = int(outside.sum())
+        n_outside = int(outside.sum())
         raise InvalidShape(
             f"{shape}: faces[{row}] is {array[row].tolist()}, but there are {corners.format(n=n, last=n - 1)}"
-            f" ({many} such facet{'s' * (many != 1)})"
+            f" ({n_outside} such facet{'s' * (n_outside != 1)})"
         )
     array = np.array(array, dtype=dtype, order="C")
     array.flags.writeable = False

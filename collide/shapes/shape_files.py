@@ -59,7 +59,7 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     import zipfile  # here, and below: a start of the library need not load it
 
     named = f"{who}.load: {checks.describe(path) if not isinstance(path, (str, Path)) else path}"
-    other = f"{named} is of another format; save the shape again"
+    complaint = f"{named} is of another format; save the shape again"
     try:
         if Path(path).exists() and not Path(path).is_file():
             raise InvalidShape(f"{named} is no regular file")
@@ -75,8 +75,8 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
                     name = member.filename.removesuffix(".npy")
                     field = {**_STAMPS, **fields}.get(name)
                     if name in arrays or (field is None and not name.startswith(dropped)):
-                        raise InvalidShape(other)
-                    arrays[name] = _read(members, member, field, other)
+                        raise InvalidShape(complaint)
+                    arrays[name] = _read(members, member, field, complaint)
     except InvalidShape:
         raise
     except OSError as error:
@@ -88,22 +88,22 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
         raise InvalidShape(f"{named} is no file that {who}.save wrote ({error})") from None
     missing = [name for name, field in {**_STAMPS, **fields}.items() if field.needed and name not in arrays]
     if missing or int(arrays.pop("format")) != version:
-        raise InvalidShape(other)
+        raise InvalidShape(complaint)
     digest = arrays.pop("digest")
     if not np.array_equal(digest, _digest(arrays)):
         raise InvalidShape(f"{named} is damaged: its contents do not fit their digest")
     return {name: array for name, array in arrays.items() if name in fields}
 
 
-def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None, other: str) -> np.ndarray:
+def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None, complaint: str) -> np.ndarray:
     """One array, once its header and its length are what they should be. field : None for any array of numbers."""
     import zipfile
 
     if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 or not member.filename.endswith(".npy"):
-        raise InvalidShape(other)  # nothing we write is compressed or encrypted
+        raise InvalidShape(complaint)  # nothing we write is compressed or encrypted
     with members.open(member) as file:
         if np.lib.format.read_magic(file) != (1, 0):
-            raise InvalidShape(other)
+            raise InvalidShape(complaint)
         shape, _, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=_LONGEST_HEADER)
         begin = file.tell()
     if field is None:
@@ -112,7 +112,7 @@ def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None
         known = f"{dtype.kind}{dtype.itemsize}".startswith(field.type) and len(shape) == len(field.shape)
         known = known and all(want in (None, have) for want, have in zip(field.shape, shape))
     if not known:
-        raise InvalidShape(other)
+        raise InvalidShape(complaint)
     if begin + math.prod(shape) * dtype.itemsize != member.file_size:
         raise ValueError(f"{member.filename} has another length than it says")
     with members.open(member) as file:

@@ -22,7 +22,7 @@ from collide.shapes.shape import Shape
 #: Where no tolerance is given: this part of a shape's largest radius.
 _USUAL = 0.01
 #: Larger tessellations are refused: a tolerance in the wrong unit, mostly.
-MOST_VERTICES = 2_000_000
+MAX_VERTICES = 2_000_000
 
 
 class Tessellation(tuple):
@@ -128,11 +128,11 @@ def _square(shape: Halfspace, size: float | None) -> Tessellation:
 
 def _hull(points: np.ndarray) -> Tessellation:
     """The hull of points, without those that are no corner of it."""
-    found = ConvexHull(points).hull
-    corners = found.vertices
+    surface = ConvexHull(points).hull
+    corners = surface.vertices
     row = np.zeros(len(points), dtype=np.int64)
     row[corners] = np.arange(len(corners))
-    return Tessellation(points[corners], row[found.facets.reshape(-1, 3)])
+    return Tessellation(points[corners], row[surface.facets.reshape(-1, 3)])
 
 
 def _box(shape: Box, _) -> Tessellation:
@@ -141,7 +141,7 @@ def _box(shape: Box, _) -> Tessellation:
     return Tessellation(signs * shape.size, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]))
 
 
-def _swept(points: np.ndarray, radius: float, tolerance: float | None) -> Tessellation:
+def _swept_hull(points: np.ndarray, radius: float, tolerance: float | None) -> Tessellation:
     """The hull of points, and a ball along it: the hull of what the ball's own tessellation covers.
 
     The sum of two sets is off by as much as the one of them that is. Of the vertices of the sum only those are made
@@ -214,11 +214,11 @@ def _ball(radius: float, tolerance: float | None) -> Tessellation:
     """A ball by an icosahedron whose facets are cut into small ones and pushed outwards."""
     part = _part(radius, tolerance)
     cuts = 2  # even ones: the axes are among the directions then, and a swept box keeps its flat sides
-    while (found := _geodesic(cuts))[2] > part:
+    while (sphere := _geodesic(cuts))[2] > part:
         # the deviation falls with the square of the cuts
-        cuts = max(cuts + 2, 2 * math.floor(0.5 * cuts * math.sqrt(found[2] / part)))
+        cuts = max(cuts + 2, 2 * math.floor(0.5 * cuts * math.sqrt(sphere[2] / part)))
         _refuse_more_than(10 * cuts * cuts + 2)
-    directions, faces, off = found
+    directions, faces, off = sphere
     return Tessellation(radius * directions, faces, radius * off)
 
 
@@ -279,21 +279,21 @@ def _off(angle: float) -> float:
 
 
 def _refuse_more_than(vertices: float) -> None:
-    if vertices > MOST_VERTICES:
+    if vertices > MAX_VERTICES:
         raise InvalidArgument(
-            f"tessellate: the tolerance would take more than {MOST_VERTICES} vertices; give a larger one [m]"
+            f"tessellate: the tolerance would take more than {MAX_VERTICES} vertices; give a larger one [m]"
         )
 
 
 _KINDS: dict[type[Shape], Callable[..., Tessellation]] = {
     Box: _box,
     Sphere: lambda shape, tolerance: _ball(shape.radius, tolerance),
-    Capsule: lambda shape, tolerance: _swept(
+    Capsule: lambda shape, tolerance: _swept_hull(
         np.array([(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]) * shape.length, shape.radius, tolerance
     ),
     Cylinder: _cylinder,
     Cone: _cone,
     Ellipsoid: _ellipsoid,
-    ConvexHull: lambda shape, tolerance: _swept(shape.points, shape.radius, tolerance),
+    ConvexHull: lambda shape, tolerance: _swept_hull(shape.points, shape.radius, tolerance),
     HPolytope: lambda shape, _: _hull(shape.vertices),
 }

@@ -28,6 +28,7 @@ ROOMS = {
     "errors": set(),
     "cache_folder": set(),
     "log": set(),
+    "lazy_modules": set(),
     "algorithms": {"errors"},
     "kernels": {"cache_folder", "errors", "log"},
     "argument_checks": {"errors"},
@@ -38,7 +39,7 @@ ROOMS = {
     "hull": {"errors", "kernels", "numerics"},
     "support": {"errors", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "kernels", "numerics", "log"},
-    "shapes": {"errors", "argument_checks", "log", "transforms", "hull", "mesh", "support"},
+    "shapes": {"errors", "argument_checks", "log", "transforms", "hull", "mesh", "support", "lazy_modules"},
     "lowering": {
         "errors",
         "argument_checks",
@@ -51,7 +52,7 @@ ROOMS = {
         "mesh",
         "shapes",
     },
-    "broadphase": {"errors", "kernels", "lowering", "support"},
+    "broadphase": {"errors", "kernels", "numerics", "lowering", "support"},
     "narrowphase": {
         "errors",
         "kernels",
@@ -66,7 +67,7 @@ ROOMS = {
         "results",
         "threads",
     },
-    "certificates": {"errors", "transforms", "numerics", "lowering", "results"},
+    "certificates": {"errors", "transforms", "numerics", "lowering", "results", "shapes"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
     "security_margin": {
@@ -154,16 +155,13 @@ ROOMS = {
     "kinematic_tree": {"errors", "transforms"},
     "joint_motions": set(),
     "robot": {"errors", "transforms", "shapes", "kinematic_tree", "joint_motions"},
-    "reports": {"errors", "results", "shapes", "cache_folder", "kernels", ""},
+    "reports": {"errors", "lowering", "results", "shapes", "cache_folder", "kernels", ""},
     "cli_arguments": {"errors", "reports", ""},
     "cli": {"cli_arguments", "errors", "reports", ""},
     "__main__": {"cli"},
 }
 #: Imports against the flow that are still there: rooms, and what they have to let go of. Each is asserted to be needed.
-TO_GO = {
-    "shapes": {"lowering"},
-    "lowering": {"broadphase", "narrowphase"},
-}
+TO_GO: dict[str, set[str]] = {}
 #: What functions may import besides, against the flow or from outside: conveniences that a user calls by name.
 LATE = {
     "kernels": {"numba", "llvmlite"},
@@ -224,6 +222,8 @@ def imports(file: Path) -> list[tuple[str, bool, int]]:
             module = node.module or ""
             inner = [f"{module}.{alias.name}" for alias in node.names]
             found.extend((name if name in known else module, late, node.lineno) for name in inner)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "lazy_module":
+            found.append((ast.literal_eval(node.args[0]), True, node.lineno))
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
             return  # never run
         inside = late or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))

@@ -403,66 +403,12 @@ def test_input_is_left_alone_and_checked():
 
 
 CHILD = r"""
-import pickle, random, sys
-from fractions import Fraction
-import numpy as np
+import pickle, sys
 from collide import kernels
-from collide.numerics import orientation as O
 from collide.hull import quickhull as Q
 from collide.hull.exact_hull import convex_hull
 from collide.hull.validate_hull import validate_hull
 assert kernels.PLAIN_PYTHON
-
-def sign(x):
-    return (x > 0) - (x < 0)
-
-rng = random.Random(4)
-work, digits, seen = np.zeros(O.WORK), np.zeros(O.DIGITS, dtype=np.int64), {}
-for name in ("by_expansions", "by_digits", "dd_determinant", "double_determinant"):
-    def counted(*args, name=name, known=getattr(O, name)):
-        seen[name] = seen.get(name, 0) + 1
-        return known(*args)
-    setattr(O, name, counted)
-
-def cloud():
-    kind = rng.randrange(7)
-    if kind == 0:
-        return np.array([[rng.uniform(-1, 1) for _ in range(3)] for _ in range(4)])
-    if kind == 1:
-        return np.array([[rng.randrange(-3, 4) * 1.0 for _ in range(3)] for _ in range(4)])
-    if kind == 2:  # whole range
-        return np.array([[rng.uniform(-1, 1) * 10.0 ** rng.randrange(-320, 308) for _ in range(3)] for _ in range(4)])
-    a, b, c = (np.array([rng.uniform(-1, 1) for _ in range(3)]) for _ in range(3))
-    if kind == 3:  # nearly coplanar
-        return np.array([a, b, c, a + rng.uniform(-1, 1) * (b - a) + rng.uniform(-1, 1) * (c - a)])
-    if kind == 4:  # exactly coplanar, full mantissas
-        points = np.array([a, b, c, [rng.uniform(-1, 1) for _ in range(3)]])
-        points[:, 2] = points[:, 0] * rng.choice((1.0, -2.0, 0.25))
-        return points
-    if kind == 5:  # coplanar but for a coordinate near nothing
-        points = np.array([[rng.randrange(-3, 4) * 1.0 for _ in range(3)] for _ in range(4)])
-        points[:, 2] = points[:, 0] + points[:, 1] if rng.random() < 0.5 else 0.0
-        points[rng.randrange(4), rng.randrange(3)] += rng.choice((0.0, 5e-324, 1e-310, 1e-200, 2.0**-52))
-        return points * rng.choice((1.0, 2.0**900, 2.0**-500))
-    return np.array([a, b, c, c + np.array([rng.uniform(-1, 1) * 2.0**-50 for _ in range(3)])])
-
-for _ in range(1500):
-    originals = cloud()
-    points = np.zeros(12)
-    O.survey(originals.ravel(), points, 4, work)
-    p = [[Fraction(float(x)) for x in row] for row in originals]
-    u, v, w = ([p[k][i] - p[0][i] for i in range(3)] for k in (1, 2, 3))
-    n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    truth = sign(sum(a * b for a, b in zip(n, w)))
-    got = O.orientation(points, originals.ravel(), work, digits, 0, 1, 2, 3, -1)
-    assert got == truth, (originals.tolist(), got, truth)
-    assert O.orientation(points, originals.ravel(), work, digits, 3, 1, 2, 0, -1) == -truth, originals.tolist()
-    for axis in range(3):
-        got = O.orientation(points, originals.ravel(), work, digits, 0, 1, 2, 0, axis)
-        assert got == sign(n[axis]), (originals.tolist(), axis)
-    got = O.by_digits(originals.ravel(), digits, 0, 1, 2, 3, -1)
-    assert got == truth, originals.tolist()
-assert min(seen[name] for name in ("by_expansions", "dd_determinant")) > 200, seen
 
 clouds = pickle.load(sys.stdin.buffer)
 pickle.dump([tuple(convex_hull(points)) for points in clouds], sys.stdout.buffer)
@@ -482,8 +428,9 @@ assert min(sure) > 20, sure
 """
 
 
-def test_plain_python_decides_as_fractions_do_and_builds_the_same_hulls():
-    clouds = [*all_clouds(30, 0).values(), *all_clouds(100, 0).values()]
+def test_plain_python_builds_the_same_hulls():
+    """Also where fans are searched by halving, and corners come in a shuffled order."""
+    clouds = [*all_clouds(30, 0).values(), *list(all_clouds(100, 0).values())[::2]]
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CHILD],
         input=pickle.dumps(clouds), capture_output=True, check=False, timeout=300,

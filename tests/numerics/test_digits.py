@@ -83,7 +83,7 @@ def test_products_and_sums_of_numbers():
             D.add_number(digits, 40, 10, 10, -1)
             assert D.carry(digits, 40, 10) == sign(a - b) and number_at(digits, 40, 10) == a - b
         signs[found] += 1
-        D.clear(digits, 20, 20)
+        D.set_zero(digits, 20, 20)
         assert not digits[20:40].any() and number_at(digits, 0, 10) == a
     assert min(signs.values()) > 20, signs
 

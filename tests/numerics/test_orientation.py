@@ -69,10 +69,31 @@ def line_of_doubles(rng) -> np.ndarray:
     return points
 
 
+def of_the_whole_range(rng) -> np.ndarray:
+    return rng.uniform(-1, 1, size=(4, 3)) * 10.0 ** rng.integers(-320, 308, size=(4, 3))
+
+
+def coplanar(rng) -> np.ndarray:
+    """Exactly, with full mantissas; or but for a coordinate that is nearly nothing."""
+    points = rng.normal(size=(4, 3))
+    points[:, 2] = points[:, 0] * rng.choice([1.0, -2.0, 0.25])
+    if rng.random() < 0.6:
+        points[int(rng.integers(4)), 2] += rng.choice([5e-324, 1e-310, 1e-200, 2.0**-52])
+    return points * rng.choice([1.0, 2.0**900, 2.0**-500])
+
+
+def crowded(rng) -> np.ndarray:
+    """Two of the points 2⁻⁵⁰ apart."""
+    points = rng.uniform(-1, 1, size=(4, 3))
+    points[3] = points[2] + rng.uniform(-1, 1, 3) * 2.0**-50
+    return points
+
+
 CLOUDS = {
     "random": lambda rng: rng.normal(size=(4, 3)), "near a plane": near_a_plane, "lattice": lattice,
-    "of all sizes": of_all_sizes,
-    "a line of doubles": line_of_doubles, "denormal": lambda rng: rng.integers(-2, 3, size=(4, 3)) * 5e-324,
+    "of all sizes": of_all_sizes, "a line of doubles": line_of_doubles,
+    "denormal": lambda rng: rng.integers(-2, 3, size=(4, 3)) * 5e-324, "of the whole range": of_the_whole_range,
+    "coplanar": coplanar, "crowded": crowded,
 }  # fmt: skip
 
 
@@ -92,9 +113,8 @@ def test_sides_are_exact(kind):
             if axis < 0:
                 assert cloud.side(1, 2, 0, 3) == true and cloud.side(1, 0, 3, 2) == true
         seen[true] += 1
-    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= (20 if kind in ("lattice", "of all sizes", "denormal") else 0), (
-        seen
-    )
+    flat = 20 if kind in ("lattice", "of all sizes", "denormal", "coplanar") else 0
+    assert min(seen[-1], seen[1]) >= 20 and seen[0] >= flat, seen
 
 
 def test_stages_agree_and_are_needed():

@@ -35,36 +35,36 @@ from collide.results import PAIR_DTYPE
 #: How far things have come to begin with.
 _AT_THE_START = (0,) * (HEADER - N_DONE)
 #: Rows of parts of a block of poses, unless one pose takes more.
-_ROOM = 4096
+_CAPACITY = 4096
 
 
 class _Workspace:
-    """Scratch memory of the kernels, with room for so many rows of parts."""
+    """Scratch memory of the kernels, for ``capacity`` rows of parts."""
 
-    def __init__(self, room: int):
-        self.room = room
-        self.poses = PoseTable(np.zeros((2 * BLOCK + room, POSE)), np.zeros((2 * BLOCK + room, TERM_ROW)))
-        self.shape_of = np.zeros(2 * BLOCK + room, dtype=np.int64)
+    def __init__(self, capacity: int):
+        self.capacity = capacity
+        self.poses = PoseTable(np.zeros((2 * BLOCK + capacity, POSE)), np.zeros((2 * BLOCK + capacity, TERM_ROW)))
+        self.shape_of = np.zeros(2 * BLOCK + capacity, dtype=np.int64)
         self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
         self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
         self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
-        self.balls = np.zeros((2 + room, BALL_IN_WORLD))
+        self.balls = np.zeros((2 + capacity, BALL_IN_WORLD))
         buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, self.scores, self.slots, self.balls
         self._addresses = tuple(map(address_of, buffers))
 
     def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
         """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        return np.array((code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.room, *_AT_THE_START))
+        return np.array((code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START))
 
 
 class _SingleSpace(_Workspace):
     """The same for single calls, which have nothing else."""
 
-    def __init__(self, room: int):
-        super().__init__(room)
+    def __init__(self, capacity: int):
+        super().__init__(capacity)
         self.byte = np.zeros(1, dtype=np.uint8)
-        self._own = np.zeros(DOUBLES), np.zeros(INTEGERS, dtype=np.int64)
-        self.scratch = address_of(self._own[0]), address_of(self._own[1])
+        self._pair_space = np.zeros(DOUBLES), np.zeros(INTEGERS, dtype=np.int64)
+        self.scratch = address_of(self._pair_space[0]), address_of(self._pair_space[1])
 
 
 class _OfThread(local):
@@ -74,8 +74,8 @@ class _OfThread(local):
     asked = 0
 
     def space_for(self, table: UnionTable) -> _Workspace:
-        if self.space is None or self.space.room < table.most:
-            self.space = _Workspace(max(table.most, _ROOM))
+        if self.space is None or self.space.capacity < table.most:
+            self.space = _Workspace(max(table.most, _CAPACITY))
         return self.space
 
 
@@ -101,18 +101,18 @@ def run_unions(
 
     which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
     """
-    table.plant(which)
+    table.build_trees(which)
     space = of_thread.space_for(table)
     header = space.header_of(table, run.scratch())
     while True:
-        said = answer_unions(
+        status = answer_unions(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), len(out), boolean, depths and not boolean, limit, check,
             run.distrust_doubles, address_of(out),
         )  # fmt: skip
-        if not said or said == BAD_POSE:
+        if not status or status == BAD_POSE:
             of_thread.asked += int(header[N_ANSWERED])
-            return not said
+            return not status
         listed = int(header[N_LISTED])
         run.settle_open(
             space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean, limit=limit,
@@ -131,12 +131,12 @@ class UnionPair:
 
     def __init__(self, A: LaidOut, B: LaidOut):
         self.unions = UnionTable([A, B])
-        self.unions.plant(None)
+        self.unions.build_trees(None)
         self.collide = self._distance = _long_way
-        if self.unions.counts.prod() > _MOST_AT_ONCE:
+        if self.unions.counts.prod() > _MAX_AT_ONCE:
             return
         space = UnionPair._space  # read once: another thread may put a smaller one there
-        if space is None or space.room < self.unions.most:
+        if space is None or space.capacity < self.unions.most:
             space = UnionPair._space = _SingleSpace(self.unions.most)
         self._held = space  # pairs made before have a smaller one
         header = space.header_of(self.unions, space.scratch)
@@ -151,7 +151,7 @@ class UnionPair:
 
 
 #: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
-_MOST_AT_ONCE = 1024
+_MAX_AT_ONCE = 1024
 
 
 def _long_way(*_) -> None:

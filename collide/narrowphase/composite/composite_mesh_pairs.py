@@ -2,7 +2,7 @@
 
 Poses that are exact are answered as any pair is. Where a product of two poses was rounded, a part stands within its
 slop of where the rounded one would put it: gaps wider than that are proven, and so are facets that cross each other
-by more, and what lies deeper inside. What is left is open.
+by more, and what lies deeper inside. The rest is open.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from collide.shapes.shape import Shape
 #: Rounding of a determinant of differences, of the product of their lengths; and of a coordinate, of the size.
 _DETERMINANT, _COORDINATE = 2.0**-46, 2.0**-48
 #: Pairs of facets that meet and are looked at for a crossing that no rounding undoes.
-_MOST_PAIRS = 4096
+_MAX_PAIRS = 4096
 
 
 def part_states(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> np.ndarray:
@@ -130,22 +130,22 @@ def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.n
     slop, radius = PA.slop + PB.slop, A.radius + B.radius
     states = np.full(len(slop), OPEN)
     core, inside = core_hits(A, B, PA.X, PB.X)
-    loose = 1.001 * slop
-    found = surface_distances(A.tree, B.tree, PA.X, PB.X, (radius + 4.0 * float(slop.max())) * FARTHER)
+    margin = 1.001 * slop
+    distances = surface_distances(A.tree, B.tree, PA.X, PB.X, (radius + 4.0 * float(slop.max())) * FARTHER)
     within = ~np.isnan(inside[:, 0])
-    states[~core & (found.lower - radius > loose)] = APART
-    states[(core & within & (found.lower > loose)) | (found.upper + loose <= radius)] = HIT
-    left = np.flatnonzero((states == OPEN) & core & ~within)
-    if len(left):
-        first = first_hits(A.tree, B.tree, PA.X[left], PB.X[left])
+    states[~core & (distances.lower - radius > margin)] = APART
+    states[(core & within & (distances.lower > margin)) | (distances.upper + margin <= radius)] = HIT
+    remaining = np.flatnonzero((states == OPEN) & core & ~within)
+    if len(remaining):
+        first = first_hits(A.tree, B.tree, PA.X[remaining], PB.X[remaining])
         met = first.starts[1:] > first.starts[:-1]
-        left = left[met]
-        crossing = _crossing(A, B, first.pairs, PA.X[left], PB.X[left], slop[left])
-        states[left[crossing]] = HIT
-        for k in left[~crossing].tolist():
-            pairs = all_hits(A.tree, B.tree, PA.X[k], PB.X[k]).pairs[:_MOST_PAIRS]
-            many = (np.broadcast_to(value, (len(pairs), *value.shape)) for value in (PA.X[k], PB.X[k], slop[k]))
-            if _crossing(A, B, pairs, *many).any():
+        remaining = remaining[met]
+        crossing = _crossing(A, B, first.pairs, PA.X[remaining], PB.X[remaining], slop[remaining])
+        states[remaining[crossing]] = HIT
+        for k in remaining[~crossing].tolist():
+            pairs = all_hits(A.tree, B.tree, PA.X[k], PB.X[k]).pairs[:_MAX_PAIRS]
+            repeated = (np.broadcast_to(value, (len(pairs), *value.shape)) for value in (PA.X[k], PB.X[k], slop[k]))
+            if _crossing(A, B, pairs, *repeated).any():
                 states[k] = HIT
     return states
 
@@ -159,11 +159,11 @@ def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.nd
     shift = X_WB[:, :3, 3] - X_WA[:, :3, 3]
     U, V = _corners(A, pairs[:, 0], X_WA, np.zeros_like(shift)), _corners(B, pairs[:, 1], X_WB, shift)
     moved = 1.001 * slop + _COORDINATE * (_terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1))
-    found = np.zeros(len(pairs), dtype=bool)
+    crossing = np.zeros(len(pairs), dtype=bool)
     for T, S in ((U, V), (V, U)):
         for k in range(3):
-            found |= _passes(S[:, k], S[:, (k + 1) % 3], T[:, 0], T[:, 1], T[:, 2], moved)
-    return found
+            crossing |= _passes(S[:, k], S[:, (k + 1) % 3], T[:, 0], T[:, 1], T[:, 2], moved)
+    return crossing
 
 
 def _corners(body: Body, facets: np.ndarray, X: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -194,7 +194,7 @@ def _sign(a, b, c, d, moved) -> np.ndarray:
     """(k,) sign of the volume of abcd, 0 where moving corners by ``moved`` might change it."""
     u, v, w = b - a, c - a, d - a
     value = (u * np.cross(v, w)).sum(axis=1)
-    x, y, z = (np.sqrt(np.square(one).sum(axis=1)) for one in (u, v, w))
+    x, y, z = (np.sqrt(np.square(edge).sum(axis=1)) for edge in (u, v, w))
     m = 2.0 * moved
     error = m * (x * y + y * z + z * x) + m * m * (x + y + z) + m * m * m
     error = error * 1.001 + _DETERMINANT * (x + m) * (y + m) * (z + m) + 1e-300

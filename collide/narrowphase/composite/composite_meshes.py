@@ -2,7 +2,7 @@
 
 Apart, the distance is the least one of the parts. Convex parts of both sides are answered together, as unions of
 convex parts always are (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh in it is asked about only where their boxes
-come as near as what is known already. Overlapping, what is told is a translation that is proven to part the unions.
+come as near as what is known already. Overlapping, the row holds a translation that is proven to separate the unions.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from collide.lowering.composite_parts import UnionParts, union_of
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
+from collide.narrowphase.composite.composite_parts import UnionParts, union_of
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
 from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
@@ -39,29 +39,29 @@ def _states(A: UnionParts, B: UnionParts, X_WA, X_WB, open_ones: bool = False) -
             states[met[rows["how"] == UNDECIDED]] = OPEN
     gaps = _box_gaps(A, B, X_WA, X_WB)
     for i, j in _mesh_pairs(A, B):
-        left = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
-        if len(left):
-            one, other, PA, PB = _posed(A, B, i, j, X_WA[left], X_WB[left])
-            found = part_states(one.shape, other.shape, PA, PB)
-            states[left] = np.where(found == APART, states[left], found)
+        remaining = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
+        if len(remaining):
+            part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
+            part_state = part_states(part_a.shape, part_b.shape, PA, PB)
+            states[remaining] = np.where(part_state == APART, states[remaining], part_state)
     return states
 
 
 def _mesh_pairs(A: UnionParts, B: UnionParts):
     """Numbers of parts of which one at least is a mesh."""
-    for i, one in enumerate(A.parts):
-        for j, other in enumerate(B.parts):
-            if one.shape.meshed or other.shape.meshed:
+    for i, part_a in enumerate(A.parts):
+        for j, part_b in enumerate(B.parts):
+            if part_a.shape.meshed or part_b.shape.meshed:
                 yield i, j
 
 
-def _posed(A: UnionParts, B: UnionParts, i: int, j: int, X_WA, X_WB):
+def _parts_at(A: UnionParts, B: UnionParts, i: int, j: int, X_WA, X_WB):
     """(part, part, their poses, their poses)."""
-    one, other = A.parts[i], B.parts[j]
+    part_a, part_b = A.parts[i], B.parts[j]
     about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    for part in (one, other):
+    for part in (part_a, part_b):
         about = about + 2.0 * (part.bound.reach + part.bound.radius + np.abs(part.X[:3, 3]).sum())
-    return one, other, one.at(X_WA, about), other.at(X_WB, about)
+    return part_a, part_b, part_a.at(X_WA, about), part_b.at(X_WB, about)
 
 
 def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
@@ -99,12 +99,12 @@ def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) 
     out = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
     for k in range(len(X_WA)):
         rows = asked[k]
-        sure = rows[rows["hit"] & (rows["how"] != UNDECIDED)]
-        unsure = rows[rows["hit"] & (rows["how"] == UNDECIDED)]
-        if planes or not len(sure) + len(unsure):
+        certain = rows[rows["hit"] & (rows["how"] != UNDECIDED)]
+        undecided = rows[rows["hit"] & (rows["how"] == UNDECIDED)]
+        if planes or not len(certain) + len(undecided):
             out[k] = _least(rows, limit, bool(left_out[k]))
         else:
-            _overlap(A, B, X_WA[k], X_WB[k], out[k : k + 1], sure if len(sure) else unsure, rows, depths)
+            _overlap(A, B, X_WA[k], X_WB[k], out[k : k + 1], certain if len(certain) else undecided, rows, depths)
     return out
 
 
@@ -116,16 +116,16 @@ def _part_rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: b
     asked: list[list[np.ndarray]] = [[] for _ in range(n)]
     upper, hit = np.full(n, math.inf), np.zeros(n, dtype=bool)
 
-    def take(rows: np.ndarray, left: np.ndarray) -> None:
+    def take(rows: np.ndarray, poses: np.ndarray) -> None:
         clean = np.zeros(len(rows), dtype=PAIR_DTYPE)
         for name in FIELDS:  # padding stays 0
             clean[name] = rows[name]
         clean["vertices_a"] = clean["vertices_b"] = -1
         clean["count"], clean["iterations"] = 0, 0
-        for k, row in zip(left.tolist(), clean):
+        for k, row in zip(poses.tolist(), clean):
             asked[k].append(row.reshape(1))
-        upper[left] = np.minimum(upper[left], clean["upper"])
-        hit[left] |= clean["hit"] & (clean["how"] != UNDECIDED)
+        upper[poses] = np.minimum(upper[poses], clean["upper"])
+        hit[poses] |= clean["hit"] & (clean["how"] != UNDECIDED)
 
     if A.convex is not None and B.convex is not None:
         rows = convex_rows(A.convex, B.convex, X_WA, X_WB, limit=limit)
@@ -139,14 +139,14 @@ def _part_rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: b
         if place + 1 == len(pairs):  # a pose keeps at least one row
             far &= np.array([bool(rows) for rows in asked], dtype=bool)
         left_out |= far & (gaps[:, i, j] > sight)
-        left = np.flatnonzero(~far & (planes | ~hit))
-        if len(left):
-            one, other, PA, PB = _posed(A, B, i, j, X_WA[left], X_WB[left])
-            rows = part_rows(one.shape, other.shape, PA, PB, limit)
+        remaining = np.flatnonzero(~far & (planes | ~hit))
+        if len(remaining):
+            part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
+            rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
             for name, side, number in (("part_a", A, i), ("part_b", B, j)):
                 if len(side.parts) > 1 or side.shape is not side.parts[0].shape:
                     rows[name] = number
-            take(rows, left)
+            take(rows, remaining)
     return [np.concatenate(rows) for rows in asked], left_out
 
 
@@ -171,31 +171,31 @@ def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
 def _overlap(A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool) -> None:
     """The row of two unions that meet, or may."""
     row = meeting[0].copy()
-    sure = row["how"] != UNDECIDED
+    certain = row["how"] != UNDECIDED
     point = 0.5 * (row["point_a"] + row["point_b"])
-    row["hit"], row["beyond"], row["certified"] = True, False, sure
-    row["upper"] = 0.0 if sure else max(0.0, float(rows["upper"].min()))
+    row["hit"], row["beyond"], row["certified"] = True, False, certain
+    row["upper"] = 0.0 if certain else max(0.0, float(rows["upper"].min()))
     row["point_a"] = row["point_b"] = point
     row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
-    if sure:
+    if certain:
         row["how"] = row["how"] or EXACT
     if depths and (A.unbounded or B.unbounded):
         row["distance"] = row["lower"] = -math.inf
         row["normal"], row["certified"] = (0.0, 0.0, 1.0), False
     elif depths:
-        length, bound, normal = _way_out(A, B, X_WA, X_WB, meeting)
+        length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
         row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
         row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
-        row["certified"] = bool(sure and bound == 0.0)
+        row["certified"] = bool(certain and bound == 0.0)
     out[0] = row
 
 
-def _way_out(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
-    """A translation of B that parts the unions, proven."""
+def _separating_translation(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
+    """A translation of B that separates the unions, proven."""
     axes = np.concatenate([np.eye(3), X_WA[:3, :3].T, X_WB[:3, :3].T])
     axes /= np.sqrt(np.square(axes).sum(axis=1))[:, None]
-    told = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
-    directions = np.concatenate([told, axes, -axes])
+    normals = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
+    directions = np.concatenate([normals, axes, -axes])
     best: SeparatingTranslation | None = None
     for n in directions:
         (a, error_a), (b, error_b) = A.extent(X_WA, n), B.extent(X_WB, -n)

@@ -124,9 +124,9 @@ def depth_by_all_planes(ordered, terms, terms_at, digits, doubles_at, ids):
     best = PlaneDepth(False, DD(math.inf, 0.0), Vec3(0.0, 0.0, 1.0))
     for k in range(n_planes):
         _set_points(exact, planes, _PLANE * k)
-        found = _extent(exact)
-        if dd.less(found.depth, best.depth):
-            best = found
+        extent = _extent(exact)
+        if dd.less(extent.depth, best.depth):
+            best = extent
     if not best.proven:
         return unproven
     _find_corners(exact, doubles_at, ids, best)
@@ -313,13 +313,13 @@ def _prune(planes, n, extent):
 
 
 @kernel
-def _find_corners(exact, doubles_at, ids, found):
+def _find_corners(exact, doubles_at, ids, best_plane):
     """The vertex pairs of three points of the facet across the direction of a `PlaneDepth`, around the foot of the origin.
 
     Any three of its corners may not do; the triangle that comes nearest does, or an edge, or a corner.
     """
     corners = view_f64(doubles_at, _CORNER * _MAX_CORNERS)
-    n_corners = _list_corners(exact, corners, found)
+    n_corners = _list_corners(exact, corners, best_plane)
     best = math.inf
     for i in range(n_corners):
         for j in range(i + 1):
@@ -335,12 +335,12 @@ def _find_corners(exact, doubles_at, ids, found):
 
 
 @kernel
-def _list_corners(exact, corners, found):
+def _list_corners(exact, corners, best_plane):
     """Points of A ⊖ B that are level with the farthest along n, less the foot, with their vertices; their number."""
     A, B, poses = exact.pair.A, exact.pair.B, exact.pair.poses
-    along_a = rotate_back(poses, A.pose_at, found.nhat)
-    along_b = rotate_back(poses, B.pose_at, found.nhat)
-    foot = scale(found.depth.high, found.nhat)
+    along_a = rotate_back(poses, A.pose_at, best_plane.nhat)
+    along_b = rotate_back(poses, B.pose_at, best_plane.nhat)
+    foot = scale(best_plane.depth.high, best_plane.nhat)
     high = -math.inf
     for i in range(A.n):
         high = max(high, dot(along_a, column_at(A.coords, A.padded, i)))

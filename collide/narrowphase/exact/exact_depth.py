@@ -17,7 +17,7 @@ from collide.results import EXACT
 def exact_depth(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, wanted_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it found.
+    """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it plane.
 
     wanted : a byte a pair, whether its depth is wanted.   Other arguments as there. Rows are left as they are where the
     hulls are too large (`all_planes.py`).
@@ -39,11 +39,11 @@ def exact_depth(
 def _write_depth(ordered, space, row_at, limit):
     """Write the depth of a row; whether it was found."""
     row = view_row(row_at)
-    found = depth_by_all_planes(ordered, space.terms, space.terms_at, space.digits, space.doubles_at, space.facet)
-    if not found.proven:
+    plane = depth_by_all_planes(ordered, space.terms, space.terms_at, space.digits, space.doubles_at, space.facet)
+    if not plane.proven:
         return False
-    bracket = bracket_of_depth(found.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B))
-    v = neg(found.nhat)
+    bracket = bracket_of_depth(plane.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B))
+    v = neg(plane.nhat)
     put_normal_and_points(row, ordered, space.terms_at, space.facet, 3, space.digits_at, v, bracket.nearest)
     lower, upper = max(row.doubles[LOWER], bracket.lower), min(row.doubles[UPPER], bracket.upper)
     write_verdict(row, bracket.nearest, lower, upper, EXACT, 0.0, limit)

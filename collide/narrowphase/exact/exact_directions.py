@@ -8,7 +8,7 @@ from typing import NamedTuple
 from collide.kernels import kernel
 from collide.narrowphase.exact.exact_workspace import direction_at, point_at, scratch_at
 from collide.numerics import double_double as dd
-from collide.numerics.digits import BITS, add_number, add_product, as_double, as_double_double, carry, clear, negate
+from collide.numerics.digits import BITS, add_number, add_product, as_double, as_double_double, carry, negate, set_zero
 from collide.numerics.double_double import ScaledDD
 from collide.numerics.vec3 import Vec3
 
@@ -30,7 +30,7 @@ def set_edge(exact, k, i, j):
     digits, d = exact.digits, exact.d
     for axis in range(3):
         at = edge_at(d, k, axis)
-        clear(digits, at, d)
+        set_zero(digits, at, d)
         add_number(digits, at, point_at(d, i, axis), d, 1)
         add_number(digits, at, point_at(d, j, axis), d, -1)
         carry(digits, at, d)
@@ -47,7 +47,7 @@ def set_cross(exact, out, e, f, axis):
     digits, d = exact.digits, exact.d
     i = (axis + 1) % 3
     j = (axis + 2) % 3
-    clear(digits, out, 2 * d)
+    set_zero(digits, out, 2 * d)
     add_product(digits, out, edge_at(d, e, i), d, edge_at(d, f, j), d, 1)
     add_product(digits, out, edge_at(d, e, j), d, edge_at(d, f, i), d, -1)
     carry(digits, out, 2 * d)
@@ -60,7 +60,7 @@ def set_normal(exact):
     set_edge(exact, 0, 1, 0)
     set_edge(exact, 1, 2, 0)
     height = scratch_at(d, 1)
-    clear(digits, height, 3 * d)
+    set_zero(digits, height, 3 * d)
     for axis in range(3):
         out = direction_at(d, axis)
         set_cross(exact, out, 0, 1, axis)
@@ -82,7 +82,7 @@ def direction_length(exact, n):
     """Length of the direction, whose components have n digits: a `ScaledDD`, 0 where it is 0."""
     digits, d = exact.digits, exact.d
     square = scratch_at(d, 0)
-    clear(digits, square, 2 * n)
+    set_zero(digits, square, 2 * n)
     for axis in range(3):
         add_product(digits, square, direction_at(d, axis), n, direction_at(d, axis), n, 1)
     carry(digits, square, 2 * n)
@@ -120,7 +120,7 @@ def side_of(exact, n, k):
     """Sign of point k along the direction; the product stands in scratch 0."""
     digits, d = exact.digits, exact.d
     out = scratch_at(d, 0)
-    clear(digits, out, n + d)
+    set_zero(digits, out, n + d)
     for axis in range(3):
         add_product(digits, out, direction_at(d, axis), n, point_at(d, k, axis), d, 1)
     return carry(digits, out, n + d)

@@ -17,7 +17,7 @@ from collide.narrowphase.exact.johnson import (
     set_gram,
     within_radius,
 )
-from collide.numerics.digits import add_product, carry, clear
+from collide.numerics.digits import add_product, carry, set_zero
 from collide.numerics.double_double import DD
 from collide.numerics.vec3 import Vec3
 
@@ -150,7 +150,7 @@ def _separating_faces(exact):
     normal = scratch_at(d, 1)
     height = scratch_at(d, 2)
     for k in range(3):
-        clear(digits, height, 6 * d)
+        set_zero(digits, height, 6 * d)
         for axis in range(3):
             set_cross(exact, normal, (k + 1) % 3, (k + 2) % 3, axis)
             add_product(digits, height, normal, 2 * d, point_at(d, 3, axis), d, -1)  # the origin, seen from 3

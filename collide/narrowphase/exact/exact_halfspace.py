@@ -33,10 +33,10 @@ from collide.numerics.digits import (
     add_product,
     as_double_double,
     carry,
-    clear,
     copy,
     grid_of,
     lowest_bit,
+    set_zero,
 )
 from collide.numerics.double_double import DD, ScaledDD
 from collide.numerics.vec3 import add, column_at, dot, rotate
@@ -47,7 +47,7 @@ _SLOT = 2 * _LONGEST
 # Slots of the workspace: R_A, the normal m in A's frame, the normal n in W's axes, det R_A, a cofactor, −b·det R_A, b; R_B;
 # of a vertex: s, a coordinate or r, a vertex's coordinate or r², s² − r²|n|² and r²|n|², two slots each, |n|².
 _ROTATION_A, _NORMAL_A, _NORMAL, _DETERMINANT, _COFACTOR, _CONSTANT, _OFFSET = 0, 9, 12, 15, 16, 17, 18
-_ROTATION_B, _HEIGHT, _FIRST, _SECOND, _LEFT, _RIGHT, _NORMAL_SQUARE = 20, 30, 31, 32, 33, 35, 37
+_ROTATION_B, _HEIGHT, _FIRST, _SECOND, _DIFFERENCE, _SUBTRAHEND, _NORMAL_SQUARE = 20, 30, 31, 32, 33, 35, 37
 #: Integers of workspace.
 INTEGERS = 40 * _SLOT
 
@@ -125,14 +125,14 @@ def _load_plane(plane):
     """n = cof(R) m, det R and −b·det R, with what they are made of."""
     digits, n_rot, n_m = plane.digits, plane.rotation_A.n, plane.normal.n
     numbers, at = plane.pair.numbers, plane.pair.A.params_at
-    clear(digits, 0, _slot(_OFFSET + 1))
+    set_zero(digits, 0, _slot(_OFFSET + 1))
     _load_rotation(digits, plane.pose_A, plane.rotation_A, _ROTATION_A)
     for k in range(3):
         add_double(digits, _slot(_NORMAL_A + k), numbers[at + k], plane.normal.grid)
     cofactor = _slot(_COFACTOR)
     for i in range(3):
         for j in range(3):
-            clear(digits, cofactor, 2 * n_rot + 1)
+            set_zero(digits, cofactor, 2 * n_rot + 1)
             r1 = _ROTATION_A + 3 * ((i + 1) % 3)
             r2 = _ROTATION_A + 3 * ((i + 2) % 3)
             c1 = (j + 1) % 3
@@ -154,7 +154,7 @@ def _load_plane(plane):
 
 @kernel
 def _load_rotation(digits, pose, span, slot):
-    clear(digits, _slot(slot), 9 * _SLOT)
+    set_zero(digits, _slot(slot), 9 * _SLOT)
     for k in range(9):
         add_entry(digits, _slot(slot + k), pose, k, span.grid, 1.0)
         carry(digits, _slot(slot + k), span.n)
@@ -214,9 +214,9 @@ def _reach_of_vertex(plane, k):
     grid = _set_square_difference(plane)
     if grid.n > 2 * _SLOT:
         return PlaneContact(UNDONE, k, DD(0.0, 0.0))
-    sign = carry(digits, _slot(_LEFT), grid.n)
+    sign = carry(digits, _slot(_DIFFERENCE), grid.n)
     # (s² − r²|n|²) / |n|² over s/|n| + r, which is s/|n| − r without cancellation.
-    difference = as_double_double(digits, _slot(_LEFT), grid.n)
+    difference = as_double_double(digits, _slot(_DIFFERENCE), grid.n)
     ratio = dd.scaled_div(ScaledDD(difference.value, difference.exponent + BITS * grid.grid), square)
     excess = dd.unscaled(dd.scaled_div(ratio, dd.normalized(dd.add(height, radius))))
     if excess.high == 0.0 and sign != 0:
@@ -233,12 +233,12 @@ def _set_height(plane, k):
     copy(digits, total, _slot(_CONSTANT), plane.height.n)
     for axis in range(3):
         y = _slot(_FIRST)
-        clear(digits, y, d)
+        set_zero(digits, y, d)
         if plane.core.n > 0:
             product = y + plane.rotation_B.grid + plane.core.grid - grid
             for j in range(3):
                 vertex = _slot(_SECOND)
-                clear(digits, vertex, plane.core.n)
+                set_zero(digits, vertex, plane.core.n)
                 add_double(digits, vertex, coords[j * padded + k], plane.core.grid)
                 rotation = _slot(_ROTATION_B + 3 * axis + j)
                 add_product(digits, product, rotation, plane.rotation_B.n, vertex, plane.core.n, 1)
@@ -255,7 +255,7 @@ def _set_normal_square(plane):
     """|n|², also as a `ScaledDD`."""
     digits, n = plane.digits, plane.n_plane
     out = _slot(_NORMAL_SQUARE)
-    clear(digits, out, 2 * n + 1)
+    set_zero(digits, out, 2 * n + 1)
     for axis in range(3):
         add_product(digits, out, _slot(_NORMAL + axis), n, _slot(_NORMAL + axis), n, 1)
     carry(digits, out, 2 * n + 1)
@@ -272,23 +272,23 @@ def _set_square_difference(plane):
     low_s = 2 * plane.height.grid
     low_r = 2 * (2 * plane.rotation_A.grid + plane.normal.grid) + 2 * radius.grid
     low = min(low_s, low_r)
-    n_right = n_square + 2 * radius.n + 1 + low_r - low
-    n = max(2 * n_height + low_s - low + 1, n_right) + 1
+    n_subtrahend = n_square + 2 * radius.n + 1 + low_r - low
+    n = max(2 * n_height + low_s - low + 1, n_subtrahend) + 1
     if n > 2 * _SLOT:
         return Span(low, n)
-    left = _slot(_LEFT)
-    right = _slot(_RIGHT)
+    difference = _slot(_DIFFERENCE)
+    subtrahend = _slot(_SUBTRAHEND)
     r = _slot(_FIRST)
     rr = _slot(_SECOND)
-    clear(digits, left, 2 * _SLOT)
-    clear(digits, right, 2 * _SLOT)
-    clear(digits, r, radius.n)
-    clear(digits, rr, 2 * radius.n + 1)
+    set_zero(digits, difference, 2 * _SLOT)
+    set_zero(digits, subtrahend, 2 * _SLOT)
+    set_zero(digits, r, radius.n)
+    set_zero(digits, rr, 2 * radius.n + 1)
     add_double(digits, r, plane.radius, radius.grid)
     add_product(digits, rr, r, radius.n, r, radius.n, 1)
     carry(digits, rr, 2 * radius.n + 1)
-    add_product(digits, left + low_s - low, _slot(_HEIGHT), n_height, _slot(_HEIGHT), n_height, 1)
-    add_product(digits, right + low_r - low, _slot(_NORMAL_SQUARE), n_square, rr, 2 * radius.n + 1, 1)
-    carry(digits, right, n)
-    add_number(digits, left, right, n, -1)
+    add_product(digits, difference + low_s - low, _slot(_HEIGHT), n_height, _slot(_HEIGHT), n_height, 1)
+    add_product(digits, subtrahend + low_r - low, _slot(_NORMAL_SQUARE), n_square, rr, 2 * radius.n + 1, 1)
+    carry(digits, subtrahend, n)
+    add_number(digits, difference, subtrahend, n, -1)
     return Span(low, n)

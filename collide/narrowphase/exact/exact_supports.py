@@ -8,7 +8,7 @@ from typing import NamedTuple
 from collide.kernels import kernel
 from collide.narrowphase.exact.exact_directions import direction_double
 from collide.narrowphase.exact.exact_workspace import direction_at, scratch_at
-from collide.numerics.digits import add_double, add_product, carry, clear
+from collide.numerics.digits import add_double, add_product, carry, set_zero
 from collide.numerics.vec3 import Vec3, column_at, divide, dot, norm, rotate_back, scale, sub
 from collide.support.support_tree_query import extreme_vertex, rings_of
 
@@ -32,7 +32,7 @@ def support_pair(exact, n):
 
 
 @kernel
-def _extreme_vertex(exact, body, posed, n, direction, length, sign):
+def _extreme_vertex(exact, body, hull, n, direction, length, sign):
     """The vertex with the least sign · (v·R a), v the exact direction; the first of equals.
 
     Doubles rule out all that are farther than twice the slack from the best; the others, usually
@@ -40,19 +40,19 @@ def _extreme_vertex(exact, body, posed, n, direction, length, sign):
     neighbours are looked at (which of equals is then up to the tree).
     """
     slack = 2.0 * exact.error * length
-    g = scale(sign, rotate_back(exact.pair.poses, posed.pose_at, direction))
-    if posed.tree != 0:
+    g = scale(sign, rotate_back(exact.pair.poses, hull.pose_at, direction))
+    if hull.tree != 0:
         rotate_direction(exact, body, n)
-        vertex = _climb(exact, body, posed, n, g, slack, sign)
+        vertex = _climb(exact, body, hull, n, g, slack, sign)
         if vertex >= 0:
             return vertex
     least = math.inf
-    for i in range(posed.n):
-        least = min(least, dot(column_at(posed.coords, posed.padded, i), g))
+    for i in range(hull.n):
+        least = min(least, dot(column_at(hull.coords, hull.padded, i), g))
     best = -1
     rotated = False
-    for i in range(posed.n):
-        if dot(column_at(posed.coords, posed.padded, i), g) > least + slack:
+    for i in range(hull.n):
+        if dot(column_at(hull.coords, hull.padded, i), g) > least + slack:
             continue
         if best < 0:
             best = i
@@ -60,20 +60,20 @@ def _extreme_vertex(exact, body, posed, n, direction, length, sign):
         if not rotated:
             rotate_direction(exact, body, n)
             rotated = True
-        if compare(exact, body, posed, n, i, best) * sign < 0:
+        if compare(exact, body, hull, n, i, best) * sign < 0:
             best = i
     return max(best, 0)
 
 
 @kernel
-def _climb(exact, body, posed, n, g, slack, sign):
+def _climb(exact, body, hull, n, g, slack, sign):
     """The least vertex by steps along hull edges from the tree's proposal, compared exactly.
 
     −1 where all neighbours are level: a vertex within a face, which may be a face on the far side.
     """
-    coords, padded = posed.coords, posed.padded
-    best, _, _, _ = extreme_vertex(posed.tree, -g.x, -g.y, -g.z)
-    starts, ring, _ = rings_of(posed.tree)
+    coords, padded = hull.coords, hull.padded
+    best, _, _, _ = extreme_vertex(hull.tree, -g.x, -g.y, -g.z)
+    starts, ring, _ = rings_of(hull.tree)
     while True:
         better = best
         level = True
@@ -82,7 +82,7 @@ def _climb(exact, body, posed, n, g, slack, sign):
             if dot(sub(column_at(coords, padded, i), column_at(coords, padded, best)), g) > slack:
                 level = False
                 continue
-            side = compare(exact, body, posed, n, i, better) * sign
+            side = compare(exact, body, hull, n, i, better) * sign
             if side < 0:
                 better = i
             level = level and side == 0
@@ -97,7 +97,7 @@ def rotate_direction(exact, body, n):
     digits, d = exact.digits, exact.d
     for j in range(3):
         at = scratch_at(d, 1) + 5 * d * j
-        clear(digits, at, n + body.rotation.n)
+        set_zero(digits, at, n + body.rotation.n)
         for axis in range(3):
             rotation = (body.rotation_at + 3 * axis + j) * d
             add_product(digits, at, direction_at(d, axis), n, rotation, body.rotation.n, 1)
@@ -105,18 +105,18 @@ def rotate_direction(exact, body, n):
 
 
 @kernel
-def compare(exact, body, posed, n, i, j):
+def compare(exact, body, hull, n, i, j):
     """Sign of (Rᵀv)·(a_i − a_j), Rᵀv standing in scratch 1."""
     digits, d = exact.digits, exact.d
     length = n + body.rotation.n
     out = scratch_at(d, 2)
     at = scratch_at(d, 3)
-    clear(digits, out, length + body.core.n)
+    set_zero(digits, out, length + body.core.n)
     for axis in range(3):
-        x = posed.coords[axis * posed.padded + i]
-        y = posed.coords[axis * posed.padded + j]
+        x = hull.coords[axis * hull.padded + i]
+        y = hull.coords[axis * hull.padded + j]
         if x != y:
-            clear(digits, at, body.core.n)
+            set_zero(digits, at, body.core.n)
             add_double(digits, at, x, body.core.grid)
             add_double(digits, at, -y, body.core.grid)
             carry(digits, at, body.core.n)

@@ -18,9 +18,9 @@ from collide.numerics.digits import (
     add_number,
     add_product,
     carry,
-    clear,
     grid_of,
     lowest_bit,
+    set_zero,
 )
 
 #: Most digits of one coordinate: 2^1664 between the largest and the smallest bit of a pair, which is
@@ -219,7 +219,7 @@ def fits(exact):
 def load_poses(exact):
     """Rotations and the shift p_WB − p_WA into the workspace."""
     digits, d = exact.digits, exact.d
-    clear(digits, 0, _POINTS * d)
+    set_zero(digits, 0, _POINTS * d)
     _load_rotation(digits, d, exact.A)
     _load_rotation(digits, d, exact.B)
     for k in range(3):
@@ -243,7 +243,7 @@ def set_point(exact, k, i, j):
     """Point k of the workspace becomes the difference of vertex i of A and vertex j of B."""
     digits, d = exact.digits, exact.d
     out = point_at(d, k, 0)
-    clear(digits, out, 3 * d)
+    set_zero(digits, out, 3 * d)
     if exact.A.core.n > 0:
         _add_vertex(exact, exact.A, exact.pair.A, i, out, 1)
     if exact.B.core.n > 0:
@@ -254,14 +254,14 @@ def set_point(exact, k, i, j):
 
 
 @kernel
-def _add_vertex(exact, body, posed, vertex, out, sign):
+def _add_vertex(exact, body, hull, vertex, out, sign):
     """Add sign · R v to three coordinates at out, out + D, out + 2D."""
     digits, d = exact.digits, exact.d
     at = scratch_at(d, 3)
     offset = body.rotation.grid + body.core.grid - exact.grid
-    clear(digits, at, 3 * body.core.n)
+    set_zero(digits, at, 3 * body.core.n)
     for j in range(3):
-        add_double(digits, at + j * body.core.n, posed.coords[j * posed.padded + vertex], body.core.grid)
+        add_double(digits, at + j * body.core.n, hull.coords[j * hull.padded + vertex], body.core.grid)
     for axis in range(3):
         for j in range(3):
             rotation = (body.rotation_at + 3 * axis + j) * d

@@ -15,8 +15,8 @@ from collide.numerics.digits import (
     add_product,
     as_double_double,
     carry,
-    clear,
     copy,
+    set_zero,
 )
 from collide.numerics.double_double import DD, ScaledDD
 from collide.numerics.error_free import two_sum
@@ -28,12 +28,12 @@ def set_gram(exact, k):
     digits, d = exact.digits, exact.d
     for i in range(k + 1):
         at = gram_at(d, k, i)
-        clear(digits, at, 2 * d)
+        set_zero(digits, at, 2 * d)
         for axis in range(3):
             add_product(digits, at, point_at(d, k, axis), d, point_at(d, i, axis), d, 1)
         carry(digits, at, 2 * d)
         if i != k:
-            clear(digits, gram_at(d, i, k), 2 * d)
+            set_zero(digits, gram_at(d, i, k), 2 * d)
             add_number(digits, gram_at(d, i, k), at, 2 * d, 1)
 
 
@@ -70,7 +70,7 @@ def set_delta(exact, mask, j):
     larger = mask | (1 << j)
     out = delta_at(d, larger, j)
     n = length_of(d, larger)
-    clear(digits, out, n)
+    set_zero(digits, out, n)
     if mask & (mask - 1) == 0:
         add_number(digits, out, gram_at(d, k, k), 2 * d, 1)
         add_number(digits, out, gram_at(d, k, j), 2 * d, -1)
@@ -78,7 +78,7 @@ def set_delta(exact, mask, j):
     difference = scratch_at(d, 0)
     for i in range(4):
         if (mask >> i) & 1:
-            clear(digits, difference, 2 * d)
+            set_zero(digits, difference, 2 * d)
             add_number(digits, difference, gram_at(d, i, k), 2 * d, 1)
             add_number(digits, difference, gram_at(d, i, j), 2 * d, -1)
             carry(digits, difference, 2 * d)
@@ -144,7 +144,7 @@ def set_direction(exact, mask):
     zero = True
     for axis in range(3):
         at = direction_at(d, axis)
-        clear(digits, at, 6 * d)
+        set_zero(digits, at, 6 * d)
         for i in range(4):
             if (mask >> i) & 1:
                 add_product(digits, at, delta_at(d, mask, i), n, point_at(d, i, axis), d, 1)
@@ -199,8 +199,8 @@ def within_radius(exact, mask, radius_a, radius_b):
     n = length_of(d, mask)
     total = scratch_at(d, 0)
     square = scratch_at(d, 1)
-    clear(digits, total, n)
-    clear(digits, square, n + 2 * d)
+    set_zero(digits, total, n)
+    set_zero(digits, square, n + 2 * d)
     for i in range(4):
         if (mask >> i) & 1:
             add_number(digits, total, delta_at(d, mask, i), n, 1)
@@ -234,12 +234,12 @@ def _subtract_square_of_radii(exact, square, total, n, radius_a, radius_b):
     """square −= r² · total."""
     digits, d = exact.digits, exact.d
     radius = scratch_at(d, 2)
-    clear(digits, radius, d)
+    set_zero(digits, radius, d)
     add_double(digits, radius, radius_a, exact.grid)
     add_double(digits, radius, radius_b, exact.grid)
     carry(digits, radius, d)
     power = scratch_at(d, 3)
-    clear(digits, power, 2 * d)
+    set_zero(digits, power, 2 * d)
     add_product(digits, power, radius, d, radius, d, 1)
     carry(digits, power, 2 * d)
     add_product(digits, square, power, 2 * d, total, n, -1)

@@ -22,9 +22,9 @@ from collide.numerics.digits import (
     add_number,
     add_product,
     carry,
-    clear,
     grid_of,
     lowest_bit,
+    set_zero,
 )
 from collide.numerics.vec3 import equal_at, max_abs, sub, vec3_at
 
@@ -118,7 +118,7 @@ def sign3(pair, i, j, k, m):
     _difference(digits, n, _U, j, i)
     _difference(digits, n, _V, k, i)
     _difference(digits, n, _W, m, i)
-    clear(digits, _DOT, 3 * n)
+    set_zero(digits, _DOT, 3 * n)
     for axis in range(3):
         _component(digits, n, axis, _CROSS)
         add_product(digits, _DOT, _CROSS, 2 * n, _W + axis * n, n, 1)
@@ -185,7 +185,7 @@ def sign1(pair, axis, i, j):
     _load_points(pair)
     digits = pair.digits
     n = pair.state[_LENGTH]
-    clear(digits, _U, n)
+    set_zero(digits, _U, n)
     add_number(digits, _U, _POINTS + (3 * j + axis) * n, n, 1)
     add_number(digits, _U, _POINTS + (3 * i + axis) * n, n, -1)
     return carry(digits, _U, n)
@@ -203,7 +203,7 @@ def _spread(corners, i, j, k, m):
 @kernel
 def _difference(digits, n, out, j, i):
     """Three coordinates of corner j less corner i."""
-    clear(digits, out, 3 * n)
+    set_zero(digits, out, 3 * n)
     add_number(digits, out, _POINTS + 3 * j * n, 3 * n, 1)
     add_number(digits, out, _POINTS + 3 * i * n, 3 * n, -1)
     for axis in range(3):
@@ -215,7 +215,7 @@ def _component(digits, n, axis, out):
     """Component of U × V along an axis; returns its sign."""
     y = (axis + 1) % 3
     z = (axis + 2) % 3
-    clear(digits, out, 2 * n)
+    set_zero(digits, out, 2 * n)
     add_product(digits, out, _U + y * n, n, _V + z * n, n, 1)
     add_product(digits, out, _U + z * n, n, _V + y * n, n, -1)
     return carry(digits, out, 2 * n)
@@ -317,7 +317,7 @@ def _load_doubles(corners, digits, state):
     grid = _grid_of_coordinates(corners, 0, 18)
     n = grid.length
     state[_LENGTH] = n
-    clear(digits, _POINTS, 18 * n)
+    set_zero(digits, _POINTS, 18 * n)
     for k in range(18):
         add_double(digits, _POINTS + k * n, corners[k], grid.lowest)
 
@@ -337,7 +337,7 @@ def _load_matrix(digits, state, X, at, which):
     for i in range(3):
         for j in range(3):
             place = (at + 3 * i + j) * _ENTRY
-            clear(digits, place, n)
+            set_zero(digits, place, n)
             add_double(digits, place, X[4 * i + j], grid_of(lowest))
             carry(digits, place, n)
 
@@ -359,7 +359,7 @@ def _load_world(pair):
     top = max(top, rotation_b.lowest + rotation_b.length + w.lowest + w.length - 1)
     grid = _Grid(lowest, top - lowest + 1)
     state[_LENGTH] = grid.length
-    clear(pair.digits, _POINTS, 18 * grid.length)
+    set_zero(pair.digits, _POINTS, 18 * grid.length)
     _load_posed(pair.digits, corners, 0, v, pair.XA, 0, rotation_a, 0, grid)
     _load_posed(pair.digits, corners, B_LOCAL_AT, w, pair.XB, 9, rotation_b, 9, grid)
 
@@ -373,7 +373,7 @@ def _load_posed(digits, corners, at, coordinates, X, matrix, rotation, number, g
     offset = rotation.lowest + coordinates.lowest - grid.lowest
     length = coordinates.length
     for k in range(0, 9, 3):
-        clear(digits, _VERTEX, 3 * length)
+        set_zero(digits, _VERTEX, 3 * length)
         for j in range(3):
             add_double(digits, _VERTEX + j * length, corners[at + k + j], coordinates.lowest)
         for i in range(3):

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from collide.lowering.composite_parts import union_of
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
+from collide.narrowphase.composite.composite_parts import union_of
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of

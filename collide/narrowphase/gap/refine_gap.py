@@ -192,8 +192,8 @@ def _set_distance(question, n, feature, direction, answer, proven):
     answer[at.SPREAD] = spread
     answer[at.LENGTH] = length.high
     over = 1.0 / question[at.SCALE]
-    swept = two_sum(question[at.RADIUS_A], question[at.RADIUS_B])
-    gap = dd.sub(dd.scale(over, distance), swept)
+    radii = two_sum(question[at.RADIUS_A], question[at.RADIUS_B])
+    gap = dd.sub(dd.scale(over, distance), radii)
     answer[at.GAP] = gap.high
     answer[at.GAP_LOW] = gap.low
     answer[at.GAP_LOWER], answer[at.GAP_NEAREST], answer[at.GAP_UPPER] = dd.bracket(gap, error * over)

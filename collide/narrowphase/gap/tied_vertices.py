@@ -48,14 +48,14 @@ def is_unique_minimiser(pair, ids, n, direction, slack):
     largest = max(abs(direction[0]), abs(direction[2]), abs(direction[4]))
     d = Vec3(direction[0] / largest, direction[2] / largest, direction[4] / largest)
     slack *= norm1(d)
-    for turn in range(2):
-        body = pair.A if turn == 0 else pair.B
-        g = scale(1.0 if turn == 0 else -1.0, rotate_back(pair.poses, body.pose_at, d))
+    for which in range(2):
+        body = pair.A if which == 0 else pair.B
+        g = scale(1.0 if which == 0 else -1.0, rotate_back(pair.poses, body.pose_at, d))
         least = math.inf
         for k in range(n):
-            least = min(least, dot(column_at(body.coords, body.padded, ids[2 * k + turn]), g))
-        n_distinct = n_of_a if turn == 0 else n_of_b
-        if not no_other_is_tied(vertices_of(body), ids, n, turn, n_distinct, g, least + slack):
+            least = min(least, dot(column_at(body.coords, body.padded, ids[2 * k + which]), g))
+        n_distinct = n_of_a if which == 0 else n_of_b
+        if not no_other_is_tied(vertices_of(body), ids, n, which, n_distinct, g, least + slack):
             return False
     return True
 
@@ -97,9 +97,9 @@ def no_other_is_tied(body, ids, n_pairs, which, n_distinct, g, limit):
         copies = padded - body.n if dot(column_at(coords, padded, 0), g) <= limit else 0
         return count_level(coords, padded, padded, g.x, g.y, g.z, limit) - copies == n_distinct
     starts, ring, corners = rings_of(body.tree)
-    for turn in range(n_distinct):
+    for k_distinct in range(n_distinct):
         # The last is a new one if the one in the middle is not.
-        v = i if turn == 0 else (k if turn == 2 or j == i else j)
+        v = i if k_distinct == 0 else (k if k_distinct == 2 or j == i else j)
         for at in range(starts[v], starts[v + 1]):
             w = ring[at]
             if dot(vec3_at(corners, 3 * w), g) <= limit and w != i and w != j and w != k:

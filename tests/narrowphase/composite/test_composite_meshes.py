@@ -16,8 +16,8 @@ from naive_triangles import as_integers, facet_pairs, surface_distance, winding,
 from surfaces import joined
 
 import collide
-from collide.lowering.composite_parts import union_of
 from collide.lowering.shape_table import moved_pose
+from collide.narrowphase.composite.composite_parts import union_of
 
 EYE = np.eye(4)
 TETRAHEDRON = (

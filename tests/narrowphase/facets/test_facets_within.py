@@ -104,7 +104,7 @@ def test_plain_python_says_the_same():
     cases = []
     for k, family in enumerate(FAMILIES):
         a, b, X_WA, X_WB = family(np.random.default_rng(k))
-        cases.append(((a[0], a[1][:5]), (b[0], b[1][:5]), X_WA, X_WB, 0.2))
+        cases.append(((a[0], a[1][:3]), (b[0], b[1][:3]), X_WA, X_WB, 0.3))
     answers = []
     for flag in ("0", "1"):
         done = subprocess.run(
@@ -112,4 +112,4 @@ def test_plain_python_says_the_same():
             capture_output=True, check=True, timeout=300,
         )  # fmt: skip
         answers.append(pickle.loads(done.stdout))
-    assert answers[0] == answers[1] and sum(len(found[1]) for found in answers[0]) > 20
+    assert answers[0] == answers[1] and sum(len(found[1]) for found in answers[0]) > 10
