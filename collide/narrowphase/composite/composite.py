@@ -74,8 +74,8 @@ class _OfThread(local):
     asked = 0
 
     def space_for(self, table: UnionTable) -> _Workspace:
-        if self.space is None or self.space.capacity < table.most:
-            self.space = _Workspace(max(table.most, _CAPACITY))
+        if self.space is None or self.space.capacity < table.max_parts:
+            self.space = _Workspace(max(table.max_parts, _CAPACITY))
         return self.space
 
 
@@ -136,8 +136,8 @@ class UnionPair:
         if self.unions.counts.prod() > _MAX_AT_ONCE:
             return
         space = UnionPair._space  # read once: another thread may put a smaller one there
-        if space is None or space.capacity < self.unions.most:
-            space = UnionPair._space = _SingleSpace(self.unions.most)
+        if space is None or space.capacity < self.unions.max_parts:
+            space = UnionPair._space = _SingleSpace(self.unions.max_parts)
         self._held = space  # pairs made before have a smaller one
         header = space.header_of(self.unions, space.scratch)
         words = np.array([code_of(answer_unions), address_of(space.byte), *header.tolist()])
