@@ -86,6 +86,15 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     return size, shapes + poses[p + POSE_SLOP] + poses[q + POSE_SLOP], known and shapes == 0.0
 
 
+class Tables(NamedTuple):
+    """Addresses of a `ShapeTable`'s integers and numbers, of the rows of a `PoseTable`, and of the shape row of each part."""
+
+    ints_at: int
+    numbers_at: int
+    poses_at: int
+    shape_of_at: int
+
+
 class PosedBody(NamedTuple):
     """One body of a pair.
 

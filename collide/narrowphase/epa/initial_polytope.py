@@ -47,8 +47,8 @@ def extremal_tetrahedron(pair, points, ids, error, start):
     e = divide(e, norm(e))
     farthest = -1.0
     n = u
-    for turn in range(4):
-        if turn > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
+    for step in range(4):
+        if step > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
             u = cross(e, u)
         difference_point(pair, points, ids, spare, u)
         across = cross(e, sub(point_at(points, spare), point_at(points, 0)))
@@ -109,7 +109,7 @@ def capped_tetrahedron(pair, points, ids, size):
     u = divide(pair.t, length)
     depth = 0.0
     width = 0.0
-    for turn in range(2):
+    for step in range(2):
         difference_point(pair, points, ids, spare, neg(u))
         difference_point(pair, points, ids, spare + 1, u)
         near, far = point_at(points, spare), point_at(points, spare + 1)
@@ -117,7 +117,7 @@ def capped_tetrahedron(pair, points, ids, size):
         width = depth - dot(near, u)
         middle = add(near, far)
         length = norm(middle)
-        if turn == 1 or not -dot(middle, u) < _SAME_DIRECTION * length:
+        if step == 1 or not -dot(middle, u) < _SAME_DIRECTION * length:
             break
         u = divide(neg(middle), length)
     if not width > 0.0:

@@ -131,12 +131,12 @@ def weigh_nearest(surface, n_facets, facet, points, ids, weights, with_ids, p, t
     ``facet`` is tried first, and is good if it comes within the tolerance; else the first that does, or the best.
     """
     best = math.inf
-    for turn in range(n_facets + 1):
-        f = facet if turn == 0 else turn - 1
+    for step in range(n_facets + 1):
+        f = facet if step == 0 else step - 1
         a = vec3_at(surface.points, POINT * corner(surface, f, 0))
         b = vec3_at(surface.points, POINT * corner(surface, f, 1))
         c = vec3_at(surface.points, POINT * corner(surface, f, 2))
-        if turn > 0 and _is_outside_box(a, b, c, p, min(best, _FAR_FROM_BOX * tolerance)):
+        if step > 0 and _is_outside_box(a, b, c, p, min(best, _FAR_FROM_BOX * tolerance)):
             continue
         nearest = nearest_of_triangle(a, b, c, p)
         if nearest.distance < best:
@@ -155,8 +155,8 @@ def weigh_origin(surface, n_facets, points, ids, weights):
     """A vertex and the facet across the origin from it become points 0 … 3, weighted for the origin among them."""
     smallest_miss = math.inf
     nearest = -1
-    for turn in range(n_facets + 1):
-        f = turn if turn < n_facets else nearest
+    for step in range(n_facets + 1):
+        f = step if step < n_facets else nearest
         if f < 0:
             break
         copy_coordinates(surface.points, 0, points, 0)

@@ -15,8 +15,8 @@ from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.epa.polytope_surface import (
     FACET,
     MARKS,
+    PROVEN,
     SEEN,
-    SURE,
     TWIN,
     WIDEST_BORDER,
     Patch,
@@ -226,8 +226,8 @@ def _invalidate(fine, f, error):
     clearances = fine.surface.clearances
     fine.distances[2 * f] = -math.inf
     if clearances[f] < math.inf:
-        sure = fine.surface.facets[FACET * f + MARKS] & SURE
-        clearances[f] = (clearances[f] - error) * fine.scale if sure else -math.inf
+        proven = fine.surface.facets[FACET * f + MARKS] & PROVEN
+        clearances[f] = (clearances[f] - error) * fine.scale if proven else -math.inf
 
 
 @kernel
@@ -235,9 +235,9 @@ def _request_nearest(surface, distance, f, n_facets, request):
     """Enter the corners of facet f and of all others that may be as near the origin, for the exact stage."""
     request[0] = 1
     request[1] = 0
-    for turn in range(n_facets + 1):
-        g = f if turn == 0 else turn - 1
-        if surface.clearances[g] > distance or (turn > 0 and g == f):
+    for step in range(n_facets + 1):
+        g = f if step == 0 else step - 1
+        if surface.clearances[g] > distance or (step > 0 and g == f):
             continue
         if request[1] == MAX_TIED_FACETS:
             request[0] = 0
