@@ -15,8 +15,9 @@ from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
 from collide.lowering.shape_table import ShapeTable
 
-# Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest its
-# core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept over it.
+# Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest
+# its core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept
+# over it.
 TURNED, MEASURE, CENTRE, BALL, SWEPT_RADIUS = 12, 13, 14, 17, 18
 PART = 19
 # Doubles of a body: such a ball for all of it, the largest radius swept, and how far its bounded parts reach.

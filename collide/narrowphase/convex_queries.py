@@ -136,15 +136,15 @@ def run_poses(
     header = space.header_of(table)
     done = 0
     while done < n:
-        said = answer_poses(
+        status = answer_poses(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
             0 if axes is None else address_of(axes), address_of(out),
         )  # fmt: skip
-        if said == BAD_POSE:
+        if status == BAD_POSE:
             return False
         done = int(header[ANSWERED])
-        if said:
+        if status:
             start = done - 1 - (done - 1) % BLOCK
             rows = space.rows[: done - start] if boolean else out[start:done]
             _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)

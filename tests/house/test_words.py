@@ -90,7 +90,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
 }
 #: Rooms that are being rebuilt, and how many names each may still have. Numbers only go down.
 ALLOWED_FOR_NOW: dict[str, int] = {
-    "collide/narrowphase": 1,
     "collide/support": 16,
 }
 
