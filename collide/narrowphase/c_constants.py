@@ -30,10 +30,11 @@ from collide.support.coarse_points import COARSE
 #: Doubles of a walk along meshes: of whichever takes most.
 _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside))
 
-#: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of box-trees, what is
-#: found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
+#: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
+#: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
 _CONSTANTS = (
-    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS, WORK,
+    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS,
+    WORK,
     FACET, PLANE, STATE, STACK,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,

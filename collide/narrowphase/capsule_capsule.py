@@ -48,7 +48,8 @@ def segment_cores(pair, work, error):
 
 @kernel
 def _keep_nearer(points, s, t, weights, best):
-    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best square so far, which is returned."""
+    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best square so far, which is
+    returned."""
     w00 = (1.0 - s) * (1.0 - t)
     w10 = s * (1.0 - t)
     w01 = (1.0 - s) * t

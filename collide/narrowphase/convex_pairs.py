@@ -34,12 +34,14 @@ SIGNATURE = (
 
 @entry(SIGNATURE)
 def answer_pairs(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit, rows_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit,
+    rows_at,
     doubles_at, integers_at,
 ):  # fmt: skip
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
-    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.   shape_of : a shape row a part.
+    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.
+    shape_of : a shape row a part.
     pairs : two part numbers a pair.
     boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
         normal that is there is the axis to try first.
@@ -71,7 +73,9 @@ def answer_pairs(
             ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * step], pairs[2 * step + 1])
             kind = _answer(ordered, query, view_row(rows_at + ROW * step), step, has_portals, work)
         if kind >= 0 and n_queued[kind] >= (n_together if step < n_pairs else 1):
-            refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, work.queue_at, work.queue_integers_at)
+            refine_queued(
+                ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, work.queue_at, work.queue_integers_at
+            )
         if stop_at_hit and step < n_pairs and view_u8(rows_at + ROW * step, ROW)[HIT] == 1:
             return step + 1
     return n_pairs

@@ -111,12 +111,15 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         lower = -result.depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
         if not exact_numbers or not query.depths or _is_final(result, size, error, radius):
             break
-        refined = refine(pair, query.terms_at, work, polytope, result.n_facets, result.n_vertices, size, ordered.slop, error)
+        refined = refine(
+            pair, query.terms_at, work, polytope, result.n_facets, result.n_vertices, size, ordered.slop, error
+        )
         if refined.sound:
             shallowest, deepest = refined.lower, refined.upper
         result = _refined_result(result, refined, error)
         start += 1
-        if refined.sound or not wants_cap or start == _MAX_STARTS:  # few vertices: `exact_depth.py` tries all planes instead
+        # few vertices: `exact_depth.py` tries all planes instead
+        if refined.sound or not wants_cap or start == _MAX_STARTS:
             break
     _weigh_foot(work, polytope, result, query.depths, not enclosed, curved, tolerance, size, error)
     if result.clearance > error:
@@ -149,7 +152,8 @@ def _refined_result(result, refined, error):
     """
     if refined.sound and refined.upper <= result.depth + 2.0 * error:
         return EpaResult(
-            result.status, refined.depth, result.clearance, refined.nhat, refined.facet, result.n_vertices, refined.n_facets
+            result.status, refined.depth, result.clearance, refined.nhat, refined.facet, result.n_vertices,
+            refined.n_facets
         )
     return EpaResult(
         result.status, result.depth, result.clearance, result.nhat, result.facet, result.n_vertices, refined.n_facets
@@ -170,8 +174,8 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, foot)) <= slack):
         facet = facet_of(polytope, result.n_facets, facet, foot, slack)
         load_facet(polytope, facet, work.points, work.ids, work.weights, with_ids, foot)
-    # The surface of curved cores keeps a width. Where wants_cap facets are as near, slivers mostly, none need hold the foot.
-    # Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
+    # The surface of curved cores keeps a width. Where wants_cap facets are as near, slivers mostly, none need hold the
+    # foot. Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
     tolerated = _NEAR_MISS * size
     if curved:
         width = result.depth - result.clearance

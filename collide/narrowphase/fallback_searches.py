@@ -1,8 +1,9 @@
 """Rows that one search of the narrowphase leaves open, and another one may settle.
 
-A boolean, a gap and a depth are searched for differently, and where curved shapes or rounded corners are within rounding of
-touching, each proves some signs that the others do not (integers settle those of polytopes). What is proven is proven: an
-open row asks the other two searches, so that `collide` and `distance`, signed or not, never contradict each other.
+A boolean, a gap and a depth are searched for differently, and where curved shapes or rounded corners are within
+rounding of touching, each proves some signs that the others do not (integers settle those of polytopes). What is proven
+is proven: an open row asks the other two searches, so that `collide` and `distance`, signed or not, never contradict
+each other.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ _SIGN, _DEPTH, _GAP = (True, False), (False, True), (False, False)
 
 
 def settle_by_other_searches(
-    rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *, boolean: bool,
+    rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *,
+    boolean: bool,
     depths: bool, limit: float,
 ) -> None:  # fmt: skip
     """Settle in place what is still open; arguments as of `run_pairs`.
@@ -59,7 +61,8 @@ def settle_by_other_searches(
 def take_proven(rows_at, open_at, results_at, n, sign, limit):
     """Take over what another search has proven of n open rows; returns how many it has.
 
-    open : int64, the numbers of the open rows.   results : rows of `answer_pairs`.   sign : the search was for the sign alone.
+    open : int64, the numbers of the open rows.   results : rows of `answer_pairs`.
+    sign : the search was for the sign alone.
     """
     open_rows = view_i64(open_at, n)
     n_proven = 0

@@ -37,7 +37,8 @@ HEADER = 10
 class PoseBlock(NamedTuple):
     """Views of what one call of the narrowphase reads: BLOCK poses of A, then as many of B.
 
-    header : of HEADER integers.   poses : POSE doubles each.   shape_of : their shape rows.   pairs : two numbers of poses a pair.
+    header : of HEADER integers.   poses : POSE doubles each.   shape_of : their shape rows.
+    pairs : two numbers of poses a pair.
     """
 
     header: Any
@@ -113,7 +114,8 @@ def is_pose(X, check):
     return _determinant(X) > 0.0
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, int64, "
+"int64)")
 def answer_poses(
     header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, depths, limit, check, axes_at, out_at
 ):
@@ -141,7 +143,9 @@ def answer_poses(
         if boolean:
             _clear_rows(rows_at, count)
             for k in range(count if axes_at != 0 else 0):
-                put_vec3(view_row(rows_at + ROW * k).doubles, NORMAL, vec3_at(view_f64(axes_at + 24 * (done + k), 3), 0))
+                put_vec3(
+                    view_row(rows_at + ROW * k).doubles, NORMAL, vec3_at(view_f64(axes_at + 24 * (done + k), 3), 0)
+                )
         else:
             rows_at = out_at + ROW * done
         answer_block(header, count, boolean, depths, limit, rows_at)
@@ -172,7 +176,8 @@ def _begin_block(block, is_batch_a, is_batch_b):
 
 @kernel(inline=True)
 def _put_poses(block, which_at, XA_at, step_a, XB_at, step_b, first, count, check):
-    """Matrices from ``first`` on become the block's poses; whether all of them are poses. Arguments as in `answer_poses`."""
+    """Matrices from ``first`` on become the block's poses; whether all of them are poses. Arguments as in
+    `answer_poses`."""
     good = True
     for k in range(count):
         if which_at != 0:
@@ -197,7 +202,8 @@ def _clear_rows(rows_at, n):
 
 @entry("int64(int64, int64, int64, int64, boolean, int64)")
 def first_bad_pose(X_at, step, first, n, check, pose_at):
-    """The number of the first matrix from ``first`` on, of n, that is no pose as `answer_poses` judges; n where all are.
+    """The number of the first matrix from ``first`` on, of n, that is no pose as `answer_poses` judges; n where all
+    are.
 
     step : 16, or 0.   pose : workspace of POSE doubles.
     """

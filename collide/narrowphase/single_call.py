@@ -44,8 +44,8 @@ def collide_single(header_at, XA_at, XB_at):
 
 @entry(prepared.ROW, nogil=False)
 def distance_single(header_at, XA_at, XB_at, row_at, depths):
-    """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1, too,
-    where the depth is infinite."""
+    """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1,
+    too, where the depth is infinite."""
     hit = _answer(header_at, XA_at, XB_at, False, depths, row_at)
     row = view_row(row_at)
     row.words[BODY_B] = 1

@@ -68,7 +68,8 @@ class Seed(NamedTuple):
     """Four points of A ⊖ B to begin with, of GJK.
 
     points, ids : POINT doubles and two vertices a point.   enclosed : the origin is proven to lie among them.
-    well_conditioned : it does so clear of rounding by far.   wants_cap : there are so many vertices that iterations cost
+    well_conditioned : it does so clear of rounding by far.
+    wants_cap : there are so many vertices that iterations cost
     more than the supports of a better seed.   start : how often EPA has begun elsewhere.
     """
 
@@ -83,7 +84,8 @@ class Seed(NamedTuple):
 class Goal(NamedTuple):
     """When EPA stops.
 
-    overlap_suffices : once the origin is proven inside (a boolean is asked).   size, error : of the pair, as in `bounds.py`.
+    overlap_suffices : once the origin is proven inside (a boolean is asked).
+    size, error : of the pair, as in `bounds.py`.
     tolerance : once the bracket is this narrow.
     """
 
@@ -132,7 +134,9 @@ def _put_seed(pair, points, ids, seed, goal):
         ids[2 * k] = seed.ids[2 * k]
         ids[2 * k + 1] = seed.ids[2 * k + 1]
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
-    if seed.enclosed and ((seed.wants_cap and capped_tetrahedron(pair, points, ids, goal.size)) or seed.well_conditioned):
+    if seed.enclosed and (
+        (seed.wants_cap and capped_tetrahedron(pair, points, ids, goal.size)) or seed.well_conditioned
+    ):
         return Extremes(3, Vec3(0.0, 0.0, 0.0))
     return extremal_tetrahedron(pair, points, ids, goal.error, seed.start)
 

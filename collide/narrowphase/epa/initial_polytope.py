@@ -27,7 +27,8 @@ _LEAST_VOLUME = 2.0**-16
 
 
 class Extremes(NamedTuple):
-    """rank : dimension of what points 0 … 3 span, as far as rounding can tell.   nhat : where less than 3, across it."""
+    """rank : dimension of what points 0 … 3 span, as far as rounding can tell.   nhat : where less than 3, across
+    it."""
 
     rank: int
     nhat: Vec3
@@ -93,14 +94,15 @@ def _farthest_pair(pair, points, ids, askew):
 
 @kernel
 def capped_tetrahedron(pair, points, ids, size):
-    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span enough.
+    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span
+    enough.
 
     The likely direction leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
     are the bodies' centres. The three lie far enough around it for the other sides to be farther off than that.
 
-    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on a
-    sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a corner on
-    that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
+    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on
+    a sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a
+    corner on that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
     """
     spare = EPA_VERTICES
     length = norm(pair.t)

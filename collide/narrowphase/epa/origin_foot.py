@@ -5,8 +5,8 @@ is as level, and the area of a needle says nothing about where in it a point lie
 lies within the surface and touches the plane in the foot, so some facet of a closed surface passes it to within the
 width of the bracket, and the nearest point of all of them is no farther.
 
-Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may be
-far off where a triangle is thin, their point is not (Björck 1967).
+Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may
+be far off where a triangle is thin, their point is not (Björck 1967).
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ def weigh_corners(points, stride, n, weights, p):
 
 @kernel(inline=True)
 def _copy_corners(surface, f, points, ids, first, with_ids):
-    """The corners of a facet become points ``first`` … first + 2, with the vertices they are made of if ``with_ids``."""
+    """The corners of a facet become points ``first`` … first + 2, with the vertices they are made of if
+    ``with_ids``."""
     for k in range(3):
         v = corner(surface, f, k)
         copy_coordinates(surface.points, v, points, first + k)
@@ -176,7 +177,9 @@ def weigh_origin(surface, n_facets, points, ids, weights):
 def _is_outside_box(a, b, c, p, slack):
     """Whether p lies outside the box of a triangle by more than the slack."""
     return (
-        _is_outside(a.x, b.x, c.x, p.x, slack) or _is_outside(a.y, b.y, c.y, p.y, slack) or _is_outside(a.z, b.z, c.z, p.z, slack)
+        _is_outside(a.x, b.x, c.x, p.x, slack)
+        or _is_outside(a.y, b.y, c.y, p.y, slack)
+        or _is_outside(a.z, b.z, c.z, p.z, slack)
     )
 
 

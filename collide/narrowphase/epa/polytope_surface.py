@@ -71,7 +71,8 @@ class Surface(NamedTuple):
 class FineSurface(NamedTuple):
     """Further views for `refine_depth.py`.
 
-    points : FINE doubles a vertex.   distances : a double-double a facet.   known : whether a vertex's fine point is there.
+    points : FINE doubles a vertex.   distances : a double-double a facet.
+    known : whether a vertex's fine point is there.
     """
 
     points: Any
@@ -119,7 +120,8 @@ def normal_of(surface, f):
 
 @kernel(inline=True)
 def ample(size, error):
-    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their triangle.
+    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their
+    triangle.
 
     Coordinates of a point add up to √3·size at most, those of an edge to twice that: the bounds of `_sides` for such.
     """
@@ -176,7 +178,9 @@ def set_facet(surface, f, i, j, k, error, enough, depth):
     """
     points, facets = surface.points, surface.facets
     f = number(f)
-    plane = plane_of(point_at(points, number(i)), point_at(points, number(j)), point_at(points, number(k)), error, enough)
+    plane = plane_of(
+        point_at(points, number(i)), point_at(points, number(j)), point_at(points, number(k)), error, enough
+    )
     at = FACET * f
     facets[at] = i
     facets[at + 1] = j
@@ -231,7 +235,8 @@ def following(t):
 
 
 class Patch(NamedTuple):
-    """What an apex sees of a surface: numbers of its facets, in ``patch``, and of the half-edges around them, in ``border``."""
+    """What an apex sees of a surface: numbers of its facets, in ``patch``, and of the half-edges around them, in
+    ``border``."""
 
     n_facets: int
     n_edges: int

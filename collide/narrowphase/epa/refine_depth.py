@@ -133,8 +133,8 @@ def _set_distance(fine, f):
     height = fine_height(fine.points, a, fine.direction)
     distance = dd.div(height, length)
     _put_distance(fine, f, distance)
-    # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle lies
-    # nearer than the nearest corner.
+    # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle
+    # lies nearer than the nearest corner.
     above_b = dd.sub(fine_height(fine.points, b, fine.direction), height).high
     above_c = dd.sub(fine_height(fine.points, c, fine.direction), height).high
     highest = max(max(0.0, above_b), above_c)
@@ -265,7 +265,8 @@ def _fine(pair, terms_at, work, surface, size, slop):
 
 @kernel
 def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, error):
-    """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a `RefinedDepth`.
+    """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a
+    `RefinedDepth`.
 
     work : the `Workspace`, whose ``request`` becomes an entry of `depth_requests.py` where the depth is near rounding.
     size, slop, error : of the pair.
@@ -326,7 +327,8 @@ def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, erro
 
 @kernel(inline=True)
 def _add_vertex(fine, f, apex, n_facets, i, j, error):
-    """Expand the surface by the difference of vertices i of A and j of B, seen from facet f; returns how many facets it has."""
+    """Expand the surface by the difference of vertices i of A and j of B, seen from facet f; returns how many facets it
+    has."""
     surface = fine.surface
     place_vertices(fine.pair, surface.points, surface.ids, apex, i, j)
     fine.known[apex] = 0

@@ -38,7 +38,8 @@ _SAME_LISTS = 64.0
 class GjkResult(NamedTuple):
     """status : NEAREST, MEETING, ENCLOSED or APART.   n_points : of the simplex, which stands first.
 
-    lower : best lower bound of the cores' distance, before ``error``.   clearance : of the origin in the tetrahedron, where
+    lower : best lower bound of the cores' distance, before ``error``.
+    clearance : of the origin in the tetrahedron, where
     ENCLOSED.   iterations : support points asked for.
     """
 
@@ -56,7 +57,8 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
     points, ids : workspace for five difference points; the simplex found stands first.
     n_start : 3 if the last three ids name vertices to begin with, else 0.
     weights : 10 doubles. In, at AXIS: a direction from A to B to begin with, or zeros. Out: weights of the simplex, its
-        nearest point v, and the unit axis (along v, from the simplex's own edges where v is too short to have a direction).
+        nearest point v, and the unit axis (along v, from the simplex's own edges where v is too short to have a
+        direction).
     boolean : stop as soon as an overlap is proven.
     radius : sum of the swept radii.   limit : stop once proven farther apart than this.
     error : absolute error of a bound, from `bounds.py`.
@@ -238,7 +240,8 @@ def _next_point(pair, points, ids, places, v, square, asked, limits, is_last):
 
 @kernel(inline=True)
 def _same_lists_cosine(pair):
-    """The squared cosine of the angle within which lists are asked again; 2, so that there is none, beside a curved core.
+    """The squared cosine of the angle within which lists are asked again; 2, so that there is none, beside a curved
+    core.
 
     A curved core never repeats a point. Runs would converge towards what lies in one list, and again in the next: some
     came to the last iteration.

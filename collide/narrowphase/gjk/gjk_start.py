@@ -35,8 +35,8 @@ NEAREST, MEETING, ENCLOSED, APART = range(4)
 _OVERLAP_RATIO = 0.9
 #: Of bodies with more than `_MIN_VERTICES_TO_SURROUND`, n of them, the vertex found first is surrounded by others in
 #: directions `_SURROUND_TANGENT` / √n from it: far enough on a ball to meet its neighbours. It pays where the first
-#: direction is a good one: its plane nearly separates the bodies (`_MAX_PLANE_RATIO`), the point is not much farther off than
-#: the plane (`_MAX_HEIGHT_RATIO`), and those directions reach as far aside as the origin lies.
+#: direction is a good one: its plane nearly separates the bodies (`_MAX_PLANE_RATIO`), the point is not much farther
+#: off than the plane (`_MAX_HEIGHT_RATIO`), and those directions reach as far aside as the origin lies.
 _MIN_VERTICES_TO_SURROUND = 32
 _SURROUND_TANGENT = 3.0
 _MAX_PLANE_RATIO = 0.5
@@ -54,7 +54,8 @@ class Limits(NamedTuple):
 
 
 class _FirstDirection(NamedTuple):
-    """d : where to look first.   factor : times d is the direction as it came.   between_origins : it is p_WB − p_WA."""
+    """d : where to look first.   factor : times d is the direction as it came.   between_origins : it is p_WB −
+    p_WA."""
 
     d: Vec3
     factor: float
@@ -145,7 +146,8 @@ def begin(pair, points, ids, weights, limits):
 
 @kernel(inline=True)
 def first_simplex(pair, points, ids, weights, n_start, start):
-    """(number of points, whether to go on with coarse points): point 0, the vertices to begin with, or those around point 0."""
+    """(number of points, whether to go on with coarse points): point 0, the vertices to begin with, or those around
+    point 0."""
     n = 1
     put_vec3(weights, NEAREST_POINT, point_at(points, 0))
     if n_start > 0:
@@ -181,7 +183,8 @@ def _start_from_vertices(pair, points, ids, weights):
 
 @kernel(inline=True)
 def _surround_tangent(pair):
-    """How far to tilt a direction so that vertices around the one found are met; 0 for curved cores and few vertices."""
+    """How far to tilt a direction so that vertices around the one found are met; 0 for curved cores and few
+    vertices."""
     n = min(pair.A.n, pair.B.n)
     polytopes = pair.A.kind == POINTS and pair.B.kind == POINTS
     return _SURROUND_TANGENT / math.sqrt(n) if n > _MIN_VERTICES_TO_SURROUND and polytopes else 0.0
@@ -192,8 +195,8 @@ def _surround(pair, points, ids, weights, d, plane, tangent, list_a, list_b):
     """Add two points on either side of where the origin lies beside point 0; returns how many are kept.
 
     Between bodies that nearly touch, the direction from a vertex of one to a vertex of the other is hardly more than
-    chance, and the next vertices found lie far off; half of all iterations went into coming back. A triangle of vertices
-    around the origin's foot has the right direction at once: on balls 5 iterations remain of 11 at n = 512.
+    chance, and the next vertices found lie far off; half of all iterations went into coming back. A triangle of
+    vertices around the origin's foot has the right direction at once: on balls 5 iterations remain of 11 at n = 512.
 
     d : the unit direction point 0 was found in.   plane : height of the plane across it.   list_a, list_b : the lists
         of support trees to look in.   weights : the simplex that is kept, and its point nearest the origin.

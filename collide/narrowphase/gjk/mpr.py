@@ -1,15 +1,15 @@
 """Minkowski portal refinement of eight pairs of small hulls, side by side.
 
-After Snethen 2008, "XenoCollide". A ray from a point o deep in A ⊖ B to the origin leaves A ⊖ B somewhere; a portal is a
-triangle of vertices that it passes through. The vertex farthest across the portal either shows a plane that separates the
-bodies, or makes a portal farther out; once the origin lies on this side of one, it lies in A ⊖ B. An iteration is a
+After Snethen 2008, "XenoCollide". A ray from a point o deep in A ⊖ B to the origin leaves A ⊖ B somewhere; a portal is
+a triangle of vertices that it passes through. The vertex farthest across the portal either shows a plane that separates
+the bodies, or makes a portal farther out; once the origin lies on this side of one, it lies in A ⊖ B. An iteration is a
 support point and two cross products whatever has been found before, so that eight pairs go through it side by side
 (`kernels/lanes.py`), where the ways of GJK part and nobody foresees its branches.
 
-An iteration concludes nothing. In the end a plane must separate the bodies, or a tetrahedron hold the origin, by more than
-`bounds.py` allows for rounding. Points are brought into the world once, which takes one rounding more a coordinate than
-item 1 there: 11u·S; o, a mean, is good to 14u·ρ beyond that; choosing vertices by their products in the world is off by
-less than item 2 has. All within ERROR. No lane sees another.
+An iteration concludes nothing. In the end a plane must separate the bodies, or a tetrahedron hold the origin, by more
+than `bounds.py` allows for rounding. Points are brought into the world once, which takes one rounding more a coordinate
+than item 1 there: 11u·S; o, a mean, is good to 14u·ρ beyond that; choosing vertices by their products in the world is
+off by less than item 2 has. All within ERROR. No lane sees another.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ MAX_ITERATIONS = 12
 #: Least square of a direction.
 _SHORTEST = 1e-200
 
-# A block, eight numbers each: poses, entries 0 to 7 and 4 to 11; how many vertices the bodies have, with padding; the error
-# of the pair; corners: o, and the three of the portal, with the name of their vertices, i + MAX_VERTICES·j, and with their
-# weights at the origin where it lies among them; the direction asked next or last, how far its vertex lies along it,
-# iterations; the clearance found; the mean of A's vertices; vertices of A, of B, then in the world about A's origin: all x,
-# all y, all z.
+# A block, eight numbers each: poses, entries 0 to 7 and 4 to 11; how many vertices the bodies have, with padding; the
+# error of the pair; corners: o, and the three of the portal, with the name of their vertices, i + MAX_VERTICES·j, and
+# with their weights at the origin where it lies among them; the direction asked next or last, how far its vertex lies
+# along it, iterations; the clearance found; the mean of A's vertices; vertices of A, of B, then in the world about A's
+# origin: all x, all y, all z.
 POSE_A, POSE_B, COUNT_A, COUNT_B, ERROR_OF = 0, 16, 32, 33, 34
 NAME, WEIGHT, CORNER = 3, 4, 5
 DEEP, PORTAL = 35, 35 + CORNER
@@ -51,7 +51,8 @@ class _Support(NamedTuple):
 
 
 class _Status(NamedTuple):
-    """By lane.   is_open : nothing is known yet.   apart : a plane separates the bodies.   hit : the origin lies before the
+    """By lane.   is_open : nothing is known yet.   apart : a plane separates the bodies.   hit : the origin lies before
+    the
     portal.   has_portal : the third corner is a vertex of one."""
 
     is_open: Any
@@ -87,7 +88,8 @@ def refine(block, n_padded, limit):
 
 @kernel(inline=True)
 def _begin(block, n_padded, margin):
-    """The first two vertices: against the way from the origin to o, and across the plane of that way and the first one."""
+    """The first two vertices: against the way from the origin to o, and across the plane of that way and the first
+    one."""
     zero = 0.0 * block[ERROR_OF]
     t = sub(vec3_at(block, POSE_B + 13), vec3_at(block, POSE_A + 13))
     a = _place(block, VERTICES, n_padded, COUNT_A, POSE_A, Vec3(zero, zero, zero))
@@ -122,7 +124,8 @@ def _begin(block, n_padded, margin):
 
 @kernel(inline=True)
 def _advance(block, n_padded, margin, status):
-    """One more vertex: of a portal, once the ray passes between the planes through o, p, r and o, q, r; then across it."""
+    """One more vertex: of a portal, once the ray passes between the planes through o, p, r and o, q, r; then across
+    it."""
     is_open, apart, has_portal = status.is_open, status.apart, status.has_portal
     o, d = vec3_at(block, DEEP), vec3_at(block, ACROSS)
     p, q, r = vec3_at(block, _CORNER_P), vec3_at(block, _CORNER_Q), vec3_at(block, _CORNER_R)
@@ -265,8 +268,8 @@ def _clearance(block):
 
 @kernel
 def _behind(error, outwards, p, e, f):
-    """The square of how far the origin lies behind the triangle p, p + e, p + f, −1 unless it provably does; and six times
-    the volume between them.
+    """The square of how far the origin lies behind the triangle p, p + e, p + f, −1 unless it provably does; and six
+    times the volume between them.
 
     `simplex.height_behind` has the proof.
     """

@@ -1,9 +1,9 @@
 """Pairs of small hulls by portals, eight at a time, before GJK: booleans, and gaps where no depths are wanted.
 
 Booleans are decided wherever a plane or a tetrahedron is clear of rounding: pairs of 8 vertices take less than half the
-time GJK takes. Of gaps (`distance` with signed=False) overlaps are decided, with a common point; of bodies apart GJK gets the
-portal to begin with, which is mostly the nearest face already: near touching one round is left of five. What is
-open goes to GJK as if nothing had been tried.
+time GJK takes. Of gaps (`distance` with signed=False) overlaps are decided, with a common point; of bodies apart GJK
+gets the portal to begin with, which is mostly the nearest face already: near touching one round is left of five. What
+is open goes to GJK as if nothing had been tried.
 
 No row depends on others; only whether the last one or two booleans of a list come here at all does. Hits are the
 same either way.
@@ -54,7 +54,8 @@ TICKETS = 6 * LANES
 
 
 class _Lanes(NamedTuple):
-    """Eight pairs.   values : their block, as doubles; number k of lane j stands at LANES·k + j.   tickets : TICKETS integers.
+    """Eight pairs.   values : their block, as doubles; number k of lane j stands at LANES·k + j.   tickets : TICKETS
+    integers.
 
     block_at, tickets_at : addresses of both.
     """
@@ -242,7 +243,8 @@ def _write_portal(lanes, lane, n_padded, clearance, row_at, limit):
         vertex_b = _vec3(lanes, mpr.VERTICES + 3 * n_padded + words[VERTICES_B + n], lane, n_padded)
         a = add(a, scale(weight, vertex_a))
         b = add(b, scale(weight, vertex_b))
-    pose = view_f64(lanes.tickets[_AT_POSE_A + lane] - 64, POSE)  # both halves have been taken, and the address moved on
+    # both halves have been taken, and the address moved on
+    pose = view_f64(lanes.tickets[_AT_POSE_A + lane] - 64, POSE)
     p_WA = vec3_at(pose, 9)
     put_vec3(row.doubles, POINT_B if flip else POINT_A, add(a, p_WA))
     put_vec3(row.doubles, POINT_A if flip else POINT_B, add(b, p_WA))
@@ -261,7 +263,9 @@ def _gather(lanes, vertices, count, target, n_padded):
     """Have the vertices of eight bodies side by side; of those that have fewer, their last ones again."""
     for axis in range(3):
         for first in range(0, n_padded, RUN):
-            transpose_eight(lanes.tickets_at + 8 * vertices, lanes.block_at + 8 * LANES * (target + n_padded * axis + first))
+            transpose_eight(
+                lanes.tickets_at + 8 * vertices, lanes.block_at + 8 * LANES * (target + n_padded * axis + first)
+            )
             last = first + RUN == n_padded
             for k in range(LANES):
                 has_more = first + RUN < lanes.values[LANES * count + k]
