@@ -152,7 +152,9 @@ def _adjacent(common: int, every: list[int]) -> bool:
 
 def _rounded(rays: list[Row]) -> tuple[np.ndarray, float]:
     vertices = np.array([[float(Fraction(c, w)) for c in (x, y, z)] for x, y, z, w in rays])
-    exact = all(Fraction(v) * w == c for row, ray in zip(vertices.tolist(), rays) for v, c, w in zip(row, ray, ray[3:] * 3))
+    exact = all(
+        Fraction(v) * w == c for row, ray in zip(vertices.tolist(), rays) for v, c, w in zip(row, ray, ray[3:] * 3)
+    )
     if exact:
         return vertices, 0.0
     # Each coordinate is rounded to nearest: half an ulp, plus the smallest number there is.

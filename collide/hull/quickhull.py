@@ -418,7 +418,9 @@ def quickhull(
     first_facets(points, facets, planes, state, corners, fan)
     edges = 4
     while True:
-        distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, n_orphans, fan, edges)
+        distribute(
+            points, originals, work, digits, facets, planes, following, owner, state, orphans, n_orphans, fan, edges
+        )
         f, i = next_corner(facets, order, owner, state, count)
         if f < 0:
             break

@@ -30,8 +30,8 @@ def validate_hull(points: np.ndarray, hull: Hull) -> None:
     """
     cloud = _Cloud(np.asarray(points, dtype=np.float64))
     vertices, facets = np.asarray(hull.vertices), np.asarray(hull.facets)
-    _check_rows(cloud.given, hull.dimension, vertices, facets)
-    dropped = _distinct(cloud.given, np.delete(np.arange(len(cloud.given)), vertices), vertices)
+    _check_rows(cloud.points, hull.dimension, vertices, facets)
+    dropped = _distinct(cloud.points, np.delete(np.arange(len(cloud.points)), vertices), vertices)
     if hull.dimension < 2:
         _check_straight(cloud.exact, vertices, dropped)
         return
@@ -43,7 +43,7 @@ class _Cloud:
     """The points as given, scaled to [1/2, 1) by a power of two, and as integers in one unit."""
 
     def __init__(self, points: np.ndarray):
-        self.given = points
+        self.points = points
         fraction, exponent = np.frexp(points)
         self.scaled = np.ldexp(points, -np.frexp(np.abs(points).max())[1])
         mantissa = (fraction * 2.0**53).astype(np.int64)

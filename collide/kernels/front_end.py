@@ -2,8 +2,8 @@
 
 Kernels are no part of Numba's own target: they have one beside it, made of subclasses of what Numba has for processors.
 So nothing of Numba's is changed for whoever uses it in the same process, and what kernels do not have need not be done:
-no counted references, no wrappers for Python, no machine code of each callee. `back_end.py` makes machine code of an entry
-and all it calls at once.
+no counted references, no wrappers for Python, no machine code of each callee. `back_end.py` makes machine code of an
+entry and all it calls at once.
 """
 
 from __future__ import annotations
@@ -29,7 +29,14 @@ from collide.kernels.back_end import FAILED
 
 #: Numba's name for the target of kernels.
 TARGET = "collide"
-_FLAGS = {"nopython": True, "nogil": True, "error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_FLAGS = {
+    "nopython": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 #: For functions within functions, with-blocks and expressions of whole arrays, of which kernels have none.
 _UNUSED_PASSES = {untyped_passes.InlineClosureLikes, untyped_passes.WithLifting, NopythonRewrites}
 
@@ -129,7 +136,7 @@ class KernelDispatcher(Dispatcher):
     targetdescr = _Target(TARGET)
 
     def get_call_template(self, args, kws):
-        """An argument written as a constant has no type of its own: kernels would be compiled anew for each constant."""
+        """An argument written as a constant has no type of its own, or kernels would be compiled for each constant."""
         return super().get_call_template(
             tuple(types.unliteral(a) for a in args), {name: types.unliteral(a) for name, a in kws.items()}
         )

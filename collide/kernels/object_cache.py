@@ -2,8 +2,8 @@
 
 Whoever writes an object file decides what runs. So the folder must be one that nobody else may write in
 (`cache_folder.why_distrusted`), and a file begins with a digest of the rest: one that is cut, or has a bit flipped, is
-noticed before it is loaded, and compiled anew. The digest is no signature: whoever may write in the folder may write that
-as well.
+noticed before it is loaded, and compiled anew. The digest is no signature: whoever may write in the folder may write
+that as well.
 
 The cache is a convenience. Nothing that goes wrong with it is an error of the question that was asked: it is said in a
 line, and the kernel is compiled.
@@ -66,7 +66,10 @@ def _folder() -> Path | None:
         say_once(f"compiled kernels cannot be kept in {folder} ({error}); {_REMEDY} that can be written.")
         return None
     if why is not None:
-        say_once(f"compiled kernels are neither kept in {folder} nor read from there, for they are code: {why}; {_REMEDY} of your own.")
+        say_once(
+            f"compiled kernels are neither kept in {folder} nor read from there, for they are code: {why}; {_REMEDY} "
+            "of your own."
+        )
         return None
     return folder
 
@@ -82,7 +85,9 @@ def _read_kept(file: Path, identity: bytes) -> bytes | None:
             raise ValueError("its digest is another")
         return code
     except (OSError, ValueError) as error:
-        log.warning("a compiled kernel in %s is damaged (%s: %s); it is compiled anew", file.parent, type(error).__name__, error)
+        log.warning(
+            "a compiled kernel in %s is damaged (%s: %s); it is compiled anew", file.parent, type(error).__name__, error
+        )
         with suppress(OSError):
             file.unlink(missing_ok=True)
         return None

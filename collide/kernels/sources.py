@@ -24,8 +24,9 @@ COMPILER_SOURCES = tuple(
 
 
 def kernel_sources() -> tuple[str, ...]:
-    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these import,
-    and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time to look."""
+    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these
+    import, and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time
+    to look."""
     files = set(COMPILER_SOURCES)
     for path in sorted(PACKAGE.rglob("*.py")):
         if b"\n@entry(" in path.read_bytes():
@@ -133,4 +134,7 @@ def compiler_versions() -> str:
     import llvmlite
     import numba
 
-    return f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {sys.version_info[0]}.{sys.version_info[1]}"
+    return (
+        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python "
+        f"{sys.version_info[0]}.{sys.version_info[1]}"
+    )

@@ -82,7 +82,10 @@ def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
         level = builder.zext(builder.fcmp_ordered("<=", values(at), limit), _INDICES)
         more = builder.add(indices, level)
         following = builder.add(at, ir.Constant(_I64, LANES))
-        for phi, initial, again in ((at, ir.Constant(_I64, 0), following), (indices, ir.Constant(_INDICES, [0] * LANES), more)):
+        for phi, initial, again in (
+            (at, ir.Constant(_I64, 0), following),
+            (indices, ir.Constant(_INDICES, [0] * LANES), more),
+        ):
             phi.add_incoming(initial, begin)
             phi.add_incoming(again, loop)
         builder.cbranch(builder.icmp_signed("<", following, args[2]), loop, done)
@@ -108,7 +111,9 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
 
 def _scan(builder: ir.IRBuilder, values, count):
     """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on."""
-    return _scan_by_count(builder, values, count, ((1, _scan_one), (4, _scan_few(4)), (8, _scan_few(8)), (16, _scan_few(16))))
+    return _scan_by_count(
+        builder, values, count, ((1, _scan_one), (4, _scan_few(4)), (8, _scan_few(8)), (16, _scan_few(16)))
+    )
 
 
 def _scan_list(builder: ir.IRBuilder, values, count):
@@ -125,7 +130,9 @@ def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
         following = None
         if max_blocks is not None:
             this, following = builder.append_basic_block("few"), builder.append_basic_block("more")
-            builder.cbranch(builder.icmp_signed("<=", last, ir.Constant(_I64, (max_blocks - 1) * LANES)), this, following)
+            builder.cbranch(
+                builder.icmp_signed("<=", last, ir.Constant(_I64, (max_blocks - 1) * LANES)), this, following
+            )
             builder.position_at_end(this)
         results.append((scan(builder, values, last), builder.block))
         builder.branch(done)
@@ -210,7 +217,9 @@ def _scan_many(builder, values, last):
     odd_next = _later(builder, odd_best, block(at))
     even_next = _later(builder, even_best, block(builder.add(at, one_block)))
     following = builder.add(at, two)
-    for phi, initial, again in zip((at, *even_best, *odd_best), (one_block, *first, *none), (following, *even_next, *odd_next)):
+    for phi, initial, again in zip(
+        (at, *even_best, *odd_best), (one_block, *first, *none), (following, *even_next, *odd_next)
+    ):
         phi.add_incoming(initial, begin)
         phi.add_incoming(again, pairs)
     builder.cbranch(builder.icmp_signed("<", following, last_but_one), pairs, ends)

@@ -2,7 +2,8 @@
 
 Cylinders, cones and ellipsoids are curved; the corners of an `HPolytope` may be rounded. A polytope around the shape
 and one inside it, both made of doubles, decide most questions without rounding: what does not meet the outer one does
-not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet (`facet_convex.py`).
+not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet
+(`facet_convex.py`).
 
 Both polytopes are right by more than rounding: rings and corners are drawn in or pushed out by 1e-12 of the size
 beyond what the geometry asks; that of a shape with planes is looked at in fractions.
@@ -54,7 +55,9 @@ def enclosure_of(shape: Shape) -> Enclosure:
     except AttributeError:
         packed = convex_set_of(shape)
         outer, inner = _polytopes(shape, packed)
-        point = inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
+        point = (
+            inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
+        )
         made = Enclosure(_body(shape, outer, point), None if inner is None else _body(shape, inner, inner[:1]), packed)
         shape._store(_surface=made)
         return made
@@ -93,7 +96,9 @@ def _ball() -> tuple[np.ndarray, float]:
     points = _unit(np.array([np.roll(p, k) for p in corners for k in range(3)]))
     for _ in range(_CUTS):
         facets = convex_hull(points).facets
-        edges = np.unique(np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1), axis=0)
+        edges = np.unique(
+            np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1), axis=0
+        )
         points = np.vstack([points, _unit(points[edges].sum(axis=1))])
     a, b, c = points[convex_hull(points).facets].transpose(1, 0, 2)
     normals = _unit(np.cross(b - a, c - a))

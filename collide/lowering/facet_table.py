@@ -34,7 +34,8 @@ class FacetTable:
         self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
         coarse = coarse_address(packed)
         self.ints[k] = (
-            packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest, 1,
+            packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest,
+            1,
             0, coarse,
         )  # fmt: skip
         self.numbers[k, :PARAMS] = packed.radius, packed.reach, packed.slop

@@ -31,7 +31,8 @@ BALL_MARGIN = 2.0**-40
 def place_part(poses, at, body, parts, part, terms_at):
     """Row ``at`` becomes where a part stands; rows are numbers of doubles, ``part`` likewise in ``parts``.
 
-    body : the row of the body's pose, its stretch known.   terms_at : 0, or where the row's terms go: their low parts are
+    body : the row of the body's pose, its stretch known.
+    terms_at : 0, or where the row's terms go: their low parts are
         written.
     """
     poses[at + POSE_SLOP] = 0.0

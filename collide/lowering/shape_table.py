@@ -21,7 +21,8 @@ INTS = 8
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
 # One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), the row of the exact terms where R and
-# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel asks.
+# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel
+# asks.
 POSE = 15
 POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
 #: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
@@ -49,7 +50,16 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, coarse_address(p)
+            self.ints[k] = (
+                p.kind,
+                len(p.points),
+                p.coordinates.shape[1],
+                address_of(p.coordinates),
+                p.lowest,
+                0,
+                0,
+                coarse_address(p),
+            )
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}

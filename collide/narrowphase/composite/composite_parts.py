@@ -29,8 +29,8 @@ class Part(NamedTuple):
     """One body of a union.
 
     shape : a mesh, or a convex shape.   X : (4, 4) its pose in the union's frame.
-    rotation, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides [m]:
-        a pose within a pose is their exact product, rounded once.
+    rotation, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides
+        [m]: a pose within a pose is their exact product, rounded once.
     """
 
     shape: Shape
@@ -85,14 +85,16 @@ class UnionParts:
 
     @cached_property
     def ball(self) -> np.ndarray | None:
-        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of half-spaces."""
+        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of
+        half-spaces."""
         if self.unbounded:
             return None
         at = self._X_BP[:, :3, 3]
         centre = 0.5 * (at.min(axis=0) + at.max(axis=0))
         across = np.sqrt(np.square(at - centre).sum(axis=1))
         reach = np.array([packed.reach + packed.radius + packed.slop for packed in self._bounds])
-        stretch = np.array([np.linalg.norm(X[:3, :3], 2) for X in self._X_BP])  # 1 but for what poses of items are off rotations
+        # 1 but for what poses of items are off rotations
+        stretch = np.array([np.linalg.norm(X[:3, :3], 2) for X in self._X_BP])
         size = np.abs(at).max() + np.abs(centre).max()
         radius = float((across + stretch * reach).max()) * _UP + 2.0**-40 * size
         return np.array([*centre, 0.0, 0.0, 0.0, radius])
