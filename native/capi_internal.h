@@ -33,7 +33,7 @@ enum { REFUSED = 255 };
    collide/narrowphase/facets/facet_queries.py. A tree is 136 nodes deep at most. */
 enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
 
-/* What `tell_measures` tells (collide/narrowphase/c_constants.py). */
+/* What `write_constants` writes (collide/narrowphase/c_constants.py). */
 enum {
     M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE, M_APICES,
     M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK,

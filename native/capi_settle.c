@@ -48,7 +48,7 @@ static void settle_by_other_searches(collide_workspace *space, const struct ques
             space->header[INTS_AT], space->header[NUMBERS_AT], space->header[POSES_AT], 0, space->header[SHAPE_OF_AT],
             address_of(space->asked), (int64_t)many, (uint8_t)booleans[search], (uint8_t)depths[search], 0, asked->limit,
             address_of(space->told), space->header[DOUBLES_AT], space->header[INTEGERS_AT]);
-        space->kernels->take_told(address_of(rows), address_of(space->left), address_of(space->told), (int64_t)many,
+        space->kernels->take_proven(address_of(rows), address_of(space->left), address_of(space->told), (int64_t)many,
                                   (uint8_t)booleans[search], asked->limit);
     }
 }

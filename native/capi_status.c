@@ -45,7 +45,7 @@ collide_status collide_level(const char **level)
 
 int rooms_of(const struct collide_kernels *kernels, int64_t measures[MEASURES])
 {
-    if (kernels->tell_measures(address_of(measures), MEASURES) != MEASURES) return 0;
+    if (kernels->write_constants(address_of(measures), MEASURES) != MEASURES) return 0;
     return measures[M_BLOCK] == BLOCK && measures[M_HEADER] == HEADER && measures[M_INTS] == INTS &&
            measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_room_bytes(measures) > 0 &&
            measures[M_ROW] == (int64_t)sizeof(collide_pair);

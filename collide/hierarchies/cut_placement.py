@@ -1,8 +1,9 @@
 """Where the new vertices of a cut are put, and the proof that they are where they must be.
 
-Vertex w is cut by a plane perpendicular to an axis, half-way to its nearest neighbour. New vertex j belongs on the edge from w to
-its neighbour r_j, a little deeper than the plane (`vertex_cutting` says why), and is moved towards a point s below all
-facets at w. Doubles propose; exact tests prove that it is in a tetrahedron of w, r_j, the next neighbour and s.
+Vertex w is cut by a plane perpendicular to an axis, half-way to its nearest neighbour. New vertex j belongs on the edge
+from w to its neighbour r_j, a little deeper than the plane (`vertex_cutting` says why), and is moved towards a point s
+below all facets at w. Doubles propose; exact tests prove that it is in a tetrahedron of w, r_j, the next neighbour and
+s.
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ _DOME = 0.25
 class Cut(NamedTuple):
     """A vertex that is to be cut off.
 
-    w : the vertex.   k : its degree.   ring, outer : k each, its neighbours and the half-edges beyond them (`read_ring`).
+    w : the vertex.   k : its degree.
+    ring, outer : k each, its neighbours and the half-edges beyond them (`read_ring`).
     fresh : k rows for new vertices, in a run.   inside : the row of s.
-    axis : a direction in which all neighbours are ahead of w.   nearest : how far the nearest is along it; −1 for no axis.
+    axis : a direction in which all neighbours are ahead of w.
+    nearest : how far the nearest is along it; −1 for no axis.
     """
 
     w: int

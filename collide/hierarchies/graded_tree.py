@@ -36,7 +36,8 @@ class GradedTree(NamedTuple):
         range of ``order`` that is the facet set; inner nodes only, parents first.
     order : (m,) facet numbers; those of a node stand together.
     owner : (m,) int64, the node that facet k (as numbered in the mesh) hangs from as a leaf.
-    outlier : (m,) bool, whether it hangs there as an outlier; else it is alone in a child, a path that leads to one leaf.
+    outlier : (m,) bool, whether it hangs there as an outlier; else it is alone in a child, a path that leads to one
+        leaf.
     levels : how far the octree may go down: ⌈log2(W/ℓ)⌉ + 3.
     """
 

@@ -39,7 +39,8 @@ from collide.hull.exact_hull import Hull
 from collide.kernels import address_of, entry, view_i64
 
 #: The bound c. The proof of Lemma 4.1 asks for more than 3^(2^17). Measured (benchmarks/hierarchies.py), any bound
-#: from 24 on gives the same depth; flat sides and cuts with k corners leave degrees of 2·log2 k + 5, to which 64 leaves room.
+#: from 24 on gives the same depth; flat sides and cuts with k corners leave degrees of 2·log2 k + 5, to which 64 leaves
+#: room.
 DEGREE_BOUND = 64
 #: A lower one is met by the neighbours of a cut again and again.
 LEAST_BOUND = 12
@@ -54,7 +55,8 @@ class Hierarchy(NamedTuple):
     parent : (N,) int32, for an added vertex the one that was cut off; else −1.
     row : (N,) int64, first row of the vertex; −1.
     neighbour_start : (rows + 1,) int64; neighbours : int32, counter-clockwise seen from outside.
-    removed_start : (rows + 1,) int64; removed : int32, what can lie beyond a plane tangent at the vertex, one level finer.
+    removed_start : (rows + 1,) int64; removed : int32, what can lie beyond a plane tangent at the vertex, one level
+        finer.
     level_start : (depth + 1,) int64; level_vertices : (rows,) int32, ascending in each level.
     """
 
@@ -125,9 +127,9 @@ def build_hierarchy(points: np.ndarray, hull: Hull, degree_bound: int = DEGREE_B
         Neighbours of large degree are cut one level after the other, so the first few levels may still have some.
         So may levels of hulls whose edges differ in length by ten orders of magnitude, see `vertex_cutting`.
 
-    Near-linear on most hulls, O(n log n). Quadratic on curves of unevenly spaced vertices that are all neighbours of two
-    (a moment curve at logarithmic steps: 4 s for 10,000 vertices): what replaces a cut vertex is then wrapped at O(k) a
-    triangle. Raises ValueError for a hull without interior.
+    Near-linear on most hulls, O(n log n). Quadratic on curves of unevenly spaced vertices that are all neighbours of
+    two (a moment curve at logarithmic steps: 4 s for 10,000 vertices): what replaces a cut vertex is then wrapped at
+    O(k) a triangle. Raises ValueError for a hull without interior.
     """
     if hull.dimension != 3:
         kind = ("a point", "a segment", "flat")[hull.dimension]
@@ -207,7 +209,8 @@ class _Building:
         scratch = np.empty(8 * max_degree, dtype=np.int64)
         thin(
             *self.cloud.addresses, self.cloud.count, *self._mesh[:4], address_of(self.vertices), len(self.vertices),
-            address_of(self.degree), address_of(self.blocked), address_of(order), bound, max_degree, address_of(scratch),
+            address_of(self.degree), address_of(self.blocked), address_of(order), bound, max_degree,
+            address_of(scratch),
             address_of(self.state),
         )  # fmt: skip
 

@@ -3,10 +3,10 @@
 Dobkin, Kirkpatrick, "Determining the separation of preprocessed polyhedra: a unified approach" (1990), as section 4 of
 Barba and Langerman repairs it, with hierarchies of bounded degree.
 
-Let S be a small body and T_j a level, b the point of T_j nearest S, and H the plane through b perpendicular to the shortest segment.
-Any point of T_{j−1} that is nearer S lies beyond H. By Lemma 4.2 at most one vertex p of T_{j−1} does, and what
-T_{j−1} has beyond H is in the hull of p and its neighbours. So the new distance is the smaller one of the old one and
-that from S to this hull: one small problem a level, and the distance of S from T in O(log m).
+Let S be a small body and T_j a level, b the point of T_j nearest S, and H the plane through b perpendicular to the
+shortest segment. Any point of T_{j−1} that is nearer S lies beyond H. By Lemma 4.2 at most one vertex p of T_{j−1}
+does, and what T_{j−1} has beyond H is in the hull of p and its neighbours. So the new distance is the smaller one of
+the old one and that from S to this hull: one small problem a level, and the distance of S from T in O(log m).
 
 Down the other hierarchy the same holds with T in the place of S: where a vertex p of P_{i−1} lies beyond the plane
 through the nearest point of P_i, the distance is the smaller one of the old one and that from the hull of p and
@@ -97,7 +97,7 @@ class Star(NamedTuple):
 
 
 class Simplex(NamedTuple):
-    """Difference points (POINT doubles each), weights with the nearest point behind, two places in the stars a point."""
+    """Difference points (POINT doubles each), weights and the nearest point, two places in the stars a point."""
 
     points: Any
     weights: Any
@@ -256,7 +256,8 @@ def write_pair(simplex, ids_a, ids_b, n, square, pair):
 def vertex_beyond(body, level, pair, counters):
     """The vertex of ``level`` that lies beyond the plane through the body's nearest point of the level above, or −1.
 
-    Vertices of the nearest point that this level has not, because a cut added them above, are replaced by the vertex cut.
+    Vertices of the nearest point that this level has not, because a cut added them above, are replaced by the vertex
+    cut.
     """
     levels = body.levels
     first_id = 3 if body.is_b else 0

@@ -100,8 +100,8 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> 
 
     Parameters
     ----------
-    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`. Their hierarchies are built when first needed,
-        in O(n log n), and stay with the shapes.
+    A, B : convex polytopes: `ConvexHull` without a radius, `Box`, `HPolytope`. Their hierarchies are built when first
+        needed, in O(n log n), and stay with the shapes.
     X_WA, X_WB : (4, 4) poses in the world, or batches (N, 4, 4), as `collide.collide` takes them.
     check_poses : refuse matrices that are no rotation.
     trace : also return the rounds of the last pose one by one.
@@ -127,7 +127,8 @@ def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
 
 
 def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> PairResult:
-    """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default narrowphase."""
+    """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default
+    narrowphase."""
     for shape in (A, B):
         walk_body(shape, "dobkin-kirkpatrick")
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
@@ -210,7 +211,8 @@ def rows_down_hierarchies(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     return rows
 
 
-#: Sizes of bodies, and translations between them, whose sixth powers doubles hold: the small problems form such products.
+#: Sizes of bodies, and translations between them, whose sixth powers doubles hold: the small problems form such
+#: products.
 _SMALLEST, _LARGEST = 1e-40, 1e40
 
 

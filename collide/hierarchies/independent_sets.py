@@ -99,7 +99,8 @@ def write_level(corners_at, twins_at, triangles, leaving_at, rows, vertices_at, 
 
 
 @entry(
-    "void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64,"
+    "void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, "
+    "int64,"
     " int64, int64, int64)"
 )
 def thin(
@@ -144,7 +145,7 @@ def thin(
 
 @kernel
 def by_degree(vertices, count, degree, max_degree, order):
-    """The vertices of degree at most ``max_degree`` in ``order``, by rising degree, in their own order where it is equal."""
+    """The vertices of degree at most ``max_degree`` in ``order``, by rising degree, else in their own order."""
     listed = 0
     d = 3
     remaining = count

@@ -27,7 +27,9 @@ def by_vertex(levels, points: int, parent: np.ndarray):
     neighbours = np.empty(start[-1], dtype=np.int32)
     for level, (vertices, level_starts, values) in enumerate(levels):
         place = start[row[vertices] + level - birth[vertices]]
-        copy_lists(address_of(level_starts), address_of(values), len(vertices), address_of(place), address_of(neighbours))
+        copy_lists(
+            address_of(level_starts), address_of(values), len(vertices), address_of(place), address_of(neighbours)
+        )
     removed_start = np.zeros(rows + 1, dtype=np.int64)
     arguments = (
         points, address_of(birth), address_of(last), address_of(parent), address_of(row), rows, address_of(start),

@@ -1,8 +1,8 @@
 """A hierarchy P_1 ⊇ P_2 ⊇ … ⊇ P_k as kernels read it, and the one step down that Lemma 4.2 allows.
 
-L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra", sections 4 and 5. Kernels read the
-arrays of `hierarchy.Hierarchy` where they stand; levels count from 0, the body itself (the paper's P_1). A vertex of a level
-has a row there: row[v] + level − birth[v].
+L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra", sections 4 and 5. Kernels read
+the arrays of `hierarchy.Hierarchy` where they stand; levels count from 0, the body itself (the paper's P_1). A vertex
+of a level has a row there: row[v] + level − birth[v].
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class PackedHierarchy:
         points, birth, parent, row, starts, neighbours, removed_start, removed, level_start, vertices = self._arrays
         self.header = np.array(
             [
-                address_of(points), len(points), address_of(birth), address_of(parent), address_of(row), len(starts) - 1,
+                address_of(points), len(points), address_of(birth), address_of(parent), address_of(row),
+                len(starts) - 1,
                 address_of(starts), address_of(neighbours), len(neighbours), address_of(removed_start),
                 address_of(removed), len(removed), address_of(level_start), address_of(vertices), len(level_start) - 1,
             ],
@@ -78,7 +79,8 @@ def levels_at(address):
     count = header[_POINTS]
     rows = header[_ROWS]
     return Levels(
-        view_f64(header[_POINTS_AT], 3 * count), view_i32(header[_BIRTH_AT], count), view_i32(header[_PARENT_AT], count),
+        view_f64(header[_POINTS_AT], 3 * count), view_i32(header[_BIRTH_AT], count),
+        view_i32(header[_PARENT_AT], count),
         view_i64(header[_ROW_AT], count), view_i64(header[_NEIGHBOUR_START_AT], rows + 1),
         view_i32(header[_NEIGHBOURS_AT], header[_NEIGHBOURS]), view_i64(header[_REMOVED_START_AT], rows + 1),
         view_i32(header[_REMOVED_AT], header[_REMOVED]), view_i64(header[_LEVEL_START_AT], header[_DEPTH] + 1),

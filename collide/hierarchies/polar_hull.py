@@ -56,8 +56,9 @@ def polar_of_hull(
 ) -> PolarBody:
     """The polar of the hull of points (n, 3) about ``origin``, or about a point well inside, with its hierarchy.
 
-    Near-linear where `build_hierarchy` is. Raises ValueError for a hull without interior, for a needle or a pancake with no
-    double inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60 to 1e60.
+    Near-linear where `build_hierarchy` is. Raises ValueError for a hull without interior, for a needle or a pancake
+    with no double inside, or too thin for the rounding; for an origin not strictly inside, and for sizes outside 1e-60
+    to 1e60.
     """
     if hull.dimension != 3:
         raise ValueError(f"the polar of a hull of dimension {hull.dimension} is not bounded; it has no interior")
@@ -79,8 +80,9 @@ def _clusters(polar: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.nda
     """(one point of each cluster, ascending; for each point the number of its cluster).
 
     Facets that rounding split from one flat side have polar points an ulp or so apart. Which of them is highest along
-    a direction is then a matter of rounding, and Lemma 4.2, which looks around one of them only, loses the maximum. Fewer
-    points make Q' smaller and R' larger: by some 3·2⁻³⁰ of its size at most, and 3·2⁻⁴⁰ for bodies that are round.
+    a direction is then a matter of rounding, and Lemma 4.2, which looks around one of them only, loses the maximum.
+    Fewer points make Q' smaller and R' larger: by some 3·2⁻³⁰ of its size at most, and 3·2⁻⁴⁰ for bodies that are
+    round.
     """
     scaled = polar * extent
     cell = min(2.0**-40 * float(np.abs(scaled).max()), 2.0**-30)
@@ -144,7 +146,9 @@ def _uneven(triangles: np.ndarray, spans: np.ndarray) -> np.ndarray:
     return np.where(large, 1.0 + _SPREAD * 2.0**-levels, 1.0)
 
 
-def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray, uneven: np.ndarray) -> np.ndarray:
+def _polar_points(
+    cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray, uneven: np.ndarray
+) -> np.ndarray:
     """(m, 3) polar points, drawn inside.
 
     Let q* be the true point, |v_k − o_k| ≤ V_k for all vertices, and W = Σ V_k |q_k| ≥ 1. What is stored is
@@ -216,7 +220,9 @@ def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_a
         z, z_low, z_size = normal_part(points, a, b, c, 0, 1)
         d, d_low, d_size = 0.0, 0.0, 0.0
         for axis in range(3):
-            n, n_low, n_size = (x, x_low, x_size) if axis == 0 else ((y, y_low, y_size) if axis == 1 else (z, z_low, z_size))
+            n, n_low, n_size = (
+                (x, x_low, x_size) if axis == 0 else ((y, y_low, y_size) if axis == 1 else (z, z_low, z_size))
+            )
             w, w_low = two_sum(points[a + axis], -origin[axis])
             d, d_low = dd.sloppy_add(DD(d, d_low), dd.unnormalized_mul(DD(n, n_low), DD(w, w_low)))
             d_size += n_size * abs(w)

@@ -9,9 +9,9 @@ A `Polyhedron` is points plus rays: conv(vertices) + cone(rays), or, the other w
 sets are polyhedra again: a vertex v gives ⟨v, y⟩ ≤ 1 (or ≥ 1), a ray d gives ⟨d, y⟩ ≤ 0 (or ≥ 0).
 
 Theorem 3.7: P and ρ0(Q) intersect if and only if a plane separates ρ∞(P) from Q. Witnesses are carried both ways:
-x ∈ P ∩ ρ0(Q) gives the plane ρ(x); a plane {y : ⟨x, y⟩ = 1} with ⟨x, y⟩ ≥ 1 on ρ∞(P), *tangent to it*, and ≤ 1 on Q gives x.
-Where ρ∞(P) is empty (the origin is in P) no plane is tangent to it; then the origin itself is common to both, and
-`separating_plane` has no plane that misses the origin to give.
+x ∈ P ∩ ρ0(Q) gives the plane ρ(x); a plane {y : ⟨x, y⟩ = 1} with ⟨x, y⟩ ≥ 1 on ρ∞(P), *tangent to it*, and ≤ 1 on Q
+gives x. Where ρ∞(P) is empty (the origin is in P) no plane is tangent to it; then the origin itself is common to both,
+and `separating_plane` has no plane that misses the origin to give.
 
 Everything here is exact, for tests and for reading; nothing is fast. Vectors are tuples of three Fractions.
 """

@@ -64,7 +64,7 @@ def run_walks(
     assert polar is not None, "the body that plays R has a polar"
     rows = no_walks(n)
     table = ShapeTable([packed_p, packed_r])
-    table.plant(np.arange(2))
+    table.build_trees(np.arange(2))
     poses = np.empty((2 * n, 4, 4))
     poses[0::2], poses[1::2] = X_WP, X_WR
     laid_out = pose_table(poses, np.broadcast_to(np.eye(4), poses.shape), np.zeros(2 * n))

@@ -27,8 +27,10 @@ CENTRES = 4
 class CloudView(NamedTuple):
     """Points in kernels, as `true_facets.Cloud` has them.
 
-    scaled, originals : three doubles a row; scaled = originals · 2^−exponent.   work, digits : workspace of `orientation`.
-    centres : row of centre 0; the others follow it.   Where only exact tests are made, centres and exponent are not read.
+    scaled, originals : three doubles a row; scaled = originals · 2^−exponent.
+    work, digits : workspace of `orientation`.
+    centres : row of centre 0; the others follow it.
+    Where only exact tests are made, centres and exponent are not read.
     """
 
     scaled: Any

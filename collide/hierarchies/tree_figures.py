@@ -1,4 +1,4 @@
-"""Sizes, depths and outliers of the two trees over a mesh: the box-tree of the queries and Erickson's graded box-tree."""
+"""Sizes, depths and outliers of the two trees over a mesh: the queries' box-tree and Erickson's graded one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ class TreeFigures(NamedTuple):
     """Figures of both trees over one mesh of F facets.
 
     facets : F.
-    nodes, depth, leaves : of the box-tree of the queries: nodes of eight boxes, nodes on the longest path, runs of facets.
+    nodes, depth, leaves : of the box-tree of the queries: nodes of eight boxes, nodes on the longest path, runs of
+        facets.
     graded_size : nodes of Erickson's graded box-tree, leaves included, paths compressed; at most 2F − 1 (2 for F = 1).
     graded_depth : edges on its longest path from root to leaf.
     graded_level : the finest level of the octree that an inner node stands on.

@@ -23,7 +23,9 @@ def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarr
     for k in range(1, len(nodes)):
         up = nodes[k, LEVEL] - nodes[parent[k], LEVEL]
         assert 0 <= parent[k] < k and up > 0, f"node {k} is not below its parent"
-        assert (nodes[k, CELL : CELL + 3] >> up == nodes[parent[k], CELL : CELL + 3]).all(), f"node {k} outside its parent"
+        assert (nodes[k, CELL : CELL + 3] >> up == nodes[parent[k], CELL : CELL + 3]).all(), (
+            f"node {k} outside its parent"
+        )
     cells = {tuple(row) for row in nodes[:, LEVEL : CELL + 3].tolist()}
     assert len(cells) == len(nodes), "two nodes with one control cube"
     children = np.bincount(parent[1:], minlength=len(nodes)) + np.bincount(tree.owner, minlength=len(nodes))
@@ -45,7 +47,9 @@ def _check_facet_sets(tree: GradedTree, corners: np.ndarray) -> None:
         above = tree.nodes[row[PARENT], LEVEL] + 1 if k else 0
         for level in range(above, row[LEVEL] + 1):
             cell = np.array(row[CELL : CELL + 3]) >> (row[LEVEL] - level)
-            assert _belongs(tree, level, cell[None], middles[facets], low[facets], high[facets]).all(), f"a facet not of node {k}"
+            assert _belongs(tree, level, cell[None], middles[facets], low[facets], high[facets]).all(), (
+                f"a facet not of node {k}"
+            )
     # The facets that hang from a node: outliers fit no child, others are alone in theirs.
     owner = tree.nodes[tree.owner]
     assert ((owner[:, FIRST] <= _places(tree)) & (_places(tree) < owner[:, LAST])).all(), "a leaf outside its node"
@@ -75,7 +79,7 @@ def _cell_of(tree: GradedTree, middles: np.ndarray, owner: np.ndarray) -> np.nda
 
 
 def _belongs(tree: GradedTree, level, cell, middles, low, high, benefit=1.0) -> np.ndarray:
-    """Whether centroids are in the control cubes of cells, and facets in the bounding cubes, rounding in favour or not."""
+    """Whether centroids are in control cubes and facets in bounding cubes, with rounding in favour or not."""
     size = tree.width / 2.0 ** np.asarray(level, dtype=float)
     slack = benefit * 4e-16 * (tree.width + np.abs(tree.low).max())
     middle = tree.low + (cell + 0.5) * size

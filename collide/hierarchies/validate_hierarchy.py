@@ -2,8 +2,8 @@
 
 Names are those of Barba and Langerman, section 4. Where the text leaves something open, this is what is checked:
 
-* B3 holds from ``bounded_from`` on. The text makes P simple by perturbing its facets, so that it counts P itself. Here P
-  is level 0 as it is, with any degrees;
+* B3 holds from ``bounded_from`` on. The text makes P simple by perturbing its facets, so that it counts P itself. Here
+  P is level 0 as it is, with any degrees;
 * A4, B4: V(P_i) \\ V(P_{i+1}) is independent in P_i. The text's own levels P_{i+1} of the second kind, the same
   polyhedron with more vertices, are left out: a cut and its removal are one level here;
 * A5, B5: depth ≤ 8 + 2.5·log2 n, and at most 16 n vertices in all levels;

@@ -42,7 +42,9 @@ def validate_rounds(body_p: WalkBody, body_r: WalkBody, X_WP, X_WR, rounds: tupl
             slack = rounding + _SLACK * np.abs(heights).max()
             assert heights.min() > 1 - slack, f"{where}: P_i is not beyond the plane of z: {heights.min()!r}"
             tangent = heights[np.flatnonzero(ids_p == round_.vertex_p)]
-            assert len(tangent) == 1 and tangent[0] <= heights.min() + slack, f"{where}: the plane is not tangent at its vertex"
+            assert len(tangent) == 1 and tangent[0] <= heights.min() + slack, (
+                f"{where}: the plane is not tangent at its vertex"
+            )
             _assert_inside(Q, round_.level_q, round_.z, f"{where}: z is not in Q_j")
         else:
             x = _moved(round_.x[None], R, offset)[0]
@@ -50,7 +52,9 @@ def validate_rounds(body_p: WalkBody, body_r: WalkBody, X_WP, X_WR, rounds: tupl
             slack = rounding + _SLACK * np.abs(heights).max()
             assert heights.max() < 1 + slack, f"{where}: Q_j is not inside the plane of x: {heights.max()!r}"
             tangent = heights[np.flatnonzero(ids_q == round_.vertex_q)]
-            assert len(tangent) == 1 and tangent[0] >= heights.max() - slack, f"{where}: the plane is not tangent at its vertex"
+            assert len(tangent) == 1 and tangent[0] >= heights.max() - slack, (
+                f"{where}: the plane is not tangent at its vertex"
+            )
             _assert_inside(P, round_.level_p, round_.x, f"{where}: x is not in P_i")
         if round_.level_p < top_p:
             others = points_p[ids_p != round_.p_star] @ round_.z_star

@@ -46,8 +46,8 @@ from collide.narrowphase.gjk.minkowski_difference import POINT
 from collide.narrowphase.posed_pair import posed_pair, size_and_slop
 from collide.numerics.vec3 import cross, divide, dot, neg, put_vec3, rotate, rotate_back, sub, vec3_at
 
-#: Status of a row. LOST: an invariant was lost, or a star is too large. OPEN_…: the walk's answer is not proven in spite of
-#: rounding. APART, MEETING: proven.
+#: Status of a row. LOST: an invariant was lost, or a star is too large. OPEN_…: the walk's answer is not proven in
+#: spite of rounding. APART, MEETING: proven.
 LOST, OPEN_APART, OPEN_MEETING, APART, MEETING = range(5)
 
 WALK_DTYPE = np.dtype(
@@ -131,7 +131,8 @@ def _plane_in_world(state):
 def _walk_down(walk, proof, trace, early, error):
     """(SEPARATED, INVERSE or NEITHER; whether it is proven): round after round to the bottom of one hierarchy.
 
-    trace : doubles of a trace, or none.   early : every new plane is tried against the whole bodies at once, every new point
+    trace : doubles of a trace, or none.
+    early : every new plane is tried against the whole bodies at once, every new point
         against the ball in R, and ends the walk where that proves it.
     """
     marks, state = walk.marks, walk.state
@@ -186,8 +187,10 @@ def walk_poses(
     """Walk at n pairs of poses.
 
     p, q : packed hierarchies, of P and of Q = ρ0(R).   ball : see `walk_proof.ball_at`.
-    ints, numbers : a `ShapeTable` of P and R, in this order.   poses : for each pair P's row and R's, POSE doubles each.
-    early : see `_walk_down`; the walk as published does not.   rows : WALK_DTYPE.   trace : 0, or TRACED_ROUNDS rounds for a
+    ints, numbers : a `ShapeTable` of P and R, in this order.
+    poses : for each pair P's row and R's, POSE doubles each.
+    early : see `_walk_down`; the walk as published does not.   rows : WALK_DTYPE.
+    trace : 0, or TRACED_ROUNDS rounds for a
     trace of the last pair.   doubles, integers : workspace.
     """
     walk = walk_at(levels_at(p_at), levels_at(q_at), doubles_at, integers_at)

@@ -78,7 +78,8 @@ class PolarSide:
     """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
 
     body : the `PolarBody` of R.   hierarchy : of Q = ρ0(R − origin), packed.   origin : (3,), inside R.
-    radius : of a ball about it that R holds, proven [m]; 0 where rounding leaves none, and then nothing is proven by it.
+    radius : of a ball about it that R holds, proven [m]; 0 where rounding leaves none, and then nothing is proven by
+        it.
     starts, triangles : the facets of R for which vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
     """
 

@@ -1,8 +1,8 @@
 """Proofs of the walk's answers, against the bodies and poses as given.
 
 The walk works with rounded numbers: the relative pose, the vertices of Q, the small linear programs. None of it is
-relied on here. A plane is proven by the extreme vertices of both bodies along it (`minkowski_difference.settle_point`). A
-common point is proven by a ball: R holds the ball of radius ρ about its centre c, and a triangle of its surface with
+relied on here. A plane is proven by the extreme vertices of both bodies along it (`minkowski_difference.settle_point`).
+A common point is proven by a ball: R holds the ball of radius ρ about its centre c, and a triangle of its surface with
 a point f in it, so it holds the ball of radius (1 − s) ρ about (1 − s) c + s f; P holds x; x lies in that ball.
 """
 
@@ -18,8 +18,8 @@ from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.narrowphase.gjk.minkowski_difference import difference_point, has_trees, settle_point
 from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, rotate, scale, sub, vec3_at
 
-# Integers that describe R's ball and facets: addresses of centre and radius (4 doubles), of where each facet's triangles
-# start, and of the triangles (three vertices of R each).
+# Integers that describe R's ball and facets: addresses of centre and radius (4 doubles), of where each facet's
+# triangles start, and of the triangles (three vertices of R each).
 _CENTRE_AT, _STARTS_AT, _FACETS, _TRIANGLES_AT, _TRIANGLES = range(5)
 _BALL = 5
 
@@ -73,8 +73,8 @@ def ball_at(address):
 
 @kernel
 def planes_apart(proof, d, error):
-    """Whether the plane across d, from P towards R, has all of P on one side and all of R on the other, by more than the
-    error [m]. d in the world, of any length."""
+    """Whether the plane across d, from P towards R, has all of P on one side and all of R on the other, by more than
+    the error [m]. d in the world, of any length."""
     span = math.sqrt(dot(d, d))
     if not span > 0.0:
         return False
@@ -127,7 +127,11 @@ def _best_triangle(proof, facet, f):
     best_weights = TriangleWeights(np.int64(0), np.int64(0), np.int64(0), Vec3(0.0, 0.0, 0.0))
     start = ball.starts[facet]
     for k in range(start, min(ball.starts[facet + 1], start + _MAX_TRIANGLES)):
-        ia, ib, ic = np.int64(ball.triangles[3 * k]), np.int64(ball.triangles[3 * k + 1]), np.int64(ball.triangles[3 * k + 2])
+        ia, ib, ic = (
+            np.int64(ball.triangles[3 * k]),
+            np.int64(ball.triangles[3 * k + 1]),
+            np.int64(ball.triangles[3 * k + 2]),
+        )
         a = sub(column_at(coords, m, ia), centre)
         b = sub(column_at(coords, m, ib), centre)
         c = sub(column_at(coords, m, ic), centre)

@@ -23,7 +23,8 @@ from collide.hierarchies.packed_hierarchy import height_of, lowest_at, lowest_of
 from collide.kernels import kernel, view_f64, view_i64
 from collide.numerics.vec3 import Vec3, add, dot, neg, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
-# Doubles of the state: the pose of P in R's frame (y = M p + t), the points of the invariants, and the inverse of R's matrix.
+# Doubles of the state: the pose of P in R's frame (y = M p + t), the points of the invariants, and the inverse of R's
+# matrix.
 M, T, Z, Z_STAR, X, X_STAR, INVERSE_OF_R = 0, 9, 12, 15, 18, 21, 24  # Z in the polar space; X in P's own frame
 _STATE = 33
 #: Doubles of workspace: the state, points of P* in both frames and of Q*, weights of both, the tableau.
@@ -54,7 +55,8 @@ class Walk(NamedTuple):
     """A walk under way.
 
     P, Q : `Levels` of both hierarchies.   state, marks : doubles and integers of the state, as named above.
-    p_own, p_moved, q_points : MAX_POINTS points each: P* in P's frame and in R's, Q*.   x_weights, z_weights : of P* and Q*.
+    p_own, p_moved, q_points : MAX_POINTS points each: P* in P's frame and in R's, Q*.
+    x_weights, z_weights : of P* and Q*.
     table, labels : workspace of `solve_game`.
     """
 
@@ -319,7 +321,7 @@ def _plane_at_p_star(walk):
 
 @kernel
 def _plane_at_q_star(walk):
-    """The inverse separation invariant with a plane tangent to κ_{q*}(Q_j) at q*, at the coarsest level to all of Q_j."""
+    """The inverse separation invariant with a plane tangent to κ_{q*}(Q_j) at q*, at the coarsest level to Q_j."""
     state, marks = walk.state, walk.marks
     if marks[Q_STAR] < 0:
         return _tangent_to_all_of_q(walk)

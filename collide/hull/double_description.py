@@ -90,7 +90,7 @@ def _cross(a: Row, b: Row, c: Row) -> Row:
 
 def _independent_rows(rows: list[Row]) -> list[int] | None:
     """Ids of four linearly independent rows, greedily, or None."""
-    chosen: list[int] = []
+    rows_of_basis: list[int] = []
     basis: list[list[Fraction]] = []
     for k, row in enumerate(rows):
         rest = [Fraction(value) for value in row]
@@ -100,9 +100,9 @@ def _independent_rows(rows: list[Row]) -> list[int] | None:
             rest = [r - factor * p for r, p in zip(rest, pivot_row)]
         if any(rest):
             basis.append(rest)
-            chosen.append(k)
-            if len(chosen) == 4:
-                return chosen
+            rows_of_basis.append(k)
+            if len(rows_of_basis) == 4:
+                return rows_of_basis
     return None
 
 
@@ -123,14 +123,14 @@ def _extreme_rays(rows: list[Row], start: list[int]) -> list[Row]:
 
 
 def _cut(rays: list[tuple[Row, int]], row: Row, bit: int) -> list[tuple[Row, int]]:
-    kept, inside, outside = [], [], []
+    on_plane, inside, outside = [], [], []
     for ray, tight in rays:
         side = _dot(row, ray)
         if side > 0:
             inside.append((ray, tight, side))
-            kept.append((ray, tight))
+            on_plane.append((ray, tight))
         elif side == 0:
-            kept.append((ray, tight | bit))
+            on_plane.append((ray, tight | bit))
         else:
             outside.append((ray, tight, side))
     every = [tight for _, tight in rays]
@@ -139,8 +139,8 @@ def _cut(rays: list[tuple[Row, int]], row: Row, bit: int) -> list[tuple[Row, int
             common = tight_out & tight_in
             if _adjacent(common, every):
                 ray = _primitive([side_in * o - side_out * i for o, i in zip(ray_out, ray_in)])
-                kept.append((ray, common | bit))
-    return kept
+                on_plane.append((ray, common | bit))
+    return on_plane
 
 
 def _adjacent(common: int, every: list[int]) -> bool:
@@ -152,7 +152,9 @@ def _adjacent(common: int, every: list[int]) -> bool:
 
 def _rounded(rays: list[Row]) -> tuple[np.ndarray, float]:
     vertices = np.array([[float(Fraction(c, w)) for c in (x, y, z)] for x, y, z, w in rays])
-    exact = all(Fraction(v) * w == c for row, ray in zip(vertices.tolist(), rays) for v, c, w in zip(row, ray, ray[3:] * 3))
+    exact = all(
+        Fraction(v) * w == c for row, ray in zip(vertices.tolist(), rays) for v, c, w in zip(row, ray, ray[3:] * 3)
+    )
     if exact:
         return vertices, 0.0
     # Each coordinate is rounded to nearest: half an ulp, plus the smallest number there is.

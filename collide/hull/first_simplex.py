@@ -33,7 +33,7 @@ def first_simplex(points, originals, work, digits, count, exponent, corners):
     sign = 0
     while dimension < 3:
         best = farthest(points, low, high, corners, dimension)
-        found = -1
+        farthest_row = -1
         for t in range(low - 1, high):
             i = best if t < low else t
             corners[dimension + 1] = i
@@ -45,13 +45,13 @@ def first_simplex(points, originals, work, digits, count, exponent, corners):
                     points, originals, work, digits, corners[0], corners[1], corners[2], corners[3], axis
                 )  # fmt: skip
                 if sign != 0:
-                    found = i
+                    farthest_row = i
                     break
-            if found >= 0:
+            if farthest_row >= 0:
                 break
-        if found < 0 and dimension == 1:
+        if farthest_row < 0 and dimension == 1:
             return 1
-        if found < 0:
+        if farthest_row < 0:
             write_apices(points, originals, count, exponent)
             low = count
             high = count + APICES
@@ -119,11 +119,11 @@ def farthest(points, low, high, corners, dimension):
         wy = points[3 * i + 1] - points[3 * a + 1]
         wz = points[3 * i + 2] - points[3 * a + 2]
         if dimension == 2:
-            found = abs(ux * wx + uy * wy + uz * wz)
+            height = abs(ux * wx + uy * wy + uz * wz)
         else:
-            found = abs(uy * wz - uz * wy) + abs(uz * wx - ux * wz) + abs(ux * wy - uy * wx)
-        if found > size or (found == size and before(points, best, i, 0)):
-            size = found
+            height = abs(uy * wz - uz * wy) + abs(uz * wx - ux * wz) + abs(ux * wy - uy * wx)
+        if height > size or (height == size and before(points, best, i, 0)):
+            size = height
             best = i
     return best
 

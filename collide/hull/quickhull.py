@@ -95,16 +95,16 @@ def make_facet(points, facets, planes, state, a, b, c):
 def free_facet(facets, state, f):
     at = FACET * f
     if facets[at + _POINT] >= 0:
-        left = facets[at + _BEFORE]
+        previous = facets[at + _BEFORE]
         right = facets[at + _AFTER]
-        if left >= 0:
-            facets[FACET * left + _AFTER] = right
+        if previous >= 0:
+            facets[FACET * previous + _AFTER] = right
         else:
             state[_FIRST] = right
         if right >= 0:
-            facets[FACET * right + _BEFORE] = left
+            facets[FACET * right + _BEFORE] = previous
         else:
-            state[_LAST] = left
+            state[_LAST] = previous
     facets[at] = -1
     facets[at + _AFTER] = state[_FREE]
     state[_FREE] = f
@@ -155,16 +155,16 @@ def put(points, facets, planes, following, state, f, i, distance):
 
 
 @kernel
-def distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, many, fan, k):
+def distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, n_points, fan, k):
     """Put each orphan into the list of a facet of the fan it lies strictly above; the others are in the hull."""
     t = 0
-    for n in range(many):
+    for n in range(n_points):
         i = np.int64(orphans[n])
         owner[i] = -1
         tries = k
         if k > WIDE_FAN:
-            t, sure = locate(points, originals, work, digits, facets, state, fan, k, i)
-            if sure:
+            t, certain = locate(points, originals, work, digits, facets, state, fan, k, i)
+            if certain:
                 tries = 1
         for _ in range(tries):
             state[_TESTS] += 1
@@ -224,10 +224,10 @@ def visible_region(points, originals, work, digits, facets, planes, state, f, i,
     now = state[_NOW]
     region[0] = f
     facets[FACET * f + _ROUND] = now
-    found = 1
+    n_visible = 1
     edges = 0
     k = 0
-    while k < found:
+    while k < n_visible:
         at = FACET * region[k]
         k += 1
         for e in range(3):
@@ -239,8 +239,8 @@ def visible_region(points, originals, work, digits, facets, planes, state, f, i,
                 stamp = now if over else -now
                 facets[FACET * g + _ROUND] = stamp
                 if over:
-                    region[found] = g
-                    found += 1
+                    region[n_visible] = g
+                    n_visible += 1
             if stamp == -now:
                 place = 0
                 while facets[FACET * g + place] != facets[at + (e + 1) % 3]:
@@ -248,21 +248,21 @@ def visible_region(points, originals, work, digits, facets, planes, state, f, i,
                 rim[2 * edges] = g
                 rim[2 * edges + 1] = place
                 edges += 1
-    return found, edges
+    return n_visible, edges
 
 
 @kernel
-def gather(facets, following, region, found, corner, orphans):
+def gather(facets, following, region, n_visible, corner, orphans):
     """All points in the lists of the region's facets but ``corner``; returns how many."""
-    many = 0
-    for k in range(found):
+    n_gathered = 0
+    for k in range(n_visible):
         i = facets[FACET * region[k] + _POINT]
         while i >= 0:
             if i != corner:
-                orphans[many] = i
-                many += 1
+                orphans[n_gathered] = i
+                n_gathered += 1
             i = following[i]
-    return many
+    return n_gathered
 
 
 @kernel
@@ -347,16 +347,16 @@ def first_facets(points, facets, planes, state, corners, fan):
 @kernel
 def write_surface(facets, state, count, marks, surface):
     """The facets of points of the cloud, and their corners marked; their number."""
-    many = 0
+    n_facets = 0
     for f in range(state[_USED]):
         at = FACET * f
         if facets[at] < 0 or max(facets[at], facets[at + 1], facets[at + 2]) >= count:
             continue
         for k in range(3):
-            surface[3 * many + k] = facets[at + k]
+            surface[3 * n_facets + k] = facets[at + k]
             marks[facets[at + k]] = 1
-        many += 1
-    return many
+        n_facets += 1
+    return n_facets
 
 
 @entry(f"int64({', '.join(['int64'] * 17)})")
@@ -370,42 +370,42 @@ def quickhull(
     that are corners of the hull, else 0; of a segment or a point too. −1: the rim of a region was no
     simple cycle, which exact tests exclude.
     """
-    room = count + APICES
-    points = view_f64(points_at, 3 * room)
-    originals = view_f64(originals_at, 3 * room)
+    capacity = count + APICES
+    points = view_f64(points_at, 3 * capacity)
+    originals = view_f64(originals_at, 3 * capacity)
     work = view_f64(work_at, WORK)
     digits = view_i64(digits_at, DIGITS)
-    facets = view_i32(facets_at, 2 * FACET * room)
-    planes = view_f64(planes_at, 2 * PLANE * room)
-    following = view_i32(following_at, room)
-    orphans = view_i32(orphans_at, room)
-    starting = view_i32(starting_at, room)
-    owner = view_i32(owner_at, room)
-    order = view_i32(order_at, room)
-    region = view_i32(region_at, 2 * room)
-    rim = view_i32(rim_at, 2 * room)
-    fan = view_i32(fan_at, room)
-    surface = view_i32(surface_at, 6 * room)
+    facets = view_i32(facets_at, 2 * FACET * capacity)
+    planes = view_f64(planes_at, 2 * PLANE * capacity)
+    following = view_i32(following_at, capacity)
+    orphans = view_i32(orphans_at, capacity)
+    starting = view_i32(starting_at, capacity)
+    owner = view_i32(owner_at, capacity)
+    order = view_i32(order_at, capacity)
+    region = view_i32(region_at, 2 * capacity)
+    rim = view_i32(rim_at, 2 * capacity)
+    fan = view_i32(fan_at, capacity)
+    surface = view_i32(surface_at, 6 * capacity)
     state = view_i64(state_at, STATE)
     corners = view_i64(state_at + 8 * _CORNERS, 4)
 
     exponent = survey(originals, points, count, work)
     dimension = first_simplex(points, originals, work, digits, count, exponent, corners)
-    for k in range(room):
+    for k in range(capacity):
         starting[k] = 0
     if dimension < 2:
         starting[corners[0]] = 1
         starting[corners[1]] = 1
         state[0] = 0
         return dimension
-    many = 0
+    n_orphans = 0
     for i in range(count):
         starting[i] = -1
         owner[i] = -1
         if i != corners[0] and i != corners[1] and i != corners[2] and i != corners[3]:
-            orphans[many] = i
-            many += 1
-    for k in range(count, room):
+            orphans[n_orphans] = i
+            n_orphans += 1
+    for k in range(count, capacity):
         starting[k] = -1
     state[_FREE] = -1
     state[_USED] = 0
@@ -418,18 +418,20 @@ def quickhull(
     first_facets(points, facets, planes, state, corners, fan)
     edges = 4
     while True:
-        distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, many, fan, edges)
+        distribute(
+            points, originals, work, digits, facets, planes, following, owner, state, orphans, n_orphans, fan, edges
+        )
         f, i = next_corner(facets, order, owner, state, count)
         if f < 0:
             break
-        found, edges = visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim)
-        many = gather(facets, following, region, found, i, orphans)
+        n_visible, edges = visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim)
+        n_orphans = gather(facets, following, region, n_visible, i, orphans)
         owner[i] = -1
-        for k in range(found):
+        for k in range(n_visible):
             free_facet(facets, state, np.int64(region[k]))
         if not build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
             return -1
-    for k in range(room):
+    for k in range(capacity):
         starting[k] = 0
     state[0] = write_surface(facets, state, count, starting, surface)
     return dimension

@@ -30,8 +30,8 @@ def validate_hull(points: np.ndarray, hull: Hull) -> None:
     """
     cloud = _Cloud(np.asarray(points, dtype=np.float64))
     vertices, facets = np.asarray(hull.vertices), np.asarray(hull.facets)
-    _check_rows(cloud.given, hull.dimension, vertices, facets)
-    dropped = _distinct(cloud.given, np.delete(np.arange(len(cloud.given)), vertices), vertices)
+    _check_rows(cloud.points, hull.dimension, vertices, facets)
+    dropped = _distinct(cloud.points, np.delete(np.arange(len(cloud.points)), vertices), vertices)
     if hull.dimension < 2:
         _check_straight(cloud.exact, vertices, dropped)
         return
@@ -42,10 +42,10 @@ def validate_hull(points: np.ndarray, hull: Hull) -> None:
 class _Cloud:
     """The points as given, scaled to [1/2, 1) by a power of two, and as integers in one unit."""
 
-    def __init__(self, given: np.ndarray):
-        self.given = given
-        fraction, exponent = np.frexp(given)
-        self.scaled = np.ldexp(given, -np.frexp(np.abs(given).max())[1])
+    def __init__(self, points: np.ndarray):
+        self.points = points
+        fraction, exponent = np.frexp(points)
+        self.scaled = np.ldexp(points, -np.frexp(np.abs(points).max())[1])
         mantissa = (fraction * 2.0**53).astype(np.int64)
         lowest = exponent[mantissa != 0].min() if mantissa.any() else 0
         self.exact = mantissa.astype(object) << np.where(mantissa == 0, 0, exponent - lowest).astype(object)
@@ -61,13 +61,13 @@ class _Planes(NamedTuple):
     exact_v: np.ndarray
 
 
-def _check_rows(given, dimension, vertices, facets) -> None:
+def _check_rows(points, dimension, vertices, facets) -> None:
     assert dimension in (0, 1, 2, 3), f"dimension is {dimension}"
     assert vertices.ndim == 1 and vertices.dtype == np.int32, "vertices must be a row of int32"
     assert facets.ndim == 2 and facets.shape[1] == 3 and facets.dtype == np.int32, "facets must be (f, 3) int32"
     assert (np.diff(vertices) > 0).all(), "vertices are not sorted, or one is named twice"
-    assert len(vertices) and vertices[0] >= 0 and vertices[-1] < len(given), "a vertex is no row of the points"
-    assert len(np.unique(given[vertices] + 0.0, axis=0)) == len(vertices), "two vertices are the same point"
+    assert len(vertices) and vertices[0] >= 0 and vertices[-1] < len(points), "a vertex is no row of the points"
+    assert len(np.unique(points[vertices] + 0.0, axis=0)) == len(vertices), "two vertices are the same point"
     if dimension < 2:
         assert len(vertices) == dimension + 1, f"dimension {dimension} with {len(vertices)} vertices"
         assert not len(facets), f"dimension {dimension} with facets"
@@ -75,10 +75,10 @@ def _check_rows(given, dimension, vertices, facets) -> None:
         assert np.array_equal(np.unique(facets), vertices), "the facets' corners are not the vertices"
 
 
-def _distinct(given, rows, vertices) -> np.ndarray:
+def _distinct(points, rows, vertices) -> np.ndarray:
     """Of the rows, one for each point that is no vertex."""
     order = np.concatenate([vertices, rows])
-    _, first = np.unique(given[order] + 0.0, axis=0, return_index=True)
+    _, first = np.unique(points[order] + 0.0, axis=0, return_index=True)
     return order[np.sort(first)][len(vertices) :]
 
 
@@ -110,11 +110,11 @@ def _sides(cloud: _Cloud, planes: _Planes, which: np.ndarray, points: np.ndarray
     away = cloud.scaled[points] - cloud.scaled[base]
     height = _inner(_cross(u, v), away)
     result = _sign(height)
-    unsure = np.flatnonzero(np.abs(height) <= _ERROR * _inner(_sizes(u, v), np.abs(away)) + _UNDERFLOW)
-    if len(unsure):
-        normal = _cross(planes.exact_u[which[unsure]], planes.exact_v[which[unsure]])
-        away = cloud.exact[points[unsure]] - cloud.exact[base[unsure]]
-        result[unsure] = _sign(_inner(normal, away))
+    ambiguous = np.flatnonzero(np.abs(height) <= _ERROR * _inner(_sizes(u, v), np.abs(away)) + _UNDERFLOW)
+    if len(ambiguous):
+        normal = _cross(planes.exact_u[which[ambiguous]], planes.exact_v[which[ambiguous]])
+        away = cloud.exact[points[ambiguous]] - cloud.exact[base[ambiguous]]
+        result[ambiguous] = _sign(_inner(normal, away))
     return result
 
 
@@ -150,15 +150,15 @@ def _twins(facets: np.ndarray) -> np.ndarray:
 
 
 def _check_solid(cloud: _Cloud, facets: np.ndarray) -> _Planes:
-    many = len(facets)
+    n_facets = len(facets)
     twins = _twins(facets)
     assert (twins >= 0).all(), f"the surface is open at edge {_edges(facets)[np.argmin(twins)].tolist()}"
-    euler = len(np.unique(facets)) - 3 * many // 2 + many
+    euler = len(np.unique(facets)) - 3 * n_facets // 2 + n_facets
     assert euler == 2, f"Euler characteristic is {euler}, not 2"
     planes = _facet_planes(cloud, facets)
     _check_areas(planes, facets)
     opposite = np.concatenate([facets[:, 2], facets[:, 0], facets[:, 1]])[twins]
-    which = np.tile(np.arange(many), 3)
+    which = np.tile(np.arange(n_facets), 3)
     bent = np.flatnonzero(_sides(cloud, planes, which, opposite) > 0)
     assert not len(bent), (
         f"facet {facets[which[bent[0]]].tolist()}: vertex {opposite[bent[0]]} of its neighbour is above it"

@@ -2,17 +2,17 @@
 
 Rules, each measured or forced by a bug met:
 
-* no fastmath and no contraction: products and sums round separately, so error bounds hold and the same call gives the same
-  bits everywhere;
-* no BLAS inside kernels, no ``parallel=True`` (two Python threads on its work queue abort the process): kernels release the
-  GIL and callers chunk;
+* no fastmath and no contraction: products and sums round separately, so error bounds hold and the same call gives the
+  same bits everywhere;
+* no BLAS inside kernels, no ``parallel=True`` (two Python threads on its work queue abort the process): kernels release
+  the GIL and callers chunk;
 * kernels hold no Python objects and raise nothing: they take integers, doubles and booleans, and everything else behind
-  addresses, of which they make views with `view_f64` and its siblings. The caller keeps every buffer alive for the length of
-  the call. The build refuses a kernel that may raise;
+  addresses, of which they make views with `view_f64` and its siblings. The caller keeps every buffer alive for the
+  length of the call. The build refuses a kernel that may raise;
 * what a kernel is compiled from stands in the sources that `sources.py` names: a stale kernel answers wrongly.
 
-`mode.py` says how kernels run: from the library made when the package was built, compiled just in time, or as the Python
-that they are written in.
+`mode.py` says how kernels run: from the library made when the package was built, compiled just in time, or as the
+Python that they are written in.
 
     kernel(inline=, cold=)    a function that other kernels call. inline : copy its code to where it is called.
         cold : it is called on few of the ways through its callers, which are made fast at its expense.
@@ -20,7 +20,8 @@ that they are written in.
         nogil : let other Python threads run meanwhile. A kernel of a microsecond that shares one workspace among all
         threads keeps the lock instead.
     code_of(entry)              address of its machine code, for `native_call`
-    native_call(signature)      a kernel ``call(address, arguments)``: runs the entry of this signature that stands there.
+    native_call(signature)
+    a kernel ``call(address, arguments)``: runs the entry of this signature that stands there.
         A second entry that called the kernels themselves would compile the whole narrowphase again.
     view_f64(address, n)        n doubles at an address; siblings for other kinds of elements
     address_of(array)           of a C-contiguous array's first element
@@ -54,7 +55,8 @@ else:
     from collide.kernels.plain import view_maker as _view
 
 __all__ = [
-    "MODE", "PLAIN_PYTHON", "WITH_NUMBA", "address_of", "code_of", "entry", "kernel", "native_call", "view_f32", "view_f64",
+    "MODE", "PLAIN_PYTHON", "WITH_NUMBA", "address_of", "code_of", "entry", "kernel", "native_call", "view_f32",
+    "view_f64",
     "view_i32", "view_i64", "view_u8",
 ]  # fmt: skip
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import llvmlite.binding as llvm
 
-#: What an entry calls where a kernel of it would raise, whose status nobody looks at; in a sound one it is optimised away.
+#: What an entry calls where a kernel of it would raise, whose status nobody looks at; in a sound one it is optimised
+#: away.
 FAILED = "collide_kernel_failed"
 
 #: Functions of Numba's that are the C library's, under names of its own.
@@ -42,7 +43,11 @@ class Target:
     def machine(self) -> llvm.TargetMachine:
         llvm.initialize_all_targets()
         llvm.initialize_all_asmprinters()
-        place = {"reloc": "pic", "codemodel": "small"} if self.position_independent else {"reloc": "static", "codemodel": "jitdefault"}
+        place = (
+            {"reloc": "pic", "codemodel": "small"}
+            if self.position_independent
+            else {"reloc": "static", "codemodel": "jitdefault"}
+        )
         target = llvm.Target.from_triple(self.triple or llvm.get_process_triple())
         return target.create_target_machine(cpu=self.cpu, features=self.features, opt=3, **place)
 
@@ -93,9 +98,9 @@ def _linked(modules: Iterable[bytes], target: Target, machine) -> llvm.ModuleRef
         if target.function_passes:
             _simplify(module, machine)
         whole.link_in(module)
-    for own, name in _OF_C.items():
-        if any(function.name == own for function in whole.functions):
-            whole.get_function(own).name = name
+    for kernel, name in _OF_C.items():
+        if any(function.name == kernel for function in whole.functions):
+            whole.get_function(kernel).name = name
     return whole
 
 
@@ -134,10 +139,14 @@ def _check(whole, names: set[str]) -> None:
     if missing := names - defined:
         raise BackEndError(f"not in the machine code: {', '.join(sorted(missing))}")
     called = {
-        function.name for function in whole.functions if function.is_declaration and not function.name.startswith("llvm.")
+        function.name
+        for function in whole.functions
+        if function.is_declaration and not function.name.startswith("llvm.")
     }
     if FAILED in called:
-        raise BackEndError(f"a kernel may raise, and nobody would see it: called by {', '.join(_callers(whole, FAILED))}")
+        raise BackEndError(
+            f"a kernel may raise, and nobody would see it: called by {', '.join(_callers(whole, FAILED))}"
+        )
     if strange := called - MAY_BE_UNDEFINED:
         raise BackEndError(f"not to be had without Python: {', '.join(sorted(strange))}")
 

@@ -25,8 +25,8 @@ class _Lanes(types.Type):
     def __init__(self):
         super().__init__(name="Lanes")
 
-    def can_convert_from(self, _context, other):
-        return Conversion.safe if other == types.float64 else None
+    def can_convert_from(self, _context, source_type):
+        return Conversion.safe if source_type == types.float64 else None
 
 
 class _Mask(types.Type):
@@ -54,8 +54,8 @@ class _MaskModel(models.PrimitiveModel):
 def _splat(builder: ir.IRBuilder, scalar):
     kind = ir.VectorType(scalar.type, LANES)
     nothing = ir.Constant(kind, ir.Undefined)
-    one = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+    first_lane = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first_lane, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
 @lower_cast(types.float64, lanes)
@@ -82,7 +82,9 @@ def _called(builder: ir.IRBuilder, name: str, *values):
     suffix = "f64" if kind == _F64 else f"v{LANES}f64"
     name = f"llvm.{name}.{suffix}"
     known = builder.module.globals.get(name)
-    return builder.call(known or ir.Function(builder.module, ir.FunctionType(kind, [kind] * len(values)), name=name), values)
+    return builder.call(
+        known or ir.Function(builder.module, ir.FunctionType(kind, [kind] * len(values)), name=name), values
+    )
 
 
 _operation((operator.add, operator.iadd), (lanes, lanes), lanes, lambda builder, a, b: builder.fadd(a, b))
@@ -91,7 +93,13 @@ _operation((operator.mul, operator.imul), (lanes, lanes), lanes, lambda builder,
 _operation((operator.truediv, operator.itruediv), (lanes, lanes), lanes, lambda builder, a, b: builder.fdiv(a, b))
 _operation((operator.neg,), (lanes,), lanes, lambda builder, a: builder.fneg(a))
 _operation((abs,), (lanes,), lanes, lambda builder, a: _called(builder, "fabs", a))
-for _compare, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "==")):
+for _compare, _sign in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.eq, "=="),
+):
     _operation((_compare,), (lanes, lanes), mask, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
 _operation((operator.ne,), (lanes, lanes), mask, lambda builder, a, b: builder.fcmp_unordered("!=", a, b))
 _operation((operator.and_, operator.iand), (mask, mask), mask, lambda builder, a, b: builder.and_(a, b))

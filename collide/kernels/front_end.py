@@ -2,8 +2,8 @@
 
 Kernels are no part of Numba's own target: they have one beside it, made of subclasses of what Numba has for processors.
 So nothing of Numba's is changed for whoever uses it in the same process, and what kernels do not have need not be done:
-no counted references, no wrappers for Python, no machine code of each callee. `back_end.py` makes machine code of an entry
-and all it calls at once.
+no counted references, no wrappers for Python, no machine code of each callee. `back_end.py` makes machine code of an
+entry and all it calls at once.
 """
 
 from __future__ import annotations
@@ -29,7 +29,14 @@ from collide.kernels.back_end import FAILED
 
 #: Numba's name for the target of kernels.
 TARGET = "collide"
-_FLAGS = {"nopython": True, "nogil": True, "error_model": "numpy", "_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_FLAGS = {
+    "nopython": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 #: For functions within functions, with-blocks and expressions of whole arrays, of which kernels have none.
 _UNUSED_PASSES = {untyped_passes.InlineClosureLikes, untyped_passes.WithLifting, NopythonRewrites}
 
@@ -97,10 +104,10 @@ class _Typing(typing.Context):
             return super().resolve_function_type(func, args, kws)
         key = func, args
         if key not in self._known:
-            found = super().resolve_function_type(func, args, kws)
-            if found is None:
+            resolved = super().resolve_function_type(func, args, kws)
+            if resolved is None:
                 return None
-            self._known[key] = found
+            self._known[key] = resolved
         return self._known[key]
 
 
@@ -129,7 +136,7 @@ class KernelDispatcher(Dispatcher):
     targetdescr = _Target(TARGET)
 
     def get_call_template(self, args, kws):
-        """An argument written as a constant has no type of its own: kernels would be compiled anew for each constant."""
+        """An argument written as a constant has no type of its own, or kernels would be compiled for each constant."""
         return super().get_call_template(
             tuple(types.unliteral(a) for a in args), {name: types.unliteral(a) for name, a in kws.items()}
         )
@@ -189,14 +196,14 @@ class Lowered:
 
 def _all_called(library: _Library) -> list[_Library]:
     """A library, those that it calls, and those that they call in turn, each once."""
-    found: dict[_Library, None] = {}
+    reached: dict[_Library, None] = {}
     waiting = [library]
     while waiting:
-        one = waiting.pop()
-        if one not in found:
-            found[one] = None
-            waiting += reversed(one._linking_libraries)
-    return list(found)
+        current = waiting.pop()
+        if current not in reached:
+            reached[current] = None
+            waiting += reversed(current._linking_libraries)
+    return list(reached)
 
 
 def c_function_type(context, arguments: tuple, result: types.Type) -> ir.FunctionType:
@@ -214,8 +221,8 @@ def _c_function(name: str, compiled, context) -> bytes:
     native = ir.Function(module, context.call_conv.get_function_type(result, arguments), description.llvm_func_name)
     made = ir.Function(module, c_function_type(context, arguments, result), name)
     builder = ir.IRBuilder(made.append_basic_block("entry"))
-    given = [context.data_model_manager[kind].from_data(builder, value) for kind, value in zip(arguments, made.args)]
-    status, value = context.call_conv.call_function(builder, native, result, arguments, given)
+    values = [context.data_model_manager[kind].from_data(builder, value) for kind, value in zip(arguments, made.args)]
+    status, value = context.call_conv.call_function(builder, native, result, arguments, values)
     with builder.if_then(status.is_error, likely=False):
         builder.call(ir.Function(module, ir.FunctionType(ir.VoidType(), []), FAILED), [])
     if result == types.none:
@@ -229,7 +236,7 @@ def native_call(signature: str):
     """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
     arguments, result = sigutils.normalize_signature(signature)
 
-    def make(_context, address, given):
+    def make(_context, address, values):
         def codegen(context, builder, _signature, args):
             manager = context.data_model_manager
             unpacked = [

@@ -1,8 +1,8 @@
 """Kernels compiled at their first call, and kept on disk: for those who change them.
 
 The same front end and the same back end as of the library (`front_end.py`, `back_end.py`), for this very processor. An
-entry's machine code is an object file, kept under a hash of the sources that it can depend on: those of its own module and
-of all that this imports (`sources.py`). An edit makes stale what it touches.
+entry's machine code is an object file, kept under a hash of the sources that it can depend on: those of its own module
+and of all that this imports (`sources.py`). An edit makes stale what it touches.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ from collide.log import log
 
 __all__ = ["Entry", "code_of", "entry", "kernel", "native_call"]
 
-_C_TYPES: dict[str, Any] = {"int64": ctypes.c_int64, "float64": ctypes.c_double, "boolean": ctypes.c_bool, "bool": ctypes.c_bool, "none": None}
+_C_TYPES: dict[str, Any] = {
+    "int64": ctypes.c_int64,
+    "float64": ctypes.c_double,
+    "boolean": ctypes.c_bool,
+    "bool": ctypes.c_bool,
+    "none": None,
+}
 #: One at a time: two threads' first calls compile an entry once.
 _compiling = threading.RLock()
 
@@ -62,10 +68,10 @@ class Entry:
     def _make(self) -> Callable:
         with _compiling:
             if self._ready is None:
-                begun = time.perf_counter()
+                start = time.perf_counter()
                 self._address = _placed(self.__name__, self._object())
                 self._ready = self._c_function()
-                log.info("kernel %s compiled or loaded: %.3f s", self.__name__, time.perf_counter() - begun)
+                log.info("kernel %s compiled or loaded: %.3f s", self.__name__, time.perf_counter() - start)
             return self._ready
 
     def _object(self) -> bytes:
@@ -78,7 +84,9 @@ class Entry:
             code.add(self.__name__, self.function, self.signature)
             return machine_code(code.names, code.modules, _here())
 
-        return object_cache.kept(f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled)
+        return object_cache.kept_or_made(
+            f"{self.function.__module__}.{self.__name__}", _key(self.function, self.signature), compiled
+        )
 
     def _c_function(self) -> Callable:
         arguments, result = sigutils.normalize_signature(self.signature)
@@ -89,8 +97,8 @@ class Entry:
 def _out_of_reach_of_signals(work: Callable) -> Any:
     """What ``work`` gives, done in another thread.
 
-    Handlers of signals run in the main thread, at any moment. What they raise within LLVM's and Numba's code, as Ctrl-C does,
-    leaves locks of theirs held for ever; and what they compile would be compiled for our target.
+    Handlers of signals run in the main thread, at any moment. What they raise within LLVM's and Numba's code, as Ctrl-C
+    does, leaves locks of theirs held for ever; and what they compile would be compiled for our target.
     """
     done: Future = Future()
 
@@ -108,7 +116,11 @@ def _out_of_reach_of_signals(work: Callable) -> Any:
 def _say_once() -> None:
     from collide.kernels.mode import WHY
 
-    log.warning("kernels are compiled at their first call (%s): half a minute once, then kept in %s", WHY, object_cache.kernel_folder())
+    log.warning(
+        "kernels are compiled at their first call (%s): half a minute once, then kept in %s",
+        WHY,
+        object_cache.kernel_folder(),
+    )
 
 
 def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
@@ -134,7 +146,9 @@ def _here() -> Target:
 
 
 def _key(function: Callable, signature: str) -> str:
-    return repr((signature, sources.of_function(function), _here(), llvm.get_process_triple(), sources.compiler_versions()))
+    return repr(
+        (signature, sources.of_function(function), _here(), llvm.get_process_triple(), sources.compiler_versions())
+    )
 
 
 _engines: list = []  # machine code lives as long as what holds it

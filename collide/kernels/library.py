@@ -1,7 +1,7 @@
 """The library of kernels that was made when the package was built: looked at, loaded, and its functions.
 
-A library cut short ends the process when it is loaded, and one of other sources answers wrongly. So sizes and checksums of
-its files are compared with those that the build wrote down, and the sources with those that it was made from: a few
+A library cut short ends the process when it is loaded, and one of other sources answers wrongly. So sizes and checksums
+of its files are compared with those that the build wrote down, and the sources with those that it was made from: a few
 milliseconds of a start.
 """
 
@@ -33,7 +33,9 @@ def load() -> str:
     global glue, level
     wanted = os.environ.get("COLLIDE_CPU", "")
     if wanted and wanted not in LEVELS:
-        raise InvalidArgument(f"COLLIDE_CPU={wanted!r} is no level of processors: it may be {', '.join(LEVELS)}, or unset")
+        raise InvalidArgument(
+            f"COLLIDE_CPU={wanted!r} is no level of processors: it may be {', '.join(LEVELS)}, or unset"
+        )
     built = _built()
     if built is None:
         return _UNBUILT
@@ -47,7 +49,9 @@ def load() -> str:
         level = functions.load(_path(_library_of(built.FILES)), wanted)
     except ValueError as error:  # no such level
         if wanted:
-            raise InvalidArgument(f"COLLIDE_CPU={wanted!r}: {error}; levels of this library: {', '.join(built.LEVELS)}") from None
+            raise InvalidArgument(
+                f"COLLIDE_CPU={wanted!r}: {error}; levels of this library: {', '.join(built.LEVELS)}"
+            ) from None
         return str(error)
     except (ImportError, OSError) as error:
         return f"it cannot be loaded: {error}; install collide-robotics again"
@@ -61,12 +65,13 @@ def exists() -> bool:
 
 
 def about() -> dict[str, str]:
-    """What it was made from: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; empty where there is none."""
+    """What it was made from: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; {} where none is."""
     built = _built()
     if built is None:
         return {}
     return {
-        "level": level, "levels": ", ".join(built.LEVELS), "compiler": built.COMPILER, "sources": f"{built.SOURCES:08x}",
+        "level": level, "levels": ", ".join(built.LEVELS), "compiler": built.COMPILER,
+        "sources": f"{built.SOURCES:08x}",
         "path": library_path(),
     }  # fmt: skip
 
@@ -116,8 +121,8 @@ def _built() -> Any:
 
 
 def _fits(built: Any) -> bool:
-    """Whether the library was made from the sources that are here. Where there are none, as in frozen programs, nobody can have
-    changed them."""
+    """Whether the library was made from the sources that are here. Where there are none, as in frozen programs, nobody
+    can have changed them."""
     if not os.path.exists(os.path.join(sources.PACKAGE, "results.py")):
         return True
     try:
@@ -127,8 +132,8 @@ def _fits(built: Any) -> bool:
 
 
 def _library_of(files: dict) -> str:
-    (found,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
-    return found
+    (name_of_library,) = (name for name in files if name.startswith("lib/") and not name.endswith(".lib"))
+    return name_of_library
 
 
 def _path(name: str) -> str:
@@ -158,7 +163,9 @@ class _Absent:
         self.__name__ = function.__name__
 
     def __call__(self, *_args):
-        raise RuntimeError(f"{self.__name__} is no kernel of the library; with COLLIDE_JIT=1 kernels are compiled at their first call")
+        raise RuntimeError(
+            f"{self.__name__} is no kernel of the library; with COLLIDE_JIT=1 kernels are compiled at their first call"
+        )
 
 
 def code_of(entry) -> int:

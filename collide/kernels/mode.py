@@ -21,7 +21,7 @@ def _asked(name: str) -> bool:
     return os.environ.get(name, "0") not in ("", "0")
 
 
-def _chosen() -> tuple[str, str]:
+def _choose_mode() -> tuple[str, str]:
     """(mode, why). Raises MissingExtra where there is neither a library that can be used nor a compiler."""
     if _asked("NUMBA_DISABLE_JIT"):
         return PYTHON, "NUMBA_DISABLE_JIT is set"
@@ -39,7 +39,7 @@ def _chosen() -> tuple[str, str]:
 
 
 #: How kernels run, and why they are not `COMPILED`.
-MODE, WHY = _chosen()
+MODE, WHY = _choose_mode()
 #: Whether kernels are what Numba makes of them: their own types and intrinsics are there.
 WITH_NUMBA = MODE == JUST_IN_TIME
 PLAIN_PYTHON = MODE == PYTHON

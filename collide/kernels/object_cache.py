@@ -2,8 +2,8 @@
 
 Whoever writes an object file decides what runs. So the folder must be one that nobody else may write in
 (`cache_folder.why_distrusted`), and a file begins with a digest of the rest: one that is cut, or has a bit flipped, is
-noticed before it is loaded, and compiled anew. The digest is no signature: whoever may write in the folder may write that
-as well.
+noticed before it is loaded, and compiled anew. The digest is no signature: whoever may write in the folder may write
+that as well.
 
 The cache is a convenience. Nothing that goes wrong with it is an error of the question that was asked: it is said in a
 line, and the kernel is compiled.
@@ -29,7 +29,7 @@ _DIGEST = hashlib.sha256().digest_size
 _REMEDY = "they are compiled again in every process. Set COLLIDE_CACHE_DIR to a folder"
 
 
-def kept(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
+def kept_or_made(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
     """The object file of this key: as it was kept, else what ``compiled`` gives, which is kept.
 
     name : for people who look into the folder.   key : all that the machine code depends on.
@@ -39,7 +39,7 @@ def kept(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
         return compiled()
     identity = repr((_VERSION, name, key)).encode()
     file = folder / f"{name}.{hashlib.sha256(identity).hexdigest()[:16]}.o"
-    code = _found(file, identity)
+    code = _read_kept(file, identity)
     if code is None:
         code = compiled()
         try:
@@ -66,12 +66,15 @@ def _folder() -> Path | None:
         say_once(f"compiled kernels cannot be kept in {folder} ({error}); {_REMEDY} that can be written.")
         return None
     if why is not None:
-        say_once(f"compiled kernels are neither kept in {folder} nor read from there, for they are code: {why}; {_REMEDY} of your own.")
+        say_once(
+            f"compiled kernels are neither kept in {folder} nor read from there, for they are code: {why}; {_REMEDY} "
+            "of your own."
+        )
         return None
     return folder
 
 
-def _found(file: Path, identity: bytes) -> bytes | None:
+def _read_kept(file: Path, identity: bytes) -> bytes | None:
     """The code in a file, None where there is none to be used."""
     try:
         content = _read(file)
@@ -82,7 +85,9 @@ def _found(file: Path, identity: bytes) -> bytes | None:
             raise ValueError("its digest is another")
         return code
     except (OSError, ValueError) as error:
-        log.warning("a compiled kernel in %s is damaged (%s: %s); it is compiled anew", file.parent, type(error).__name__, error)
+        log.warning(
+            "a compiled kernel in %s is damaged (%s: %s); it is compiled anew", file.parent, type(error).__name__, error
+        )
         with suppress(OSError):
             file.unlink(missing_ok=True)
         return None
@@ -96,8 +101,8 @@ def _read(file: Path) -> bytes | None:
     """What a file holds, None where there is none. Raises PermissionError where somebody else may have written it."""
     try:
         with open(file, "rb") as opened:
-            found = os.fstat(opened.fileno())
-            if TRUST and (found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) & 0o022):
+            status = os.fstat(opened.fileno())
+            if TRUST and (status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o022):
                 raise PermissionError("others may have written it")
             return opened.read()
     except FileNotFoundError:

@@ -1,7 +1,7 @@
 """Kernels of single calls, bound to what they were prepared for: nothing is left to do in Python but the call.
 
-Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what is
-wrong with it, or converts it.
+Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what
+is wrong with it, or converts it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ else:
         def asked(X_WA, X_WB):
             if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
                 return None
-            said = entry(address_of(header), address_of(X_WA), address_of(X_WB))
-            return None if said < 0 else bool(said)
+            status = entry(address_of(header), address_of(X_WA), address_of(X_WB))
+            return None if status < 0 else bool(status)
 
         return asked
 
@@ -46,8 +46,8 @@ else:
         def asked(X_WA, X_WB, out, flag):
             if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
                 return None
-            said = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
-            return None if said < 0 else bool(said)
+            status = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
+            return None if status < 0 else bool(status)
 
         return asked
 

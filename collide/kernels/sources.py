@@ -24,14 +24,15 @@ COMPILER_SOURCES = tuple(
 
 
 def kernel_sources() -> tuple[str, ...]:
-    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these import,
-    and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time to look."""
-    found = set(COMPILER_SOURCES)
+    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these
+    import, and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time
+    to look."""
+    files = set(COMPILER_SOURCES)
     for path in sorted(PACKAGE.rglob("*.py")):
         if b"\n@entry(" in path.read_bytes():
             module = ".".join(("collide", *path.relative_to(PACKAGE).with_suffix("").parts))
-            found.update(map(_place_of, _reached(module)))
-    return tuple(sorted(found))
+            files.update(map(_place_of, _reached(module)))
+    return tuple(sorted(files))
 
 
 def _place_of(module: str) -> str:
@@ -41,12 +42,12 @@ def _place_of(module: str) -> str:
 
 def fingerprint(names: tuple[str, ...]) -> int:
     """A checksum of such files. Two milliseconds. Raises OSError where one is not there."""
-    found = 0
+    checksum = 0
     for name in names:
         with open(os.path.join(PACKAGE, *name.split("/")), "rb") as file:
             text = file.read().replace(b"\r\n", b"\n")
-        found = zlib.crc32(text, zlib.crc32(name.encode(), found))
-    return found
+        checksum = zlib.crc32(text, zlib.crc32(name.encode(), checksum))
+    return checksum
 
 
 def of_function(function: Callable) -> str:
@@ -56,8 +57,8 @@ def of_function(function: Callable) -> str:
     digest = hashlib.sha256()
     code = function.__code__
     cells = [_named(cell.cell_contents) for cell in function.__closure__ or ()]
-    given = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
-    digest.update(repr((function.__qualname__, *given)).encode())
+    parts = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
+    digest.update(repr((function.__qualname__, *parts)).encode())
     for module in sorted(_reached(function.__module__ or "")):
         digest.update(module.encode())
         digest.update(_text(module))
@@ -76,13 +77,13 @@ def _constants(code) -> list:
 
 def _reached(module: str) -> set[str]:
     """The package's modules that a module imports, those that these import, …, and itself."""
-    found, waiting = set(), [module]
+    reached, waiting = set(), [module]
     while waiting:
-        one = waiting.pop()
-        if one not in found:
-            found.add(one)
-            waiting += _imported(one)
-    return found
+        source_module = waiting.pop()
+        if source_module not in reached:
+            reached.add(source_module)
+            waiting += _imported(source_module)
+    return reached
 
 
 @cache
@@ -91,14 +92,14 @@ def _imported(module: str) -> tuple[str, ...]:
         tree = ast.parse(_text(module))
     except SyntaxError:  # something typed in by hand
         return ()
-    found = []
+    imported = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            imported += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            imported += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
     # `collide` itself imports everything, and no kernel takes anything from there.
-    return tuple(name for name in found if name.startswith("collide.") and _may_matter(name))
+    return tuple(name for name in imported if name.startswith("collide.") and _may_matter(name))
 
 
 def _may_matter(module: str) -> bool:
@@ -133,4 +134,7 @@ def compiler_versions() -> str:
     import llvmlite
     import numba
 
-    return f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {sys.version_info[0]}.{sys.version_info[1]}"
+    return (
+        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python "
+        f"{sys.version_info[0]}.{sys.version_info[1]}"
+    )

@@ -78,11 +78,14 @@ def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
         loop, done = (builder.append_basic_block(name) for name in ("loop", "done"))
         builder.branch(loop)
         builder.position_at_end(loop)
-        at, found = builder.phi(_I64), builder.phi(_INDICES)
+        at, indices = builder.phi(_I64), builder.phi(_INDICES)
         level = builder.zext(builder.fcmp_ordered("<=", values(at), limit), _INDICES)
-        more = builder.add(found, level)
+        more = builder.add(indices, level)
         following = builder.add(at, ir.Constant(_I64, LANES))
-        for phi, initial, again in ((at, ir.Constant(_I64, 0), following), (found, ir.Constant(_INDICES, [0] * LANES), more)):
+        for phi, initial, again in (
+            (at, ir.Constant(_I64, 0), following),
+            (indices, ir.Constant(_INDICES, [0] * LANES), more),
+        ):
             phi.add_incoming(initial, begin)
             phi.add_incoming(again, loop)
         builder.cbranch(builder.icmp_signed("<", following, args[2]), loop, done)
@@ -108,7 +111,9 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
 
 def _scan(builder: ir.IRBuilder, values, count):
     """(largest, its index) of ``count`` ≥ 8 numbers; values(at): eight of them from an index on."""
-    return _scan_by_count(builder, values, count, ((1, _scan_one), (4, _scan_few(4)), (8, _scan_few(8)), (16, _scan_few(16))))
+    return _scan_by_count(
+        builder, values, count, ((1, _scan_one), (4, _scan_few(4)), (8, _scan_few(8)), (16, _scan_few(16)))
+    )
 
 
 def _scan_list(builder: ir.IRBuilder, values, count):
@@ -120,20 +125,22 @@ def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
     """A scan of up to so many blocks in each of several ways, and of more in a loop."""
     last = builder.sub(count, ir.Constant(_I64, LANES))
     done = builder.append_basic_block("done")
-    found = []
-    for most, scan in (*ways, (None, _scan_many)):
+    results = []
+    for max_blocks, scan in (*ways, (None, _scan_many)):
         following = None
-        if most is not None:
+        if max_blocks is not None:
             this, following = builder.append_basic_block("few"), builder.append_basic_block("more")
-            builder.cbranch(builder.icmp_signed("<=", last, ir.Constant(_I64, (most - 1) * LANES)), this, following)
+            builder.cbranch(
+                builder.icmp_signed("<=", last, ir.Constant(_I64, (max_blocks - 1) * LANES)), this, following
+            )
             builder.position_at_end(this)
-        found.append((scan(builder, values, last), builder.block))
+        results.append((scan(builder, values, last), builder.block))
         builder.branch(done)
         if following is not None:
             builder.position_at_end(following)
     builder.position_at_end(done)
     value, index = builder.phi(_F64), builder.phi(_I64)
-    for (one_value, one_index), block in found:
+    for (one_value, one_index), block in results:
         value.add_incoming(one_value, block)
         index.add_incoming(one_index, block)
     return builder.fadd(value, ir.Constant(_F64, 0.0)), index  # −0 becomes 0: lanes may hold both
@@ -197,10 +204,10 @@ def _scan_many(builder, values, last):
     def block(at):
         return values(at), builder.add(lanes, _splat(builder, at, _INDICES))
 
-    zero, one, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
+    zero, one_block, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
     none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
     first = block(zero)
-    last_but_one = builder.sub(last, one)
+    last_but_one = builder.sub(last, one_block)
     begin = builder.block
     pairs, ends = (builder.append_basic_block(name) for name in ("pairs", "ends"))
     builder.branch(pairs)
@@ -208,9 +215,11 @@ def _scan_many(builder, values, last):
     builder.position_at_end(pairs)  # blocks ``at`` and ``at + 8``, before the last two
     at, even_best, odd_best = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
     odd_next = _later(builder, odd_best, block(at))
-    even_next = _later(builder, even_best, block(builder.add(at, one)))
+    even_next = _later(builder, even_best, block(builder.add(at, one_block)))
     following = builder.add(at, two)
-    for phi, initial, again in zip((at, *even_best, *odd_best), (one, *first, *none), (following, *even_next, *odd_next)):
+    for phi, initial, again in zip(
+        (at, *even_best, *odd_best), (one_block, *first, *none), (following, *even_next, *odd_next)
+    ):
         phi.add_incoming(initial, begin)
         phi.add_incoming(again, pairs)
     builder.cbranch(builder.icmp_signed("<", following, last_but_one), pairs, ends)
@@ -239,10 +248,10 @@ def _holding(builder, numbers, largest):
     return builder.bitcast(builder.fcmp_ordered("==", numbers, _splat(builder, largest, _VALUES)), _I8)
 
 
-def _later(builder, best, found):
+def _later(builder, best, indices):
     """Running maximum: what comes later has to be strictly larger."""
-    larger = builder.fcmp_ordered(">", found[0], best[0])
-    return builder.select(larger, found[0], best[0]), builder.select(larger, found[1], best[1])
+    larger = builder.fcmp_ordered(">", indices[0], best[0])
+    return builder.select(larger, indices[0], best[0]), builder.select(larger, indices[1], best[1])
 
 
 def _earlier_of(builder, a, b):
@@ -295,9 +304,9 @@ def _load(builder, plane, at):
 
 
 def _splat(builder, scalar, kind):
-    one = builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    first_lane = builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), mask)
+    return builder.shuffle_vector(first_lane, ir.Constant(kind, ir.Undefined), mask)
 
 
 # --- eight boxes at once ------------------------------------------------------------------------
@@ -342,9 +351,9 @@ def _meeting(boxes, frame, probe, parted):
 def _outside(builder, data, probe):
     """Three vectors of bits: which boxes lie outside the half-space of each edge of the probe."""
     for edge in (17, 21, 25):
-        out = _one(builder, probe, edge + 3)
+        out = _element(builder, probe, edge + 3)
         for j in range(3):
-            entry = _one(builder, probe, edge + j)
+            entry = _element(builder, probe, edge + j)
             out = builder.fadd(out, builder.fmul(entry, _eight(builder, data, j)))
             out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
         yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
@@ -353,24 +362,24 @@ def _outside(builder, data, probe):
 def _apart(builder, data, frame, probe):
     """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
     centres = [_eight(builder, data, axis) for axis in range(3)]
-    halves = [_eight(builder, data, 3 + axis) for axis in range(3)]
-    yield _unused(builder, halves)
+    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    yield _unused(builder, half_lengths)
     for axis in range(3):
-        gap = builder.fsub(centres[axis], _one(builder, probe, axis))
-        reach = builder.fadd(halves[axis], _one(builder, probe, 3 + axis))
+        gap = builder.fsub(centres[axis], _element(builder, probe, axis))
+        reach = builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis))
         yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
     for axis in range(3):
-        gap, reach = _one(builder, probe, 6 + axis), _one(builder, probe, 9 + axis)
+        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
         for j in range(3):
-            entry = _one(builder, frame, 3 * axis + j)
+            entry = _element(builder, frame, 3 * axis + j)
             gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
-            reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), halves[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
         yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
-    gap, reach = _one(builder, probe, 15), _one(builder, probe, 16)
+    gap, reach = _element(builder, probe, 15), _element(builder, probe, 16)
     for j in range(3):  # the probe's slab
-        entry = _one(builder, probe, 12 + j)
+        entry = _element(builder, probe, 12 + j)
         gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
-        reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), halves[j]))
+        reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
     yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
 
 
@@ -393,7 +402,7 @@ def _eight(builder, data, row):
     return builder.load(builder.bitcast(place, _FLOATS.as_pointer()), align=4)
 
 
-def _one(builder, data, k):
+def _element(builder, data, k):
     """Float k in all lanes."""
     return _splat(builder, builder.load(builder.gep(data, [ir.Constant(_I64, k)])), _FLOATS)
 
@@ -427,54 +436,54 @@ def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
 def _gaps(builder, data, slab, frame, probe):
     """Vectors: the largest gap along eight axes; the squared length of the line between centres."""
     centres = [_eight(builder, data, axis) for axis in range(3)]
-    halves = [_eight(builder, data, 3 + axis) for axis in range(3)]
-    entries = [[_one(builder, frame, 3 * i + j) for j in range(3)] for i in range(3)]
+    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    entries = [[_element(builder, frame, 3 * i + j) for j in range(3)] for i in range(3)]
     best = ir.Constant(_FLOATS, [float("-inf")] * LANES)
 
     def larger(gap):
         return builder.select(builder.fcmp_ordered(">", gap, best), gap, best)
 
     for axis in range(3):
-        gap = _abs(builder, builder.fsub(centres[axis], _one(builder, probe, axis)))
-        gap = builder.fsub(gap, builder.fadd(halves[axis], _one(builder, probe, 3 + axis)))
-        best = larger(builder.fmul(gap, _one(builder, probe, 12 + axis)))
+        gap = _abs(builder, builder.fsub(centres[axis], _element(builder, probe, axis)))
+        gap = builder.fsub(gap, builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis)))
+        best = larger(builder.fmul(gap, _element(builder, probe, 12 + axis)))
     line, across, square = [], None, None
     for axis in range(3):
-        gap, reach = _one(builder, probe, 6 + axis), _one(builder, probe, 9 + axis)
+        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
         for j in range(3):
             gap = builder.fadd(gap, builder.fmul(entries[axis][j], centres[j]))
-            reach = builder.fadd(reach, builder.fmul(_abs(builder, entries[axis][j]), halves[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entries[axis][j]), half_lengths[j]))
         line.append(gap)
         size = _abs(builder, gap)
-        best = larger(builder.fmul(builder.fsub(size, reach), _one(builder, probe, 15 + axis)))
-        own = builder.fmul(size, _one(builder, probe, 9 + axis))
-        across = own if across is None else builder.fadd(across, own)
-        own = builder.fmul(gap, gap)
-        square = own if square is None else builder.fadd(square, own)
+        best = larger(builder.fmul(builder.fsub(size, reach), _element(builder, probe, 15 + axis)))
+        spread = builder.fmul(size, _element(builder, probe, 9 + axis))
+        across = spread if across is None else builder.fadd(across, spread)
+        spread = builder.fmul(gap, gap)
+        square = spread if square is None else builder.fadd(square, spread)
     for j in range(3):  # the line between the centres as an axis
         along = builder.fmul(line[0], entries[0][j])
         for i in (1, 2):
             along = builder.fadd(along, builder.fmul(line[i], entries[i][j]))
-        across = builder.fadd(across, builder.fmul(_abs(builder, along), halves[j]))
+        across = builder.fadd(across, builder.fmul(_abs(builder, along), half_lengths[j]))
     root = builder.call(_square_root(builder.module), [square])
     gap = builder.fdiv(builder.fsub(square, across), root)
-    best = larger(builder.fmul(gap, _one(builder, probe, 18)))
-    best = larger(_along_direction(builder, centres, halves, slab, probe))
+    best = larger(builder.fmul(gap, _element(builder, probe, 18)))
+    best = larger(_along_direction(builder, centres, half_lengths, slab, probe))
     nothing = ir.Constant(_FLOATS, [float("inf")] * LANES)
-    return builder.select(_unused(builder, halves), nothing, best), square
+    return builder.select(_unused(builder, half_lengths), nothing, best), square
 
 
-def _unused(builder, halves):
-    return builder.fcmp_ordered("<", halves[0], ir.Constant(_FLOATS, [0.0] * LANES))
+def _unused(builder, half_lengths):
+    return builder.fcmp_ordered("<", half_lengths[0], ir.Constant(_FLOATS, [0.0] * LANES))
 
 
-def _along_direction(builder, centres, halves, slab, probe):
+def _along_direction(builder, centres, half_lengths, slab, probe):
     """Gaps along the direction given: what the boxes say, or their slabs and boxes together, whichever is more."""
-    direction = [_one(builder, probe, 19 + j) for j in range(3)]
-    plain = thin = _one(builder, probe, 22)
+    direction = [_element(builder, probe, 19 + j) for j in range(3)]
+    plain = thin = _element(builder, probe, 22)
     for j in range(3):
         plain = builder.fadd(plain, builder.fmul(direction[j], centres[j]))
-        plain = builder.fsub(plain, builder.fmul(_abs(builder, direction[j]), halves[j]))
+        plain = builder.fsub(plain, builder.fmul(_abs(builder, direction[j]), half_lengths[j]))
     normals = [_eight(builder, slab, j) for j in range(3)]
     share = builder.fmul(direction[0], normals[0])
     for j in (1, 2):
@@ -484,7 +493,7 @@ def _along_direction(builder, centres, halves, slab, probe):
     for j in range(3):
         rest = builder.fsub(direction[j], builder.fmul(share, normals[j]))
         thin = builder.fadd(thin, builder.fmul(rest, centres[j]))
-        thin = builder.fsub(thin, builder.fmul(_abs(builder, rest), halves[j]))
+        thin = builder.fsub(thin, builder.fmul(_abs(builder, rest), half_lengths[j]))
     return builder.select(builder.fcmp_ordered(">", thin, plain), thin, plain)
 
 

@@ -1,8 +1,8 @@
 """What kernels see of a buffer, for the compiler: an address, and elements of one kind behind it.
 
-A view indexes as it is told. Numba's arrays count an index below 0 from the end, so that wherever the compiler cannot see
-its sign each access compares, adds and selects; no kernel has such an index. And a view is two words where an array is
-seven: most kernels hand over the views of a pair, some fifty of those.
+A view indexes as it is told. Numba's arrays count an index below 0 from the end, so that wherever the compiler cannot
+see its sign each access compares, adds and selects; no kernel has such an index. And a view is two words where an array
+is seven: most kernels hand over the views of a pair, some fifty of those.
 """
 
 from __future__ import annotations

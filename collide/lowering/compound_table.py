@@ -15,9 +15,10 @@ from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
 from collide.lowering.shape_table import ShapeTable
 
-# Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest its
-# core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept over it.
-TURNED, MEASURE, CENTRE, BALL, SWEPT = 12, 13, 14, 17, 18
+# Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest
+# its core's points and its shift reach, summed; a ball in the body's frame that holds its core, and the radius swept
+# over it.
+TURNED, MEASURE, CENTRE, BALL, SWEPT_RADIUS = 12, 13, 14, 17, 18
 PART = 19
 # Doubles of a body: such a ball for all of it, the largest radius swept, and how far its bounded parts reach.
 BODY_CENTRE, BODY_BALL, BODY_SWEPT, BODY_REACH = 0, 3, 4, 5
@@ -46,7 +47,7 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     rows[:, :9], rows[:, 9:12] = X[:, :3, :3].reshape(-1, 9), X[:, :3, 3]
     rows[:, TURNED] = (X != np.eye(4)).any(axis=(1, 2))
     rows[:, MEASURE] = [packed.reach for packed, _ in parts] + np.abs(X[:, :3, 3]).sum(axis=1)
-    rows[:, SWEPT] = [packed.radius for packed, _ in parts]
+    rows[:, SWEPT_RADIUS] = [packed.radius for packed, _ in parts]
     balls = np.array([_ball_of(packed) for packed, _ in parts])
     rows[:, CENTRE : CENTRE + 3] = (X[:, :3, :3] @ balls[:, :3, None])[:, :, 0] + X[:, :3, 3]
     # A matrix that passes for a rotation may lengthen a little.
@@ -56,8 +57,8 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     body = np.zeros(BODY)
     body[BODY_CENTRE : BODY_CENTRE + 3] = middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
     body[BODY_BALL] = (np.sqrt(np.square(centres - middle).sum(axis=1)) + radii).max() * _OUTWARD
-    body[BODY_SWEPT] = rows[:, SWEPT].max()
-    reaches = np.sqrt(np.square(centres).sum(axis=1)) + radii + rows[:, SWEPT]
+    body[BODY_SWEPT] = rows[:, SWEPT_RADIUS].max()
+    reaches = np.sqrt(np.square(centres).sum(axis=1)) + radii + rows[:, SWEPT_RADIUS]
     body[BODY_REACH] = reaches[np.isfinite(reaches)].max(initial=0.0)
     return LaidOut(tuple(packed for packed, _ in parts), rows, body)
 
@@ -83,12 +84,12 @@ class UnionTable:
         self._bodies = np.ascontiguousarray(np.stack([self.first, self.counts], axis=1))
         self._balls = np.array([body.ball for body in bodies])
         #: Rows of parts that any two of these bodies take at most.
-        self.most = 2 * int(self.counts.max())
+        self.max_parts = 2 * int(self.counts.max())
         self.addresses = *self.table.addresses, *map(address_of, (self._parts, self._bodies, self._balls))
 
-    def plant(self, which: np.ndarray | None) -> None:
+    def build_trees(self, which: np.ndarray | None) -> None:
         """Have the support trees of these bodies; of bodies 0 and 1 without."""
-        if self.table.planted:
+        if self.table.is_built:
             return
         used = [0, 1] if which is None else np.unique(which).tolist()
-        self.table.plant(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))
+        self.table.build_trees(np.concatenate([np.arange(self.first[k], self.first[k] + self.counts[k]) for k in used]))

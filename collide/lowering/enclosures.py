@@ -2,7 +2,8 @@
 
 Cylinders, cones and ellipsoids are curved; the corners of an `HPolytope` may be rounded. A polytope around the shape
 and one inside it, both made of doubles, decide most questions without rounding: what does not meet the outer one does
-not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet (`facet_convex.py`).
+not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet
+(`facet_convex.py`).
 
 Both polytopes are right by more than rounding: rings and corners are drawn in or pushed out by 1e-12 of the size
 beyond what the geometry asks; that of a shape with planes is looked at in fractions.
@@ -27,7 +28,7 @@ from collide.shapes.shape import Shape
 #: Corners of the rings around an axis, and times the facets of an icosahedron are cut in four.
 _SIDES, _CUTS = 32, 2
 #: Beyond what the geometry asks, relative.
-_CLEAR = 1e-12
+_MARGIN = 1e-12
 
 
 class Enclosure(NamedTuple):
@@ -54,7 +55,9 @@ def enclosure_of(shape: Shape) -> Enclosure:
     except AttributeError:
         packed = convex_set_of(shape)
         outer, inner = _polytopes(shape, packed)
-        point = inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
+        point = (
+            inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
+        )
         made = Enclosure(_body(shape, outer, point), None if inner is None else _body(shape, inner, inner[:1]), packed)
         shape._store(_surface=made)
         return made
@@ -70,12 +73,12 @@ def _polytopes(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarr
     """Corners (n, 3) of a solid polytope around a shape, and of one within."""
     if packed.kind in (CYLINDER, CONE):
         radius, half = packed.params[:2].tolist()
-        return _turned(radius * (1 + _CLEAR) / np.cos(np.pi / _SIDES), half, packed.kind), _turned(
-            radius * (1 - _CLEAR), half, packed.kind
+        return _turned(radius * (1 + _MARGIN) / np.cos(np.pi / _SIDES), half, packed.kind), _turned(
+            radius * (1 - _MARGIN), half, packed.kind
         )
     if packed.kind == ELLIPSOID:
         points, least = _ball()
-        return points * ((1 + _CLEAR) / least) * packed.params[:3], points * (1 - _CLEAR) * packed.params[:3]
+        return points * ((1 + _MARGIN) / least) * packed.params[:3], points * (1 - _MARGIN) * packed.params[:3]
     return _around(packed), _within(shape, packed)
 
 
@@ -93,7 +96,9 @@ def _ball() -> tuple[np.ndarray, float]:
     points = _unit(np.array([np.roll(p, k) for p in corners for k in range(3)]))
     for _ in range(_CUTS):
         facets = convex_hull(points).facets
-        edges = np.unique(np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1), axis=0)
+        edges = np.unique(
+            np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1), axis=0
+        )
         points = np.vstack([points, _unit(points[edges].sum(axis=1))])
     a, b, c = points[convex_hull(points).facets].transpose(1, 0, 2)
     normals = _unit(np.cross(b - a, c - a))
@@ -129,9 +134,9 @@ def _within(shape: Shape, packed: PackedConvex) -> np.ndarray | None:
 def _in_all(shape: HPolytope, points: np.ndarray) -> bool:
     """Whether points are in all half-spaces: by doubles where these tell, in fractions where they do not."""
     terms = shape.normals[:, None] * points[None]
-    clear = terms.sum(axis=2) + 2.0**-48 * np.abs(terms).sum(axis=2) <= shape.offsets[:, None] - 2.0**-1000
+    inside = terms.sum(axis=2) + 2.0**-48 * np.abs(terms).sum(axis=2) <= shape.offsets[:, None] - 2.0**-1000
     return all(
         sum(Fraction(a) * Fraction(x) for a, x in zip(shape.normals[i].tolist(), points[j].tolist()))
         <= Fraction(float(shape.offsets[i]))
-        for i, j in np.argwhere(~clear).tolist()
+        for i, j in np.argwhere(~inside).tolist()
     )

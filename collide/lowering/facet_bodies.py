@@ -94,7 +94,9 @@ def facet_body(shape, caller: str) -> Body:
     Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}")
+        raise InvalidArgument(
+            f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
+        )
     name = type(shape).__name__
     if is_halfspace(shape):
         raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
@@ -107,7 +109,9 @@ def facet_body(shape, caller: str) -> Body:
         )
     body = body_of(shape)
     if body.radius > 0.0:
-        raise UnsupportedQuery(f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in")
+        raise UnsupportedQuery(
+            f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in"
+        )
     return body
 
 

@@ -34,7 +34,8 @@ class FacetTable:
         self.numbers[:k, REACH] = np.sqrt(np.square(corners).sum(axis=2).max(axis=1)) * (1 + 1e-15)
         coarse = coarse_address(packed)
         self.ints[k] = (
-            packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest, 1,
+            packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest,
+            1,
             0, coarse,
         )  # fmt: skip
         self.numbers[k, :PARAMS] = packed.radius, packed.reach, packed.slop
@@ -42,5 +43,5 @@ class FacetTable:
         self.packed = [_FACET] * k + [packed]
         self.addresses = address_of(self.ints), address_of(self.numbers)
 
-    def plant(self, rows: np.ndarray) -> None:
+    def build_trees(self, rows: np.ndarray) -> None:
         """Shapes asked about here are scanned: none is large enough for a support tree."""

@@ -25,7 +25,7 @@ BLOCK = 8
 
 
 class PreparedStructures:
-    """What `prepared_structures.py` makes of the points when a query first needs it; shared by all copies of a packed set.
+    """What `prepared_structures.py` makes of the points when first needed; shared by all copies of a packed set.
 
     with_tree : whether a support tree may be made, if the points are many.   made : by name, what has been made.
     """
@@ -99,19 +99,30 @@ def _packed(kind, radius, reach, slop, params, points, coordinates, with_tree=Fa
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
     lowest = int(lowest_exponents(points.ravel())) if len(points) else NO_BITS
-    return PackedConvex(kind, radius, reach, slop, _frozen(row), points, coordinates, PreparedStructures(with_tree), lowest, digest.digest())
+    return PackedConvex(
+        kind,
+        radius,
+        reach,
+        slop,
+        _frozen(row),
+        points,
+        coordinates,
+        PreparedStructures(with_tree),
+        lowest,
+        digest.digest(),
+    )
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:
     """An empty array of doubles that begins where a cache line does.
 
-    A block of eight is then read from one line. Where two are touched, as numpy's own arrays mostly have it, a scan of 128
-    points takes a quarter longer.
+    A block of eight is then read from one line. Where two are touched, as numpy's own arrays mostly have it, a scan of
+    128 points takes a quarter longer.
     """
     size = math.prod(shape)
-    room = np.empty(size + BLOCK - 1)
-    first = -(room.ctypes.data // room.itemsize) % BLOCK
-    return room[first : first + size].reshape(shape)
+    block = np.empty(size + BLOCK - 1)
+    first = -(block.ctypes.data // block.itemsize) % BLOCK
+    return block[first : first + size].reshape(shape)
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

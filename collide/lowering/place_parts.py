@@ -31,7 +31,8 @@ BALL_MARGIN = 2.0**-40
 def place_part(poses, at, body, parts, part, terms_at):
     """Row ``at`` becomes where a part stands; rows are numbers of doubles, ``part`` likewise in ``parts``.
 
-    body : the row of the body's pose, its stretch known.   terms_at : 0, or where the row's terms go: their low parts are
+    body : the row of the body's pose, its stretch known.
+    terms_at : 0, or where the row's terms go: their low parts are
         written.
     """
     poses[at + POSE_SLOP] = 0.0
@@ -88,9 +89,9 @@ def _are_safe(poses, body, parts, part):
     for i in range(3):
         for j in range(4):
             for k in range(3):
-                left = poses[body + 3 * i + k]
+                remaining = poses[body + 3 * i + k]
                 factor = parts[part + (3 * k + j if j < 3 else 9 + k)]
-                if not (abs(left * factor) > SAFE_PRODUCT or left == 0.0 or factor == 0.0):
+                if not (abs(remaining * factor) > SAFE_PRODUCT or remaining == 0.0 or factor == 0.0):
                     return False
     return True
 

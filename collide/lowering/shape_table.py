@@ -21,7 +21,8 @@ INTS = 8
 RADIUS, REACH, SLOP, PARAMS = range(4)
 NUMBERS = 7
 # One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), the row of the exact terms where R and
-# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel asks.
+# t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel
+# asks.
 POSE = 15
 POSE_SLOP, POSE_TERMS, POSE_STRETCH = 12, 13, 14
 #: Doubles whose sum is one entry of a product of two poses: three products, each in two parts, and a shift.
@@ -49,7 +50,16 @@ class ShapeTable:
         self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
         self.numbers = np.zeros((len(packed), NUMBERS))
         for k, p in enumerate(packed):
-            self.ints[k] = p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest, 0, 0, coarse_address(p)
+            self.ints[k] = (
+                p.kind,
+                len(p.points),
+                p.coordinates.shape[1],
+                address_of(p.coordinates),
+                p.lowest,
+                0,
+                0,
+                coarse_address(p),
+            )
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
         order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
@@ -58,11 +68,11 @@ class ShapeTable:
         self._without_tree = {k for k, p in enumerate(packed) if may_have_tree(p)}
 
     @property
-    def planted(self) -> bool:
+    def is_built(self) -> bool:
         """Whether no support tree is still to be made."""
         return not self._without_tree
 
-    def plant(self, rows: np.ndarray) -> None:
+    def build_trees(self, rows: np.ndarray) -> None:
         """Have the support trees of these rows, so far as their shapes are large enough for one."""
         if self._without_tree:
             for k in self._without_tree.intersection(np.unique(rows).tolist()):
@@ -84,12 +94,12 @@ class PoseTable(NamedTuple):
     def __len__(self) -> int:
         return len(self.rows)
 
-    def followed_by(self, other: PoseTable) -> PoseTable:
+    def followed_by(self, following: PoseTable) -> PoseTable:
         """One table of both, this one's parts first."""
-        rows = np.concatenate([self.rows, other.rows])
+        rows = np.concatenate([self.rows, following.rows])
         moved = rows[len(self) :, POSE_TERMS]
         moved[moved >= 0.0] += len(self.terms)
-        return PoseTable(rows, np.concatenate([self.terms, other.terms]))
+        return PoseTable(rows, np.concatenate([self.terms, following.terms]))
 
     def exact(self, part: int) -> list[Fraction]:
         """The 12 entries of a part's pose without rounding."""
@@ -117,24 +127,24 @@ def pose_table(
     rows[:, 9:12] = p_WB
     rows[:, POSE_SLOP] = 0.0
     rows[:, POSE_TERMS] = rows[:, POSE_STRETCH] = -1.0
-    own = has_own_pose(X_BP) if has_pose is None else has_pose
-    if not own.any():
+    needs_pose = has_own_pose(X_BP) if has_pose is None else has_pose
+    if not needs_pose.any():
         return PoseTable(rows, NO_TERMS)
     identity = np.eye(4)
-    unmoved = own & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
+    unmoved = needs_pose & (X_WB == identity).all(axis=(1, 2))  # a body at the origin: its parts' own poses
     rows[unmoved, :9], rows[unmoved, 9:12] = X_BP[unmoved, :3, :3].reshape(-1, 9), X_BP[unmoved, :3, 3]
-    own = np.flatnonzero(own & ~unmoved)
-    if not len(own):
+    needs_pose = np.flatnonzero(needs_pose & ~unmoved)
+    if not len(needs_pose):
         return PoseTable(rows, NO_TERMS)
-    R, p, X = R_WB[own], p_WB[own], X_BP[own]
-    rows[own, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
-    rows[own, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
+    R, p, X = R_WB[needs_pose], p_WB[needs_pose], X_BP[needs_pose]
+    rows[needs_pose, :9] = _product(R, X[:, :3, :3]).reshape(-1, 9)
+    rows[needs_pose, 9:12] = _product(R, X[:, :3, 3:])[:, :, 0] + p
     stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
-    parts = reach[own] + np.abs(X[:, :3, 3]).sum(axis=1)
-    rows[own, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
+    parts = reach[needs_pose] + np.abs(X[:, :3, 3]).sum(axis=1)
+    rows[needs_pose, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
     terms, exact = _terms(R, p, X)
-    rows[own[exact], POSE_TERMS] = np.arange(int(exact.sum()))
-    terms, rounded = terms[exact], rows[own[exact], :12]
+    rows[needs_pose[exact], POSE_TERMS] = np.arange(int(exact.sum()))
+    terms, rounded = terms[exact], rows[needs_pose[exact], :12]
     return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
 
 
@@ -148,8 +158,8 @@ def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:
     total, rest = np.zeros_like(rounded), np.zeros_like(rounded)
     for j in range(TERMS):
         before, total = total, total + terms[:, :, j]
-        other = total - before
-        rest += (before - (total - other)) + (terms[:, :, j] - other)
+        low_term = total - before
+        rest += (before - (total - low_term)) + (terms[:, :, j] - low_term)
     return rest + (total - rounded)
 
 
@@ -170,12 +180,12 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             if k == 3:
                 high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
             else:
-                left, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
-                high, low = _two_products(left, factor)
-                exact &= ((np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)).all(axis=1)
-            sum_, other = total + high, total
-            back = sum_ - other
-            lost = (other - (sum_ - back)) + (high - back)
+                factor_a, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
+                high, low = _two_products(factor_a, factor)
+                exact &= ((np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)).all(axis=1)
+            sum_, low_term = total + high, total
+            back = sum_ - low_term
+            lost = (low_term - (sum_ - back)) + (high - back)
             exact &= ((low == 0.0) & (lost == 0.0)).all(axis=1)
             total = sum_
         out[:, :3, j] = total
@@ -202,10 +212,10 @@ def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.
     exact = np.ones(k, dtype=bool)
     for j in range(3):
         for target, factor in ((rotation, X[:, None, j, :3]), (shift, X[:, j, 3][:, None])):
-            left = R[:, :, j, None] if target is rotation else R[:, :, j]
-            high, low = _two_products(left, factor)
+            factor_a = R[:, :, j, None] if target is rotation else R[:, :, j]
+            high, low = _two_products(factor_a, factor)
             target[..., 2 * j], target[..., 2 * j + 1] = high, low
-            safe = (np.abs(high) > SAFE_PRODUCT) | (left == 0.0) | (factor == 0.0)
+            safe = (np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)
             exact &= safe.reshape(k, -1).all(axis=1)
     return terms, exact
 

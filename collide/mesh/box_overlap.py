@@ -23,8 +23,8 @@ PROBE = 17
 #: A triangle as probe has three half-spaces more that hold it, one an edge: the outward direction in the node's frame
 #: (3) and how far its origin is out (1), less rounding.
 PRISM = PROBE + 12
-#: For distances, from 12 on: the least lengths in the world of a gap of 1 along the axes of the node's frame (3), of the
-#: probe's (3) and along any line in it (1); a direction in the node's frame (3) and its gap from the probe to the
+#: For distances, from 12 on: the least lengths in the world of a gap of 1 along the axes of the node's frame (3), of
+#: the probe's (3) and along any line in it (1); a direction in the node's frame (3) and its gap from the probe to the
 #: node's middle (1).
 NEAR_PROBE = 23
 
@@ -116,8 +116,8 @@ else:
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
 #: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.
-#: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0 where
-#: no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
+#: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0
+#: where no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",

@@ -120,7 +120,9 @@ def _exact_signs(vertices, corners, row, direction) -> tuple[np.ndarray, np.ndar
     away = [exact[ids[: -len(row)].reshape(-1, 3)[:, k]] * len(row) - middle for k in range(3)]
     normals = [np.cross(away[k], away[(k + 1) % 3]) for k in range(3)]
     along = np.array(direction, dtype=object)
-    values = np.stack([(a * n).sum(axis=1) for a, n in zip((along, along, along, away[0]), (*normals, normals[1]))], axis=1)
+    values = np.stack(
+        [(a * n).sum(axis=1) for a, n in zip((along, along, along, away[0]), (*normals, normals[1]))], axis=1
+    )
     signs = (values > 0).astype(np.int8) - (values < 0).astype(np.int8)
     return signs[:, :3], signs[:, 3]
 
@@ -146,7 +148,7 @@ def _widened(a, slack):
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64)")
 def cast_ray(points_at, n, corners_at, n_facets, ray_at, total_at, ambiguous_at):
-    """Facets that a ray certainly passes, counted +1 outwards and −1 inwards; returns how many are left open, and which.
+    """Facets that a ray certainly passes, +1 outwards and −1 inwards; returns how many are undecided, and which.
 
     ray : eight doubles: the sum of some points, the direction, how many points, and how far that sum may be off.
     total : one int64 out.   ambiguous : (n_facets,) int32 out.

@@ -52,7 +52,7 @@ PROMISE_CURVED = 2.0**-26
 TOLERANCE_CURVED = 2.0**-36
 
 #: A tetrahedron that holds the origin this deep, in units of S, is a seed for EPA.
-ROOMY = 2.0**-10
+WELL_CONDITIONED = 2.0**-10
 
 #: Rounds after which GJK hands over the bracket it has.
 GJK_ROUNDS = 128

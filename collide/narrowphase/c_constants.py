@@ -1,4 +1,4 @@
-"""How much room kernels take and where things stand in it, for callers in C, who cannot read Python's constants."""
+"""Sizes of the kernels' workspaces and layouts, for callers in C, who cannot read Python's constants."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ from collide.support.coarse_points import COARSE
 #: Doubles of a walk along meshes: of whichever takes most.
 _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside))
 
-#: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of box-trees, what is
-#: found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
-_MEASURES = (
-    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS, WORK,
+#: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
+#: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
+_CONSTANTS = (
+    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS,
+    WORK,
     FACET, PLANE, STATE, STACK,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
@@ -42,12 +43,12 @@ _MEASURES = (
 
 
 @entry("int64(int64, int64)")
-def tell_measures(out_at, n):
-    """Write the first n of `_MEASURES`; returns how many there are."""
+def write_constants(out_at, n):
+    """Write the first n of `_CONSTANTS`; returns how many there are."""
     out = view_i64(out_at, n)
     at = 0
-    for measure in _MEASURES:
+    for constant in _CONSTANTS:
         if at < n:
-            out[at] = measure
+            out[at] = constant
         at += 1
     return at

@@ -48,7 +48,8 @@ def segment_cores(pair, work, error):
 
 @kernel
 def _keep_nearer(points, s, t, weights, best):
-    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best square so far, which is returned."""
+    """Keep segment parameters s, t if a(s) − b(t) is nearer the origin than the best square so far, which is
+    returned."""
     w00 = (1.0 - s) * (1.0 - t)
     w10 = s * (1.0 - t)
     w01 = (1.0 - s) * t
@@ -116,8 +117,8 @@ def _best_bound(points, weights, u, v, n):
     # The same direction to full precision, where the gap is tiny beside the segments: from the
     # segments themselves (see `simplex.across_simplex`).
     lower = _raised_bound(points, weights, lower, neg(n) if dot(n, nearest) < 0.0 else n)
-    for turn in range(2):
-        e = u if turn == 0 else v
+    for k in range(2):
+        e = u if k == 0 else v
         square = dot(e, e)
         if square > 0.0:
             d = nearest

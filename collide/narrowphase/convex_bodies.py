@@ -1,7 +1,7 @@
 """Bodies of convex parts at many poses: one convex set each, or several.
 
-Pairs of convex sets in their own frames, by far the most, go through `pose_batches.py` as they are; bodies of several parts
-are taken apart and put together again by `composite/`.
+Pairs of convex sets in their own frames, by far the most, go through `pose_batches.py` as they are; bodies of several
+parts are taken apart and put together again by `composite/`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class Question(NamedTuple):
     limit : how far apart bodies may be for their distance to matter [m].
     depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
     check : refuse matrices that are no rotation.
-    axes : (n, 3) for booleans of convex sets: an axis to try first, pose by pose, replaced by one that parts the bodies.
+    axes : (n, 3) for booleans of convex sets: an axis to try first, pose by pose, replaced by one that parts the
+        bodies.
     """
 
     boolean: bool
@@ -49,7 +50,9 @@ def convex_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.nd
     return out
 
 
-def convex_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float = math.inf, depths: bool = True) -> np.ndarray:
+def convex_rows(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float = math.inf, depths: bool = True
+) -> np.ndarray:
     """Rows of `PAIR_DTYPE` of two bodies of convex parts at checked poses (n, 4, 4) or (1, 4, 4)."""
     out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
     answer_convex(out, A, B, X_WA, X_WB, Question(False, limit, depths))
@@ -57,7 +60,8 @@ def convex_rows(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit
 
 
 def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    """Answer pairs of bodies of convex parts; False where a pose is none, and ``out`` is to be zeroed before it is used again.
+    """Answer pairs of bodies of convex parts; False where a pose is none, and ``out`` is to be zeroed before it is used
+    again.
 
     out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
     A, B : two shapes, or shapes `Picked` from one set pose by pose.
@@ -80,7 +84,11 @@ def prepare_convex(A: Shape, B: Shape):
 
 
 def _one_part(shapes) -> bool:
-    return bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all()) if isinstance(shapes, Picked) else is_single_convex(shapes)
+    return (
+        bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
+        if isinstance(shapes, Picked)
+        else is_single_convex(shapes)
+    )
 
 
 def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:

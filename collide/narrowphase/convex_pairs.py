@@ -18,8 +18,8 @@ from collide.narrowphase.gap.gap_queue import KINDS, clear_queue, refine_queued
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import halfspace_convex
 from collide.narrowphase.halfspace_halfspace import halfspace_halfspace
-from collide.narrowphase.pair_query import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
-from collide.narrowphase.posed_pair import ordered_pair
+from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
+from collide.narrowphase.posed_pair import Tables, ordered_pair
 from collide.narrowphase.rows import COUNT, HIT, HOW, ROW, VERTICES_A, VERTICES_B, clear_vertices, view_row
 from collide.results import REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
@@ -34,12 +34,14 @@ SIGNATURE = (
 
 @entry(SIGNATURE)
 def answer_pairs(
-    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit, rows_at,
+    ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit,
+    rows_at,
     doubles_at, integers_at,
 ):  # fmt: skip
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
-    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.   shape_of : a shape row a part.
+    ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.
+    shape_of : a shape row a part.
     pairs : two part numbers a pair.
     boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
         normal that is there is the axis to try first.
@@ -57,23 +59,25 @@ def answer_pairs(
     n_together = 1 if stop_at_hit else LANES
     has_portals = False
     if not depths and not stop_at_hit:
+        tables = Tables(ints_at, numbers_at, poses_at, shape_of_at)
         n_small = answer_small_hulls(
-            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, work.queue_at,
-            work.queue_integers_at,
-        )  # fmt: skip
+            tables, pairs_at, n_pairs, boolean, limit, rows_at, work.queue_at, work.queue_integers_at
+        )
         has_portals = n_small > 0
     clear_queue(work.queue_integers_at)
-    for turn in range(n_pairs if boolean else n_pairs + KINDS):
-        kind = turn - n_pairs
-        if has_portals and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HOW] != UNDECIDED:
+    for step in range(n_pairs if boolean else n_pairs + KINDS):
+        kind = step - n_pairs
+        if has_portals and step < n_pairs and view_u8(rows_at + ROW * step, ROW)[HOW] != UNDECIDED:
             continue
-        if turn < n_pairs:
-            ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * turn], pairs[2 * turn + 1])
-            kind = _answer(ordered, query, view_row(rows_at + ROW * turn), turn, has_portals, work)
-        if kind >= 0 and n_queued[kind] >= (n_together if turn < n_pairs else 1):
-            refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, work.queue_at, work.queue_integers_at)
-        if stop_at_hit and turn < n_pairs and view_u8(rows_at + ROW * turn, ROW)[HIT] == 1:
-            return turn + 1
+        if step < n_pairs:
+            ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * step], pairs[2 * step + 1])
+            kind = _answer(ordered, query, view_row(rows_at + ROW * step), step, has_portals, work)
+        if kind >= 0 and n_queued[kind] >= (n_together if step < n_pairs else 1):
+            refine_queued(
+                ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, work.queue_at, work.queue_integers_at
+            )
+        if stop_at_hit and step < n_pairs and view_u8(rows_at + ROW * step, ROW)[HIT] == 1:
+            return step + 1
     return n_pairs
 
 

@@ -46,12 +46,13 @@ def run_pairs(
 ) -> np.ndarray:
     """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
 
-    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.   depths : whether it is wanted how deep overlaps are.
+    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.
+    depths : whether it is wanted how deep overlaps are.
     Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
     rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-    table.plant(shape_of[pairs])
+    table.build_trees(shape_of[pairs])
     tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
     depths = depths and not boolean
     done = 0
@@ -70,15 +71,26 @@ def run_pairs(
     return rows[:done]
 
 
-def settle_proposals(table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray) -> None:
+def settle_proposals(
+    table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray
+) -> None:
     """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
 
-    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet are told
-    to, without a depth.
+    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet
+    are told to, without a depth.
     """
     rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
     _of_thread.space.integers[REQUESTS_AT] = 0
-    _finish(rows, np.ascontiguousarray(pairs, dtype=np.int64), table, poses, shape_of, boolean=False, limit=np.inf, depths=False)
+    _finish(
+        rows,
+        np.ascontiguousarray(pairs, dtype=np.int64),
+        table,
+        poses,
+        shape_of,
+        boolean=False,
+        limit=np.inf,
+        depths=False,
+    )
 
 
 def _finish(
@@ -93,7 +105,8 @@ def _finish(
         rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
     if (rows["how"] == UNDECIDED).any():
         settle_rows(
-            rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit, digits=_of_thread.space.digits,
+            rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit,
+            digits=_of_thread.space.digits,
             requests_at=_of_thread.space.addresses[1] + 8 * REQUESTS_AT,
         )  # fmt: skip
         if not distrust_doubles:
@@ -131,20 +144,20 @@ def run_poses(
     depths : of rows: whether it is wanted how deep overlaps are.
     """
     n = len(out)
-    table.plant(np.arange(2) if which is None else which)
+    table.build_trees(np.arange(2) if which is None else which)
     space = _of_thread.space
     header = space.header_of(table)
     done = 0
     while done < n:
-        said = answer_poses(
+        status = answer_poses(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
             0 if axes is None else address_of(axes), address_of(out),
         )  # fmt: skip
-        if said == BAD_POSE:
+        if status == BAD_POSE:
             return False
         done = int(header[ANSWERED])
-        if said:
+        if status:
             start = done - 1 - (done - 1) % BLOCK
             rows = space.rows[: done - start] if boolean else out[start:done]
             _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)
@@ -158,7 +171,9 @@ def scratch() -> tuple[int, int]:
     return _of_thread.space.addresses
 
 
-def settle_open(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool) -> None:
+def settle_open(
+    rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
+) -> None:
     """Settle in place what doubles left open of rows that `answer_pairs` has just made with this thread's workspace."""
     _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
 
@@ -209,8 +224,8 @@ def single_calls_are_safe() -> bool:
 
 @cache
 def _space_of_single_calls() -> _Workspace:
-    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either is
-    good as long as it is held."""
+    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
+    is good as long as it is held."""
     return _Workspace()
 
 
@@ -221,7 +236,7 @@ class SinglePair:
     """
 
     def __init__(self, table: ShapeTable):
-        table.plant(np.arange(2))
+        table.build_trees(np.arange(2))
         self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
         header = self._space.header_of(table)
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)

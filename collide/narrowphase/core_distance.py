@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.narrowphase.bounds import GJK_ROUNDS, PROMISE_DEPTH, ROOMY, TOLERANCE_CURVED
-from collide.narrowphase.epa.expand_polytope import FLAT, EpaResult, epa, facet_of, height_over
+from collide.narrowphase.bounds import GJK_ROUNDS, PROMISE_DEPTH, TOLERANCE_CURVED, WELL_CONDITIONED
+from collide.narrowphase.epa.expand_polytope import FLAT, EpaResult, Goal, Seed, epa, facet_of, height_over
 from collide.narrowphase.epa.origin_foot import load_facet, weigh_nearest, weigh_origin
 from collide.narrowphase.epa.polytope_surface import number, surface_at
 from collide.narrowphase.epa.refine_depth import refine
@@ -28,7 +28,7 @@ _MISS_OF_WIDTH = 2.0**-10
 _WELL_INSIDE = 2.0**-10
 #: With more vertices than this in two cores, a better seed for EPA than GJK's tetrahedron is worth its support points.
 _MAX_VERTICES_FOR_GJK_SEED = 48
-#: How often EPA begins at most, where there are so many vertices.
+#: How often EPA begins at most, where there are so wants_cap vertices.
 _MAX_STARTS = 4
 
 
@@ -39,7 +39,7 @@ class CoreDistance(NamedTuple):
     lower, upper : bounds of the signed distance.
     shallowest, deepest : proven bracket of the depth by `refine`, or (−∞, ∞).
     nhat : unit vector from A towards B.
-    n_points : of the deciding feature in the workspace.   n_vertices : how many of its vertex pairs the row names.
+    n_points : of the deciding feature in the workspace.   n_vertices : how wants_cap of its vertex pairs the row names.
     iterations : of GJK, plus 65536 times those of EPA.
     """
 
@@ -60,36 +60,45 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
 
     radius : sum of the radii.   error : of a bound.   curved : a core is no polytope.   n_start : as of `gjk`.
     """
-    pair, size = ordered.pair, ordered.size
+    pair = ordered.pair
     points, weights, ids = work.points, work.weights, work.ids
     exact_numbers = ordered.exact_numbers and not curved
-    found = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)
-    n = found.n_points
+    run = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)
+    n = run.n_points
     distance = norm(vec3_at(weights, NEAREST_POINT))
-    if found.status == NEAREST or found.status == APART:
+    if run.status == NEAREST or run.status == APART:
         nhat = neg(vec3_at(weights, AXIS))
-        return CoreDistance(-distance, found.lower, distance, -math.inf, math.inf, nhat, n, n, found.iterations)
-    enclosed = found.status == ENCLOSED
-    upper = -found.clearance if enclosed else distance
+        return CoreDistance(-distance, run.lower, distance, -math.inf, math.inf, nhat, n, n, run.iterations)
+    enclosed = run.status == ENCLOSED
+    upper = -run.clearance if enclosed else distance
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if not query.depths and (upper + error < radius or exact_numbers):
         if enclosed and not query.boolean:
             miss, extent = weigh_enclosed(points, weights)
             if not miss <= _NEAR_MISS * extent:
                 nearest_of_all(points, 4, weights, 15)
-        return _common_point(upper, n, found.iterations)
+        return _common_point(upper, n, run.iterations)
+    return _by_epa(ordered, query, work, run, upper, radius, error, curved)
+
+
+@kernel(inline=True)
+def _by_epa(ordered, query, work, run, upper, radius, error, curved):
+    """The `CoreDistance` of cores that GJK could not separate.   run : its result.   upper : of the signed distance."""
+    pair, size = ordered.pair, ordered.size
+    points, weights, ids = work.points, work.weights, work.ids
+    exact_numbers = ordered.exact_numbers and not curved
+    enclosed = run.status == ENCLOSED
+    n = run.n_points
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     polytope = surface_at(work.epa_at, work.epa_integers_at)
-    many = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
-    well_conditioned = enclosed and found.clearance > ROOMY * size
-    iterations = found.iterations
+    wants_cap = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
+    well_conditioned = enclosed and run.clearance > WELL_CONDITIONED * size
+    iterations = run.iterations
     shallowest, deepest = -math.inf, math.inf
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
-        result = epa(
-            pair, polytope, points, ids, enclosed and start == 0, well_conditioned, many, start, not query.depths, size, error,
-            tolerance,
-        )  # fmt: skip
+        seed = Seed(points, ids, enclosed and start == 0, well_conditioned, wants_cap, start)
+        result = epa(pair, polytope, seed, Goal(not query.depths, size, error, tolerance))
         iterations += 65536 * max(result.n_vertices - 4, 0)
         if result.status == FLAT:
             if result.n_vertices == 3 and not curved:  # what spans it: for the exact stage, which may prove it flat
@@ -102,12 +111,15 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
         lower = -result.depth  # the depth of a last facet is no bound: what it is level with may lie beyond it
         if not exact_numbers or not query.depths or _is_final(result, size, error, radius):
             break
-        refined = refine(pair, query.terms_at, work, polytope, result.n_facets, result.n_vertices, size, ordered.slop, error)
+        refined = refine(
+            pair, query.terms_at, work, polytope, result.n_facets, result.n_vertices, size, ordered.slop, error
+        )
         if refined.sound:
             shallowest, deepest = refined.lower, refined.upper
         result = _refined_result(result, refined, error)
         start += 1
-        if refined.sound or not many or start == _MAX_STARTS:  # few vertices: `exact_depth.py` tries all planes instead
+        # few vertices: `exact_depth.py` tries all planes instead
+        if refined.sound or not wants_cap or start == _MAX_STARTS:
             break
     _weigh_foot(work, polytope, result, query.depths, not enclosed, curved, tolerance, size, error)
     if result.clearance > error:
@@ -140,7 +152,8 @@ def _refined_result(result, refined, error):
     """
     if refined.sound and refined.upper <= result.depth + 2.0 * error:
         return EpaResult(
-            result.status, refined.depth, result.clearance, refined.nhat, refined.facet, result.n_vertices, refined.n_facets
+            result.status, refined.depth, result.clearance, refined.nhat, refined.facet, result.n_vertices,
+            refined.n_facets
         )
     return EpaResult(
         result.status, result.depth, result.clearance, result.nhat, result.facet, result.n_vertices, refined.n_facets
@@ -161,8 +174,8 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, foot)) <= slack):
         facet = facet_of(polytope, result.n_facets, facet, foot, slack)
         load_facet(polytope, facet, work.points, work.ids, work.weights, with_ids, foot)
-    # The surface of curved cores keeps a width. Where many facets are as near, slivers mostly, none need hold the foot.
-    # Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
+    # The surface of curved cores keeps a width. Where wants_cap facets are as near, slivers mostly, none need hold the
+    # foot. Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
     tolerated = _NEAR_MISS * size
     if curved:
         width = result.depth - result.clearance

@@ -1,10 +1,11 @@
 """THE table: which method answers which pair of shapes. Nothing else decides it.
 
-`Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it is
-written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the file
-that it names; `pair_queries.py` says with which function each public question goes there.
+`Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it
+is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the
+file that it names; `pair_queries.py` says with which function each public question goes there.
 
-To add a pair or a kind: a row here, its kind in lowering, its functions in `pair_queries.py`; a test asks for all three.
+To add a pair or a kind: a row here, its kind in lowering, its functions in `pair_queries.py`; a test asks for all
+three.
 """
 
 from __future__ import annotations
@@ -18,15 +19,24 @@ class Method(Enum):
     """How a pair is answered: (name of its file or files in this room, what happens there)."""
 
     #: The four first are those of kernels, which find them in `convex_methods.py` by the packed sets.
-    CLOSED = "capsule_capsule", "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment"
+    CLOSED = (
+        "capsule_capsule",
+        "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment",
+    )
     PLANE = "halfspace_convex", "closed form: one support query against the plane"
     PLANES = "halfspace_convex", "two planes: they meet unless exactly opposite"
-    CONVEX = "gjk/gjk", "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open"
+    CONVEX = (
+        "gjk/gjk",
+        "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open",
+    )
     FACETS = "facets/mesh_rows", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
     HULL = "facets/mesh_rows", "the hull of the mesh answers against the plane"
     PARTS = "composite/composite", "pairs of convex parts, culled by balls, combined to one row"
-    MESH_PARTS = "composite/composite_meshes", "pairs of parts of which some are meshes, culled by boxes, combined to one row"
+    MESH_PARTS = (
+        "composite/composite_meshes",
+        "pairs of parts of which some are meshes, culled by boxes, combined to one row",
+    )
 
     @property
     def file(self) -> str:
@@ -45,7 +55,8 @@ U, M = Method.PARTS, Method.MESH_PARTS
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 # fmt: off
 _UPPER_HALF = (
-    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  mesh compound
+    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  mesh
+    # compound
     (Kind.SPHERE,       (C,     C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
     (Kind.CAPSULE,      (       C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
     (Kind.POLYTOPE,     (                G,        G,       G,        G,    G,         H,         F,    U,        M)),
@@ -66,7 +77,10 @@ TABLE: tuple[tuple[Method, ...], ...] = tuple(
 )
 #: Questions that a method does not answer, and why, in the words of the error.
 REFUSED: dict[tuple[Method, str], str] = {
-    (Method.PLANES, "distance"): "their overlap has no end, so no translation of finite length separates them; collide() still answers",
+    (
+        Method.PLANES,
+        "distance",
+    ): "their overlap has no end, so no translation of finite length separates them; collide() still answers"
 }
 
 

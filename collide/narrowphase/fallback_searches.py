@@ -1,8 +1,9 @@
 """Rows that one search of the narrowphase leaves open, and another one may settle.
 
-A boolean, a gap and a depth are searched for differently, and where curved shapes or rounded corners are within rounding of
-touching, each proves some signs that the others do not (integers settle those of polytopes). What is proven is proven: an
-open row asks the other two searches, so that `collide` and `distance`, signed or not, never contradict each other.
+A boolean, a gap and a depth are searched for differently, and where curved shapes or rounded corners are within
+rounding of touching, each proves some signs that the others do not (integers settle those of polytopes). What is proven
+is proven: an open row asks the other two searches, so that `collide` and `distance`, signed or not, never contradict
+each other.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ _SIGN, _DEPTH, _GAP = (True, False), (False, True), (False, False)
 
 
 def settle_by_other_searches(
-    rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *, boolean: bool,
+    rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *,
+    boolean: bool,
     depths: bool, limit: float,
 ) -> None:  # fmt: skip
     """Settle in place what is still open; arguments as of `run_pairs`.
@@ -50,45 +52,46 @@ def settle_by_other_searches(
         n = len(open_rows)
         if search == already_run or n == 0:
             continue
-        found, asked = np.zeros(n, dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[open_rows])
-        answer_pairs(*tables, address_of(asked), n, *search, False, limit, address_of(found), *workspace)
-        take_proven(address_of(rows), address_of(open_rows), address_of(found), n, search == _SIGN, limit)
+        results, asked = np.zeros(n, dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[open_rows])
+        answer_pairs(*tables, address_of(asked), n, *search, False, limit, address_of(results), *workspace)
+        take_proven(address_of(rows), address_of(open_rows), address_of(results), n, search == _SIGN, limit)
 
 
 @entry("int64(int64, int64, int64, int64, boolean, float64)")
-def take_proven(rows_at, open_at, found_at, n, sign, limit):
+def take_proven(rows_at, open_at, results_at, n, sign, limit):
     """Take over what another search has proven of n open rows; returns how many it has.
 
-    open : int64, the numbers of the open rows.   found : rows of `answer_pairs`.   sign : the search was for the sign alone.
+    open : int64, the numbers of the open rows.   results : rows of `answer_pairs`.
+    sign : the search was for the sign alone.
     """
     open_rows = view_i64(open_at, n)
     n_proven = 0
     for k in range(n):
-        found_row_at = found_at + ROW * k
-        found = view_row(found_row_at)
-        if is_undecided(found):
+        result_at = results_at + ROW * k
+        result = view_row(result_at)
+        if is_undecided(result):
             continue
         n_proven += 1
         row_at = rows_at + ROW * open_rows[k]
-        if sign or found.flags[HIT] != 0:
-            _take_sign(view_row(row_at), found, limit)
+        if sign or result.flags[HIT] != 0:
+            _take_sign(view_row(row_at), result, limit)
         else:  # a gap, with all that is known of one
-            source, target = view_i64(found_row_at, ROW // 8), view_i64(row_at, ROW // 8)
+            source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
             for i in range(ROW // 8):
                 target[i] = source[i]
     return n_proven
 
 
 @kernel
-def _take_sign(row, found, limit):
+def _take_sign(row, result, limit):
     """Take over whether the bodies meet, and what follows for the bracket; the points stay about their middle."""
     doubles, flags = row.doubles, row.flags
-    flags[HOW] = found.flags[HOW]
-    flags[HIT] = found.flags[HIT]
-    if found.flags[HIT] != 0:
+    flags[HOW] = result.flags[HOW]
+    flags[HIT] = result.flags[HIT]
+    if result.flags[HIT] != 0:
         doubles[UPPER] = min(doubles[UPPER], 0.0)
     else:
-        doubles[LOWER] = max(doubles[LOWER], found.doubles[LOWER])
+        doubles[LOWER] = max(doubles[LOWER], result.doubles[LOWER])
         doubles[UPPER] = max(doubles[UPPER], doubles[LOWER])
     beyond = doubles[LOWER] > limit
     flags[BEYOND] = 1 if beyond else 0

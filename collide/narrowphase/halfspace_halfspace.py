@@ -16,7 +16,8 @@ _OPPOSITE = 512.0 * 2.0**-53
 
 @kernel
 def halfspace_halfspace(pair, flip, row):
-    """Write the row of two half-spaces. Opposite within rounding is left open, for `opposite_halfspaces.py` to settle."""
+    """Write the row of two half-spaces. Opposite within rounding is left open, for `opposite_halfspaces.py` to
+    settle."""
     A = plane_in_world(pair, pair.A)
     B = plane_in_world(pair, pair.B)
     across = cross(A.normal, B.normal)

@@ -7,23 +7,26 @@ compiled (`kernels.native_call`), not compiled once more.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.convex_pairs import SIGNATURE
 from collide.narrowphase.posed_pair import stretch_of
-from collide.narrowphase.rows import HIT, HOW, NORMAL, ROW
-from collide.results import REFUSED, UNDECIDED
+from collide.narrowphase.rows import HIT, NORMAL, ROW, is_open, view_row
+from collide.numerics.vec3 import Vec3, cross, dot, norm1, put_vec3, vec3_at
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
-answer_at = native_call(SIGNATURE)
+_answer_pairs_at = native_call(SIGNATURE)
 
 #: Poses that go through together.
 BLOCK = 64
 
-#: What `answer_poses` says besides a count: rows of the block before it are open, or a pose is no pose.
+#: How `answer_poses` ends, besides 0: rows of the block before are open, or a matrix is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
-# Workspace, integers: addresses of everything (see `Workspace` in `convex_queries.py`).
+# Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`Workspace` in
+# `convex_queries.py` and C write them); then how many poses are answered.
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED,
 ) = range(10)  # fmt: skip
@@ -31,48 +34,68 @@ OPEN, BAD_POSE = range(1, 3)
 HEADER = 10
 
 
+class PoseBlock(NamedTuple):
+    """Views of what one call of the narrowphase reads: BLOCK poses of A, then as many of B.
+
+    header : of HEADER integers.   poses : POSE doubles each.   shape_of : their shape rows.
+    pairs : two numbers of poses a pair.
+    """
+
+    header: Any
+    poses: Any
+    shape_of: Any
+    pairs: Any
+
+
+@kernel(inline=True)
+def block_of(header_at):
+    """The `PoseBlock` whose addresses a header holds."""
+    header = view_i64(header_at, HEADER)
+    return PoseBlock(
+        header, view_f64(header[POSES_AT], 2 * BLOCK * POSE), view_i64(header[SHAPE_OF_AT], 2 * BLOCK),
+        view_i64(header[PAIRS_AT], 2 * BLOCK),
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def answer_block(header, n, boolean, depths, limit, rows_at):
+    """`answer_pairs` of the first n pairs of the block."""
+    _answer_pairs_at(
+        header[CORE],
+        (
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], n, boolean,
+            depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
+        ),
+    )  # fmt: skip
+
+
 @kernel(inline=True)
 def set_pose(R, at, X, check):
-    """Pose row at ``at`` becomes the matrix X; False where it is no pose (`transforms.as_poses`)."""
-    R[at] = X[0]
-    R[at + 1] = X[1]
-    R[at + 2] = X[2]
-    R[at + 3] = X[4]
-    R[at + 4] = X[5]
-    R[at + 5] = X[6]
-    R[at + 6] = X[8]
-    R[at + 7] = X[9]
-    R[at + 8] = X[10]
-    R[at + 9] = X[3]
-    R[at + 10] = X[7]
-    R[at + 11] = X[11]
+    """Pose row at ``at`` becomes the matrix X, 16 doubles; False where it is no pose (`transforms.as_poses`)."""
+    p = Vec3(X[3], X[7], X[11])
+    for i in range(3):
+        put_vec3(R, at + 3 * i, vec3_at(X, 4 * i))
+    put_vec3(R, at + 9, p)
     R[at + POSE_SLOP] = 0.0
     R[at + POSE_TERMS] = -1.0
     if not (X[12] == 0.0 and X[13] == 0.0 and X[14] == 0.0 and X[15] == 1.0):
         return False
-    # Six products instead of nine comparisons; what is no number fails them too.
-    xx = X[0] * X[0] + X[4] * X[4] + X[8] * X[8]
-    yy = X[1] * X[1] + X[5] * X[5] + X[9] * X[9]
-    zz = X[2] * X[2] + X[6] * X[6] + X[10] * X[10]
-    xy = X[0] * X[1] + X[4] * X[5] + X[8] * X[9]
-    yz = X[1] * X[2] + X[5] * X[6] + X[9] * X[10]
-    zx = X[2] * X[0] + X[6] * X[4] + X[10] * X[8]
+    # Six products of columns instead of nine comparisons; what is no number fails them too.
+    x, y, z = Vec3(X[0], X[4], X[8]), Vec3(X[1], X[5], X[9]), Vec3(X[2], X[6], X[10])
+    xx, yy, zz, xy, yz, zx = dot(x, x), dot(y, y), dot(z, z), dot(x, y), dot(y, z), dot(z, x)
     R[at + POSE_STRETCH] = stretch_of(xx, yy, zz, xy, yz, zx)
     xx -= 1.0
     yy -= 1.0
     zz -= 1.0
     off = xx * xx + yy * yy + zz * zz + xy * xy + yz * yz + zx * zx
-    shift = abs(X[3]) + abs(X[7]) + abs(X[11])
-    if off <= ROTATION_TOLERANCE * ROTATION_TOLERANCE and shift <= LARGEST:
+    if off <= ROTATION_TOLERANCE * ROTATION_TOLERANCE and norm1(p) <= LARGEST:
         return _determinant(X) > 0.0 or not check
     return is_pose(X, check)
 
 
 @kernel(inline=True)
 def _determinant(X):
-    return (
-        X[0] * (X[5] * X[10] - X[6] * X[9]) + X[1] * (X[6] * X[8] - X[4] * X[10]) + X[2] * (X[4] * X[9] - X[5] * X[8])
-    )
+    return dot(vec3_at(X, 0), cross(vec3_at(X, 4), vec3_at(X, 8)))
 
 
 @kernel
@@ -91,92 +114,101 @@ def is_pose(X, check):
     return _determinant(X) > 0.0
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, int64, "
+"int64)")
 def answer_poses(
     header_at, which_at, XA_at, step_a, XB_at, step_b, first, n, boolean, depths, limit, check, axes_at, out_at
 ):
     """Answer poses ``first`` … n − 1 of a pair, or of n pairs; 0, OPEN or BAD_POSE.
 
     header : HEADER integers; [ANSWERED] becomes the number of poses answered in all. Where it stops OPEN,
-        the rows of the last block are left where the block's rows stand, for the exact stage.
+        the rows of the last block stay where the block's rows stand, for the exact stage.
     which : 0, or two shape rows a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
     depths : as in `answer_pairs`.   check : refuse matrices that are no rotation.
-    axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by one that parts the bodies.
+    axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by one that separates the bodies.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed, which is where rows stand.
+
+    Fourteen arguments: Python and C call it, with integers, doubles and booleans alone.
     """
-    header = view_i64(header_at, HEADER)
-    poses = view_f64(header[POSES_AT], 2 * BLOCK * POSE)
-    shape_of = view_i64(header[SHAPE_OF_AT], 2 * BLOCK)
+    block = block_of(header_at)
+    header = block.header
     rows_at = header[ROWS_AT]
-    scratch = view_i64(rows_at, BLOCK * ROW // 8)
-    pairs = view_i64(header[PAIRS_AT], 2 * BLOCK)
-    for k in range(BLOCK):
-        pairs[2 * k] = k if step_a != 0 or which_at != 0 else 0
-        pairs[2 * k + 1] = BLOCK + (k if step_b != 0 or which_at != 0 else 0)
-        shape_of[k] = 0
-        shape_of[BLOCK + k] = 1
+    _begin_block(block, step_a != 0 or which_at != 0, step_b != 0 or which_at != 0)
     done = first
     while done < n:
         count = min(BLOCK, n - done)
-        good = True
-        for k in range(count):
-            if which_at != 0:
-                which = view_i64(which_at + 16 * (done + k), 2)
-                shape_of[k] = which[0]
-                shape_of[BLOCK + k] = which[1]
-            # A pose that goes with all of the other's is laid out once, where shapes are.
-            if pairs[2 * k] == k:
-                good = set_pose(poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
-            if pairs[2 * k + 1] == BLOCK + k:
-                at = (BLOCK + k) * POSE
-                good = set_pose(poses, at, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
-        if not good:
+        if not _put_poses(block, which_at, XA_at, step_a, XB_at, step_b, done, count, check):
             header[ANSWERED] = done
             return BAD_POSE
         if boolean:
-            for k in range(count * ROW // 8):
-                scratch[k] = 0
-            if axes_at != 0:
-                for k in range(count):
-                    row = view_f64(rows_at + ROW * k, 12)
-                    axis = view_f64(axes_at + 24 * (done + k), 3)
-                    for j in range(3):
-                        row[NORMAL + j] = axis[j]
+            _clear_rows(rows_at, count)
+            for k in range(count if axes_at != 0 else 0):
+                put_vec3(
+                    view_row(rows_at + ROW * k).doubles, NORMAL, vec3_at(view_f64(axes_at + 24 * (done + k), 3), 0)
+                )
         else:
             rows_at = out_at + ROW * done
-        answer_at(
-            header[CORE],
-            (
-                header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], count,
-                boolean, depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
-            ),
-        )  # fmt: skip
-        left_open = False
+        answer_block(header, count, boolean, depths, limit, rows_at)
+        some_open = False
         for k in range(count):
-            marks = view_u8(rows_at + ROW * k, ROW)
-            left_open = left_open or marks[HOW] == UNDECIDED or marks[HOW] == REFUSED
+            row = view_row(rows_at + ROW * k)
+            some_open = some_open or is_open(row)
             if boolean:
-                view_u8(out_at + done + k, 1)[0] = marks[HIT]
-                if axes_at != 0 and marks[HIT] == 0:
-                    row = view_f64(rows_at + ROW * k, 12)
-                    axis = view_f64(axes_at + 24 * (done + k), 3)
-                    for j in range(3):
-                        axis[j] = row[NORMAL + j]
+                view_u8(out_at + done + k, 1)[0] = row.flags[HIT]
+                if axes_at != 0 and row.flags[HIT] == 0:
+                    put_vec3(view_f64(axes_at + 24 * (done + k), 3), 0, vec3_at(row.doubles, NORMAL))
         done += count
         header[ANSWERED] = done
-        if left_open:
+        if some_open:
             return OPEN
     return 0
 
 
-@entry("int64(int64, int64, int64, int64, boolean, int64)")
-def first_bad_pose(X_at, step, first, n, check, room_at):
-    """The number of the first matrix from ``first`` on, of n, that is no pose as `answer_poses` judges; n where all are.
+@kernel(inline=True)
+def _begin_block(block, is_batch_a, is_batch_b):
+    """Pair pose k of A with pose k of B; the one pose of a body that has no batch goes with all."""
+    for k in range(BLOCK):
+        block.pairs[2 * k] = k if is_batch_a else 0
+        block.pairs[2 * k + 1] = BLOCK + (k if is_batch_b else 0)
+        block.shape_of[k] = 0
+        block.shape_of[BLOCK + k] = 1
 
-    step : 16, or 0.   room : POSE doubles.
+
+@kernel(inline=True)
+def _put_poses(block, which_at, XA_at, step_a, XB_at, step_b, first, count, check):
+    """Matrices from ``first`` on become the block's poses; whether all of them are poses. Arguments as in
+    `answer_poses`."""
+    good = True
+    for k in range(count):
+        if which_at != 0:
+            which = view_i64(which_at + 16 * (first + k), 2)
+            block.shape_of[k] = which[0]
+            block.shape_of[BLOCK + k] = which[1]
+        # A pose that goes with all of the other body's is written once, where shapes are.
+        if block.pairs[2 * k] == k:
+            good = set_pose(block.poses, k * POSE, view_f64(XA_at + 8 * step_a * (first + k), 16), check) and good
+        if block.pairs[2 * k + 1] == BLOCK + k:
+            at = (BLOCK + k) * POSE
+            good = set_pose(block.poses, at, view_f64(XB_at + 8 * step_b * (first + k), 16), check) and good
+    return good
+
+
+@kernel(inline=True)
+def _clear_rows(rows_at, n):
+    words = view_i64(rows_at, n * ROW // 8)
+    for k in range(n * ROW // 8):
+        words[k] = 0
+
+
+@entry("int64(int64, int64, int64, int64, boolean, int64)")
+def first_bad_pose(X_at, step, first, n, check, pose_at):
+    """The number of the first matrix from ``first`` on, of n, that is no pose as `answer_poses` judges; n where all
+    are.
+
+    step : 16, or 0.   pose : workspace of POSE doubles.
     """
-    room = view_f64(room_at, POSE)
+    pose = view_f64(pose_at, POSE)
     for k in range(first, n):
-        if not set_pose(room, 0, view_f64(X_at + 8 * step * k, 16), check):
+        if not set_pose(pose, 0, view_f64(X_at + 8 * step * k, 16), check):
             return k
     return n

@@ -78,7 +78,11 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     tz = poses[q + 11] - poses[p + 11]
     size = numbers[at_a + REACH] * _stretch(poses, p) + numbers[at_b + REACH] * _stretch(poses, q)
     # The largest coordinate too: squares of tiny ones vanish, and such a pair must be refused, not 0.
-    size += max(math.sqrt(tx * tx + ty * ty + tz * tz), abs(tx), abs(ty), abs(tz)) + numbers[at_a + RADIUS] + numbers[at_b + RADIUS]
+    size += (
+        max(math.sqrt(tx * tx + ty * ty + tz * tz), abs(tx), abs(ty), abs(tz))
+        + numbers[at_a + RADIUS]
+        + numbers[at_b + RADIUS]
+    )
     shapes = numbers[at_a + SLOP] + numbers[at_b + SLOP]
     known = (poses[p + POSE_SLOP] == 0.0 or poses[p + POSE_TERMS] >= 0.0) and (
         poses[q + POSE_SLOP] == 0.0 or poses[q + POSE_TERMS] >= 0.0
@@ -86,12 +90,25 @@ def size_and_slop(numbers, poses, sa, pa, sb, pb):
     return size, shapes + poses[p + POSE_SLOP] + poses[q + POSE_SLOP], known and shapes == 0.0
 
 
+class Tables(NamedTuple):
+    """Addresses of a `ShapeTable`'s integers and numbers, of the rows of a `PoseTable`, and of the shape row of each
+    part."""
+
+    ints_at: int
+    numbers_at: int
+    poses_at: int
+    shape_of_at: int
+
+
 class PosedBody(NamedTuple):
     """One body of a pair.
 
-    coords : view of its points, all x, then all y, then all z.   n : points.   padded : length of each of the three runs.
-    kind : of `packed_convex.py`.   shape : its row of the `ShapeTable`.   params_at : its parameters in the table's numbers.
-    pose_at : where its row of the poses begins.   tree, coarse_at : addresses of its support tree and coarse points, or 0.
+    coords : view of its points, all x, then all y, then all z.   n : points.
+    padded : length of each of the three runs.
+    kind : of `packed_convex.py`.   shape : its row of the `ShapeTable`.
+    params_at : its parameters in the table's numbers.
+    pose_at : where its row of the poses begins.
+    tree, coarse_at : addresses of its support tree and coarse points, or 0.
     """
 
     coords: Any
@@ -118,7 +135,8 @@ class PosedPair(NamedTuple):
 class OrderedPair(NamedTuple):
     """A pair with what the tables say of it.
 
-    ints : view of the `ShapeTable`.   flip : whether A and B were exchanged.   size, slop, exact_numbers : of `size_and_slop`.
+    ints : view of the `ShapeTable`.   flip : whether A and B were exchanged.
+    size, slop, exact_numbers : of `size_and_slop`.
     """
 
     pair: PosedPair
@@ -134,7 +152,8 @@ def posed_body(ints, shape, part):
     """The `PosedBody` of a row of the `ShapeTable` at the pose of a part."""
     at = INTS * shape
     return PosedBody(
-        view_f64(ints[at + ADDRESS], 3 * ints[at + PADDED]), ints[at + COUNT], ints[at + PADDED], ints[at + KIND], shape, NUMBERS * shape + PARAMS, POSE * part,
+        view_f64(ints[at + ADDRESS], 3 * ints[at + PADDED]), ints[at + COUNT], ints[at + PADDED], ints[at + KIND],
+        shape, NUMBERS * shape + PARAMS, POSE * part,
         ints[at + TREE], ints[at + COARSE_AT],
     )  # fmt: skip
 

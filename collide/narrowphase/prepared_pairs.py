@@ -25,7 +25,8 @@ def keep_prepared(A: Shape, B: Shape, pair: Any) -> None:
     if not hasattr(B, "_serial"):
         B._store(_serial=next(_serials))
     prepared, serial = A._prepared, B._serial
-    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:  # a list: other threads add and finalizers take
+    # a list: other threads add and finalizers take
+    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:
         prepared.pop(oldest, None)
     prepared[serial] = pair
     weakref.finalize(B, prepared.pop, serial, None)  # a partner that is gone is not held

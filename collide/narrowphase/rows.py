@@ -29,7 +29,8 @@ CERTIFIED, BEYOND = _at("certified", 1), _at("beyond", 1)
 class Row(NamedTuple):
     """Views of one row of `PAIR_DTYPE`.
 
-    doubles : distance, bracket, normal, witness points.   words : 32-bit integers.   flags : bytes: how, hit, certified, beyond.
+    doubles : distance, bracket, normal, witness points.   words : 32-bit integers.
+    flags : bytes: how, hit, certified, beyond.
     """
 
     doubles: Any

@@ -7,43 +7,22 @@ import math
 from collide.kernels import entry, kernel, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.finalize_rows import forget_depth
-from collide.narrowphase.pose_batches import (
-    BLOCK,
-    CORE,
-    DOUBLES_AT,
-    HEADER,
-    INTEGERS_AT,
-    INTS_AT,
-    NUMBERS_AT,
-    PAIRS_AT,
-    POSES_AT,
-    ROWS_AT,
-    SHAPE_OF_AT,
-    answer_at,
-    set_pose,
-)
+from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose
 from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, ROW, is_open, view_row
 
 
 @kernel
-def _single(header_at, XA_at, XB_at, boolean, depths, row_at):
-    """One pair at one pair of poses: 0 apart, 1 hit, −1 where more than doubles, or an error, is called for.
+def _answer(header_at, XA_at, XB_at, boolean, depths, row_at):
+    """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than doubles, or an error has to be raised.
 
-    header_at : of `pose_batches.py`.
+    header : of `pose_batches.py`.
     """
-    header = view_i64(header_at, HEADER)
-    poses = view_f64(header[POSES_AT], (BLOCK + 1) * POSE)
-    good_a = set_pose(poses, 0, view_f64(XA_at, 16), True)
-    good_b = set_pose(poses, BLOCK * POSE, view_f64(XB_at, 16), True)
+    block = block_of(header_at)
+    good_a = set_pose(block.poses, 0, view_f64(XA_at, 16), True)
+    good_b = set_pose(block.poses, BLOCK * POSE, view_f64(XB_at, 16), True)
     if not (good_a and good_b):
         return -1
-    answer_at(
-        header[CORE],
-        (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
-            depths, False, 0.0 if boolean else math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
-        ),
-    )  # fmt: skip
+    answer_block(block.header, 1, boolean, depths, 0.0 if boolean else math.inf, row_at)
     row = view_row(row_at)
     if is_open(row):
         return -1
@@ -52,7 +31,7 @@ def _single(header_at, XA_at, XB_at, boolean, depths, row_at):
 
 @entry(prepared.BOOLEAN, nogil=False)
 def collide_single(header_at, XA_at, XB_at):
-    """Whether the pair meets, 0 or 1; −1 where the long way is to be taken.
+    """Whether the pair meets, 0 or 1; −1 where the caller has to ask as of a batch.
 
     All threads share its workspace: it keeps Python's lock.
     """
@@ -60,14 +39,14 @@ def collide_single(header_at, XA_at, XB_at):
     row = view_i64(rows_at, ROW // 8)
     for k in range(ROW // 8):
         row[k] = 0
-    return _single(header_at, XA_at, XB_at, True, False, rows_at)
+    return _answer(header_at, XA_at, XB_at, True, False, rows_at)
 
 
 @entry(prepared.ROW, nogil=False)
 def distance_single(header_at, XA_at, XB_at, row_at, depths):
-    """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1, too,
-    where the depth has no end."""
-    hit = _single(header_at, XA_at, XB_at, False, depths, row_at)
+    """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1,
+    too, where the depth is infinite."""
+    hit = _answer(header_at, XA_at, XB_at, False, depths, row_at)
     row = view_row(row_at)
     row.words[BODY_B] = 1
     if not depths and hit >= 0:

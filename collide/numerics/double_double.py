@@ -188,7 +188,7 @@ class DDVec3(NamedTuple):
 
 @kernel(inline=True)
 def vec3_at(values, at):
-    """Three double-doubles stored as six consecutive doubles, or Lanes: high and low part of x, then of y, then of z."""
+    """Three double-doubles stored as six consecutive doubles, or Lanes: high and low parts of x, y and z in turn."""
     return DDVec3(
         DD(values[at], values[at + 1]), DD(values[at + 2], values[at + 3]), DD(values[at + 4], values[at + 5])
     )

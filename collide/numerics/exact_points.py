@@ -32,7 +32,7 @@ def integers(values) -> tuple[list[int], int]:
 
 
 def placed(X: np.ndarray, points: np.ndarray) -> tuple[list[Point], int]:
-    """(points (k, 3) placed by the pose X (4, 4) as integers, exponent of their grid), entries taken as exact numbers."""
+    """(points (k, 3) placed by the pose X (4, 4) as integers, exponent of their grid), entries taken as exact."""
     local, grid = integers(points)
     return moved(X, zip(local[0::3], local[1::3], local[2::3]), grid)
 
@@ -67,7 +67,7 @@ def inner(a, b):
 
 
 def leading_digits(vector: Point) -> tuple[float, float, float]:
-    """A vector along this one, components below 1 and rounded, the largest of them at least ½; zeros of a zero vector."""
+    """A vector along this one, components below 1 and rounded, the largest at least ½; zeros of a zero vector."""
     digits = max(abs(x).bit_length() for x in vector)
     scale = 1 << digits
     return vector[0] / scale, vector[1] / scale, vector[2] / scale
@@ -96,8 +96,8 @@ def enters(triangle: list[Point], origin: Point, direction: Point) -> Fraction:
     slope = inner(across, direction)
     if slope:
         return Fraction(inner(across, v[0]), slope)
-    # The ray runs in the triangle's plane, or the triangle has no area: seen from `across` its corners lie left or right
-    # of the ray, or on it, and it is entered at one of those or on a side from left to right.
+    # The ray runs in the triangle's plane, or the triangle has no area: seen from `across` its corners lie left or
+    # right of the ray, or on it, and it is entered at one of those or on a side from left to right.
     if across == (0, 0, 0):
         sides = (cross(direction, minus(triangle[j], triangle[i])) for i, j in ((0, 1), (1, 2), (2, 0)))
         across = next((side for side in sides if side != (0, 0, 0)), (0, 0, 0))

@@ -1,7 +1,7 @@
 """Small vectors in kernels: `Vec3`, and the products that geometry is written in.
 
-Sums are taken from left to right, x first, with no contraction: error bounds count on it, and equal answers are equal bits.
-A Vec3 costs nothing in machine code: its three doubles are registers.
+Sums are taken from left to right, x first, with no contraction: error bounds count on it, and equal answers are equal
+bits. A Vec3 costs nothing in machine code: its three doubles are registers.
 """
 
 from __future__ import annotations

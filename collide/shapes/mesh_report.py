@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from collide.lazy_modules import lazy_module
+
 if TYPE_CHECKING:
     from collide.mesh.mesh_survey import Survey
+
+topology = lazy_module("collide.mesh.mesh_topology")
+flags = lazy_module("collide.mesh.mesh_survey")
 
 #: Facet numbers shown of each defect; `Defect.facets` has them all.
 _MAX_LISTED = 6
@@ -72,27 +77,24 @@ def _numbers(facets: np.ndarray) -> str:
 
 def find_defects(survey: Survey) -> tuple[Defect, ...]:
     """The defects that a survey flags, what spoils a solid first."""
-    from collide.mesh import mesh_survey as says
-    from collide.mesh import mesh_topology as meet
-
     nothing = bool(len(survey.signs)) and not (survey.signs > 0).any()
     kinds = [
         (
-            meet.DOUBLED,
+            topology.DOUBLED,
             not survey.closed,
             "duplicate facets",
             "the same corners as an earlier facet, the same way round",
         ),
-        (meet.OPEN, True, "open edges", "an edge has no other facet"),
-        (meet.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
-        (meet.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),
-        (meet.ONE_SIDED, True, "one-sided", "where the surface closes to a band with one side"),
-        (says.INSIDE_OUT, True, "inside out", "parts that run clockwise seen from outside, and are no cavities"),
-        (says.EMPTY, nothing, "encloses nothing", "parts without volume"),
-        (meet.BACK_TO_BACK, False, "back-to-back facets", "the same corners as another facet, the other way round"),
-        (meet.SEVERAL, False, "non-manifold edges", "four or more meet at an edge"),
-        (meet.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
-        (says.NO_AREA, False, "no area", "corners on one line"),
+        (topology.OPEN, True, "open edges", "an edge has no other facet"),
+        (topology.UNBALANCED, True, "unbalanced edges", "three or more meet at an edge, more of them one way round"),
+        (topology.TURNED, True, "inconsistent orientation", "turned over against their neighbours"),
+        (topology.ONE_SIDED, True, "one-sided", "where the surface closes to a band with one side"),
+        (flags.INSIDE_OUT, True, "inside out", "parts that run clockwise seen from outside, and are no cavities"),
+        (flags.EMPTY, nothing, "encloses nothing", "parts without volume"),
+        (topology.BACK_TO_BACK, False, "back-to-back facets", "the same corners as another facet, the other way round"),
+        (topology.SEVERAL, False, "non-manifold edges", "four or more meet at an edge"),
+        (topology.PINCHED, False, "non-manifold vertices", "touching others in a vertex only"),
+        (flags.NO_AREA, False, "no area", "corners on one line"),
     ]
     defects = [
         Defect(name, np.flatnonzero(survey.flags & bit), spoils, meaning)

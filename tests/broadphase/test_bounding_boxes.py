@@ -21,7 +21,7 @@ EYE = np.eye(4)
 def box_of(shape: collide.Shape, X_WB: np.ndarray) -> np.ndarray:
     (packed, X_BP), = parts_of(shape)
     table = ShapeTable([packed])
-    table.plant(np.zeros(1, dtype=np.int64))
+    table.build_trees(np.zeros(1, dtype=np.int64))
     return boxes_of(
         table, pose_table(X_WB[None], X_BP[None], np.array([packed.reach])).rows, np.zeros(1, dtype=np.int64)
     )[0]

@@ -27,7 +27,7 @@ CODE = rng_of("machine code").bytes(3000)
 def came_from_disk(name: str = "collide.a_kernel", key: str = "all it depends on", code: bytes = CODE) -> bool:
     """Ask for a kernel; whether it need not be compiled."""
     compiled = []
-    assert object_cache.kept(name, key, lambda: compiled.append(name) or code) == code
+    assert object_cache.kept_or_made(name, key, lambda: compiled.append(name) or code) == code
     return not compiled
 
 
@@ -146,7 +146,7 @@ def test_what_a_compiler_raises_is_the_askers(folder):
         raise NotImplementedError("of a compiler")
 
     with pytest.raises(NotImplementedError, match="of a compiler"):
-        object_cache.kept("collide.a_kernel", "key", fails)
+        object_cache.kept_or_made("collide.a_kernel", "key", fails)
     assert not list(folder.iterdir())
 
 
@@ -157,7 +157,7 @@ def test_threads_that_keep_the_same_kernel_at_once(folder, caplog):
     def ask():
         for k in range(30):
             together.wait()
-            told.append(object_cache.kept("collide.a_kernel", str(k), lambda: CODE) == CODE)
+            told.append(object_cache.kept_or_made("collide.a_kernel", str(k), lambda: CODE) == CODE)
 
     threads = [threading.Thread(target=ask) for _ in range(6)]
     for thread in threads:

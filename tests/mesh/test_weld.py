@@ -42,7 +42,7 @@ def test_hashes_spread():
     hashes = set()
     bits = (np.arange(4096) * 0.125).view(np.int64).tolist()
     for value in bits:
-        h = module._stir(0, value)
+        h = module._mix(0, value)
         assert 0 <= h < 2**31
         hashes.add(h & 8191)
     assert len(hashes) > 0.9 * 8192 * (1 - np.exp(-0.5)), len(hashes)

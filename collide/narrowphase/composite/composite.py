@@ -54,7 +54,9 @@ class _Workspace:
 
     def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
         """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        return np.array((code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START))
+        return np.array(
+            (code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START)
+        )
 
 
 class _SingleSpace(_Workspace):
@@ -74,8 +76,8 @@ class _OfThread(local):
     asked = 0
 
     def space_for(self, table: UnionTable) -> _Workspace:
-        if self.space is None or self.space.capacity < table.most:
-            self.space = _Workspace(max(table.most, _CAPACITY))
+        if self.space is None or self.space.capacity < table.max_parts:
+            self.space = _Workspace(max(table.max_parts, _CAPACITY))
         return self.space
 
 
@@ -101,7 +103,7 @@ def run_unions(
 
     which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
     """
-    table.plant(which)
+    table.build_trees(which)
     space = of_thread.space_for(table)
     header = space.header_of(table, run.scratch())
     while True:
@@ -115,13 +117,15 @@ def run_unions(
             return not status
         listed = int(header[N_LISTED])
         run.settle_open(
-            space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean, limit=limit,
+            space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean,
+            limit=limit,
             depths=depths and not boolean,
         )  # fmt: skip
 
 
 class UnionPair:
-    """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has them.
+    """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has
+    them.
 
     collide : a built-in function of two poses; None where it leaves the answer to the long way.
     """
@@ -131,13 +135,13 @@ class UnionPair:
 
     def __init__(self, A: LaidOut, B: LaidOut):
         self.unions = UnionTable([A, B])
-        self.unions.plant(None)
+        self.unions.build_trees(None)
         self.collide = self._distance = _long_way
         if self.unions.counts.prod() > _MAX_AT_ONCE:
             return
         space = UnionPair._space  # read once: another thread may put a smaller one there
-        if space is None or space.capacity < self.unions.most:
-            space = UnionPair._space = _SingleSpace(self.unions.most)
+        if space is None or space.capacity < self.unions.max_parts:
+            space = UnionPair._space = _SingleSpace(self.unions.max_parts)
         self._held = space  # pairs made before have a smaller one
         header = space.header_of(self.unions, space.scratch)
         words = np.array([code_of(answer_unions), address_of(space.byte), *header.tolist()])
@@ -158,7 +162,9 @@ def _long_way(*_) -> None:
     return None
 
 
-def combine(rows: np.ndarray, starts: np.ndarray, spans: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of) -> np.ndarray:
+def combine(
+    rows: np.ndarray, starts: np.ndarray, spans: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of
+) -> np.ndarray:
     """One row a pair of bodies from rows of pairs of parts.
 
     rows : PAIR_DTYPE, those of a pair of bodies standing together.   starts : first row of each pair of bodies.

@@ -158,7 +158,9 @@ def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.nd
     """
     shift = X_WB[:, :3, 3] - X_WA[:, :3, 3]
     U, V = _corners(A, pairs[:, 0], X_WA, np.zeros_like(shift)), _corners(B, pairs[:, 1], X_WB, shift)
-    moved = 1.001 * slop + _COORDINATE * (_terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1))
+    moved = 1.001 * slop + _COORDINATE * (
+        _terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1)
+    )
     crossing = np.zeros(len(pairs), dtype=bool)
     for T, S in ((U, V), (V, U)):
         for k in range(3):

@@ -1,8 +1,9 @@
 """Unions with meshes: a `Compound` against a mesh, a mesh among the parts of a `Compound`, to any nesting.
 
 Apart, the distance is the least one of the parts. Convex parts of both sides are answered together, as unions of
-convex parts always are (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh in it is asked about only where their boxes
-come as near as what is known already. Overlapping, the row holds a translation that is proven to separate the unions.
+convex parts always are (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh in it is asked about
+only where their boxes come as near as what is known already. Overlapping, the row holds a translation that is proven to
+separate the unions.
 """
 
 from __future__ import annotations
@@ -79,7 +80,8 @@ def union_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = T
 
 
 def _rows_in_order(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
-    """Rows worked out on the same numbers for swapped questions: unions in the order of their contents, equal ones by poses."""
+    """Rows worked out on the same numbers for swapped questions: unions in the order of their contents, equal ones by
+    poses."""
     if B.key < A.key:
         return flipped(_rows_in_order(B, A, X_WB, X_WA, limit, depths))
     rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
@@ -108,8 +110,11 @@ def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) 
     return out
 
 
-def _part_rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: bool) -> tuple[list[np.ndarray], np.ndarray]:
-    """(rows of the pairs of parts that matter, pose by pose; (n,) bool, whether some beyond the limit were left out)."""
+def _part_rows(
+    A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: bool
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """(rows of the pairs of parts that matter, pose by pose; (n,) bool, whether some beyond the limit were left
+    out)."""
     n = len(X_WA)
     sight = math.nextafter(limit, math.inf)
     left_out = np.zeros(n, dtype=bool)
@@ -168,7 +173,9 @@ def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
     return row
 
 
-def _overlap(A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool) -> None:
+def _overlap(
+    A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool
+) -> None:
     """The row of two unions that meet, or may."""
     row = meeting[0].copy()
     certain = row["how"] != UNDECIDED

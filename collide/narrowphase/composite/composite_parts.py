@@ -29,13 +29,13 @@ class Part(NamedTuple):
     """One body of a union.
 
     shape : a mesh, or a convex shape.   X : (4, 4) its pose in the union's frame.
-    turn, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides [m]:
-        a pose within a pose is their exact product, rounded once.
+    rotation, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides
+        [m]: a pose within a pose is their exact product, rounded once.
     """
 
     shape: Shape
     X: np.ndarray
-    turn: float
+    rotation: float
     shift: float
 
     def at(self, X_WB: np.ndarray, about: np.ndarray) -> PosesWithSlop:
@@ -47,7 +47,7 @@ class Part(NamedTuple):
         reach = np.full(len(X_WB), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
         X, slop = moved_pose(X_WB, self.X, reach)
         stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
-        return PosesWithSlop(X, slop + stretch * (self.turn * reach + self.shift) * _UP)
+        return PosesWithSlop(X, slop + stretch * (self.rotation * reach + self.shift) * _UP)
 
     @property
     def bound(self) -> PackedConvex:
@@ -85,14 +85,16 @@ class UnionParts:
 
     @cached_property
     def ball(self) -> np.ndarray | None:
-        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of half-spaces."""
+        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of
+        half-spaces."""
         if self.unbounded:
             return None
         at = self._X_BP[:, :3, 3]
         centre = 0.5 * (at.min(axis=0) + at.max(axis=0))
         across = np.sqrt(np.square(at - centre).sum(axis=1))
         reach = np.array([packed.reach + packed.radius + packed.slop for packed in self._bounds])
-        stretch = np.array([np.linalg.norm(X[:3, :3], 2) for X in self._X_BP])  # 1 but for what poses of items are off rotations
+        # 1 but for what poses of items are off rotations
+        stretch = np.array([np.linalg.norm(X[:3, :3], 2) for X in self._X_BP])
         size = np.abs(at).max() + np.abs(centre).max()
         radius = float((across + stretch * reach).max()) * _UP + 2.0**-40 * size
         return np.array([*centre, 0.0, 0.0, 0.0, radius])
@@ -114,10 +116,10 @@ class UnionParts:
         """(what no product of its points with the unit vector n exceeds, error of that), at a pose (4, 4)."""
         value, size, slop = -math.inf, 0.0, 0.0
         for part in self.parts:
-            posed = part.at(X_WB[None], np.zeros(1))
-            X, packed = posed.X[0], part.bound
-            own = extent_of(packed, X, n)
-            value, slop = max(value, own), max(slop, float(posed.slop[0]) + packed.slop)
+            at_pose = part.at(X_WB[None], np.zeros(1))
+            X, packed = at_pose.X[0], part.bound
+            part_extent = extent_of(packed, X, n)
+            value, slop = max(value, part_extent), max(slop, float(at_pose.slop[0]) + packed.slop)
             size = max(size, 2 * packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()))
         return value, ERROR * size + slop
 
@@ -142,8 +144,8 @@ def _leaves(shape: Shape, X: list[list[Fraction]] | None):
         yield shape, X
         return
     for item, X_CS in shape.items:
-        own = [[Fraction(v) for v in row] for row in X_CS.tolist()]
-        yield from _leaves(item, own if X is None else _times(X, own))
+        R_p = [[Fraction(v) for v in row] for row in X_CS.tolist()]
+        yield from _leaves(item, R_p if X is None else _times(X, R_p))
 
 
 def _times(X: list[list[Fraction]], Y: list[list[Fraction]]) -> list[list[Fraction]]:
@@ -156,9 +158,9 @@ def _rounded(X: list[list[Fraction]] | None) -> tuple[np.ndarray, float, float]:
         return IDENTITY, 0.0, 0.0
     rounded = np.array([[float(v) for v in row] for row in X])
     lost = [[abs(v - Fraction(float(v))) for v in row[:4]] for row in X]
-    turn = sum((v for row in lost for v in row[:3]), Fraction(0))
+    lost_rotation = sum((v for row in lost for v in row[:3]), Fraction(0))
     shift = sum((row[3] for row in lost), Fraction(0))
-    return rounded, float(turn) * _UP, float(shift) * _UP
+    return rounded, float(lost_rotation) * _UP, float(shift) * _UP
 
 
 def _convex_part(shape: Shape) -> Shape | None:
@@ -167,6 +169,6 @@ def _convex_part(shape: Shape) -> Shape | None:
         return shape
     if not isinstance(shape, Compound):
         return None
-    kept = [(_convex_part(item), X) for item, X in shape.items]
-    kept = [(item, X) for item, X in kept if item is not None]
-    return Compound(kept) if kept else None
+    items = [(_convex_part(item), X) for item, X in shape.items]
+    items = [(item, X) for item, X in items if item is not None]
+    return Compound(items) if items else None

@@ -1,12 +1,12 @@
 """Two bodies of several convex parts at many pairs of poses: from matrices to answers inside kernels.
 
-Most pairs of parts are far apart, and balls around them say so. The pair whose balls are nearest is answered first; then
-those that may be nearer than its answer, or may overlap; of booleans, those whose balls overlap, and none after a hit,
-nor where no depth is wanted.
+Most pairs of parts are far apart, and balls around them say so. The pair whose balls are nearest is answered first;
+then those that may be nearer than its answer, or may overlap; of booleans, those whose balls overlap, and none after a
+hit, nor where no depth is wanted.
 Which pairs a pose has answered depends on that pose alone, and so does its answer.
 
-Pairs of parts are put on a list, which the narrowphase answers where it was compiled (`kernels.native_call`). A list goes
-over many poses, since gaps are refined eight at a time. Where rows of it are undecided, Python has the exact stage
+Pairs of parts are put on a list, which the narrowphase answers where it was compiled (`kernels.native_call`). A list
+goes over many poses, since gaps are refined eight at a time. Where rows of it are undecided, Python has the exact stage
 settle them and calls again: the header holds how far things have come.
 """
 
@@ -45,12 +45,13 @@ LIST = ROWS_PER_BATCH
 #: What `answer_unions` returns besides 0: rows of the list are undecided, or a pose is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
-# Header: the kernel, tables of shapes, parts and bodies; the workspace, and how many rows of parts it has room for; then how
-# far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to go on with, pairs
-# on the list, and how many pairs of parts were answered in all.
+# Header: the kernel, tables of shapes, parts and bodies; the workspace, and how many rows of parts it has room for;
+# then how far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to
+# go on with, pairs on the list, and how many pairs of parts were answered in all.
 (
     CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT,
-    POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, DOUBLES_AT, INTEGERS_AT,
+    POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, DOUBLES_AT,
+    INTEGERS_AT,
     CAPACITY,
     N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
 ) = range(25)  # fmt: skip
@@ -64,8 +65,8 @@ _BODIES, _BODY_ROWS, _PART_ROWS, _IS_HIT, _FIRST_PAIR = 0, 2, 4, 6, 7
 _SLOT = 8
 SLOTS = _SLOT * BLOCK
 
-#: Pairs of parts whose balls are farther apart than the best so far by this much of the bodies' size are left out: far more
-#: than brackets of curved parts are wide, so that they have no say in any number of the answer.
+#: Pairs of parts whose balls are farther apart than the best so far by this much of the bodies' size are left out: far
+#: more than brackets of curved parts are wide, so that they have no say in any number of the answer.
 _BRACKET = 2.0**-20
 
 
@@ -96,8 +97,10 @@ def _open(header_at):
     header = view_i64(header_at, HEADER)
     rows = 2 * BLOCK + header[CAPACITY]
     return Block(
-        header, view_f64(header[POSES_AT], POSE * rows), view_i64(header[SHAPE_OF_AT], rows), view_i64(header[PAIRS_AT], 2 * LIST),
-        view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK), view_i64(header[SLOTS_AT], SLOTS),
+        header, view_f64(header[POSES_AT], POSE * rows), view_i64(header[SHAPE_OF_AT], rows),
+        view_i64(header[PAIRS_AT], 2 * LIST),
+        view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK),
+        view_i64(header[SLOTS_AT], SLOTS),
         view_f64(header[BALLS_AT], (2 + header[CAPACITY]) * BALL_IN_WORLD),
     )  # fmt: skip
 
@@ -109,7 +112,8 @@ def _body(block, k, which):
     number = block.slots[slot + _BODIES]
     bodies = view_i64(block.header[BODIES_AT], 2 * (number + 1))
     return Body(
-        bodies[2 * number + FIRST], bodies[2 * number + COUNT], block.slots[slot + _PART_ROWS], block.slots[slot + _BODY_ROWS]
+        bodies[2 * number + FIRST], bodies[2 * number + COUNT], block.slots[slot + _PART_ROWS],
+        block.slots[slot + _BODY_ROWS]
     )
 
 
@@ -164,7 +168,9 @@ def _lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
         if not once_a:
             good = set_pose(block.poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
         if not once_b:
-            good = set_pose(block.poses, (BLOCK + k) * POSE, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
+            good = (
+                set_pose(block.poses, (BLOCK + k) * POSE, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
+            )
         k += 1
     for row in range(2 * BLOCK, 2 * BLOCK + n_rows):
         block.shape_of[row] = -1  # not placed yet
@@ -297,7 +303,8 @@ def _list_nearest(block, boolean, every):
 
 @kernel
 def _list_others(block, boolean, depths, every):
-    """List the other pairs of parts that have a say, from SLOT and PAIR on, until the list is full; returns how many."""
+    """List the other pairs of parts that have a say, from SLOT and PAIR on, until the list is full; returns how
+    many."""
     header, slots = block.header, block.slots
     n_listed = 0
     while header[SLOT] < header[N_POSES] and n_listed < LIST:
@@ -355,7 +362,8 @@ def _answer_list(header, boolean, depths, limit):
     answer_at(
         header[CORE],
         (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[TERMS_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[TERMS_AT], header[SHAPE_OF_AT],
+            header[PAIRS_AT],
             header[N_LISTED], boolean, depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip
@@ -445,8 +453,8 @@ UNIONS_SIGNATURE = (
 def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean, depths, limit, check, every, out_at):
     """Answer n pairs of poses of two bodies, or of n pairs of bodies; 0, OPEN or BAD_POSE.
 
-    header : HEADER integers. Where it stops OPEN, the first [N_LISTED] rows and pairs of the list are for the exact stage, and
-        the next call goes on.
+    header : HEADER integers. Where it stops OPEN, the first [N_LISTED] rows and pairs of the list are for the exact
+        stage, and the next call goes on.
     which : 0 for bodies 0 and 1, or two bodies a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
     depths : as in `answer_pairs`; without them bodies that overlap get the row of parts that do.
     limit : larger distances are not looked for [m].   check : refuse matrices that are no rotation.

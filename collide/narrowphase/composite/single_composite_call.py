@@ -25,7 +25,8 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, out_at):
     status = answer_unions_at(
         header[_KERNEL],
         (
-            header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, 0.0 if boolean else math.inf, True, False,
+            header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, 0.0 if boolean else math.inf, True,
+            False,
             out_at,
         ),
     )  # fmt: skip
@@ -46,8 +47,8 @@ def collide_single_union(header_at, XA_at, XB_at):
 
 @entry(prepared.ROW, nogil=False)
 def distance_single_union(header_at, XA_at, XB_at, row_at, depths):
-    """ROW zero bytes become the pair's row, without a depth unless those are wanted; −1 as there, else 0. −1, too, where
-    the depth is infinite."""
+    """ROW zero bytes become the pair's row, without a depth unless those are wanted; −1 as there, else 0. −1, too,
+    where the depth is infinite."""
     if not _answer(header_at, XA_at, XB_at, False, depths, row_at):
         return -1
     row = view_row(row_at)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel
 from collide.narrowphase.bounds import EPA_VERTICES
@@ -64,6 +64,37 @@ class EpaResult(NamedTuple):
     n_facets: int
 
 
+class Seed(NamedTuple):
+    """Four points of A ⊖ B to begin with, of GJK.
+
+    points, ids : POINT doubles and two vertices a point.   enclosed : the origin is proven to lie among them.
+    well_conditioned : it does so clear of rounding by far.
+    wants_cap : there are so many vertices that iterations cost
+    more than the supports of a better seed.   start : how often EPA has begun elsewhere.
+    """
+
+    points: Any
+    ids: Any
+    enclosed: bool
+    well_conditioned: bool
+    wants_cap: bool
+    start: int
+
+
+class Goal(NamedTuple):
+    """When EPA stops.
+
+    overlap_suffices : once the origin is proven inside (a boolean is asked).
+    size, error : of the pair, as in `bounds.py`.
+    tolerance : once the bracket is this narrow.
+    """
+
+    overlap_suffices: bool
+    size: float
+    error: float
+    tolerance: float
+
+
 @kernel(inline=True)
 def _is_corner(ids, facets, f, k):
     """Whether point k is a vertex of facet f or of a neighbour, or one of many vertices, by its support vertices."""
@@ -96,40 +127,34 @@ def _surface_clearance(clearances, n_facets, error):
 
 
 @kernel(inline=True)
-def _seed(pair, points, ids, simplex, simplex_ids, enclosed, well_conditioned, many, start, size, error):
-    """Points 0 … 3 to begin with; returns `Extremes` of rank 3, or less where A ⊖ B is flat. Arguments as in `epa`."""
-    for k in range(4 if enclosed else 0):
-        copy_coordinates(simplex, k, points, k)
-        ids[2 * k] = simplex_ids[2 * k]
-        ids[2 * k + 1] = simplex_ids[2 * k + 1]
+def _put_seed(pair, points, ids, seed, goal):
+    """Points 0 … 3 to begin with; returns `Extremes` of rank 3, or less where A ⊖ B is flat."""
+    for k in range(4 if seed.enclosed else 0):
+        copy_coordinates(seed.points, k, points, k)
+        ids[2 * k] = seed.ids[2 * k]
+        ids[2 * k + 1] = seed.ids[2 * k + 1]
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
-    if enclosed and ((many and capped_tetrahedron(pair, points, ids, size)) or well_conditioned):
+    if seed.enclosed and (
+        (seed.wants_cap and capped_tetrahedron(pair, points, ids, goal.size)) or seed.well_conditioned
+    ):
         return Extremes(3, Vec3(0.0, 0.0, 0.0))
-    return extremal_tetrahedron(pair, points, ids, error, start)
+    return extremal_tetrahedron(pair, points, ids, goal.error, seed.start)
 
 
 @kernel(inline=True)
-def epa(
-    pair, surface, simplex, simplex_ids, enclosed, well_conditioned, many, start, overlap_suffices, size, error, tolerance
-):  # fmt: skip
-    """Expand until the nearest facet of A ⊖ B is known; returns an `EpaResult`.
-
-    surface : where to.   simplex, simplex_ids : four points of A ⊖ B, which are ``enclosed`` if the origin is proven to lie
-        among them, and ``well_conditioned`` if it does so clear of rounding by far.
-    many : of vertices, so that rounds cost more than supports.   start : how often it has begun elsewhere.
-    overlap_suffices : stop once the origin is proven inside (a boolean is asked).
-    size, error : of the pair, as in `bounds.py`.   tolerance : stop once the bracket is this narrow.
-    """
+def epa(pair, surface, seed, goal):
+    """Expand until the nearest facet of A ⊖ B is known; returns an `EpaResult`.   surface : a `Surface` to grow in."""
     points, ids, facets, clearances = surface.points, surface.ids, surface.facets, surface.clearances
-    seed = _seed(pair, points, ids, simplex, simplex_ids, enclosed, well_conditioned, many, start, size, error)
-    nhat = seed.nhat
-    if seed.rank < 3:
+    overlap_suffices, error = goal.overlap_suffices, goal.error
+    extremes = _put_seed(pair, points, ids, seed, goal)
+    nhat = extremes.nhat
+    if extremes.rank < 3:
         up = _extent(pair, points, ids, nhat)
         down = _extent(pair, points, ids, neg(nhat))
         if down < up:
-            return EpaResult(FLAT, down, -1.0, neg(nhat), -1, seed.rank + 1, 0)
-        return EpaResult(FLAT, up, -1.0, nhat, -1, seed.rank + 1, 0)
-    enough = ample(size, error)
+            return EpaResult(FLAT, down, -1.0, neg(nhat), -1, extremes.rank + 1, 0)
+        return EpaResult(FLAT, up, -1.0, nhat, -1, extremes.rank + 1, 0)
+    enough = ample(goal.size, error)
     set_tetrahedron(surface, error, enough)
     met = 0
     for k in range(4):
@@ -158,7 +183,7 @@ def epa(
             nhat = normal
         if overlap_suffices and value < -error:
             return EpaResult(EXPANDED, depth, -1.0, nhat, facet, n_vertices, n_facets)
-        if depth - distance <= tolerance or not may_expand(n_vertices, n_facets):
+        if depth - distance <= goal.tolerance or not may_expand(n_vertices, n_facets):
             break
         if met & _vertex_fingerprint(ids, n_vertices) != 0 and _is_corner(ids, facets, f, n_vertices):
             break

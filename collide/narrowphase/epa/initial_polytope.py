@@ -27,7 +27,8 @@ _LEAST_VOLUME = 2.0**-16
 
 
 class Extremes(NamedTuple):
-    """rank : dimension of what points 0 … 3 span, as far as rounding can tell.   nhat : where less than 3, across it."""
+    """rank : dimension of what points 0 … 3 span, as far as rounding can tell.   nhat : where less than 3, across
+    it."""
 
     rank: int
     nhat: Vec3
@@ -47,8 +48,8 @@ def extremal_tetrahedron(pair, points, ids, error, start):
     e = divide(e, norm(e))
     farthest = -1.0
     n = u
-    for turn in range(4):
-        if turn > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
+    for step in range(4):
+        if step > 0:  # a quarter turn about the edge, from u to e × u and on to their opposites
             u = cross(e, u)
         difference_point(pair, points, ids, spare, u)
         across = cross(e, sub(point_at(points, spare), point_at(points, 0)))
@@ -93,14 +94,15 @@ def _farthest_pair(pair, points, ids, askew):
 
 @kernel
 def capped_tetrahedron(pair, points, ids, size):
-    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span enough.
+    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span
+    enough.
 
     The likely direction leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
     are the bodies' centres. The three lie far enough around it for the other sides to be farther off than that.
 
-    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on a
-    sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a corner on
-    that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
+    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on
+    a sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a
+    corner on that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
     """
     spare = EPA_VERTICES
     length = norm(pair.t)
@@ -109,7 +111,7 @@ def capped_tetrahedron(pair, points, ids, size):
     u = divide(pair.t, length)
     depth = 0.0
     width = 0.0
-    for turn in range(2):
+    for step in range(2):
         difference_point(pair, points, ids, spare, neg(u))
         difference_point(pair, points, ids, spare + 1, u)
         near, far = point_at(points, spare), point_at(points, spare + 1)
@@ -117,7 +119,7 @@ def capped_tetrahedron(pair, points, ids, size):
         width = depth - dot(near, u)
         middle = add(near, far)
         length = norm(middle)
-        if turn == 1 or not -dot(middle, u) < _SAME_DIRECTION * length:
+        if step == 1 or not -dot(middle, u) < _SAME_DIRECTION * length:
             break
         u = divide(neg(middle), length)
     if not width > 0.0:

@@ -5,8 +5,8 @@ is as level, and the area of a needle says nothing about where in it a point lie
 lies within the surface and touches the plane in the foot, so some facet of a closed surface passes it to within the
 width of the bracket, and the nearest point of all of them is no farther.
 
-Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may be
-far off where a triangle is thin, their point is not (Björck 1967).
+Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may
+be far off where a triangle is thin, their point is not (Björck 1967).
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ def weigh_corners(points, stride, n, weights, p):
 
 @kernel(inline=True)
 def _copy_corners(surface, f, points, ids, first, with_ids):
-    """The corners of a facet become points ``first`` … first + 2, with the vertices they are made of if ``with_ids``."""
+    """The corners of a facet become points ``first`` … first + 2, with the vertices they are made of if
+    ``with_ids``."""
     for k in range(3):
         v = corner(surface, f, k)
         copy_coordinates(surface.points, v, points, first + k)
@@ -131,12 +132,12 @@ def weigh_nearest(surface, n_facets, facet, points, ids, weights, with_ids, p, t
     ``facet`` is tried first, and is good if it comes within the tolerance; else the first that does, or the best.
     """
     best = math.inf
-    for turn in range(n_facets + 1):
-        f = facet if turn == 0 else turn - 1
+    for step in range(n_facets + 1):
+        f = facet if step == 0 else step - 1
         a = vec3_at(surface.points, POINT * corner(surface, f, 0))
         b = vec3_at(surface.points, POINT * corner(surface, f, 1))
         c = vec3_at(surface.points, POINT * corner(surface, f, 2))
-        if turn > 0 and _is_outside_box(a, b, c, p, min(best, _FAR_FROM_BOX * tolerance)):
+        if step > 0 and _is_outside_box(a, b, c, p, min(best, _FAR_FROM_BOX * tolerance)):
             continue
         nearest = nearest_of_triangle(a, b, c, p)
         if nearest.distance < best:
@@ -155,8 +156,8 @@ def weigh_origin(surface, n_facets, points, ids, weights):
     """A vertex and the facet across the origin from it become points 0 … 3, weighted for the origin among them."""
     smallest_miss = math.inf
     nearest = -1
-    for turn in range(n_facets + 1):
-        f = turn if turn < n_facets else nearest
+    for step in range(n_facets + 1):
+        f = step if step < n_facets else nearest
         if f < 0:
             break
         copy_coordinates(surface.points, 0, points, 0)
@@ -176,7 +177,9 @@ def weigh_origin(surface, n_facets, points, ids, weights):
 def _is_outside_box(a, b, c, p, slack):
     """Whether p lies outside the box of a triangle by more than the slack."""
     return (
-        _is_outside(a.x, b.x, c.x, p.x, slack) or _is_outside(a.y, b.y, c.y, p.y, slack) or _is_outside(a.z, b.z, c.z, p.z, slack)
+        _is_outside(a.x, b.x, c.x, p.x, slack)
+        or _is_outside(a.y, b.y, c.y, p.y, slack)
+        or _is_outside(a.z, b.z, c.z, p.z, slack)
     )
 
 

@@ -23,7 +23,7 @@ PLANE = 4
 #: half-edge across TWIN places on.
 FACET, TWIN, MARKS = 8, 4, 7
 #: Marks: the facet is seen from the apex; the origin lies behind it wherever its corners truly are.
-SEEN, SURE = 1, 2
+SEEN, PROVEN = 1, 2
 #: Vertices stand in this many points; the last ones are for trying.
 POINTS = EPA_VERTICES + 8
 #: Rounding of the determinant of three corners, in units of |a|·|b − a|·|c − a| as sums of coordinates: eight roundings
@@ -71,7 +71,8 @@ class Surface(NamedTuple):
 class FineSurface(NamedTuple):
     """Further views for `refine_depth.py`.
 
-    points : FINE doubles a vertex.   distances : a double-double a facet.   known : whether a vertex's fine point is there.
+    points : FINE doubles a vertex.   distances : a double-double a facet.
+    known : whether a vertex's fine point is there.
     """
 
     points: Any
@@ -119,7 +120,8 @@ def normal_of(surface, f):
 
 @kernel(inline=True)
 def ample(size, error):
-    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their triangle.
+    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their
+    triangle.
 
     Coordinates of a point add up to √3·size at most, those of an edge to twice that: the bounds of `_sides` for such.
     """
@@ -128,7 +130,7 @@ def ample(size, error):
 
 @kernel(inline=True)
 def _sides(determinant, a, e, f, error):
-    """(behind, sure) of `plane_of`, from the lengths of this very triangle."""
+    """(behind, proven) of `plane_of`, from the lengths of this very triangle."""
     e, f, a = norm1(e), norm1(f), norm1(a)
     return determinant > DETERMINANT_ERROR * a * e * f, determinant > 2.0 * error * (e * f + 2.0 * a * (e + f))
 
@@ -140,13 +142,13 @@ class FacetPlane(NamedTuple):
     distance : the least of the corners' along the normal: for any unit normal, however badly a thin triangle
         defines it, no point of the triangle lies nearer the origin.
     clearance : the same where the origin provably lies behind the triangle of the corners as they stand, else −1.
-    sure : whether it would with corners anywhere within ``error`` of these (see `simplex.height_behind`).
+    proven : whether it would with corners anywhere within ``error`` of these (see `simplex.height_behind`).
     """
 
     normal: Vec3
     distance: float
     clearance: float
-    sure: bool
+    proven: bool
 
 
 @kernel(inline=True)
@@ -157,14 +159,14 @@ def plane_of(a, b, c, error, enough):
     square = dot(n, n)
     determinant = dot(n, a)
     behind = True
-    sure = True
+    proven = True
     if not determinant > enough:
         if square == 0.0:
             return FacetPlane(Vec3(0.0, 0.0, 0.0), math.inf, -1.0, False)
-        behind, sure = _sides(determinant, a, e, f, error)
+        behind, proven = _sides(determinant, a, e, f, error)
     n = scale(1.0 / math.sqrt(square), n)
     distance = min(min(dot(n, a), dot(n, b)), dot(n, c))
-    return FacetPlane(n, distance, distance if behind else -1.0, sure)
+    return FacetPlane(n, distance, distance if behind else -1.0, proven)
 
 
 @kernel(inline=True)
@@ -176,13 +178,15 @@ def set_facet(surface, f, i, j, k, error, enough, depth):
     """
     points, facets = surface.points, surface.facets
     f = number(f)
-    plane = plane_of(point_at(points, number(i)), point_at(points, number(j)), point_at(points, number(k)), error, enough)
+    plane = plane_of(
+        point_at(points, number(i)), point_at(points, number(j)), point_at(points, number(k)), error, enough
+    )
     at = FACET * f
     facets[at] = i
     facets[at + 1] = j
     facets[at + 2] = k
     facets[at + 3] = i
-    facets[at + MARKS] = SURE if plane.sure else 0
+    facets[at + MARKS] = PROVEN if plane.proven else 0
     put_vec3(surface.planes, PLANE * f, plane.normal)
     surface.planes[PLANE * f + 3] = plane.distance
     # A facet farther off than a known separating translation will never be the nearest.
@@ -231,7 +235,8 @@ def following(t):
 
 
 class Patch(NamedTuple):
-    """What an apex sees of a surface: numbers of its facets, in ``patch``, and of the half-edges around them, in ``border``."""
+    """What an apex sees of a surface: numbers of its facets, in ``patch``, and of the half-edges around them, in
+    ``border``."""
 
     n_facets: int
     n_edges: int
@@ -299,7 +304,7 @@ def expand(surface, f, apex, count, seen, depth, error, enough):
     if n_edges == 0:
         for k in range(1, n_facets):
             h = number(patch[k])
-            facets[FACET * h + MARKS] &= SURE
+            facets[FACET * h + MARKS] &= PROVEN
             distance = surface.planes[PLANE * h + 3]
             surface.reaches[h] = distance if distance <= depth else math.inf
             if surface.reaches[h] < least_reach:

@@ -1,7 +1,7 @@
 """Facets of EPA's surface whose side doubles leave open, in double-doubles: slivers, mostly.
 
-One facet that is not known to face outwards leaves the whole surface without a proof. Of curved bodies one in a thousand
-runs ended so.
+One facet that is not known to face outwards leaves the whole surface without a proof. Of curved bodies one in a
+thousand runs ended so.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from collide.kernels import kernel, view_f64, view_i64
 from collide.narrowphase.epa.polytope_surface import (
     FACET,
     MARKS,
+    PROVEN,
     SEEN,
-    SURE,
     TWIN,
     WIDEST_BORDER,
     Patch,
@@ -133,8 +133,8 @@ def _set_distance(fine, f):
     height = fine_height(fine.points, a, fine.direction)
     distance = dd.div(height, length)
     _put_distance(fine, f, distance)
-    # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle lies
-    # nearer than the nearest corner.
+    # Rounding tilts the plane: its corners' heights are what counts, and along any direction no point of a triangle
+    # lies nearer than the nearest corner.
     above_b = dd.sub(fine_height(fine.points, b, fine.direction), height).high
     above_c = dd.sub(fine_height(fine.points, c, fine.direction), height).high
     highest = max(max(0.0, above_b), above_c)
@@ -226,8 +226,8 @@ def _invalidate(fine, f, error):
     clearances = fine.surface.clearances
     fine.distances[2 * f] = -math.inf
     if clearances[f] < math.inf:
-        sure = fine.surface.facets[FACET * f + MARKS] & SURE
-        clearances[f] = (clearances[f] - error) * fine.scale if sure else -math.inf
+        proven = fine.surface.facets[FACET * f + MARKS] & PROVEN
+        clearances[f] = (clearances[f] - error) * fine.scale if proven else -math.inf
 
 
 @kernel
@@ -235,9 +235,9 @@ def _request_nearest(surface, distance, f, n_facets, request):
     """Enter the corners of facet f and of all others that may be as near the origin, for the exact stage."""
     request[0] = 1
     request[1] = 0
-    for turn in range(n_facets + 1):
-        g = f if turn == 0 else turn - 1
-        if surface.clearances[g] > distance or (turn > 0 and g == f):
+    for step in range(n_facets + 1):
+        g = f if step == 0 else step - 1
+        if surface.clearances[g] > distance or (step > 0 and g == f):
             continue
         if request[1] == MAX_TIED_FACETS:
             request[0] = 0
@@ -265,7 +265,8 @@ def _fine(pair, terms_at, work, surface, size, slop):
 
 @kernel
 def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, error):
-    """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a `RefinedDepth`.
+    """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a
+    `RefinedDepth`.
 
     work : the `Workspace`, whose ``request`` becomes an entry of `depth_requests.py` where the depth is near rounding.
     size, slop, error : of the pair.
@@ -326,7 +327,8 @@ def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, erro
 
 @kernel(inline=True)
 def _add_vertex(fine, f, apex, n_facets, i, j, error):
-    """Expand the surface by the difference of vertices i of A and j of B, seen from facet f; returns how many facets it has."""
+    """Expand the surface by the difference of vertices i of A and j of B, seen from facet f; returns how many facets it
+    has."""
     surface = fine.surface
     place_vertices(fine.pair, surface.points, surface.ids, apex, i, j)
     fine.known[apex] = 0

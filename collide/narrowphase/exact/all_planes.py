@@ -1,8 +1,8 @@
 """The depth of two small hulls from all planes there are, where no surface around the origin could be closed.
 
-A facet of A ⊖ B is a facet of A, one of B, or spanned by an edge of each. So its depth is the least extent of A ⊖ B from
-the origin along the normals of any three vertices of one body and of any two pairs of vertices: no direction gives less,
-so normals of what is no facet do no harm. Nothing is said about how facets hang together, which is what needles
+A facet of A ⊖ B is a facet of A, one of B, or spanned by an edge of each. So its depth is the least extent of A ⊖ B
+from the origin along the normals of any three vertices of one body and of any two pairs of vertices: no direction gives
+less, so normals of what is no facet do no harm. Nothing is said about how facets hang together, which is what needles
 a billion times as long as wide, pressed flat on each other, leave open in doubles and in double-doubles.
 
 Doubles leave out nearly all, double-doubles nearly all of the rest; integers measure the others. O((n + m)·n²·m²).
@@ -51,7 +51,8 @@ from collide.numerics.vec3 import (
 MAX_VERTICES, MAX_PLANES = 64, 60_000
 #: Most planes that double-doubles may leave.
 _MAX_CANDIDATES = 256
-#: Of a candidate: the ends of two edges along its plane, numbers among the points of A, then of B; a lower bound of the extent.
+#: Of a candidate: the ends of two edges along its plane, numbers among the points of A, then of B; a lower bound of the
+#: extent.
 _EXTENT, _PLANE = 4, 5
 #: Most points of a facet that are looked at for the nearest one, and doubles of each: the point, its vertex pair.
 _MAX_CORNERS, _CORNER = 64, 5
@@ -77,7 +78,8 @@ class PlaneDepth(NamedTuple):
 class PlaneSearch(NamedTuple):
     """Where candidates come from and go to.
 
-    fine : points of A, then of B, scaled to size 1, as double-doubles.   direction : a workspace.   planes : candidates.
+    fine : points of A, then of B, scaled to size 1, as double-doubles.   direction : a workspace.
+    planes : candidates.
     """
 
     fine: Any
@@ -314,7 +316,8 @@ def _prune(planes, n, extent):
 
 @kernel
 def _find_corners(exact, doubles_at, ids, best_plane):
-    """The vertex pairs of three points of the facet across the direction of a `PlaneDepth`, around the foot of the origin.
+    """The vertex pairs of three points of the facet across the direction of a `PlaneDepth`, around the foot of the
+    origin.
 
     Any three of its corners may not do; the triangle that comes nearest does, or an edge, or a corner.
     """

@@ -1,7 +1,9 @@
-"""What `answer_pairs` asks of the exact stage: depths below rounding, by the facets of A ⊖ B nearest the origin, maybe several.
+"""What `answer_pairs` asks of the exact stage: depths below rounding, by the facets of A ⊖ B nearest the origin, maybe
+several.
 
-A list in the workspace of one call: how many integers are used, then an entry a row, in the order of rows: the row's number,
-whether all other facets are farther for certain, the number of facets, and of each the vertex pairs of its three corners.
+A list in the workspace of one call: how many integers are used, then an entry a row, in the order of rows: the row's
+number, whether all other facets are farther for certain, the number of facets, and of each the vertex pairs of its
+three corners.
 """
 
 from __future__ import annotations
@@ -10,8 +12,8 @@ from collide.kernels import kernel
 
 #: Facets an entry may name: around a corner that touches a face there are a dozen.
 MAX_TIED_FACETS = 24
-#: Rows that are answered before the exact stage has its turn; integers of one entry, without its row, and of a list that
-#: fits if all of these rows ask.
+#: Rows that are answered before the exact stage has its turn; integers of one entry, without its row, and of a list
+#: that fits if all of these rows ask.
 ROWS_PER_BATCH = 256
 ENTRY = 2 + 6 * MAX_TIED_FACETS
 REQUESTS = 1 + ROWS_PER_BATCH * (1 + ENTRY)

@@ -1,4 +1,5 @@
-"""A step of the exact stage: depths of overlaps of small hulls that neither a closed surface nor nearest facets have given."""
+"""A step of the exact stage: depths of overlaps of small hulls that neither a closed surface nor nearest facets have
+given."""
 
 from __future__ import annotations
 
@@ -15,7 +16,18 @@ from collide.results import EXACT
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)")
 def exact_depth(
-    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, wanted_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
+    ints_at,
+    numbers_at,
+    poses_at,
+    shape_of_at,
+    pairs_at,
+    wanted_at,
+    n_pairs,
+    limit,
+    rows_at,
+    terms_at,
+    n_terms,
+    digits_at,
 ):
     """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it plane.
 
@@ -42,7 +54,9 @@ def _write_depth(ordered, space, row_at, limit):
     plane = depth_by_all_planes(ordered, space.terms, space.terms_at, space.digits, space.doubles_at, space.facet)
     if not plane.proven:
         return False
-    bracket = bracket_of_depth(plane.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B))
+    bracket = bracket_of_depth(
+        plane.depth, radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B)
+    )
     v = neg(plane.nhat)
     put_normal_and_points(row, ordered, space.terms_at, space.facet, 3, space.digits_at, v, bracket.nearest)
     lower, upper = max(row.doubles[LOWER], bracket.lower), min(row.doubles[UPPER], bracket.upper)

@@ -16,7 +16,8 @@ from collide.numerics.vec3 import Vec3
 class Normal(NamedTuple):
     """A direction that is a normal of points 0, 1, 2.
 
-    n : digits of a component.   side : 1 where the origin lies behind the points as they stand counter-clockwise, −1 where
+    n : digits of a component.
+    side : 1 where the origin lies behind the points as they stand counter-clockwise, −1 where
     before them, 0 where in their plane.
     """
 

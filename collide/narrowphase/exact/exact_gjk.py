@@ -54,7 +54,8 @@ def _sign_only(verdict, n, rounds):
 def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
     """The `ExactAnswer` of an `OrderedPair` whose cores are hulls of points.
 
-    terms : exact terms of poses that are products (`PoseTable.terms`).   digits : workspace of `exact_workspace.INTEGERS`.
+    terms : exact terms of poses that are products (`PoseTable.terms`).
+    digits : workspace of `exact_workspace.INTEGERS`.
     boolean : stop at the first plane that separates, which need not be the nearest point's.
     ids : in, vertex pairs of a first simplex of n ≥ 1 points; out, of the deciding one.
     """

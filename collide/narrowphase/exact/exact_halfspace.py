@@ -44,8 +44,8 @@ from collide.numerics.vec3 import add, column_at, dot, rotate
 #: Most digits of any number that is multiplied once more; a slot holds twice as many.
 _LONGEST = 64
 _SLOT = 2 * _LONGEST
-# Slots of the workspace: R_A, the normal m in A's frame, the normal n in W's axes, det R_A, a cofactor, −b·det R_A, b; R_B;
-# of a vertex: s, a coordinate or r, a vertex's coordinate or r², s² − r²|n|² and r²|n|², two slots each, |n|².
+# Slots of the workspace: R_A, the normal m in A's frame, the normal n in W's axes, det R_A, a cofactor, −b·det R_A, b;
+# R_B; of a vertex: s, a coordinate or r, a vertex's coordinate or r², s² − r²|n|² and r²|n|², two slots each, |n|².
 _ROTATION_A, _NORMAL_A, _NORMAL, _DETERMINANT, _COFACTOR, _CONSTANT, _OFFSET = 0, 9, 12, 15, 16, 17, 18
 _ROTATION_B, _HEIGHT, _FIRST, _SECOND, _DIFFERENCE, _SUBTRAHEND, _NORMAL_SQUARE = 20, 30, 31, 32, 33, 35, 37
 #: Integers of workspace.
@@ -76,7 +76,8 @@ class ExactPlane(NamedTuple):
 
 
 class PlaneContact(NamedTuple):
-    """TOUCHING, SEPARATE or UNDONE; the deepest vertex of B; its signed distance minus the radius [m], to EXACT_ERROR."""
+    """TOUCHING, SEPARATE or UNDONE; the deepest vertex of B; its signed distance minus the radius [m], to
+    EXACT_ERROR."""
 
     verdict: int
     vertex: int
@@ -115,7 +116,8 @@ def _exact_plane(ordered, terms, digits):
     low = min(low_product, low_constant)
     n_height = max(n_plane + d + low_product - low, 3 * rotation_a.n + 2 + offset.n + low_constant - low) + 1
     return ExactPlane(
-        digits, pair, pose_a, pose_b, radius_of(pair, B), rotation_a, normal, offset, rotation_b, core, Span(grid, d), n_plane,
+        digits, pair, pose_a, pose_b, radius_of(pair, B), rotation_a, normal, offset, rotation_b, core, Span(grid, d),
+        n_plane,
         Span(low, n_height),
     )  # fmt: skip
 
@@ -265,7 +267,8 @@ def _set_normal_square(plane):
 
 @kernel
 def _set_square_difference(plane):
-    """s² − r²|n|², before it is carried; its `Span`, of which more than two slots are too many: then nothing is written."""
+    """s² − r²|n|², before it is carried; its `Span`, of which more than two slots are too many: then nothing is
+    written."""
     digits, n_height, n_square = plane.digits, plane.height.n, 2 * plane.n_plane + 1
     low_bit, high_bit = lowest_bit(plane.radius), math.frexp(plane.radius)[1] - 1
     radius = Span(grid_of(low_bit), grid_of(high_bit) - grid_of(low_bit) + 1)

@@ -1,4 +1,5 @@
-"""The exact stage: rows whose sign or last digits doubles leave open are settled in integers. No rounding decides anything.
+"""The exact stage: rows whose sign or last digits doubles leave open are settled in integers. No rounding decides
+anything.
 
 GJK with Johnson's subalgorithm (Gilbert, Johnson and Keerthi 1988) in integers: every quantity is a
 polynomial of the doubles given (vertices, both poses, radii), which `numerics/digits.py` holds exactly.
@@ -41,20 +42,23 @@ def settle_rows(
     What is asked, in this order, cheapest and most frequent first; a step sees what those before it have left open:
 
     1. `settle_hulls`: two swept hulls. GJK in integers says whether they share a point; the distance of cores that are
-       apart is then known to all digits. Depths below rounding come from the facets nearest the origin that doubles have
-       named (`depth_requests.py`, `plane_depth.py`).
-    2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex. Only if 1 met such rows.
-    3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the least
-       extent over all planes there are (`all_planes.py`). After 1, which says that they are overlaps.
+       apart is then known to all digits. Depths below rounding come from the facets nearest the origin that doubles
+       have named (`depth_requests.py`, `plane_depth.py`).
+    2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex. Only if 1 met such
+       rows.
+    3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the
+       least extent over all planes there are (`all_planes.py`). After 1, which says that they are overlaps.
     4. `settle_opposite_halfspaces`: two half-spaces with opposite normals, in fractions.
 
-    What stays open: curved cores, shapes whose stored numbers are rounded, and magnitudes that span more than 1600 bits.
+    What stays open: curved cores, shapes whose stored numbers are rounded, and magnitudes that span more than 1600
+    bits.
 
     Parameters
     ----------
     rows : PAIR_DTYPE, with the vertices to begin with.
     pairs : (k, 2) int64, parts: rows of ``poses`` and ``shape_of``, which says the part's row of ``table``.
-    boolean : only signs are wanted.   depths : it is wanted how deep overlaps are.   limit : larger distances are not [m].
+    boolean : only signs are wanted.   depths : it is wanted how deep overlaps are.
+    limit : larger distances are not [m].
     digits : int64 workspace of `settle_space.WORKSPACE`.   requests_at : address of what `answer_pairs` asks of depths.
     """
     if not (rows["how"] == UNDECIDED).any():

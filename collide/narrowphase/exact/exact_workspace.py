@@ -1,6 +1,8 @@
-"""A pair of posed hulls in integers: where its numbers stand in the workspace, how long they are, how vertices get into it.
+"""A pair of posed hulls in integers: where its numbers stand in the workspace, how long they are, how vertices get into
+it.
 
-All coordinates of a pair share one grid and one length of D digits; other numbers have a few times as many, by their degree.
+All coordinates of a pair share one grid and one length of D digits; other numbers have a few times as many, by their
+degree.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ from collide.numerics.digits import (
 LONGEST = 64
 assert 2 * LONGEST <= LONGEST_FACTOR
 
-# Layout of the workspace in units of D digits: both rotations 18, p_WB − p_WA 3, five points 15, Gram matrix 50, Johnson's Δ
-# 384, direction 18, scratch 60.
+# Layout of the workspace in units of D digits: both rotations 18, p_WB − p_WA 3, five points 15, Gram matrix 50,
+# Johnson's Δ 384, direction 18, scratch 60.
 _ROTATION_B, _SHIFT, _POINTS, _GRAM, _DELTA, _DIRECTION, _SCRATCH, _END = 9, 18, 21, 36, 86, 470, 488, 548
 #: Integers of workspace.
 INTEGERS = _END * LONGEST + 64
@@ -156,7 +158,8 @@ def span_of_entries(pose, first, count):
 
 @kernel
 def core_span(lowest, reach):
-    """The `Span` of the coordinates of a core, by their lowest bit and their largest magnitude; 0 digits where all are 0."""
+    """The `Span` of the coordinates of a core, by their lowest bit and their largest magnitude; 0 digits where all are
+    0."""
     grid = grid_of(min(lowest, _FAR_BIT))
     if lowest >= _NO_BIT:
         return Span(grid, 0)
@@ -177,7 +180,8 @@ def add_entry(digits, at, pose, j, grid, sign):
 def exact_pair(ordered, terms, digits, radius_a, radius_b):
     """The `ExactPair` of an `OrderedPair`: spans only, `load_poses` fills the workspace.
 
-    terms : of the `PoseTable`.   digits : workspace of INTEGERS.   radius_a, radius_b : that are to have a place on the grid.
+    terms : of the `PoseTable`.   digits : workspace of INTEGERS.
+    radius_a, radius_b : that are to have a place on the grid.
     """
     pair = ordered.pair
     A = _exact_body(ordered, pair.A, 0, terms)
@@ -189,8 +193,8 @@ def exact_pair(ordered, terms, digits, radius_a, radius_b):
         grid = min(grid, A.rotation.grid + A.core.grid)
     if B.core.n > 0:
         grid = min(grid, B.rotation.grid + B.core.grid)
-    # Digits from the lowest bit to the highest: |x| < 2^e reaches up to bit e − 1. A coordinate is less than 2·size; the
-    # highest digit is signed and may be as large as a factor.
+    # Digits from the lowest bit to the highest: |x| < 2^e reaches up to bit e − 1. A coordinate is less than 2·size;
+    # the highest digit is signed and may be as large as a factor.
     d = grid_of(math.frexp(ordered.size)[1]) - grid + 1
     d = max(d, grid_of(max(high_a, high_b, -_FAR_BIT)) - grid + 1)
     if A.core.n > 0:

@@ -29,7 +29,12 @@ class _HalfSpace(NamedTuple):
 
 
 def settle_opposite_halfspaces(
-    rows: np.ndarray, undecided: np.ndarray, pairs: np.ndarray, table: ShapeTable, poses: PoseTable, shape_of: np.ndarray
+    rows: np.ndarray,
+    undecided: np.ndarray,
+    pairs: np.ndarray,
+    table: ShapeTable,
+    poses: PoseTable,
+    shape_of: np.ndarray,
 ) -> None:
     """Settle those of the undecided rows (their numbers) that are pairs of half-spaces, in place."""
     for k in undecided.tolist():
@@ -68,7 +73,8 @@ def _settle(row: np.ndarray, A: _HalfSpace, B: _HalfSpace) -> None:
 
 
 def _half_space(params: np.ndarray, pose: list[Fraction]) -> _HalfSpace:
-    """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p (`halfspace_convex.plane_in_world`)."""
+    """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p
+    (`halfspace_convex.plane_in_world`)."""
     r0, r1, r2, p = (tuple(pose[k : k + 3]) for k in (0, 3, 6, 9))
     cofactor = cross(r1, r2), cross(r2, r0), cross(r0, r1)
     m = tuple(map(Fraction, params[:3].tolist()))

@@ -92,7 +92,8 @@ def _set_facet(exact, requests, at):
 
 @kernel
 def _is_outermost(exact):
-    """Whether no vertex of A ⊖ B lies beyond the plane of points 0 … 2, whose normal is the direction, which is reversed."""
+    """Whether no vertex of A ⊖ B lies beyond the plane of points 0 … 2, whose normal is the direction, which is
+    reversed."""
     digits, d = exact.digits, exact.d
     n = 2 * d
     reverse_direction(exact, n)

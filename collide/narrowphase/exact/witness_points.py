@@ -1,7 +1,7 @@
 """Normals and witness points of rows that the exact stage has settled, on the feature that decided.
 
-Those that doubles have found carry the direction of a difference of nearly equal points, which says nothing where the gap
-is below rounding, and need not lie on that feature.
+Those that doubles have found carry the direction of a difference of nearly equal points, which says nothing where the
+gap is below rounding, and need not lie on that feature.
 
 Everywhere: row : `Row`.   ordered : the `OrderedPair`.   ids : vertex pairs of n ≤ 4 points of A ⊖ B.
 doubles_at, terms_at : of workspace, and of the `PoseTable`.

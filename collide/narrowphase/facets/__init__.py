@@ -1,6 +1,9 @@
 """Bodies of facets: triangles against triangles, exactly, and the traversals of two BVHs that lead to them.
 
+The way in is `mesh_pairs.py` (any two shapes with a mesh), then by kind `mesh_rows.py`; two bodies of facets go to
+`body_pairs.py`, whose kernels `surface_pairs.py` (booleans) and `surface_gaps.py` (rows) take whole batches; curved
+shapes to `mesh_curved.py`. `facet_queries.py` asks single traversals from Python: `surface_collision.py`,
+`surface_distance.py`, `winding_numbers.py`, `facets_within.py`, `ray_surface.py`, `self_collision.py`.
 `posed_surfaces.py` sets two posed trees in relation, `filtered_triangles.py` decides in doubles what doubles can decide,
-`exact_corners.py` and `exact_triangles.py` the rest; `surface_collision.py` and `surface_distance.py` traverse.
-`mesh_rows.py` makes rows of results from their answers, `mesh_curved.py` where one body has no facets.
+`exact_corners.py` and `exact_triangles.py` the rest.
 """

@@ -33,7 +33,6 @@ from collide.narrowphase.facets.facet_queries import (
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.surface_gaps import (
-    CORES_MEET,
     FARTHEST,
     NEARLY_TOUCH,
     PROMISE,
@@ -190,17 +189,17 @@ def body_rows(
     """
     n = number_of_poses(X_WA, X_WB)
     rows = np.zeros(n, dtype=PAIR_DTYPE) if out is None else out
-    lacks = _fill_rows(rows, A, B, X_WA, X_WB, limit, check)
+    lacks = _fill_rows(rows, A, B, X_WA, X_WB, limit, depths, check)
     if lacks.any():
         near = np.flatnonzero(lacks & NEARLY_TOUCH)
         if len(near):
             XA, XB = _poses_of(X_WA, near), _poses_of(X_WB, near)
             again = np.zeros(len(near), dtype=PAIR_DTYPE)
-            lacks[near] = _fill_rows(again, A, B, XA, XB, limit, False, hull_rows(A, B, XA, XB, math.inf))
+            lacks[near] = _fill_rows(again, A, B, XA, XB, limit, depths, False, hull_rows(A, B, XA, XB, math.inf))
             rows[near] = again
         for k in np.flatnonzero(lacks).tolist():
             XA, XB = (X[k if len(X) > 1 else 0] for X in (X_WA, X_WB))
-            rows[k] = _completed(A, B, XA, XB, rows[k : k + 1], int(lacks[k]), limit, depths)
+            rows[k] = _completed(A, B, XA, XB, rows[k : k + 1], int(lacks[k]), limit)
     return rows
 
 
@@ -209,7 +208,8 @@ def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
 
 
 def _fill_rows(
-    rows: np.ndarray, A: Body, B: Body, X_WA, X_WB, limit: float, check: bool, hulls: np.ndarray | None = None
+    rows: np.ndarray, A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool, check: bool,
+    hulls: np.ndarray | None = None,
 ) -> np.ndarray:
     """(n,) uint8: what rows lack (`gap_poses`), having written them. hulls : their hulls' rows, for directions."""
     lacks = np.zeros(len(rows), dtype=np.uint8)
@@ -221,7 +221,7 @@ def _fill_rows(
     def ask_from(first: int, check: bool) -> int:
         return gap_poses(
             address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, len(rows), check,
-            limit, reach, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+            limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
         )  # fmt: skip
 
     _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
@@ -243,40 +243,28 @@ def hull_rows(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, limit: float
     return convex_rows(hull_of(A), hull_of(B), X_WA, X_WB, limit=limit)
 
 
-def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float, depths: bool) -> np.ndarray:
+def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float) -> np.ndarray:
     """The row (1,) of one pair of poses (4, 4), whole: worked on in the order that the kernel took."""
     if B.key < A.key or (B.key == A.key and X_WA[:3].tolist() > X_WB[:3].tolist()):
-        return flipped(_completed_in_order(B, A, X_WB, X_WA, flipped(row), lacks, limit, depths))
-    return _completed_in_order(A, B, X_WA, X_WB, row.copy(), lacks, limit, depths)
+        return flipped(_completed_in_order(B, A, X_WB, X_WA, flipped(row), lacks, limit))
+    return _completed_in_order(A, B, X_WA, X_WB, row.copy(), lacks, limit)
 
 
-def _completed_in_order(
-    A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float, depths: bool
-) -> np.ndarray:
+def _completed_in_order(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float) -> np.ndarray:
+    """A far gap, or a row of bodies that meet, with a depth."""
     if lacks & TOO_FAR:
         return _far_gap(A, B, X_WA, X_WB, limit)
+    point = 0.5 * (row["point_a"][0] + row["point_b"][0])
     steps: list[np.ndarray] = []
     if lacks & RADII_MEET:
-        point = 0.5 * (row["point_a"][0] + row["point_b"][0])
-        if depths:
-            lower = surface_distances(A.tree, B.tree, X_WA, X_WB, _reach_of_search(A, B, limit)).lower[0]
-            overlap = (A.radius + B.radius - float(lower)) * (1 + 1e-12) + 1e-300
-            steps = [overlap * row["normal"][0]] if overlap > 0.0 else []
-    else:
-        assert lacks == CORES_MEET
-        point = row["point_a"][0].copy()
-        if np.isnan(point[0]):
-            meeting = surface_distances(A.tree, B.tree, X_WA, X_WB)
-            row["part_a"], row["part_b"] = np.maximum(meeting.facets[0], 0)
-            point = meeting.point_a[0]
-    decided = row["how"][0] != UNDECIDED
+        lower = surface_distances(A.tree, B.tree, X_WA, X_WB, _reach_of_search(A, B, limit)).lower[0]
+        overlap = (A.radius + B.radius - float(lower)) * (1 + 1e-12) + 1e-300
+        steps = [overlap * row["normal"][0]] if overlap > 0.0 else []
+    row["certified"] = decided = row["how"][0] != UNDECIDED
     row["upper"] = 0.0 if decided else max(float(row["upper"][0]), 0.0)
     row["beyond"] = False
-    row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
-    row["point_a"], row["point_b"], row["certified"] = point, point, decided
-    if depths:
-        hulls = hull_rows(A, B, X_WA[None], X_WB[None], math.inf)[0]
-        write_depth(row, point, separating_translation(A, B, X_WA, X_WB, hulls, steps, hits))
+    hulls = hull_rows(A, B, X_WA[None], X_WB[None], math.inf)[0]
+    write_depth(row, point, separating_translation(A, B, X_WA, X_WB, hulls, steps, hits))
     return row
 
 
@@ -333,7 +321,7 @@ class SinglePair:
         return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, bytes as of a batch; None of overlaps, and of what kernels do not complete."""
+        """One row of `PAIR_DTYPE`, bytes as of a batch; None of depths, and of what kernels do not complete."""
         if not self._has_slabs:
             _make_slabs(*self._held[:2])
             self._has_slabs = True

@@ -1,8 +1,8 @@
 """Questions about two mesh trees from Python: poses in, arrays out.
 
 Bodies are taken in the order of their contents, so that swapped questions are worked out on the same numbers; of two
-equal ones the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and asking numpy for their
-addresses, takes longer than most booleans.
+equal ones the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and asking numpy for
+their addresses, takes longer than most booleans.
 """
 
 from __future__ import annotations

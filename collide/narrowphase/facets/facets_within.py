@@ -103,7 +103,9 @@ def _widen_probe(query, which, probe):
         probe[3 + i] = np.float32((float(probe[3 + i]) + reaches[node_axes + i]) * (1.0 + 2.0**-20))
         probe[9 + i] = np.float32((float(probe[9 + i]) + reaches[probe_axes + i]) * (1.0 + 2.0**-20))
     if half_width > 0.0:
-        probe[16] = np.float32(half_width * (1.0 + 2.0**-20) + reaches[probe_axes] + reaches[probe_axes + 1] + reaches[probe_axes + 2])
+        probe[16] = np.float32(
+            half_width * (1.0 + 2.0**-20) + reaches[probe_axes] + reaches[probe_axes + 1] + reaches[probe_axes + 2]
+        )
 
 
 @kernel
@@ -184,14 +186,17 @@ def list_near_pairs(
     """
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)
-    trees, invertible = pose_trees(A, XA_at, B, XB_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, exact_at)
+    trees, invertible = pose_trees(
+        A, XA_at, B, XB_at, doubles_at, doubles_at + 8 * DOUBLES, PROBE, integers_at, exact_at
+    )
     if not invertible:
         return -SINGULAR
     numbers_at = doubles_at + 8 * (PLACING + CORNERS)
     error = _world_error(A, trees.XA, B, trees.XB)
     query = _Query(
         trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(numbers_at + 8 * _REACHES, 6),
-        view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6), view_i64(numbers_at + 8 * _COUNTERS, 2),
+        view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),
+        view_i64(numbers_at + 8 * _COUNTERS, 2),
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
     )  # fmt: skip
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)

@@ -143,7 +143,8 @@ def _moved(X: np.ndarray, point: np.ndarray) -> np.ndarray:
 def curved_rows(
     A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, *, limit: float, depths: bool
 ) -> np.ndarray:
-    """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop only."""
+    """Rows (PAIR_DTYPE) of a mesh A and a shape B; limit, depths as in `distance`, depths of poses without slop
+    only."""
     rows = np.zeros(len(PA.X), dtype=PAIR_DTYPE)
     rows["vertices_a"] = rows["vertices_b"] = -1
     exact = (PA.slop == 0.0) & (PB.slop == 0.0)

@@ -87,7 +87,8 @@ def place(A, XA, B, XB, placing, frame_a, frame_b):
 def balls_apart(XA, numbers_a, XB, numbers_b, margin):
     """Whether the balls around two bodies are certainly farther apart than a margin [m].
 
-    False of matrices that are not close to rotations. With d the largest row sum of |RᵀR − I|, lengths grow by a factor of at most 1 + d.
+    False of matrices that are not close to rotations. With d the largest row sum of |RᵀR − I|, lengths grow by a factor
+    of at most 1 + d.
     """
     stretch_a = deviation_from_rotation(XA)
     stretch_b = deviation_from_rotation(XB)
@@ -224,7 +225,8 @@ def sum_is_exact(x, y):
 
 @kernel
 def _set_frame(probe, node, placing, matrix, error, at, frame):
-    """From the boxes of the nodes' tree to those of the probe's: FRAME_SIZE doubles at ``at``, and the matrix as floats."""
+    """From the boxes of the nodes' tree to those of the probe's: FRAME_SIZE doubles at ``at``, and the matrix as
+    floats."""
     if node.exponent - probe.exponent > MAX_UNIT_EXPONENT:  # floats might overflow: nothing is culled in this frame
         for k in range(9):
             placing[at + k] = 0.0

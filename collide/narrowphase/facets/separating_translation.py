@@ -29,7 +29,8 @@ Hits = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
 
 
 class SeparatingTranslation(NamedTuple):
-    """A translation of B that separates it from A: its length, the same rounded upwards [m], and a unit direction (3,)."""
+    """A translation of B that separates it from A: its length, the same rounded upwards [m], and a unit direction
+    (3,)."""
 
     length: float
     bound: float

@@ -94,7 +94,9 @@ def _visit_leaves(query, pair):
                 facet_a = int(A.ids[a])
                 facet_b = int(B.ids[b])
                 n_pairs = progress[N_PAIRS]
-                query.pairs[n_pairs] = facet_b * len(B.ids) + facet_a if query.swapped else facet_a * len(B.ids) + facet_b
+                query.pairs[n_pairs] = (
+                    facet_b * len(B.ids) + facet_a if query.swapped else facet_a * len(B.ids) + facet_b
+                )
                 progress[N_PAIRS] = n_pairs + 1
                 if query.first_only:
                     return True

@@ -182,43 +182,85 @@ def _write_unseen(pair, limit, normal, middle_a, middle_b, row_at):
 
 
 @kernel
-def _write_row(space, pair, limit, reach, hull_at, exchanged, row_at):
+def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
     """The row of two bodies, A and B as worked on; returns what it lacks.
 
-    reach : how far cores are looked for, above the limit and the radii [m].   hull, exchanged : as of `_write_gap`.
+    reach : how far cores are looked for, above the limit and the radii [m].   depths : whether it is wanted how deep
+    overlaps are.   hull, exchanged : as of `_write_gap`.
     """
-    result, marks = result_of(space)
-    _, _, flags = open_row(row_at)
     radius = pair.A.radius + pair.B.radius
     if balls_farther_than(pair, reach):
-        for i in range(RESULT):
-            result[i] = 0.0
-        for i in range(MARKS):
-            marks[i] = 0
-        marks[FACET_A] = marks[FACET_B] = -1
-        result[surface_distance.DISTANCE] = result[surface_distance.LOWER] = reach
-        result[surface_distance.UPPER] = math.inf
+        _set_unseen(space, reach)
     else:
-        inside = view_f64(row_at + 8 * rows.POINT_A, 3)
-        inside[0] = math.nan
+        row, _, _ = open_row(row_at)
+        row[rows.POINT_A] = math.nan
         state = cores_state(space, pair, row_at + 8 * rows.POINT_A)
         if state == SINGULAR or (state == APART and not measure(space, pair, reach)):
             return ROW_SINGULAR
         if state == HIT:
-            flags[rows.HIT] = 1
-            flags[rows.HOW] = EXACT
-            put_vec3(view_f64(row_at, 12), rows.POINT_B, vec3_at(inside, 0))
-            return CORES_MEET
+            return _write_core_hit(space, pair, depths, row_at)
     lacks = _write_gap(space, pair, limit, hull_at, exchanged, row_at)
     state = gap_state(space, radius)
     if state == OPEN:  # a search no farther than the radii may have a bracket that is narrow enough
         measure(space, pair, radius * FARTHER)
         state = APART if gap_state(space, radius) == APART else OPEN
-    if state != APART:
-        lacks |= RADII_MEET
-        flags[rows.HIT] = 1
+    _, _, flags = view_row(row_at)
     flags[rows.HOW] = UNDECIDED if state == OPEN else FORMULA
-    return lacks
+    if state == APART:
+        return lacks
+    flags[rows.HIT] = 1
+    if depths or lacks != 0:
+        return lacks | RADII_MEET
+    _forget_gap(row_at, state == HIT)
+    return 0
+
+
+@kernel
+def _set_unseen(space, reach):
+    """Make the scratch what the traversal leaves of surfaces that are farther than it looks."""
+    result, marks = result_of(space)
+    for i in range(RESULT):
+        result[i] = 0.0
+    for i in range(MARKS):
+        marks[i] = 0
+    marks[FACET_A] = marks[FACET_B] = -1
+    result[surface_distance.DISTANCE] = result[surface_distance.LOWER] = reach
+    result[surface_distance.UPPER] = math.inf
+
+
+@kernel
+def _write_core_hit(space, pair, depths, row_at):
+    """The row of bodies whose cores meet, at a common point; returns what it lacks.
+
+    The row's point A is one of a part that lies inside the other body, NaN where surfaces meet.
+    """
+    row, words, flags = view_row(row_at)
+    flags[rows.HIT] = 1
+    flags[rows.HOW] = EXACT
+    if math.isnan(row[rows.POINT_A]):
+        measure(space, pair, math.inf)
+        result, marks = result_of(space)
+        put_vec3(row, rows.POINT_A, vec3_at(result, surface_distance.POINT_A))
+        words[rows.PART_A] = max(marks[FACET_A], 0)
+        words[rows.PART_B] = max(marks[FACET_B], 0)
+    put_vec3(row, rows.POINT_B, vec3_at(row, rows.POINT_A))
+    flags[rows.CERTIFIED] = 1
+    return CORES_MEET if depths else 0
+
+
+@kernel
+def _forget_gap(row_at, proven):
+    """Make the row of bodies that their radii make meet, or may, one without a depth, at a point between the cores."""
+    row, _, flags = view_row(row_at)
+    middle = scale(0.5, add(vec3_at(row, rows.POINT_A), vec3_at(row, rows.POINT_B)))
+    put_vec3(row, rows.POINT_A, middle)
+    put_vec3(row, rows.POINT_B, middle)
+    put_vec3(row, rows.NORMAL, Vec3(0.0, 0.0, 0.0))
+    row[rows.DISTANCE] = 0.0
+    row[rows.LOWER] = 0.0
+    row[rows.UPPER] = 0.0 if proven else max(row[rows.UPPER], 0.0)
+    flags[rows.BEYOND] = 0
+    flags[rows.CERTIFIED] = 1 if proven else 0
 
 
 @kernel
@@ -236,7 +278,7 @@ def _exchange(row_at):
 
 
 @kernel
-def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, hull_at, row_at):
+def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, depths, hull_at, row_at):
     """A row of the bodies as they are asked about; returns what it lacks.
 
     Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped questions
@@ -248,29 +290,32 @@ def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, hull_at, row_at)
     if words[SAME_BODY] != 0 and is_swapped_order(view_f64(pair.XA_at, 12), view_f64(pair.XB_at, 12)):
         pair = PosedPair(pair.B, pair.A, pair.XB_at, pair.XA_at, pair.same_tree)
         exchanged = not exchanged
-    lacks = _write_row(space, pair, limit, reach, hull_at, exchanged, row_at)
+    lacks = _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at)
     if exchanged and lacks != ROW_SINGULAR:
         _exchange(row_at)
     return lacks
 
 
 @entry(prepared.ROW, nogil=False)
-def gap_single(header_at, XA_at, XB_at, row_at, _depths):
-    """1 where bodies are apart, with their row of PAIR_DTYPE, zeroed before; −1 where the long way is to be taken."""
+def gap_single(header_at, XA_at, XB_at, row_at, depths):
+    """1 with the row of PAIR_DTYPE, zeroed before, of bodies that are apart or without depths; −1: the long way is taken."""
     if not (is_rigid(XA_at, True) and is_rigid(XB_at, True)):
         return -1
     view_i32(row_at, ROW // 4)[rows.BODY_B] = 1
-    lacks = _row_at_poses(header_at, open_space(header_at), XA_at, XB_at, math.inf, math.inf, 0, row_at)
-    return -1 if lacks != 0 else 1
+    lacks = _row_at_poses(header_at, open_space(header_at), XA_at, XB_at, math.inf, math.inf, depths, 0, row_at)
+    _, _, flags = view_row(row_at)
+    return -1 if lacks != 0 or flags[rows.HOW] == UNDECIDED else 1
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, float64, int64, int64, int64)")
-def gap_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, reach, hulls_at, rows_at, lacks_at):
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, float64, boolean, int64, int64, int64)")
+def gap_poses(
+    header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, reach, depths, hulls_at, rows_at, lacks_at
+):
     """Rows of bodies at poses ``first`` … n − 1; returns how many are done: of one that is not, ``lacks`` says why.
 
     XA, XB, check : as of `meet_poses`.   limit : beyond it only a lower bound is wanted [m].   reach : how far cores
-    are looked for: next above the limit and the radii [m].   hulls : 0, or rows of the bodies' hulls, for directions.
-    rows : of PAIR_DTYPE, zeroed; of cores that meet both points become a point inside both, NaN where surfaces meet.
+    are looked for: next above the limit and the radii [m].   depths : whether it is wanted how deep overlaps are.
+    hulls : 0, or rows of the bodies' hulls, for directions.   rows : of PAIR_DTYPE, zeroed.
     lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
     """
     space = open_space(header_at)
@@ -281,8 +326,9 @@ def gap_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, r
             return k
         hull_at = hulls_at + ROW * k if hulls_at != 0 else 0
         lacks[k] = _row_at_poses(
-            header_at, space, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k, limit, reach, hull_at, rows_at + ROW * k
-        )
+            header_at, space, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k, limit, reach, depths, hull_at,
+            rows_at + ROW * k,
+        )  # fmt: skip
         if lacks[k] == ROW_SINGULAR:
             return k
     return n

@@ -283,7 +283,9 @@ def _bodies_state(space, pair):
 @kernel
 def balls_farther_than(pair, margin):
     """Whether balls around the cores are certainly farther apart than a margin [m]."""
-    return balls_apart(view_f64(pair.XA_at, 16), numbers_of(pair.A), view_f64(pair.XB_at, 16), numbers_of(pair.B), margin)
+    return balls_apart(
+        view_f64(pair.XA_at, 16), numbers_of(pair.A), view_f64(pair.XB_at, 16), numbers_of(pair.B), margin
+    )
 
 
 @entry(prepared.BOOLEAN, nogil=False)

@@ -14,8 +14,8 @@ from collide.numerics import double_double as dd
 from collide.numerics.vec3 import Vec3
 
 # A question: both poses (R row by row, then p) and what composed ones are more than that (low parts); the first point's
-# vertices a and b; a power of two that brings the pair to a size of about 1, slop and error of the pair [m], both radii [m],
-# 1 where the nearest point lies in the parallelogram of two segments; two edges.
+# vertices a and b; a power of two that brings the pair to a size of about 1, slop and error of the pair [m], both radii
+# [m], 1 where the nearest point lies in the parallelogram of two segments; two edges.
 POSE_A, POSE_B, LOW_A, LOW_B, CORNER_A, CORNER_B, SCALE, SLOP, ERROR, RADIUS_A, RADIUS_B, PARALLELOGRAM, EDGES = (
     0, 12, 24, 36, 48, 51, 54, 55, 56, 57, 58, 59, 60
 )  # fmt: skip
@@ -25,11 +25,12 @@ PART = 7
 EDGE = 2 * PART
 QUESTION = EDGES + 2 * EDGE
 
-# An answer: 1 where proven, as far as the feature itself says; the core distance, the spread of the feature's heights and
-# the direction's length, all scaled; the gap (double-double) and its bracket [m]; the unit vector from B to A; the cores'
-# points; that vector in either body's frame, and how low other vertices must not be along it.
+# An answer: 1 where proven, as far as the feature itself says; the core distance, the spread of the feature's heights
+# and the direction's length, all scaled; the gap (double-double) and its bracket [m]; the unit vector from B to A; the
+# cores' points; that vector in either body's frame, and how low other vertices must not be along it.
 (
-    PROVEN, CORE, SPREAD, LENGTH, GAP, GAP_LOW, GAP_LOWER, GAP_NEAREST, GAP_UPPER, UNIT, POINT_A, POINT_B, ALONG_A, ALONG_B,
+    PROVEN, CORE, SPREAD, LENGTH, GAP, GAP_LOW, GAP_LOWER, GAP_NEAREST, GAP_UPPER, UNIT, POINT_A, POINT_B, ALONG_A,
+    ALONG_B,
     LIMIT_A, LIMIT_B,
 ) = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 18, 21, 24, 25)  # fmt: skip
 ANSWER = 26

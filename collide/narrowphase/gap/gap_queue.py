@@ -96,8 +96,8 @@ def clear_queue(integers_at):
 def enqueue(ordered, query, work, n, how, row_number, error):
     """Put a row into the queue whose gap is to be refined; returns its kind.
 
-    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_query.py`: of its n vertex pairs those with a weight
-    are the feature, of four of two segments three corners.
+    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`: of its n vertex pairs those with a
+    weight are the feature, of four of two segments three corners.
     how : what the row says if its digits are proven.   error : of a bound in doubles [m].
     """
     pair = ordered.pair

@@ -15,8 +15,8 @@ Errors, with S, ρ and σ the sizes of `bounds.py`, d the direction in the world
 * the height of a vertex v over the first one v₀ is (v − v₀)·g′, where v − v₀ is exact: 25u²·2ρσ|d|.
 
 No vertex is lower over the first one of its body than is said, by more than the sum of both; of both bodies together,
-as ρσ adds up to S at most, 2.2·2⁻¹⁰⁰ S|d|. With what the first points are off by, 1.25·2⁻⁹⁸ S|d| (`refine_gap.py`), that is
-less than `HEIGHT_ERROR`.
+as ρσ adds up to S at most, 2.2·2⁻¹⁰⁰ S|d|. With what the first points are off by, 1.25·2⁻⁹⁸ S|d| (`refine_gap.py`),
+that is less than `HEIGHT_ERROR`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ _DD_ERROR, _TINY = 2.0**-101, 2.0**-960
 
 
 class LowestVertex(NamedTuple):
-    """proven : false where it could not be found.   height : over the first vertex, ≤ 0.   n_visited : vertices compared."""
+    """proven : false where it could not be found.   height : over the first vertex, ≤ 0.   n_visited : vertices
+    compared."""
 
     proven: bool
     vertex: int
@@ -86,7 +87,8 @@ def _column(poses, p, low, low_at):
 def descend(tree, first, g, terms):
     """A lowest vertex of a hull, exactly, by steps along its edges; `n_visited` is O(log n) of a level cap.
 
-    tree : address of a support tree.   first : the row to start from.   g : `DDVec3`.   terms : workspace of PRODUCT_TERMS
+    tree : address of a support tree.   first : the row to start from.   g : `DDVec3`.
+    terms : workspace of PRODUCT_TERMS
     doubles.
 
     Not proven: too many neighbours, or products too small to be exact, or a vertex in the middle of a facet, from which
@@ -154,8 +156,8 @@ def _compare_finely(a, b, g, error, terms):
 
 @kernel
 def lowest_of_all(coords, n, padded, first, g):
-    """The lowest of all n vertices by a scan, O(n); `n_visited` counts heights taken in double-doubles, those that doubles
-    cannot tell from the lowest so far."""
+    """The lowest of all n vertices by a scan, O(n); `n_visited` counts heights taken in double-doubles, those that
+    doubles cannot tell from the lowest so far."""
     start = column_at(coords, padded, first)
     best = first
     lowest = DD(0.0, 0.0)

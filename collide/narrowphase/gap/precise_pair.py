@@ -1,4 +1,5 @@
-"""A pair of cores of points in double-doubles: differences of posed vertices, planes across them, and heights along these.
+"""A pair of cores of points in double-doubles: differences of posed vertices, planes across them, and heights along
+these.
 
 Doubles find the deciding feature; here its numbers get their last digits. Points are taken straight from the
 shapes and the poses as given, so nothing that doubles rounded before has a say. Everything is scaled by a power
@@ -84,7 +85,9 @@ def _put_low_parts(pair, terms_at, low_at):
     low = view_f64(low_at, LOW_PARTS_OF_PAIR)
     terms = view_f64(terms_at, TERM_ROW * rows)
     for body in range(2):
-        at_terms = TERM_ROW * int(pair.poses[(pair.A.pose_at if body == 0 else pair.B.pose_at) + POSE_TERMS]) + LOW_PARTS
+        at_terms = (
+            TERM_ROW * int(pair.poses[(pair.A.pose_at if body == 0 else pair.B.pose_at) + POSE_TERMS]) + LOW_PARTS
+        )
         for k in range(12):
             low[12 * body + k] = terms[at_terms + k] if at_terms >= 0 else 0.0
     return LOW_PARTS_OF_PAIR

@@ -5,9 +5,9 @@ the heights of the feature's own points, whose greatest is an upper bound if the
 the feature (the Karush-Kuhn-Tucker conditions of the nearest point). Nearly always they are the same number.
 Where they are not, doubles stopped at the wrong one of several nearly level features: that is left to integers.
 
-The feature is its first point w₀ = R_A a₀ + p_A − R_B b₀ − p_B and the edges to its others. Other points have, as a rule,
-a vertex of one body in common with the first, so that an edge is R (v − v₀) of one body: half the work of a point,
-and good to its own length instead of the pair's size.
+The feature is its first point w₀ = R_A a₀ + p_A − R_B b₀ − p_B and the edges to its others. Other points have, as a
+rule, a vertex of one body in common with the first, so that an edge is R (v − v₀) of one body: half the work of a
+point, and good to its own length instead of the pair's size.
 
 Error of an edge: v − v₀ is exact, as a double-double; a coordinate is three terms, whose lower parts are at most
 4u·ΣT and rounded eight times: 32u²·ΣT, across three coordinates less than 2⁻⁹⁹ S, as |v − v₀| ≤ 2ρ. Along a
@@ -138,7 +138,8 @@ def refine_gaps(question, n, parts, composed, feature, direction, answer):
     """The distances of eight pairs of cores of points that are apart, from the n ≤ 3 points nearest the origin.
 
     question : a lane block of `gap_layout.py`, or one pair's question as doubles.   parts : of an edge, 1 or 2.
-    composed : whether low parts of poses are there.   feature, direction, answer : FEATURE, dd.STRIDE, ANSWER numbers, out.
+    composed : whether low parts of poses are there.
+    feature, direction, answer : FEATURE, dd.STRIDE, ANSWER numbers, out.
 
     What other vertices lie as low is for the caller to see (`tied_vertices.py`).
     """
@@ -148,7 +149,9 @@ def refine_gaps(question, n, parts, composed, feature, direction, answer):
     )
     for k in range(1, n):
         for part in range(parts):
-            _put_edge(question, at.EDGES + at.EDGE * (k - 1) + at.PART * part, feature, dd.STRIDE * k, part > 0, composed)
+            _put_edge(
+                question, at.EDGES + at.EDGE * (k - 1) + at.PART * part, feature, dd.STRIDE * k, part > 0, composed
+            )
     w = dd.vec3_at(feature, 0)
     across = w
     proven = question[at.SCALE] > 0.0
@@ -219,7 +222,8 @@ def _set_witnesses(question, n, parts, first, second, answer):
 
 @kernel(inline=True)
 def _set_limits(question, n, answer):
-    """The direction in the frames of both bodies, and what is level with the feature's vertices along it, in doubles."""
+    """The direction in the frames of both bodies, and what is level with the feature's vertices along it, in
+    doubles."""
     unit = vec3_at(answer, at.UNIT)
     along_a = rotate_back(question, at.POSE_A, unit)
     along_b = neg(rotate_back(question, at.POSE_B, unit))

@@ -1,4 +1,5 @@
-"""Which vertices are the least of A ⊖ B along a direction: told apart in doubles where that is enough, else in double-doubles."""
+"""Which vertices are the least of A ⊖ B along a direction: told apart in doubles where that is enough, else in
+double-doubles."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def vertices_of(body):
 
 @kernel(inline=True)
 def is_unique_minimiser(pair, ids, n, direction, slack):
-    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with tied pairs of their own vertices alone.
+    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with tied pairs of their own vertices
+    alone.
 
     ids : their vertex pairs.   slack : how far doubles may be wrong along |direction| = 1. False also where a pair of
     their vertices might not be tied with them: n pairs over n + 1 vertices hang together, so that it must be.
@@ -74,9 +76,11 @@ def distinct_vertices(ids, n):
 
 @kernel
 def no_other_is_tied(body, ids, n_pairs, which, n_distinct, g, limit):
-    """Whether those of a body's vertices in some vertex pairs, and no others, have a product with g of at most the limit.
+    """Whether those of a body's vertices in some vertex pairs, and no others, have a product with g of at most the
+    limit.
 
-    body : `Vertices`.   ids : at most three pairs, with ``n_distinct`` different vertices of body ``which``, 0 for A, 1 for B.
+    body : `Vertices`.   ids : at most three pairs, with ``n_distinct`` different vertices of body ``which``, 0 for A, 1
+        for B.
 
     A scan; or, where there is a support tree, a visit of their neighbours: the vertices of a hull below a level hang
     together. Also a scan where they have very many, as the tip of a cone has.
@@ -175,8 +179,8 @@ def lowest_pair(pair, low, ids, direction, terms_at, scale):
     terms_at : workspace of PRODUCT_TERMS doubles.   scale : what heights are multiplied with, a power of two.
 
     For the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `hull_descent.py`.
-    Asked where they are not alone (`is_unique_minimiser`). O(log n) where there are support trees, but for vertices of very
-    many neighbours; else O(n).
+    Asked where they are not alone (`is_unique_minimiser`). O(log n) where there are support trees, but for vertices of
+    very many neighbours; else O(n).
     """
     of_a = _lowest(pair.A, pair.poses, ids[0], low, 0, direction, 1.0, terms_at)
     of_b = _lowest(pair.B, pair.poses, ids[1], low, 12, direction, -1.0, terms_at)

@@ -25,8 +25,8 @@ _OPTIMAL = 1.0 - 2.0**-40
 class Nearest(NamedTuple):
     """The nearest point of a simplex of old points A, B, C and the newest, D.
 
-    n_kept : points that stay, D and the first ones of (A, B, C), (B, C, A) or (C, A, B), as ``rotation`` = 0, 1, 2 says.
-        NOT_FOUND: look at all faces. INSIDE: the origin lies in the tetrahedron; ``w0`` is how deep, at least.
+    n_kept : points that stay, D and the first ones of (A, B, C), (B, C, A) or (C, A, B), as ``rotation`` = 0, 1, 2
+        says. NOT_FOUND: look at all faces. INSIDE: the origin lies in the tetrahedron; ``w0`` is how deep, at least.
     w0, w1, w2 : weights of D and of the other two.   v : the point.
     """
 
@@ -165,7 +165,8 @@ def _on_best_edge(D, e, f, g):
 
 @kernel(inline=True)
 def _squared_clearance(outwards, n, a, b, c, error):
-    """h² / |n|² for the normal n of a triangle, turned outwards: see `height_behind`; −1 unless the origin lies behind."""
+    """h² / |n|² for the normal n of a triangle, turned outwards: see `height_behind`; −1 unless the origin lies
+    behind."""
     height, square = height_behind(scale(outwards, n), a, b, c, error)
     return height * height / square if height > 0.0 else -1.0
 

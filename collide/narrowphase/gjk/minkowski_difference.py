@@ -6,6 +6,8 @@ is closest where this set is nearest the origin, overlaps where it contains the 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from collide.kernels import kernel
 from collide.numerics.vec3 import Vec3, add, column_at, dot, neg, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 from collide.support.support_mapping import settled_vertex, support
@@ -158,3 +160,71 @@ def weighted_sum(points, weights, n, first):
     for k in range(n):
         total = add(total, scale(weights[k], vec3_at(points, POINT * k + first)))
     return total
+
+
+class Places(NamedTuple):
+    """Where points A, B and C of a simplex, of which n are there, and a new one, D, stand in memory."""
+
+    n: int
+    a: int
+    b: int
+    c: int
+    d: int
+
+
+@kernel(inline=True)
+def is_repeated(ids, places):
+    """Whether point D is one of the n others (curved cores have no ids and never repeat)."""
+    i = ids[2 * places.d]
+    j = ids[2 * places.d + 1]
+    if i < 0 or j < 0:
+        return False
+    if ids[2 * places.a] == i and ids[2 * places.a + 1] == j:
+        return True
+    if places.n > 1 and ids[2 * places.b] == i and ids[2 * places.b + 1] == j:
+        return True
+    return places.n > 2 and ids[2 * places.c] == i and ids[2 * places.c + 1] == j
+
+
+@kernel(cold=True)
+def bring_to_front(points, ids, places):
+    """Bring the n points A, B, C to the front, and D behind them; returns where all of them stand then."""
+    n, a, b, c, d = places
+    if a != 0:
+        _exchange_points(points, ids, 0, a)
+        b = a if b == 0 else b
+        c = a if c == 0 else c
+        d = a if d == 0 else d
+    if n > 1 and b != 1:
+        _exchange_points(points, ids, 1, b)
+        c = b if c == 1 else c
+        d = b if d == 1 else d
+    if n > 2 and c != 2:
+        _exchange_points(points, ids, 2, c)
+        d = c if d == 2 else d
+    if d != n:
+        _exchange_points(points, ids, n, d)
+    return Places(n, 0, 1 if n > 1 else 2, 2 if n > 2 else 3, n)
+
+
+@kernel(inline=True)
+def _exchange_points(points, ids, k, j):
+    for i in range(POINT):
+        points[POINT * k + i], points[POINT * j + i] = points[POINT * j + i], points[POINT * k + i]
+    for i in range(2):
+        ids[2 * k + i], ids[2 * j + i] = ids[2 * j + i], ids[2 * k + i]
+
+
+@kernel(inline=True)
+def drop_unused(points, ids, weights, n):
+    """Keep the points with a positive weight; returns their number."""
+    n_kept = 0
+    for k in range(n):
+        if weights[k] > 0.0:
+            if n_kept != k:
+                copy_point(points, ids, k, n_kept)
+                weights[n_kept] = weights[k]
+            n_kept += 1
+    for k in range(n_kept, 4):
+        weights[k] = 0.0
+    return n_kept

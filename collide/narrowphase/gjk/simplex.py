@@ -189,8 +189,8 @@ def height_behind(n, p, q, r, error):
 
     n : the computed normal (q − p) × (r − p), outwards.   error : how far each point may be from its true place.
 
-    The side is the sign of det(p, q, r) = p·(e × f), e = q − p, f = r − p. Moving the three points by ``error`` moves it
-    by at most error·(|e||f| + 2|p|(|e| + |f|)) in first order, doubled here for the rest. Without this
+    The side is the sign of det(p, q, r) = p·(e × f), e = q − p, f = r − p. Moving the three points by ``error`` moves
+    it by at most error·(|e||f| + 2|p|(|e| + |f|)) in first order, doubled here for the rest. Without this
     test a tetrahedron as thin as rounding "contained" an origin 0.29 m outside it. h / |n| is the least of
     the three corners' distances along the computed normal, a lower bound for any unit normal. Lengths are
     bounded by sums: no roots.
@@ -234,7 +234,11 @@ def faces_in_sight(points, error):
 def signed_volume(points, first):
     """Six times the signed volume of four points in a row: positive where the last lies in front of the first three."""
     a = point_at(points, first)
-    e, f, g = sub(point_at(points, first + 1), a), sub(point_at(points, first + 2), a), sub(point_at(points, first + 3), a)
+    e, f, g = (
+        sub(point_at(points, first + 1), a),
+        sub(point_at(points, first + 2), a),
+        sub(point_at(points, first + 3), a),
+    )
     return dot(g, cross(e, f))
 
 

@@ -17,7 +17,8 @@ from collide.kernels import address_of, entry
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.gjk import mpr_batch as small_hulls
-from collide.narrowphase.gjk.mpr import ROUNDS
+from collide.narrowphase.gjk.mpr import MAX_ITERATIONS
+from collide.narrowphase.posed_pair import Tables
 from collide.results import HOW, PAIR_DTYPE, flipped
 
 #: Gaps and depths to ask about, in metres, of bodies about one metre long.
@@ -26,9 +27,8 @@ GAPS = (0.3, 0.02, 1e-4, 1e-9, 1e-13, 1e-16, -1e-16, -1e-13, -1e-9, -1e-4, -0.02
 
 @entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64)")
 def _answer(ints, numbers, poses, shape_of, pairs, n, boolean, limit, rows, doubles, integers):
-    return small_hulls.answer_small_hulls(
-        ints, numbers, poses, shape_of, pairs, n, boolean, limit, rows, doubles, integers
-    )
+    tables = Tables(ints, numbers, poses, shape_of)
+    return small_hulls.answer_small_hulls(tables, pairs, n, boolean, limit, rows, doubles, integers)
 
 
 def small_shape(rng) -> collide.Shape:
@@ -70,7 +70,7 @@ def rows_of(cases: list[Case], limit: float = 0.0, boolean: bool = True) -> np.n
     poses = pose_table(X, np.tile(np.eye(4), (len(X), 1, 1)), np.array([p.reach for p in packed]))
     shape_of, pairs = np.arange(len(packed)), np.arange(len(packed)).reshape(-1, 2)
     rows = np.zeros(len(cases), dtype=PAIR_DTYPE)
-    doubles, integers = np.zeros(small_hulls.DOUBLES), np.zeros(small_hulls.NOTES, dtype=np.int64)
+    doubles, integers = np.zeros(small_hulls.DOUBLES), np.zeros(small_hulls.TICKETS, dtype=np.int64)
     buffers = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
     _answer(*buffers, len(pairs), boolean, limit, address_of(rows), address_of(doubles), address_of(integers))
     return rows
@@ -99,7 +99,7 @@ def test_what_portals_decide_is_right_and_proven():
     assert not decided(rows[gaps == 0.0]).any()
     assert naive.share(decided(rows[gaps > 1e-9])) > 0.95
     assert 0.3 < naive.share(rows["hit"][decided(rows)]) < 0.7
-    assert (rows["iterations"][decided(rows)] <= ROUNDS).all()
+    assert (rows["iterations"][decided(rows)] <= MAX_ITERATIONS).all()
 
 
 def test_batches_answer_as_single_calls_and_exact_arithmetic_do():

@@ -15,15 +15,15 @@ from collide.narrowphase.gjk.minkowski_difference import POINT
 from collide.numerics.double_double import STRIDE
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
 
-# Workspace of one thread, in doubles: difference points and their weights; last digits of depths and heights (four points, a
-# direction, low parts of two poses); EPA's; the queue of gaps.
+# Workspace of one thread, in doubles: difference points and their weights; last digits of depths and heights (four
+# points, a direction, low parts of two poses); EPA's; the queue of gaps.
 _WEIGHTS_AT = 5 * POINT
 _FINE_AT = 64
 _EPA_DOUBLES_AT = _FINE_AT + 5 * STRIDE + LOW_PARTS_OF_PAIR
 _QUEUE_DOUBLES_AT = _EPA_DOUBLES_AT + EPA_DOUBLES
 DOUBLES = _QUEUE_DOUBLES_AT + QUEUE_DOUBLES
-# In integers: vertex pairs of the difference points; of the nearest facet; ties, or the terms of a sum; one request to the
-# exact stage; EPA's; the queue of gaps; all requests of a call.
+# In integers: vertex pairs of the difference points; of the nearest facet; ties, or the terms of a sum; one request to
+# the exact stage; EPA's; the queue of gaps; all requests of a call.
 _NEAREST_AT, _TIES_AT = 10, 16
 _REQUEST_AT = _TIES_AT + max(MAX_TIES + 1, PRODUCT_TERMS)
 _EPA_INTEGERS_AT = _REQUEST_AT + ENTRY
