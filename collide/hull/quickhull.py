@@ -96,13 +96,13 @@ def free_facet(facets, state, f):
     at = FACET * f
     if facets[at + _POINT] >= 0:
         previous = facets[at + _BEFORE]
-        right = facets[at + _AFTER]
+        following_one = facets[at + _AFTER]
         if previous >= 0:
-            facets[FACET * previous + _AFTER] = right
+            facets[FACET * previous + _AFTER] = following_one
         else:
-            state[_FIRST] = right
-        if right >= 0:
-            facets[FACET * right + _BEFORE] = previous
+            state[_FIRST] = following_one
+        if following_one >= 0:
+            facets[FACET * following_one + _BEFORE] = previous
         else:
             state[_LAST] = previous
     facets[at] = -1

@@ -12,8 +12,7 @@ from itertools import combinations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from collide.hierarchies.polarity import (
+from polarity import (
     Halfspace,
     Plane,
     Polyhedron,
