@@ -1,7 +1,7 @@
 """What queries need of many points besides the points: made when first needed, and kept with the packed set.
 
-A support tree answers support queries in logarithmic time (`support/`); a few coarse points, chosen so that they span most of
-the hull, begin them.
+A support tree answers support queries in logarithmic time (`support/`); a few coarse points, chosen so that they span
+most of the hull, begin them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from collide.support.lazy_support_tree import LazySupportTree
 
 #: So many points have coarse points: twice as many as then stand for them.
 _MIN_FOR_COARSE = 64
-#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone, so that an answer
-#: does not depend on what was asked before.
+#: Fewer points are scanned: it takes no longer, and needs no hull. Decided by the number of points alone, so that an
+#: answer does not depend on what was asked before.
 MIN_FOR_TREE = 224
 
 

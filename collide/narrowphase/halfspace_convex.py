@@ -60,7 +60,8 @@ def plane_in_world(pair, body):
 def reach_of_plane(pair, body):
     """(distance of the plane from the frame's origin, skew): what a half-space adds to S, and by what errors grow.
 
-    n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; a matrix that is no rotation may make that much of |n|.
+    n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; a matrix that is no rotation may make that much of
+    |n|.
     """
     plane = plane_in_world(pair, body)
     row = 0.0
@@ -75,7 +76,8 @@ def reach_of_plane(pair, body):
 
 @kernel
 def halfspace_convex(ordered, query, row, work):
-    """Write the row of a half-space A and a convex set B: the point of B's core deepest behind the plane, moved by the radius."""
+    """Write the row of a half-space A and a convex set B: the point of B's core deepest behind the plane, moved by the
+    radius."""
     pair = ordered.pair
     A, B, poses = pair.A, pair.B, pair.poses
     distance, skew = reach_of_plane(pair, A)
@@ -184,7 +186,8 @@ def refine_height(pair, doubles_at, ties_at, vertex, size, error, skew):
         if too_many and dot(b, g) > limit:
             continue
         point = DDVec3(
-            _fine_coordinate(b, poses, p, q, 0), _fine_coordinate(b, poses, p, q, 1), _fine_coordinate(b, poses, p, q, 2)
+            _fine_coordinate(b, poses, p, q, 0), _fine_coordinate(b, poses, p, q, 1),
+            _fine_coordinate(b, poses, p, q, 2)
         )
         height = dd.inner(point, normal)
         if dd.less(height, least):

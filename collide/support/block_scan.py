@@ -63,5 +63,6 @@ else:
 #: ``count_level(coordinates, stride, count, gx, gy, gz, limit) -> n``: how many of the first ``count`` points, a
 #: multiple of 8, have a product at most the limit.
 __all__ = [
-    "count_level", "count_level_one_by_one", "farthest", "farthest_listed", "farthest_one_by_one", "least", "least_one_by_one",
+    "count_level", "count_level_one_by_one", "farthest", "farthest_listed", "farthest_one_by_one", "least",
+    "least_one_by_one",
 ]  # fmt: skip

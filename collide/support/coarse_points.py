@@ -1,4 +1,5 @@
-"""Coarse points: those of a cloud that are farthest in directions spread over the sphere, the cloud stretched to a cube.
+"""Coarse points: those of a cloud that are farthest in directions spread over the sphere, the cloud stretched to a
+cube.
 
 A kernel, since Python and C are to choose the same ones: numpy's sines and cosines differ from platform to platform.
 """

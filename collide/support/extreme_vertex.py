@@ -43,7 +43,8 @@ _TRIPLE_ROUNDING = 64.0 * 2.0**-53
 class Ring(NamedTuple):
     """A vertex among its neighbours.
 
-    points : three doubles a row.   neighbours : of all vertices; those of this one are neighbours[begin : begin + degree], in
+    points : three doubles a row.
+    neighbours : of all vertices; those of this one are neighbours[begin : begin + degree], in
     cyclic order, counter-clockwise from outside.
     """
 

@@ -3,7 +3,8 @@
 A subset's candidate lists are as long as its normal cones are large, counted in cones of the finer subset. Random
 subsets have cones of very different size: among lists of 46 on average were some of 100, and queries meet the long
 ones oftener. Here the vertices are put in order along a Hilbert curve over the sphere of directions (Hilbert 1891, on
-an octahedron unfolded to a square), and vertices at even distances along it are taken: lists as long on average, never much longer.
+an octahedron unfolded to a square), and vertices at even distances along it are taken: lists as long on average, never
+much longer.
 """
 
 from __future__ import annotations

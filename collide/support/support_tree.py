@@ -53,7 +53,8 @@ class SupportTree:
         self.header = np.array(
             [len(self.points), self.depth, len(self.nodes) - 1, len(self.entries), len(self.ring),
              *(address_of(part) for part in (
-                 self.nodes, self.entries, self.list_coordinates, self.ring_starts, self.ring, self.range)), self.flat, address_of(self.points)],
+                 self.nodes, self.entries, self.list_coordinates, self.ring_starts, self.ring,
+                 self.range)), self.flat, address_of(self.points)],
             dtype=np.int64,
         )  # fmt: skip
         self.address = address_of(self.header)

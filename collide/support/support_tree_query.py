@@ -50,7 +50,8 @@ class SupportPoint(NamedTuple):
 
 
 class Lists(NamedTuple):
-    """Candidate lists of a support tree, as `SupportTree` names them.   depth : how many are scanned one after another."""
+    """Candidate lists of a support tree, as `SupportTree` names them.   depth : how many are scanned one after
+    another."""
 
     nodes: Any
     entries: Any
@@ -188,6 +189,7 @@ def extreme_vertices(
         raise ValueError(f"counters must be ({COUNTERS},) of int64")
     ids = np.empty(len(directions), dtype=np.int64)
     write_extreme_vertices(
-        tree.address, address_of(directions), len(directions), settled, address_of(ids), 0 if counters is None else address_of(counters),
+        tree.address, address_of(directions), len(directions), settled, address_of(ids),
+        0 if counters is None else address_of(counters),
     )  # fmt: skip
     return ids

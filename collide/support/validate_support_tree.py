@@ -44,7 +44,8 @@ def farthest_rows(points: np.ndarray, g: np.ndarray) -> set[int]:
         return {int(candidates[0])}
     direction = [Fraction(c) for c in g.tolist()]
     exact = {
-        int(row): sum((Fraction(c) * d for c, d in zip(points[row].tolist(), direction)), Fraction(0)) for row in candidates
+        int(row): sum((Fraction(c) * d for c, d in zip(points[row].tolist(), direction)), Fraction(0))
+        for row in candidates
     }
     best = max(exact.values())
     return {row for row, value in exact.items() if value == best}
@@ -92,7 +93,9 @@ def _facet_directions(tree: SupportTree, samples: int, rng) -> tuple[np.ndarray,
     shift = rng.integers(0, 1 << 30, size=samples)
 
     def neighbour(i):
-        return tree.points[tree.ring[tree.ring_starts[vertices] + (shift + i) % degree[vertices]]] - tree.points[vertices]
+        return (
+            tree.points[tree.ring[tree.ring_starts[vertices] + (shift + i) % degree[vertices]]] - tree.points[vertices]
+        )
 
     scale = 1.0 / np.abs(tree.points).max()
     corners = [neighbour(i) * scale for i in range(3)]

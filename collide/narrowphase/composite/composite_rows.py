@@ -38,8 +38,8 @@ from collide.support.support_mapping import support
 MAX_NORMALS = 8
 
 # Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
-# ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, the upper end of the
-# first row, the number of overlaps kept, and the deepest of them.
+# ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, the upper end
+# of the first row, the number of overlaps kept, and the deepest of them.
 (
     _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _FIRST_UPPER, _N_OVERLAPS, _DEEPEST,
 ) = range(11)  # fmt: skip
@@ -59,7 +59,8 @@ class PosedParts(NamedTuple):
 
 
 class BodySize(NamedTuple):
-    """Size of a body seen from a point of the world [m], how far its points may be off besides, whether it is curved."""
+    """Size of a body seen from a point of the world [m], how far its points may be off besides, whether it is
+    curved."""
 
     size: float
     slop: float
@@ -97,7 +98,8 @@ def copy_row(row_at, out_at):
 
 @kernel
 def add_row(score, at, row_at, number, out_at):
-    """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of least number."""
+    """Take a row of two parts into account; ``out`` becomes the nearest row so far, of equal ones that of least
+    number."""
     row = view_row(row_at)
     distance = row.doubles[DISTANCE]
     lower = row.doubles[LOWER]
@@ -261,7 +263,8 @@ def _extent(parts, first, n_parts, origin, n):
 def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at, shape_of_at, score_at, out_at):
     """Write one row for each of n pairs of bodies from rows of their parts.
 
-    starts : n + 1 numbers of rows, where each pair's begin and end.   spans : first part and number of parts of A, and of B,
+    starts : n + 1 numbers of rows, where each pair's begin and end.
+    spans : first part and number of parts of A, and of B,
     pair by pair.   ints, numbers, poses, shape_of : as in `answer_pairs`.   score : SCORE doubles.   out : zeroed rows.
     """
     starts = view_i64(starts_at, n + 1)

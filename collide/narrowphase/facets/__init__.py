@@ -4,6 +4,6 @@ The way in is `mesh_pairs.py` (any two shapes with a mesh), then by kind `mesh_r
 `body_pairs.py`, whose kernels `surface_pairs.py` (booleans) and `surface_gaps.py` (rows) take whole batches; curved
 shapes to `mesh_curved.py`. `facet_queries.py` asks single traversals from Python: `surface_collision.py`,
 `surface_distance.py`, `winding_numbers.py`, `facets_within.py`, `ray_surface.py`, `self_collision.py`.
-`posed_surfaces.py` sets two posed trees in relation, `filtered_triangles.py` decides in doubles what doubles can decide,
-`exact_corners.py` and `exact_triangles.py` the rest.
+`posed_surfaces.py` sets two posed trees in relation, `filtered_triangles.py` decides in doubles what doubles can
+decide, `exact_corners.py` and `exact_triangles.py` the rest.
 """

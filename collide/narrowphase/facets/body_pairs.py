@@ -3,8 +3,8 @@
 Kernels answer whole batches (`surface_pairs.py`, `surface_gaps.py`). Completed here, pose by pose, is what a row may
 still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
 surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
-that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so the
-bracket reaches up to 0.
+that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so
+the bracket reaches up to 0.
 """
 
 from __future__ import annotations
@@ -79,7 +79,13 @@ def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bo
 
 
 def balls_farther(
-    numbers_a: np.ndarray, numbers_b: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, *, check: bool = False
+    numbers_a: np.ndarray,
+    numbers_b: np.ndarray,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    margin: float,
+    *,
+    check: bool = False,
 ) -> np.ndarray:
     """(n,) bool: whether balls around two bodies are certainly farther apart than a margin [m].
 

@@ -155,7 +155,8 @@ def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
 
 @kernel
 def _write_points(pair, result, normal, by_hulls, row):
-    """Witness points of a row, whose distance is that of its bracket; by_hulls: the normal is not that of the facets."""
+    """Witness points of a row, whose distance is that of its bracket; by_hulls: the normal is not that of the
+    facets."""
     point_a = add(vec3_at(result, surface_distance.POINT_A), scale(pair.A.radius, normal))
     point_b = sub(vec3_at(result, surface_distance.POINT_B), scale(pair.B.radius, normal))
     if by_hulls:  # lay the points as far apart along it, about their middle
@@ -281,8 +282,8 @@ def _exchange(row_at):
 def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, depths, hull_at, row_at):
     """A row of the bodies as they are asked about; returns what it lacks.
 
-    Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped questions
-    give the same numbers.
+    Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped
+    questions give the same numbers.
     """
     words = view_i64(header_at, HEADER)
     exchanged = words[EXCHANGED] != 0
@@ -298,7 +299,8 @@ def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, depths, hull_at,
 
 @entry(prepared.ROW, nogil=False)
 def gap_single(header_at, XA_at, XB_at, row_at, depths):
-    """1 with the row of PAIR_DTYPE, zeroed before, of bodies that are apart or without depths; −1: the long way is taken."""
+    """1 with the row of PAIR_DTYPE, zeroed before, of bodies that are apart or without depths; −1: the long way is
+    taken."""
     if not (is_rigid(XA_at, True) and is_rigid(XB_at, True)):
         return -1
     view_i32(row_at, ROW // 4)[rows.BODY_B] = 1
@@ -307,7 +309,8 @@ def gap_single(header_at, XA_at, XB_at, row_at, depths):
     return -1 if lacks != 0 or flags[rows.HOW] == UNDECIDED else 1
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, float64, boolean, int64, int64, int64)")
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, float64, boolean, int64, int64, "
+"int64)")
 def gap_poses(
     header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, reach, depths, hulls_at, rows_at, lacks_at
 ):

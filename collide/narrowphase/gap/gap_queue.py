@@ -1,8 +1,9 @@
-"""A queue of gaps to refine: rows that lack their last digits, until eight of a kind are there or the list of pairs ends.
+"""A queue of gaps to refine: rows that lack their last digits, until eight of a kind are there or the list of pairs
+ends.
 
-A row is answered in doubles first, then enqueued: what `refine_gap.py` asks of it goes into one lane of the block of its
-kind. When the block is full, or nothing else is left to do, all in it are refined at once, and their rows are finished.
-Those whose digits are not proven get what doubles say, and are left undecided: the exact stage settles them.
+A row is answered in doubles first, then enqueued: what `refine_gap.py` asks of it goes into one lane of the block of
+its kind. When the block is full, or nothing else is left to do, all in it are refined at once, and their rows are
+finished. Those whose digits are not proven get what doubles say, and are left undecided: the exact stage settles them.
 
 Lanes do not see each other, so that no answer depends on which rows share a block. Lanes without a row hold the numbers
 of earlier ones, or zeros; what comes of them is not read.
@@ -44,13 +45,13 @@ KINDS = 12
 #: Witness points may be off by this much of the pair's size, or of their largest coordinate.
 _NEAR_MISS = 2.0**-47
 
-# A ticket says what is needed to finish a row: its number, both shapes and poses as they are worked on, whether they are
-# exchanged, how it was decided, its vertex pairs.
+# A ticket says what is needed to finish a row: its number, both shapes and poses as they are worked on, whether they
+# are exchanged, how it was decided, its vertex pairs.
 _ROW, _SHAPE_A, _POSE_A, _SHAPE_B, _POSE_B, _FLIP, _HOW, _IDS = range(8)
 _TICKET = _IDS + 6
 
-# Workspace in doubles: low parts and a direction for one row; then lane blocks: the feature, its direction, the answer, the
-# questions of each kind. In integers: how many are queued of each kind, tickets, vertex pairs, terms of a sum.
+# Workspace in doubles: low parts and a direction for one row; then lane blocks: the feature, its direction, the answer,
+# the questions of each kind. In integers: how many are queued of each kind, tickets, vertex pairs, terms of a sum.
 _LOWS, _DIRECTION = 0, LOW_PARTS_OF_PAIR
 _BLOCKS = _DIRECTION + dd.STRIDE
 _QUESTIONS = at.FEATURE + dd.STRIDE + at.ANSWER
@@ -96,7 +97,8 @@ def clear_queue(integers_at):
 def enqueue(ordered, query, work, n, how, row_number, error):
     """Put a row into the queue whose gap is to be refined; returns its kind.
 
-    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`: of its n vertex pairs those with a
+    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`: of its n vertex pairs those
+        with a
     weight are the feature, of four of two segments three corners.
     how : what the row says if its digits are proven.   error : of a bound in doubles [m].
     """
@@ -145,8 +147,8 @@ def enqueue(ordered, query, work, n, how, row_number, error):
 
 @kernel(inline=True)
 def _common_corner(feature, n_points):
-    """(first, parts): the vertex pair that has a vertex in common with each of the others, and 1; else 0 and 2, the parts
-    that edges then have."""
+    """(first, parts): the vertex pair that has a vertex in common with each of the others, and 1; else 0 and 2, the
+    parts that edges then have."""
     first = 0
     parts = 2
     for k in range(n_points):
@@ -229,7 +231,8 @@ def refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, d
         if proven and (parts == 2 or not _is_unique_minimiser(ints_at, ticket, ids, n, question, answer)):
             direction = lane_of(direction_at, dd.STRIDE, lane)
             proven = _widen_by_ties(
-                ints_at, numbers_at, poses_at, ticket, ids, question, answer, direction, composed, doubles_at, integers_at
+                ints_at, numbers_at, poses_at, ticket, ids, question, answer, direction, composed, doubles_at,
+                integers_at
             )
         _finish_row(rows_at + ROW * ticket[_ROW], question, answer, ticket, proven, depths, limit)
 

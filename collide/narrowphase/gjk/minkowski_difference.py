@@ -21,7 +21,8 @@ NEAREST_POINT, AXIS = 4, 7
 
 @kernel(cold=True)
 def listed_difference_point(pair, points, ids, k, d, list_a, list_b):
-    """`inlined_difference_point` of whole bodies, called: a copy at every place where one is asked for took 8 s to compile."""
+    """`inlined_difference_point` of whole bodies, called: a copy at every place where one is asked for took 8 s to
+    compile."""
     return inlined_difference_point(pair, points, ids, k, d, False, list_a, list_b)
 
 
