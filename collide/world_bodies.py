@@ -156,7 +156,7 @@ class WorldBodies:
 
     def remove(self, identity: int) -> None:
         row = self._row_of.pop(identity)
-        del self._id_of[self._names[row]]
+        del self._id_of[self._names[row]]  # type: ignore[arg-type]
         self._names[row] = None
         self._made.pop(identity, None)
         self._roster = None
@@ -175,7 +175,9 @@ class WorldBodies:
         if body is None:
             row = self._row_of[identity]
             X_WB = self._X_WBs[row].copy()
-            body = Body(identity, self._names[row], self._shapes[row], X_WB, *self._flags[row])
+            name = self._names[row]
+            assert name is not None
+            body = Body(identity, name, self._shapes[row], X_WB, *self._flags[row])
             self._made[identity] = body
         return body
 
@@ -248,9 +250,8 @@ class WorldBodies:
         """Drop the rows of removed bodies."""
         rows = list(self._row_of.values())
         self._X_WBs, self._moved = self._X_WBs[rows], self._moved[rows]
-        self._ids, self._names, self._shapes, self._flags = (
-            [column[row] for row in rows] for column in (self._ids, self._names, self._shapes, self._flags)
-        )  # type: ignore[assignment]
+        self._ids, self._names = [self._ids[row] for row in rows], [self._names[row] for row in rows]
+        self._shapes, self._flags = [self._shapes[row] for row in rows], [self._flags[row] for row in rows]
         self._row_of = {identity: row for row, identity in enumerate(self._ids)}
 
 

@@ -48,10 +48,10 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
     n, offset = halfspace.plane
     points, grid = body.vertices
     denominator = max(c.denominator for c in n)  # powers of two
-    n = tuple(int(c * denominator) for c in n)
-    limit = (body.radius / Fraction(2) ** grid) ** 2 * inner(n, n)
+    normal = tuple(int(c * denominator) for c in n)
+    limit = (body.radius / Fraction(2) ** grid) ** 2 * inner(normal, normal)
     offset = offset * denominator / Fraction(2) ** grid
-    heights = [inner(n, p) - offset for p in points]
+    heights = [inner(normal, p) - offset for p in points]
     is_clear = [height > 0 and height**2 > limit for height in heights]
     if hit:
         vertices = [j if halfspace is A else i for i, j in pairs]

@@ -43,11 +43,11 @@ class ExactPart:
         x, y, z, offset = (Fraction(v) for v in self.plane_P.tolist())
         n = x, y, z
         for X in self._poses:
-            rows = [tuple(Fraction(v) for v in row) for row in X[:3].tolist()]
-            R = [row[:3] for row in rows]
-            cofactors = cross(R[1], R[2]), cross(R[2], R[0]), cross(R[0], R[1])
-            n = tuple(inner(row, n) for row in cofactors)
-            offset = offset * inner(R[0], cofactors[0]) + inner(n, [row[3] for row in rows])
+            entries = [[Fraction(v) for v in row] for row in X[:3].tolist()]
+            r0, r1, r2 = ((row[0], row[1], row[2]) for row in entries)
+            cofactors = cross(r1, r2), cross(r2, r0), cross(r0, r1)
+            n = inner(cofactors[0], n), inner(cofactors[1], n), inner(cofactors[2], n)
+            offset = offset * inner(r0, cofactors[0]) + inner(n, [row[3] for row in entries])
         return n, offset
 
 

@@ -26,16 +26,19 @@ class ProofBody:
     def __init__(self, shape, X: np.ndarray):
         self.shape, self.X = shape, X
         self.is_mesh = bool(shape.meshed and hasattr(shape, "faces"))
-        self.kind, self.vertex_ids, self._part = POINTS, None, None
+        self.kind, self.has_certificates = POINTS, False
+        self.vertex_ids: np.ndarray | None = None
+        self._part: ExactPart | None = None
         if self.is_mesh:
             self.vertex_ids, self.has_certificates = np.unique(shape.faces), True
             return
         parts = [] if shape.meshed else parts_of(shape)
         if parts:
             packed, X_BP = parts[0]
-            self.kind, self._part = packed.kind, exact_part(packed, X)
+            part = exact_part(packed, X)
+            self.kind, self._part = packed.kind, part
             is_plain = len(parts) == 1 and np.array_equal(X_BP, IDENTITY) and packed.slop == 0.0
-        self.has_certificates = bool(parts) and is_plain and has_exact_numbers(self._part)
+            self.has_certificates = is_plain and has_exact_numbers(part)
 
     def part(self, ids: Sequence[int] | np.ndarray | None = None) -> ExactPart:
         """The hull of all vertices in use, or of those of these ids, in this order; a convex shape whole."""
@@ -54,7 +57,7 @@ class ProofBody:
 
     def has_vertex(self, vertex: int) -> bool:
         """Whether an id is one of a vertex in use."""
-        if not self.is_mesh:
+        if self.vertex_ids is None:
             return self.kind == POINTS and 0 <= vertex < len(self.part())
         return 0 <= vertex < len(self.shape.vertices) and vertex in self.vertex_ids
 

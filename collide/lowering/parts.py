@@ -56,6 +56,7 @@ def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
     try:
         return shape._bounds
     except AttributeError:
+        assert isinstance(shape, (Compound, Mesh))
         bounds = _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
         shape._store(_bounds=bounds)
         return bounds

@@ -41,7 +41,7 @@ class _Surface(NamedTuple):
     fan : parents of the facets' corners in classes of those around a vertex that share edges.
     parent, parity : of the facets in classes of neighbours, and which are turned over against each other.
     tally, spare : room for an integer a facet, and a half-edge.
-    count, stamp, upward, downward : room for an integer a vertex.
+    per_vertex, stamp, upward, downward : room for an integer a vertex.
     """
 
     corners: np.ndarray
@@ -55,7 +55,7 @@ class _Surface(NamedTuple):
     parent: np.ndarray
     parity: np.ndarray
     tally: np.ndarray
-    count: np.ndarray
+    per_vertex: np.ndarray
     stamp: np.ndarray
     upward: np.ndarray
     downward: np.ndarray
@@ -100,7 +100,7 @@ def _sort_half_edges(surface):
 
     Two counting sorts, so that a vertex of very many facets costs no more than others.
     """
-    corners, count, spare, order = surface.corners, surface.count, surface.spare, surface.order
+    corners, count, spare, order = surface.corners, surface.per_vertex, surface.spare, surface.order
     n_half_edges = 0
     for k in range(surface.n_vertices + 1):
         count[k] = 0
@@ -255,7 +255,7 @@ def _join_shells(surface, n_half_edges, part):
 @kernel
 def _count_fans(surface):
     """Vertices in use, those at which fans touch, and the facets there."""
-    corners, flags, counts, n_fans = surface.corners, surface.flags, surface.counts, surface.count
+    corners, flags, counts, n_fans = surface.corners, surface.flags, surface.counts, surface.per_vertex
     for v in range(surface.n_vertices):
         n_fans[v] = 0
     for c in range(3 * surface.n):

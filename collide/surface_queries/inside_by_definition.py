@@ -78,8 +78,9 @@ def _winds_around(corners: np.ndarray, point: _Point) -> bool:
         missed = (sides > slack).any(axis=0) & (sides < -slack).any(axis=0)
         near = np.flatnonzero(~missed).tolist()
         crossings = [ray_crossing(direction, *(minus(_fractions(p), point) for p in corners[k])) for k in near]
-        if None not in crossings:
-            return sum(crossings) > 0
+        certain = [crossing for crossing in crossings if crossing is not None]
+        if len(certain) == len(crossings):
+            return sum(certain) > 0
     raise UnsupportedQuery("contains: every ray tried passes an edge of the facets; please report it")
 
 

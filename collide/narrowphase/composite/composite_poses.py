@@ -87,7 +87,7 @@ class Body(NamedTuple):
     """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own."""
 
     first: int
-    count: int
+    n_parts: int
     part_rows: int
     row: int
 
@@ -120,7 +120,7 @@ def _body(block, k, which):
 @kernel(inline=True)
 def _n_pairs(block, k):
     """How many pairs of parts the bodies of slot k make."""
-    return _body(block, k, 0).count * _body(block, k, 1).count
+    return _body(block, k, 0).n_parts * _body(block, k, 1).n_parts
 
 
 @kernel(inline=True)
@@ -150,8 +150,8 @@ def _lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
             which = view_i64(which_at + 16 * (done + k), 2)
             slots[slot + _BODIES] = which[0]
             slots[slot + _BODIES + 1] = which[1]
-        rows_a = 0 if once_a else _body(block, k, 0).count
-        rows_b = 0 if once_b else _body(block, k, 1).count
+        rows_a = 0 if once_a else _body(block, k, 0).n_parts
+        rows_b = 0 if once_b else _body(block, k, 1).n_parts
         if n_rows + rows_a + rows_b > header[CAPACITY]:
             break
         slots[slot + _BODY_ROWS] = 0 if once_a else k
@@ -162,7 +162,7 @@ def _lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
         n_rows += rows_a + rows_b
         for which in range(2):
             body = _body(block, k, which)
-            if body.count == 1 and _part_view(block, body.first + 1)[PART * body.first + TURNED] == 0.0:
+            if body.n_parts == 1 and _part_view(block, body.first + 1)[PART * body.first + TURNED] == 0.0:
                 slots[slot + _PART_ROWS + which] = body.row  # the part stands where the body does
                 block.shape_of[body.row] = body.first
         if not once_a:
@@ -230,13 +230,13 @@ def _place_part_balls(block, k):
     A = _body(block, k, 0)
     B = _body(block, k, 1)
     _place_balls_of(block, A, 2, Vec3(0.0, 0.0, 0.0))
-    _place_balls_of(block, B, 2 + A.count, _shift(block, POSE * A.row, POSE * B.row))
+    _place_balls_of(block, B, 2 + A.n_parts, _shift(block, POSE * A.row, POSE * B.row))
 
 
 @kernel(inline=True)
 def _place_balls_of(block, body, first, shift):
-    parts = _part_view(block, body.first + body.count)
-    for k in range(body.count):
+    parts = _part_view(block, body.first + body.n_parts)
+    for k in range(body.n_parts):
         numbers_at = PART * (body.first + k) + CENTRE
         ball_at = (first + k) * BALL_IN_WORLD
         place_ball(block.poses, POSE * body.row, parts, numbers_at, shift.x, shift.y, shift.z, block.balls, ball_at)
@@ -259,8 +259,8 @@ def _nearest_pair(block, k, boolean):
         return -1
     if n_pairs == 1:
         return 0
-    count_a = _body(block, k, 0).count
-    count_b = _body(block, k, 1).count
+    count_a = _body(block, k, 0).n_parts
+    count_b = _body(block, k, 1).n_parts
     _place_part_balls(block, k)
     least = math.inf
     nearest = -1
@@ -295,7 +295,7 @@ def _list_nearest(block, boolean, every):
         pair = 0 if every else _nearest_pair(block, k, boolean)
         block.slots[_SLOT * k + _FIRST_PAIR] = pair
         if pair >= 0:
-            _list_pair(block, k, _body(block, k, 1).count, pair, boolean, n_listed)
+            _list_pair(block, k, _body(block, k, 1).n_parts, pair, boolean, n_listed)
             n_listed += 1
     block.header[SLOT] = block.header[N_POSES]
     return n_listed
@@ -325,8 +325,8 @@ def _list_others(block, boolean, depths, every):
 def _list_others_of(block, k, boolean, every, n_listed):
     """The same of one pose, from PAIR on; PAIR becomes the one to go on with."""
     header = block.header
-    count_a = _body(block, k, 0).count
-    count_b = _body(block, k, 1).count
+    count_a = _body(block, k, 0).n_parts
+    count_b = _body(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     _place_part_balls(block, k)
     reach = BALL_MARGIN * size
@@ -403,7 +403,7 @@ def _take_rows(block, boolean, out_at):
         if _n_pairs(block, k) == 1:
             copy_row(row_at, out)
             continue
-        count_b = _body(block, k, 1).count
+        count_b = _body(block, k, 1).n_parts
         pair = block.owners[2 * listed + 1]
         words = view_i32(row_at, ROW // 4)
         words[PART_A] = pair // count_b
@@ -430,17 +430,17 @@ def _separate_bodies_of(block, k, row_at):
     """Have the depth of two bodies that overlap written, from all their parts."""
     A = _body(block, k, 0)
     B = _body(block, k, 1)
-    for part in range(A.count):
+    for part in range(A.n_parts):
         _row_of_part(block, k, 0, part, False)
-    for part in range(B.count):
+    for part in range(B.n_parts):
         _row_of_part(block, k, 1, part, False)
-    last = max(A.part_rows + A.count, B.part_rows + B.count)
-    n_shapes = max(A.first + A.count, B.first + B.count)
+    last = max(A.part_rows + A.n_parts, B.part_rows + B.n_parts)
+    n_shapes = max(A.first + A.n_parts, B.first + B.n_parts)
     parts = PosedParts(
         view_i64(block.header[INTS_AT], INTS * n_shapes), view_f64(block.header[NUMBERS_AT], NUMBERS * n_shapes),
         view_f64(block.header[POSES_AT], POSE * last), view_i64(block.header[SHAPE_OF_AT], last),
     )  # fmt: skip
-    separate_bodies(block.scores, SCORE * k, row_at, parts, A.part_rows, A.count, B.part_rows, B.count)
+    separate_bodies(block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts)
 
 
 #: How `answer_unions` is called.

@@ -75,8 +75,8 @@ def _settle(row: np.ndarray, A: _HalfSpace, B: _HalfSpace) -> None:
 def _half_space(params: np.ndarray, pose: list[Fraction]) -> _HalfSpace:
     """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p
     (`halfspace_convex.plane_in_world`)."""
-    r0, r1, r2, p = (tuple(pose[k : k + 3]) for k in (0, 3, 6, 9))
+    r0, r1, r2, p = ((pose[k], pose[k + 1], pose[k + 2]) for k in (0, 3, 6, 9))
     cofactor = cross(r1, r2), cross(r2, r0), cross(r0, r1)
     m = tuple(map(Fraction, params[:3].tolist()))
-    n = tuple(inner(row, m) for row in cofactor)
+    n = inner(cofactor[0], m), inner(cofactor[1], m), inner(cofactor[2], m)
     return _HalfSpace(n, Fraction(float(params[3])) * inner(r0, cofactor[0]) + inner(n, p), p)

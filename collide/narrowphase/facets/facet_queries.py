@@ -152,8 +152,8 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.
     between = np.flatnonzero((marks[:, 0] < 0) & (results[:, 1] < limit) & (limit < np.inf))
     if len(between):
-        some = [X if X.ndim == 2 else np.ascontiguousarray(X[between]) for X in (X_WA, X_WB)]
-        results[between], marks[between] = _near(A, B, *some, len(between), np.inf)
+        some_A, some_B = (X if X.ndim == 2 else np.ascontiguousarray(X[between]) for X in (X_WA, X_WB))
+        results[between], marks[between] = _near(A, B, some_A, some_B, len(between), np.inf)
     return SurfaceDistances(
         results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
         marks[:, 2] != 0, marks[:, 3:],

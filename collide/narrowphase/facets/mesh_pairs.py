@@ -129,8 +129,14 @@ def _are_unions(A: Shape, B: Shape) -> bool:
 
 def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
     """Two shapes of convex parts that hold the given ones, where there are such."""
-    covers = [shape.convex_hull if isinstance(shape, Mesh) else None if shape.meshed else shape for shape in (A, B)]
-    return None if None in covers else (covers[0], covers[1])
+    cover_a, cover_b = _convex_cover(A), _convex_cover(B)
+    return None if cover_a is None or cover_b is None else (cover_a, cover_b)
+
+
+def _convex_cover(shape: Shape) -> Shape | None:
+    if isinstance(shape, Mesh):
+        return shape.convex_hull
+    return None if shape.meshed else shape
 
 
 def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
