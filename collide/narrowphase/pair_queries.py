@@ -7,13 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_bodies import Question, answer_convex, prepare_convex
 from collide.narrowphase.convex_queries import single_calls_are_safe
 from collide.narrowphase.dispatch import TABLE, Method, method_of
-from collide.narrowphase.facets.mesh_pairs import pair_hits, pair_rows, single_pair
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.shapes.shape import Shape
+
+#: Half of the engine, which scenes without meshes never load.
+mesh_pairs = lazy_module("collide.narrowphase.facets.mesh_pairs")
 
 
 class Answer(NamedTuple):
@@ -31,10 +34,15 @@ class Answer(NamedTuple):
 
 def _answer_meshes(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
     if question.boolean:
-        out[:] = pair_hits(A, B, X_WA, X_WB, check=question.check)
+        out[:] = mesh_pairs.pair_hits(A, B, X_WA, X_WB, check=question.check)
     else:
-        pair_rows(A, B, X_WA, X_WB, limit=question.limit, depths=question.depths, check=question.check, out=out)
+        limit, depths, check = question.limit, question.depths, question.check
+        mesh_pairs.pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
     return True
+
+
+def _prepare_facets(A: Shape, B: Shape) -> Any:
+    return mesh_pairs.single_pair(A, B)
 
 
 def _unprepared(A: Shape, B: Shape) -> None:
@@ -42,7 +50,7 @@ def _unprepared(A: Shape, B: Shape) -> None:
 
 
 _CONVEX = Answer(answer_convex, prepare_convex, False)
-_FACETS = Answer(_answer_meshes, single_pair, True)
+_FACETS = Answer(_answer_meshes, _prepare_facets, True)
 _MESHES = Answer(_answer_meshes, _unprepared, True)
 
 ANSWERS: dict[Method, Answer] = {

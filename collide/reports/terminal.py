@@ -9,11 +9,14 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from typing import TYPE_CHECKING
 
 from collide.reports.number_format import count, seconds
-from collide.reports.report import Report
 from collide.reports.report_tables import tables
 from collide.reports.tables import Line, Table, lay_out, missing_columns, table_lines, wrapped
+
+if TYPE_CHECKING:
+    from collide.reports.report import Report
 
 #: Cells a line may take where the output is no terminal and says nothing about its width.
 PIPE_WIDTH = 120

@@ -1,7 +1,7 @@
 """Setting a pair to a given gap: B is moved along the exact normal until it is there.
 
 The normal and the distance come from the exact oracle, `collide.adapters.peers.exact`, which imports
-nothing of the engine. It is imported inside `measure`: the scenes package needs no adapter to load.
+nothing of the engine. It is loaded when first used: the scenes package needs no adapter to load.
 """
 
 from __future__ import annotations
@@ -10,8 +10,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide.adapters.peers import exact
+from collide.lazy_modules import lazy_module
 from collide.scenes.families.case import Case
+
+#: Numbers of cases are made with its help; families can be listed and described without it.
+exact = lazy_module("collide.adapters.peers.exact")
 
 #: A gap this much off, relative to itself, is set again; the translation's rounding is the limit.
 NEAR_ENOUGH = 1e-3

@@ -41,10 +41,11 @@ import numpy as np
 import collide
 from collide.kernels import object_cache
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 
 logging.basicConfig(level=logging.INFO, format="%(message)s")
-packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
+packed, X = parts_of(collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]))[0]
 poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
 print(boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64)).round(6).tolist())
 """

@@ -33,9 +33,10 @@ from collide.kernels import library, mode
 
 def box():
     from collide.broadphase.bounding_boxes import boxes_of
+    from collide.lowering.parts import parts_of
     from collide.lowering.shape_table import ShapeTable, pose_table
 
-    packed, X = collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]).parts()[0]
+    packed, X = parts_of(collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]))[0]
     poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
     return boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64)).round(6).tolist()
 """

@@ -12,6 +12,7 @@ from naive import Case, pose, random_pose, rng_of
 
 import collide
 from collide.adapters.peers import exact
+from collide.lowering import parts as lowering_parts
 
 #: One compound is a bracket open to the right: ][ shapes catch each other.
 BRACKET = collide.Compound(
@@ -88,7 +89,7 @@ def test_distance_of_unions_is_the_least_of_their_parts():
 
 
 def radius_around(shape: collide.Shape) -> float:
-    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in parts_of(shape))
+    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in lowering_parts.parts_of(shape))
 
 
 def test_upper_bound_is_what_the_parts_need():
