@@ -8,11 +8,14 @@ adds how every answer is known.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from collide.reports.number_format import brief_length, coordinates, count, directions, lengths, widths
 from collide.reports.pair_classes import Fold, Pair, Pairs
-from collide.reports.report import Report
 from collide.reports.tables import Column, Table
+
+if TYPE_CHECKING:
+    from collide.reports.report import Report
 
 #: Rows shown of each long list, unless all are asked for.
 SHORT = 12

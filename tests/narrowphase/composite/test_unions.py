@@ -89,7 +89,8 @@ def test_distance_of_unions_is_the_least_of_their_parts():
 
 
 def radius_around(shape: collide.Shape) -> float:
-    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in lowering_parts.parts_of(shape))
+    parts = lowering_parts.parts_of(shape)
+    return max(packed.reach + packed.radius + float(np.linalg.norm(X[:3, 3])) for packed, X in parts)
 
 
 def test_upper_bound_is_what_the_parts_need():
