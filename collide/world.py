@@ -11,9 +11,9 @@ import numpy as np
 
 from collide import argument_checks as checks
 from collide.certificates.make_certificate import certify
-from collide.contact.contact_query import check_margin, check_max_contacts, contact_rows
 from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.lazy_modules import lazy_module
 from collide.log import log_duration
 from collide.packed_world import PackedWorld, QueryRecord
 from collide.results import WorldResult
@@ -23,6 +23,9 @@ from collide.transforms import as_pose
 from collide.world_bodies import BodiesAsTheyStood, Body, WorldBodies
 
 __all__ = ["Body", "World"]
+
+#: Contacts need what meshes need, which other questions about convex scenes do not.
+contact_query = lazy_module("collide.contact.contact_query")
 
 
 class World:
@@ -279,14 +282,14 @@ class World:
         ------
         InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
         """
-        margin = check_margin("World.contacts", margin)
-        max_contacts = check_max_contacts("World.contacts", max_contacts)
+        margin = contact_query.check_margin("World.contacts", margin)
+        max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
         packed = self._pack()
         names, shapes, X_WBs = packed.roster.names, packed.roster.shapes, packed.X_WBs
         of_pairs = [no_rows()]
         for i, j in packed.candidates(margin).tolist():
             try:
-                of_pairs.append(contact_rows(shapes[i], shapes[j], X_WBs[i], X_WBs[j], margin, max_contacts))
+                of_pairs.append(contact_query.contact_rows(shapes[i], shapes[j], X_WBs[i], X_WBs[j], margin, max_contacts))
             except UnsupportedQuery as error:
                 raise UnsupportedQuery(f'"{names[i]}" and "{names[j]}": {error}') from None
             of_pairs[-1]["a"], of_pairs[-1]["b"] = i, j

@@ -277,7 +277,7 @@ def test_engine_flows_one_way():
     wrong = []
     for file in sources("collide"):
         own = room(dotted(file))
-        allowed = {own, *ROOMS.get(own, set(ROOMS)), *TO_GO.get(own, ())}
+        allowed = {own, "lazy_modules", *ROOMS.get(own, set(ROOMS)), *TO_GO.get(own, ())}
         for module, late, line in imports(file):
             if module.split(".")[0] == "collide" and room(module) not in allowed:
                 if room(module) not in LATE.get(own, set()):
