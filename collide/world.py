@@ -289,7 +289,8 @@ class World:
         of_pairs = [no_rows()]
         for i, j in packed.candidates(margin).tolist():
             try:
-                of_pairs.append(contact_query.contact_rows(shapes[i], shapes[j], X_WBs[i], X_WBs[j], margin, max_contacts))
+                pair = shapes[i], shapes[j], X_WBs[i], X_WBs[j]
+                of_pairs.append(contact_query.contact_rows(*pair, margin, max_contacts))
             except UnsupportedQuery as error:
                 raise UnsupportedQuery(f'"{names[i]}" and "{names[j]}": {error}') from None
             of_pairs[-1]["a"], of_pairs[-1]["b"] = i, j
