@@ -8,8 +8,8 @@ import numpy as np
 
 from collide.errors import InvalidPose
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.convex_bodies import Question
-from collide.narrowphase.pair_queries import OF_ONE_PAIR, answer_of
+from collide.narrowphase.convex_bodies import Question, answer_convex
+from collide.narrowphase.pair_queries import OF_ONE_PAIR, Answer, answer_of
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -52,6 +52,7 @@ def answer_batch(
     if n == 0:
         return out
     A, B = _of_one_set(A, B, n)
+    answer = None if isinstance(A, Picked) else answer_of(A, B)
 
     def work(piece: slice | np.ndarray) -> None:
         """Answer the poses of these numbers."""
@@ -61,9 +62,9 @@ def answer_batch(
             if len(copy) > 1:
                 copy[piece] = X
         rows = out[piece] if isinstance(piece, slice) else np.zeros_like(out, shape=len(piece))
-        axes = None if question.axes is None else question.axes[piece]
+        own = question if question.axes is None else question._replace(axes=question.axes[piece])
         try:
-            _answer_into(rows, A_k, B_k, X_WAk, X_WBk, question._replace(axes=axes))
+            _answer_into(rows, A_k, B_k, X_WAk, X_WBk, own, answer)
         except InvalidPose:
             _refuse_poses(X_WA, X_WB, question.check)  # named by its place in the whole batch
             raise
@@ -72,7 +73,7 @@ def answer_batch(
         if not isinstance(piece, slice):
             out[piece] = rows
 
-    if not _any_of_one_pair(A, B):
+    if not (_of_one_pair(A, B).any() if answer is None else answer.of_one_pair):
         threads = min(threads, n // _MIN_POSES_PER_THREAD)
         if threads < 2:
             work(slice(0, n))
@@ -84,13 +85,6 @@ def answer_batch(
         order = _pairs_together(A, B)
         share_if_it_helps(n, work if order is None else lambda piece: work(order[piece]), threads)
     return out
-
-
-def _any_of_one_pair(A, B) -> bool:
-    """Whether some pair is answered by a batch of its own."""
-    if isinstance(A, Picked):
-        return bool(_of_one_pair(A, B).any())
-    return answer_of(A, B).of_one_pair
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
@@ -136,13 +130,16 @@ def _refuse_poses(X_WA, X_WB, check: bool) -> None:
     as_poses(X_WB, "X_WB", check=check)
 
 
-def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, question: Question) -> None:
-    """Answer a batch in this thread into ``out``, zeroed: bool[n] or rows."""
-    if isinstance(A, Picked) and _of_one_pair(A, B).any():
+def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, question: Question, answer: Answer | None) -> None:
+    """Answer a batch in this thread into ``out``, zeroed: bool[n] or rows.
+
+    answer : of two shapes; None of shapes picked from a set.
+    """
+    if answer is None and _of_one_pair(A, B).any():
         _refuse_poses(X_WA, X_WB, question.check)
         _answer_pair_by_pair(out, A, B, X_WA, X_WB, question._replace(check=False))
         return
-    batch = answer_of(*((S.shape_set.shapes[S.rows[0]] if isinstance(S, Picked) else S) for S in (A, B))).batch
+    batch = answer_convex if answer is None else answer.batch
     if not batch(out, A, B, X_WA, X_WB, question):
         _refuse_poses(X_WA, X_WB, question.check)
         out.fill(0)  # it is a pose after all, on the brink of the tolerance
@@ -158,5 +155,5 @@ def _answer_pair_by_pair(out: np.ndarray, A: Picked, B: Picked, X_WA, X_WB, ques
         some = np.flatnonzero(keys == key)
         rows = np.zeros_like(out, shape=len(some))
         pair = (A[some], B[some]) if key < 0 else (A[int(some[0])], B[int(some[0])])
-        _answer_into(rows, *pair, X_WA[some], X_WB[some], question)
+        _answer_into(rows, *pair, X_WA[some], X_WB[some], question, None if key < 0 else answer_of(*pair))
         out[some] = rows

@@ -222,7 +222,7 @@ def distance(
     an overlap is minus the length of a translation that is proven to separate the bodies.
     """
     limit = checks.limit("max_distance", max_distance)
-    answer = named_algorithm("distance", algorithm)
+    answer = None if algorithm is None else named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:
             raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')

@@ -7,7 +7,6 @@ parts are taken apart and put together again by `composite/`.
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -69,11 +68,14 @@ def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, que
     """
     if not len(out):
         return True
+    boolean, limit, depths, check, axes = question
     if _one_part(A) and _one_part(B) and not convex_queries.distrust_doubles:
-        run = partial(convex_queries.run_poses, out, *_shape_table(A, B), X_WA, X_WB, axes=question.axes)
-    else:
-        run = partial(run_unions, out, *_compound_table(A, B), X_WA, X_WB)
-    return run(boolean=question.boolean, limit=question.limit, check=question.check, depths=question.depths)
+        table, which = _shape_table(A, B)
+        return convex_queries.run_poses(
+            out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
+        )
+    compounds, which = _compound_table(A, B)
+    return run_unions(out, compounds, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, depths=depths)
 
 
 def prepare_convex(A: Shape, B: Shape):

@@ -11,7 +11,7 @@ from collide.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_bodies import Question, answer_convex, prepare_convex
 from collide.narrowphase.convex_queries import single_calls_are_safe
-from collide.narrowphase.dispatch import TABLE, Method, method_of
+from collide.narrowphase.dispatch import TABLE, Method
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.shapes.shape import Shape
 
@@ -66,13 +66,15 @@ ANSWERS: dict[Method, Answer] = {
 }
 
 
+#: [kind of A][kind of B]: the same by the table.
+_ANSWER_TABLE = tuple(tuple(ANSWERS[method] for method in row) for row in TABLE)
 #: [kind of A, kind of B]: whether a batch is of one pair of shapes.
 OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row in TABLE])
 
 
 def prepare(A, B) -> None:
     """Make a pair of shapes ready for single calls, and keep it with A; nothing for sequences of shapes."""
-    if isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe() and prepared_pair(A, B) is None:
+    if isinstance(A, Shape) and isinstance(B, Shape) and prepared_pair(A, B) is None and single_calls_are_safe():
         pair = answer_of(A, B).prepare(A, B)
         if pair is not None:
             keep_prepared(A, B, pair)
@@ -80,4 +82,4 @@ def prepare(A, B) -> None:
 
 def answer_of(A: Shape, B: Shape) -> Answer:
     """What answers a pair of shapes."""
-    return ANSWERS[method_of(kind_of(A), kind_of(B))]
+    return _ANSWER_TABLE[kind_of(A)][kind_of(B)]
