@@ -62,9 +62,9 @@ def answer_batch(
             if len(copy) > 1:
                 copy[piece] = X
         rows = out[piece] if isinstance(piece, slice) else np.zeros_like(out, shape=len(piece))
-        own = question if question.axes is None else question._replace(axes=question.axes[piece])
+        piece_question = question if question.axes is None else question._replace(axes=question.axes[piece])
         try:
-            _answer_into(rows, A_k, B_k, X_WAk, X_WBk, own, answer)
+            _answer_into(rows, A_k, B_k, X_WAk, X_WBk, piece_question, answer)
         except InvalidPose:
             _refuse_poses(X_WA, X_WB, question.check)  # named by its place in the whole batch
             raise
