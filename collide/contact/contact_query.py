@@ -12,10 +12,12 @@ from collide import argument_checks as checks
 from collide.batches import answer_batch, length_of
 from collide.contact.contact_rows import Contacts, no_rows
 from collide.contact.convex_contacts import convex_contacts
-from collide.contact.mesh_contacts import surface_contacts
+from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfspace_contacts
 from collide.errors import InvalidArgument
+from collide.lowering.kinds import kind_of
 from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
@@ -26,6 +28,16 @@ if TYPE_CHECKING:
 
     Shapes = Shape | Sequence[Shape]
 
+#: What makes the contacts of a pair, by the method that answers it; compounds are taken apart before.
+_CONTACTS = {
+    Method.CLOSED: convex_contacts,
+    Method.PLANE: convex_contacts,
+    Method.PLANES: convex_contacts,
+    Method.CONVEX: convex_contacts,
+    Method.FACETS: facet_contacts,
+    Method.CURVED: curved_contacts,
+    Method.HULL: halfspace_contacts,
+}
 _U = 2.0**-53
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
@@ -124,9 +136,8 @@ def _rows_of_parts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: 
 
 
 def contacts_of_pair(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    if A.meshed or B.meshed:
-        return surface_contacts(A, B, X_WA, X_WB, margin, max_contacts)
-    return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts)
+    """Rows of two shapes that are no compounds, by the table of pairs."""
+    return _CONTACTS[method_of(kind_of(A), kind_of(B))](A, B, X_WA, X_WB, margin, max_contacts)
 
 
 def _parts(shape: Shape, X: np.ndarray) -> list[tuple[Shape, np.ndarray, float]]:

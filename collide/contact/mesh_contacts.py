@@ -19,14 +19,15 @@ from collide.shapes.shape import Shape
 _ERRORS, _SHARE = 64.0, 2.0**-30
 
 
-def surface_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows for single poses (4, 4). Raises UnsupportedQuery, naming the shape."""
+def halfspace_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
+    """Rows of a mesh and a half-space at single poses (4, 4)."""
     if is_halfspace(A):
         return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
-    if is_halfspace(B):
-        return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
-    if not (has_facets(A) and has_facets(B)):
-        return _witness(A, B, X_WA, X_WB, margin)
+    return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
+
+
+def facet_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
+    """Rows of two bodies of facets at single poses (4, 4), on the same numbers when A and B are exchanged."""
     body_a, body_b = body_of(A), body_of(B)
     exchanged = body_b.key < body_a.key or (body_a.key == body_b.key and X_WA[:3].tolist() > X_WB[:3].tolist())
     if exchanged:
@@ -34,8 +35,8 @@ def surface_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts
     return _ordered(body_a, body_b, A, B, X_WA, X_WB, margin, max_contacts)
 
 
-def _witness(A: Shape, B: Shape, X_WA, X_WB, margin: float) -> np.ndarray:
-    """One row for a curved body and a mesh: the answer of `distance`; none beyond the margin."""
+def curved_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, _max_contacts: int) -> np.ndarray:
+    """One row for a mesh and a shape without exact facets: the answer of `distance`; none beyond the margin."""
     row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=margin)[0]
     if row["beyond"] or row["lower"] > margin:
         return no_rows()
@@ -51,7 +52,7 @@ def _ordered(
     rounding = 0.0 if margin + body_a.radius + body_b.radius == 0.0 else STEP_ERRORS * frame.error
     patches, deep = patches_of(frame, margin + rounding)
     if not patches:
-        return _witness(A, B, X_WA, X_WB, margin) if deep else no_rows()
+        return curved_contacts(A, B, X_WA, X_WB, margin, max_contacts) if deep else no_rows()
     of_patches = [patch_contacts(frame, patch, margin, max_contacts) for patch in patches]
     if deep:
         of_patches.append(_of_distance(A, B, X_WA, X_WB))

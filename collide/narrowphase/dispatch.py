@@ -24,7 +24,7 @@ class Method(Enum):
         "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment",
     )
     PLANE = "halfspace_convex", "closed form: one support query against the plane"
-    PLANES = "halfspace_convex", "two planes: they meet unless exactly opposite"
+    PLANES = "halfspace_halfspace", "two planes: they meet unless exactly opposite"
     CONVEX = (
         "gjk/gjk",
         "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open",
@@ -52,11 +52,11 @@ F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
 
 #: Row and column in the order of `Kind`; what stands below the diagonal is mirrored.
+#: The last column, "both", is of compounds with meshes among their parts.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 # fmt: off
 _UPPER_HALF = (
-    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  mesh
-    # compound
+    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  both
     (Kind.SPHERE,       (C,     C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
     (Kind.CAPSULE,      (       C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
     (Kind.POLYTOPE,     (                G,        G,       G,        G,    G,         H,         F,    U,        M)),
@@ -77,10 +77,9 @@ TABLE: tuple[tuple[Method, ...], ...] = tuple(
 )
 #: Questions that a method does not answer, and why, in the words of the error.
 REFUSED: dict[tuple[Method, str], str] = {
-    (
-        Method.PLANES,
-        "distance",
-    ): "their overlap has no end, so no translation of finite length separates them; collide() still answers"
+    (Method.PLANES, "distance"): (
+        "their overlap has no end, so no translation of finite length separates them; collide() still answers"
+    ),
 }
 
 

@@ -12,9 +12,11 @@ import math
 import numpy as np
 
 from collide.lowering.enclosures import enclosure_of
-from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, has_facets, is_halfspace
+from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, is_halfspace
+from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_bodies import convex_rows
+from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.body_pairs import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, settle_curved
@@ -39,20 +41,26 @@ def part_states(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop) ->
         states[exact] = mesh_states(A, B, X_WA.X[exact], X_WB.X[exact])
     if not exact.all():
         PA, PB = X_WA.of(~exact), X_WB.of(~exact)
-        if is_halfspace(A) or is_halfspace(B):
-            rows = _plane_rows(A, B, PA, PB, math.inf)
-            states[~exact] = np.where(rows["how"] == UNDECIDED, OPEN, np.where(rows["hit"], HIT, APART))
-        elif has_facets(A) and has_facets(B):
-            states[~exact] = loose_states(body_of(A), body_of(B), PA, PB)
-        else:
-            states[~exact] = _curved_states(A, B, PA, PB)
+        states[~exact] = _STATES[method_of(kind_of(A), kind_of(B))](A, B, PA, PB)
     return states
 
 
+def _plane_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
+    rows = _plane_rows(A, B, PA, PB, math.inf)
+    return np.where(rows["how"] == UNDECIDED, OPEN, np.where(rows["hit"], HIT, APART))
+
+
+def _facet_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
+    return loose_states(body_of(A), body_of(B), PA, PB)
+
+
 def _curved_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
-    if not has_facets(A):
+    if kind_of(A) not in WITH_FACETS:
         A, B, PA, PB = B, A, PB, PA
     return settle_curved(body_of(A), enclosure_of(B), PA, PB).state
+
+
+_STATES = {Method.HULL: _plane_states, Method.FACETS: _facet_states, Method.CURVED: _curved_states}
 
 
 def part_rows(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop, limit: float) -> np.ndarray:
@@ -63,20 +71,19 @@ def part_rows(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop, limi
     slop = X_WA.slop + X_WB.slop
     exact = slop == 0.0
     rows = np.zeros(len(slop), dtype=PAIR_DTYPE)
-    planes = is_halfspace(A) or is_halfspace(B)
+    method = method_of(kind_of(A), kind_of(B))
     if exact.any():
-        rows[exact] = mesh_rows(A, B, X_WA.X[exact], X_WB.X[exact], limit=limit, depths=planes)
+        rows[exact] = mesh_rows(A, B, X_WA.X[exact], X_WB.X[exact], limit=limit, depths=method is Method.HULL)
     if not exact.all():
         PA, PB = X_WA.of(~exact), X_WB.of(~exact)
-        if planes:
-            rows[~exact] = _plane_rows(A, B, PA, PB, limit)
-        elif has_facets(A) and has_facets(B):
-            rows[~exact] = _loose_rows(A, B, PA, PB, limit)
-        elif has_facets(A):
-            rows[~exact] = curved_rows(body_of(A), enclosure_of(B), PA, PB, limit=limit, depths=False)
-        else:
-            rows[~exact] = flipped(curved_rows(body_of(B), enclosure_of(A), PB, PA, limit=limit, depths=False))
+        rows[~exact] = _ROWS[method](A, B, PA, PB, limit)
     return rows
+
+
+def _curved_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit: float) -> np.ndarray:
+    if kind_of(A) in WITH_FACETS:
+        return curved_rows(body_of(A), enclosure_of(B), PA, PB, limit=limit, depths=False)
+    return flipped(curved_rows(body_of(B), enclosure_of(A), PB, PA, limit=limit, depths=False))
 
 
 def _plane_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit: float) -> np.ndarray:
@@ -123,6 +130,9 @@ def _loose_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit:
     rows["certified"] &= states != OPEN
     rows["beyond"] &= apart
     return rows
+
+
+_ROWS = {Method.HULL: _plane_rows, Method.FACETS: _loose_rows, Method.CURVED: _curved_rows}
 
 
 def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
