@@ -70,7 +70,7 @@ def test_kernels_are_kept_until_a_source_of_theirs_is_edited(tmp_path):
     assert ask(compiled=True) == right
     files = kept()
     (name,) = files
-    assert re.fullmatch(r"collide\.geometry\.boxes\.bounding_boxes\.[0-9a-f]{16}\.o", name)
+    assert re.fullmatch(r"collide\.broadphase\.bounding_boxes\.bounding_boxes\.[0-9a-f]{16}\.o", name)
     assert ask(compiled=False) == right and kept() == files
     world = site / "collide" / "world.py"
     world.write_text(world.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
@@ -217,7 +217,7 @@ from numba.core.compiler_lock import global_compiler_lock
 inside, waiting, seen = threading.Event(), threading.Event(), []
 owner, name = {
     "lowering": (front_end._Context, "post_lowering"), "machine code": (jit, "machine_code"),
-    "loading": (object_cache, "_found"),
+    "loading": (object_cache, "_read_kept"),
 }[sys.argv[1]]
 kept, acquire, mine = getattr(owner, name), type(global_compiler_lock).acquire, numbas_own()
 
