@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import collide
+from collide.adapters.peers.coal_peer import CoalPeer
 
 RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (1, 12, 120, 1200, 12000)
@@ -62,21 +63,9 @@ class Coal:
     def __init__(self, A: collide.Mesh, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):
         import coal
 
-        self._coal, self._A, self._B = coal, self._geometry(coal, A), self._geometry(coal, B)
+        peer = CoalPeer()
+        self._coal, self._A, self._B = coal, peer.build(A), peer.build(B)
         self._poses = [tuple(coal.Transform3s(X[:3, :3], X[:3, 3]) for X in pair) for pair in zip(X_WA, X_WB)]
-
-    @staticmethod
-    def _geometry(coal, shape: collide.Shape):
-        if isinstance(shape, collide.Box):
-            return coal.Box(*map(float, shape.size))
-        if isinstance(shape, collide.Sphere):
-            return coal.Sphere(float(shape.radius))
-        model = coal.BVHModelOBBRSS()
-        model.beginModel(len(shape.faces), len(shape.vertices))
-        model.addVertices(shape.vertices)
-        model.addTriangles(shape.faces)
-        model.endModel()
-        return model
 
     def ask(self, question: str) -> None:
         coal, A, B = self._coal, self._A, self._B

@@ -7,12 +7,11 @@ so that a motion of R changes nothing.
 from __future__ import annotations
 
 import math
-import os
-import threading
 from fractions import Fraction
 
 import numpy as np
 
+from collide.fork_safe_lock import ForkSafeLock
 from collide.hierarchies.flat_hierarchy import flat_hierarchy
 from collide.hierarchies.hierarchy import build_hierarchy
 from collide.hierarchies.packed_hierarchy import PackedHierarchy
@@ -163,18 +162,5 @@ def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
     return math.sqrt(float(height * height / sum(x * x for x in normal))) * (1 - 1e-12)
 
 
-_lock = threading.RLock()
-
-
-def _build_lock() -> threading.RLock:  # type: ignore[valid-type]
-    """Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds."""
-    return _lock
-
-
-def _new_lock() -> None:
-    global _lock
-    _lock = threading.RLock()
-
-
-if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
-    os.register_at_fork(after_in_child=_new_lock)
+#: Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds.
+_build_lock = ForkSafeLock()

@@ -23,7 +23,7 @@ from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, PackedConv
 from collide.lowering.parts import convex_set_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, kept_with_shape
 
 #: Corners of the rings around an axis, and times the facets of an icosahedron are cut in four.
 _SIDES, _CUTS = 32, 2
@@ -48,19 +48,13 @@ class Enclosure(NamedTuple):
         return self.outer.key
 
 
+@kept_with_shape("_surface")
 def enclosure_of(shape: Shape) -> Enclosure:
     """The polytopes of a convex shape without exact facets, made when first asked for and kept with it."""
-    try:
-        return shape._surface
-    except AttributeError:
-        packed = convex_set_of(shape)
-        outer, inner = _polytopes(shape, packed)
-        point = (
-            inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
-        )
-        made = Enclosure(_body(shape, outer, point), None if inner is None else _body(shape, inner, inner[:1]), packed)
-        shape._store(_surface=made)
-        return made
+    packed = convex_set_of(shape)
+    outer, inner = _polytopes(shape, packed)
+    point = inner[:1] if inner is not None and packed.slop else packed.points[:1] if packed.slop else np.zeros((1, 3))
+    return Enclosure(_body(shape, outer, point), None if inner is None else _body(shape, inner, inner[:1]), packed)
 
 
 def _body(shape: Shape, points: np.ndarray, own_point: np.ndarray) -> Body:

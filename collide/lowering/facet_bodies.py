@@ -14,13 +14,14 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, kept_with_shape
 
 
 class Body(NamedTuple):
@@ -72,20 +73,13 @@ def is_halfspace(shape: Shape) -> bool:
 
 def has_facets(shape: Shape) -> bool:
     """Whether a mesh, or a convex set whose surface is that of a hull of doubles, and a radius: `body_of` serves it."""
-    if isinstance(shape, Mesh):
-        return True
-    packed = convex_set_of(shape)
-    return packed.kind == POINTS and packed.slop == 0.0
+    return kind_of(shape) in WITH_FACETS
 
 
+@kept_with_shape("_surface")
 def body_of(shape: Shape) -> Body:
     """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with it."""
-    try:
-        return shape._surface
-    except AttributeError:
-        body = _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
-        shape._store(_surface=body)
-        return body
+    return _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
 
 
 def facet_body(shape, caller: str) -> Body:

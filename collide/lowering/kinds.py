@@ -7,7 +7,7 @@ from enum import IntEnum
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
 from collide.lowering.parts import convex_set_of
 from collide.shapes.compound import Compound
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, kept_with_shape
 
 
 class Kind(IntEnum):
@@ -31,16 +31,9 @@ WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
 _CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, HALFSPACE: Kind.HALFSPACE}
 
 
+@kept_with_shape("_kind")
 def kind_of(shape: Shape) -> Kind:
-    """The kind of a shape; worked out once and kept with it."""
-    try:
-        return shape._kind
-    except AttributeError:
-        shape._store(_kind=_kind_of(shape))
-        return shape._kind
-
-
-def _kind_of(shape: Shape) -> Kind:
+    """The kind of a shape."""
     if isinstance(shape, Compound):
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     return Kind.MESH if shape.meshed else _kind_of_convex(convex_set_of(shape))

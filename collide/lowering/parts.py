@@ -27,7 +27,7 @@ from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
-from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
 Part = tuple[PackedConvex, np.ndarray]
@@ -40,26 +40,20 @@ _ULP = 2.0**-53
 _MAX_OWN_BOUNDS, _CELLS = 512, 6
 
 
+@kept_with_shape("_parts")
 def parts_of(shape: Shape) -> tuple[Part, ...]:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes."""
-    try:
-        return shape._parts
-    except AttributeError:
-        shape._store(_parts=_rule_for(shape)(shape))
-        return shape._parts
+    return _rule_for(shape)(shape)
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
     """Convex sets that hold a shape: its parts, or something larger and simpler where meshes are in it. For culling."""
-    if not shape.meshed:
-        return parts_of(shape)
-    try:
-        return shape._bounds
-    except AttributeError:
-        assert isinstance(shape, (Compound, Mesh))
-        bounds = _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
-        shape._store(_bounds=bounds)
-        return bounds
+    return _bounds_around_meshes(shape) if shape.meshed else parts_of(shape)
+
+
+@kept_with_shape("_bounds")
+def _bounds_around_meshes(shape: Compound | Mesh) -> tuple[Part, ...]:
+    return _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
 
 
 def convex_set_of(shape: Shape) -> PackedConvex:

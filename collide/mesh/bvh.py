@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
-import threading
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.fork_safe_lock import ForkSafeLock
 from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
 from collide.numerics.vec3 import Vec3
 
@@ -141,21 +140,8 @@ class MeshTree:
         _require(self.depth == _depth(parents, below, len(self.nodes)), "another depth than it says")
 
 
-_lock = threading.Lock()
-
-
-def _making() -> threading.Lock:
-    """Held while slabs are made: one tree at a time."""
-    return _lock
-
-
-def _new_lock() -> None:
-    global _lock
-    _lock = threading.Lock()
-
-
-if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
-    os.register_at_fork(after_in_child=_new_lock)
+#: Held while slabs are made: one tree at a time.
+_making = ForkSafeLock()
 
 
 def _depth(parents: np.ndarray, below: np.ndarray, n: int) -> int:

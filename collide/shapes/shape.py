@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.transforms import LARGEST, SMALLEST
+
+T = TypeVar("T")
 
 
 class Shape:
@@ -78,6 +82,23 @@ class Shape:
     def __repr__(self) -> str:
         fields = ", ".join(f"{f}={_brief(getattr(self, f))}" for f in self._fields)
         return f"{type(self).__name__}({fields})"
+
+
+def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any], T]]:
+    """Decorates what makes something of a shape: made when first asked for, and kept in this slot of the shape."""
+
+    def decorate(make: Callable[[Any], T]) -> Callable[[Any], T]:
+        @wraps(make)
+        def of(shape: Any) -> T:
+            try:
+                return getattr(shape, slot)
+            except AttributeError:
+                shape._store(**{slot: make(shape)})
+                return getattr(shape, slot)
+
+        return of
+
+    return decorate
 
 
 IDENTITY = np.eye(4)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import threading
-
 import numpy as np
 
+from collide.fork_safe_lock import ForkSafeLock
 from collide.hull.exact_hull import convex_hull
 from collide.log import log_duration
 from collide.support.build_support_tree import build_support_tree
@@ -41,21 +39,8 @@ class LazySupportTree:
         return self.tree.address if self.tree is not None else 0
 
 
-_lock = threading.Lock()
-
-
-def _build_lock() -> threading.Lock:
-    """Held while a tree is built: one at a time, since a tree of 100,000 points is a matter of a second."""
-    return _lock
-
-
-def _new_lock() -> None:
-    global _lock
-    _lock = threading.Lock()
-
-
-if hasattr(os, "register_at_fork"):  # the parent's thread that holds it does not exist in a forked child
-    os.register_at_fork(after_in_child=_new_lock)
+#: Held while a tree is built: one at a time, since a tree of 100,000 points is a matter of a second.
+_build_lock = ForkSafeLock()
 
 
 def _built(points: np.ndarray) -> SupportTree | None:

@@ -29,6 +29,7 @@ ROOMS = {
     "cache_folder": set(),
     "log": set(),
     "lazy_modules": set(),
+    "fork_safe_lock": set(),
     "algorithms": {"errors"},
     "kernels": {"cache_folder", "errors", "log"},
     "argument_checks": {"errors"},
@@ -37,8 +38,8 @@ ROOMS = {
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
     "hull": {"errors", "kernels", "numerics"},
-    "support": {"errors", "kernels", "numerics", "hull", "log"},
-    "mesh": {"errors", "kernels", "numerics", "log"},
+    "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
+    "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
     "shapes": {"errors", "argument_checks", "log", "transforms", "hull", "mesh", "support", "lazy_modules"},
     "lowering": {
         "errors",
@@ -122,6 +123,7 @@ ROOMS = {
     },
     "hierarchies": {
         "errors",
+        "fork_safe_lock",
         "kernels",
         "transforms",
         "numerics",

@@ -19,7 +19,7 @@ from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
@@ -124,18 +124,10 @@ class UnionParts:
         return value, ERROR * size + slop
 
 
-def is_union(shape: Shape) -> bool:
-    """Whether a shape is a `Compound`."""
-    return isinstance(shape, Compound)
-
-
+@kept_with_shape("_union")
 def union_of(shape: Shape) -> UnionParts:
-    """The parts of a shape, kept with it."""
-    try:
-        return shape._union
-    except AttributeError:
-        shape._store(_union=UnionParts(shape))
-        return shape._union
+    """The parts of a shape."""
+    return UnionParts(shape)
 
 
 def _leaves(shape: Shape, X: list[list[Fraction]] | None):

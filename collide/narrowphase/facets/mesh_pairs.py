@@ -11,18 +11,17 @@ import math
 import numpy as np
 
 from collide.lowering.facet_bodies import body_of
-from collide.lowering.kinds import kind_of
+from collide.lowering.kinds import Kind, kind_of
 from collide.narrowphase.composite.composite_meshes import union_rows, union_states
 from collide.narrowphase.composite.composite_parts import union_of
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.body_pairs import SinglePair, balls_farther
-from collide.narrowphase.facets.mesh_rows import checked_poses, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_rows import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.facets.surface_pairs import APART, OPEN
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
-from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 
 
@@ -134,9 +133,7 @@ def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
 
 
 def _convex_cover(shape: Shape) -> Shape | None:
-    if isinstance(shape, Mesh):
-        return shape.convex_hull
-    return None if shape.meshed else shape
+    return None if kind_of(shape) is Kind.MESH_COMPOUND else hull_shape(shape)
 
 
 def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
