@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import UnionTable
+from collide.lowering.compound_table import CompoundTable
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_queries
-from collide.narrowphase.composite.composite import UnionPair, run_unions
+from collide.narrowphase.composite.composite import CompoundPair, answer_compound_batch
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -75,14 +75,16 @@ def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, que
             out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
         )
     compounds, which = _compound_table(A, B)
-    return run_unions(out, compounds, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, depths=depths)
+    return answer_compound_batch(
+        out, compounds, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, depths=depths
+    )
 
 
 def prepare_convex(A: Shape, B: Shape):
     """The pair made ready for single calls."""
     if is_single_convex(A) and is_single_convex(B):
         return convex_queries.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
-    return UnionPair(layout_of(A), layout_of(B))
+    return CompoundPair(layout_of(A), layout_of(B))
 
 
 def _one_part(shapes) -> bool:
@@ -101,10 +103,12 @@ def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     return (prepared.table if prepared else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
 
 
-def _compound_table(A, B) -> tuple[UnionTable, np.ndarray | None]:
+def _compound_table(A, B) -> tuple[CompoundTable, np.ndarray | None]:
     """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).compounds, np.stack([A.rows, B.rows], axis=1)
     prepared = prepared_pair(A, B)
-    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([layout_of(A), layout_of(B)])), None
+    if isinstance(prepared, CompoundPair):
+        return prepared.compounds, None
+    return CompoundTable([layout_of(A), layout_of(B)]), None
 

@@ -42,7 +42,7 @@ answer_at = native_call(SIGNATURE)
 BLOCK = 64
 LIST = ROWS_PER_BATCH
 
-#: What `answer_unions` returns besides 0: rows of the list are undecided, or a pose is no pose.
+#: What `answer_compounds` returns besides 0: rows of the list are undecided, or a pose is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
 # Header: the kernel, tables of shapes, parts and bodies; the workspace, and how many rows of parts it has room for;
@@ -443,14 +443,16 @@ def _separate_bodies_of(block, k, row_at):
     separate_bodies(block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts)
 
 
-#: How `answer_unions` is called.
-UNIONS_SIGNATURE = (
+#: How `answer_compounds` is called.
+COMPOUNDS_SIGNATURE = (
     "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, boolean, int64)"
 )
 
 
-@entry(UNIONS_SIGNATURE)
-def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean, depths, limit, check, every, out_at):
+@entry(COMPOUNDS_SIGNATURE)
+def answer_compounds(
+    header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean, depths, limit, check, every, out_at
+):
     """Answer n pairs of poses of two bodies, or of n pairs of bodies; 0, OPEN or BAD_POSE.
 
     header : HEADER integers. Where it stops OPEN, the first [N_LISTED] rows and pairs of the list are for the exact
