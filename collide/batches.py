@@ -51,7 +51,7 @@ def answer_batch(
             copy[:] = X
     if n == 0:
         return out
-    A, B = _of_one_set(A, B, n)
+    A, B = of_one_set(A, B, n)
     answer = None if isinstance(A, Picked) else answer_of(A, B)
 
     def work(piece: slice | np.ndarray) -> None:
@@ -97,7 +97,7 @@ def _pairs_together(A, B) -> np.ndarray | None:
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 
-def _of_one_set(A, B, n: int):
+def of_one_set(A, B, n: int):
     """The shapes as they are, or where one side is a sequence, both as picked from one set."""
     if isinstance(A, Shape) and isinstance(B, Shape):
         return A, B

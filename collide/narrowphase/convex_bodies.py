@@ -70,7 +70,7 @@ def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, que
         return True
     boolean, limit, depths, check, axes = question
     if _one_part(A) and _one_part(B) and not convex_queries.distrust_doubles:
-        table, which = _shape_table(A, B)
+        table, which = shape_table(A, B)
         return convex_queries.run_poses(
             out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
         )
@@ -95,7 +95,7 @@ def _one_part(shapes) -> bool:
     )
 
 
-def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
+def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
