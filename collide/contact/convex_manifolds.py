@@ -5,7 +5,7 @@ their overlap are the contacts (`manifold_points.py`); the nearest points of the
 Half-spaces have no corners of their own: the support of the other body stands on the plane.
 
 Every length here comes from the poses as given, seen from A's origin; `error` bounds the rounding of a coordinate, and
-every gap of a face's plane, whose slope is below 1, is within a few of them (`_bound`).
+every gap measured is within a few of them (`_bound`).
 """
 
 from __future__ import annotations
@@ -167,10 +167,9 @@ def _put_manifold(header, row, margin, max_contacts, out_at):
         manifold.features[0] = of_a.feature
         manifold.features[1] = of_b.feature
         n += 1
-        chosen = 0
         bound = max(bound, bracket)
     tolerance = max(_ERRORS * error, _SHARE * _extent(manifold, n))
-    n = drop_repeated(manifold, n, tolerance)
+    n = drop_repeated(manifold, n, bound, tolerance)
     chosen = deepest_point(manifold, n, bound, tolerance)
     n = select_points(manifold, n, chosen, max_contacts, order)
     bound += 8.0 * error + pair.numbers[NUMBERS * pair.A.shape + SLOP] + pair.numbers[NUMBERS * pair.B.shape + SLOP]
@@ -191,19 +190,28 @@ def _point(row, of_a):
 
 @kernel(inline=True)
 def _error(pair, row):
-    """Bound of the rounding of a coordinate seen from A's origin."""
-    at_a, at_b = pair.A.pose_at + 9, pair.B.pose_at + 9
-    reach = 4.0 * (reach_of(pair, pair.A) + reach_of(pair, pair.B) + radius_of(pair, pair.A) + radius_of(pair, pair.B))
-    reach += norm1(vec3_at(pair.poses, at_a)) + norm1(vec3_at(pair.poses, at_b))
-    if pair.A.kind == HALFSPACE:
+    """Bound of the rounding of a coordinate (u, v, h) seen from A's origin.
+
+    With S = ρ_A + ρ_B + |t|, ρ the reach of a body and a little for its stretch: a turned corner is good to 4u·ρ, the
+    sum with t and t itself to 2u·S, a product with an axis, itself good to 4u, to 8u·S; 14u·S in all.
+    """
+    reach = 1.01 * (reach_of(pair, pair.A) + reach_of(pair, pair.B)) + norm1(pair.t)
+    reach += radius_of(pair, pair.A) + radius_of(pair, pair.B)
+    if pair.A.kind == HALFSPACE:  # its nearest point, and that seen from its origin
         reach += norm1(vec3_at(row.doubles, POINT_A)) + norm1(vec3_at(row.doubles, POINT_B))
-    return 8.0 * _U * reach
+        reach += norm1(vec3_at(pair.poses, pair.A.pose_at + 9))
+    return 16.0 * _U * reach
 
 
 @kernel(inline=True)
 def _bound(error, of_a, of_b):
-    """How far a gap measured may be off."""
-    return 64.0 * error + 2.0 * (of_a.flatness + of_b.flatness)
+    """How far a gap measured may be off.
+
+    Two heights, and for each face twice the error of a place times its slope, at most 1.02; a slope is good to 32u, and
+    extends over 2S at most: 6 errors and 8. A face's corners are off its plane by its flatness, measured along its
+    normal, of which the gap is the slant, at most 1.5 times as long.
+    """
+    return 16.0 * error + 2.0 * (of_a.flatness + of_b.flatness)
 
 
 @kernel(inline=True)
@@ -249,8 +257,10 @@ def _write_contact(contact_at, manifold, k, is_first, axes, pair, row, flip, bou
     radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
     distance = manifold.points[POINT * k + POINT_GAP] - radius_a - radius_b
     lower, upper = distance - bound, distance + bound
-    if is_first and lower <= row.doubles[DISTANCE] and row.doubles[DISTANCE] <= upper:
+    if is_first and lower <= row.doubles[UPPER] and row.doubles[LOWER] <= upper:
         distance = row.doubles[DISTANCE]  # the deepest point of the manifold is that of the pair
+        lower = min(lower, row.doubles[LOWER])
+        upper = max(upper, row.doubles[UPPER])
     height = manifold.points[POINT * k + HEIGHT] + 0.5 * (radius_a - radius_b)
     middle = add(
         add(scale(manifold.points[POINT * k], axes.e), scale(manifold.points[POINT * k + V], axes.f)),

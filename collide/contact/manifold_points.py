@@ -175,10 +175,11 @@ def least_gap(manifold, n):
 
 
 @kernel
-def drop_repeated(manifold, n, tolerance):
+def drop_repeated(manifold, n, error, tolerance):
     """Drop points nearer than the tolerance to the one before, or to the line through their neighbours; how many stay.
 
-    Of points in one place the one of least gap stays.
+    Of points in one place the one of least gap stays, and so does one deeper than both its neighbours by more than the
+    error of gaps.
     """
     points = manifold.points
     n_kept = 0
@@ -197,7 +198,8 @@ def drop_repeated(manifold, n, tolerance):
     k = 0
     while n_kept > 2 and k < n_kept:
         before, after = (k - 1 if k > 0 else n_kept - 1), (k + 1 if k + 1 < n_kept else 0)
-        if _height(points, before, after, k) > tolerance:
+        shallowest = min(points[POINT * before + GAP], points[POINT * after + GAP])
+        if _height(points, before, after, k) > tolerance or points[POINT * k + GAP] < shallowest - error:
             k += 1
             continue
         for j in range(k, n_kept - 1):
