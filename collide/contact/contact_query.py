@@ -11,7 +11,9 @@ from collide import argument_checks as checks
 from collide.batches import length_of
 from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
+from collide.contact.convex_contacts import single_contacts
 from collide.errors import InvalidArgument
+from collide.narrowphase.pair_queries import prepare
 from collide.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
 from collide.threads import check_threads
@@ -76,10 +78,16 @@ def contacts(
     near the surface costs about a millisecond, which grows with the facets within the margin.
     """
     margin, max_contacts = check_margin("contacts", margin), check_max_contacts("contacts", max_contacts)
+    threads = check_threads(threads)
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        rows = single_contacts(A, B, X_WA, X_WB, margin, max_contacts)
+        if rows is not None:
+            return Contacts(rows, np.array([0, len(rows)]))
+        prepare(A, B)
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
     n = length_of(A, B, X_WA, X_WB)
-    rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, threads=check_threads(threads))
+    rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, threads=threads)
     return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 
 

@@ -10,18 +10,24 @@ from collide.batches import answer_batch
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
     HEADER,
+    MARGIN,
+    MAX_CONTACTS,
     PAIRS_DONE,
     ROWS_DONE,
     convex_manifolds,
     workspace_doubles,
     workspace_integers,
 )
+from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
 from collide.contact.support_face import ROUND
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of
-from collide.lowering.hull_faces import face_table_of
+from collide.kernels.prepared import prepared_row
+from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.shape_table import POSE, ShapeTable
 from collide.narrowphase.convex_bodies import Question, shape_table
+from collide.narrowphase.convex_queries import SinglePair
+from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.shapes.shape import Shape
 
 #: Rows asked for to begin with, a pair.
@@ -63,13 +69,10 @@ def manifolds_of_rows(
     n = len(rows)
     faces = face_table_of(table, ROUND)
     table.build_trees(np.arange(2) if which is None else which)
-    space = _of_thread
+    space = _of_thread.space
     space.fit(faces.largest)
     header = np.zeros(HEADER, dtype=np.int64)
-    header[: PAIRS_DONE] = (
-        *table.addresses, address_of(faces.ints), address_of(space.poses), address_of(space.shape_of),
-        address_of(space.doubles), address_of(space.integers), faces.largest,
-    )  # fmt: skip
+    header[:PAIRS_DONE] = _addresses(table, faces, space)
     ends = np.zeros(n, dtype=np.int64)
     most = min(max_contacts, 2 * faces.largest + 8)
     out = np.zeros(_ROWS_PER_PAIR * n + most, dtype=CONTACT_DTYPE)
@@ -82,13 +85,62 @@ def manifolds_of_rows(
     return out[: header[ROWS_DONE]], ends
 
 
-class _Workspace(local):
-    """Scratch memory of one thread."""
+def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tuple[int, ...]:
+    """The header of `convex_manifolds` up to what a call has done."""
+    return (
+        *table.addresses, address_of(faces.ints), address_of(space.poses), address_of(space.shape_of),
+        address_of(space.doubles), address_of(space.integers), faces.largest,
+    )  # fmt: skip
+
+
+def single_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
+    """Rows of two shapes prepared for single calls, at one pair of poses; None where that is not what was asked, or
+    takes the long way.
+    """
+    pair = prepared_pair(A, B)
+    if not isinstance(pair, SinglePair):
+        return None
+    if pair.of_contacts is None:
+        pair.of_contacts = SingleContacts(pair)
+    return pair.of_contacts.contacts(X_WA, X_WB, margin, max_contacts)
+
+
+class SingleContacts:
+    """Two convex sets prepared for `contacts` of one pair of poses at a time.
+
+    ask : a built-in function of two poses, rows and a flag; None where it leaves the answer to the long way.
+    """
+
+    def __init__(self, pair: SinglePair):
+        self._pair = pair  # held, since kernels use its buffers
+        table, header = pair.table, pair.header
+        self._faces = face_table_of(table, ROUND)
+        self._space = _Workspace()
+        self._space.fit(self._faces.largest)
+        self.room = 2 * self._faces.largest + 8
+        self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
+        self._header[: len(header)] = header
+        self._of_manifold = self._header[len(header) :]
+        self._of_manifold[:PAIRS_DONE] = _addresses(table, self._faces, self._space)
+        self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
+        self._ask = prepared_row(contacts_single, self._header)
+
+    def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
+        """Rows; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(min(max_contacts, self.room), dtype=CONTACT_DTYPE)
+        self._margin[0], self._of_manifold[MAX_CONTACTS] = margin, max_contacts
+        if self._ask(X_WA, X_WB, rows, False) is None:
+            return None
+        return rows[: self._of_manifold[ROWS_DONE]]
+
+
+class _Workspace:
+    """Scratch memory of the kernel."""
 
     def __init__(self) -> None:
         self.largest = 0
         self.doubles, self.integers = np.zeros(0), np.zeros(0, dtype=np.int64)
-        self.poses, self.shape_of = np.zeros((2, POSE)), np.array([0, 1])
+        self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
 
     def fit(self, largest: int) -> None:
         """Have room for faces of so many corners."""
@@ -99,4 +151,11 @@ class _Workspace(local):
             self.integers = np.zeros(workspace_integers(largest), dtype=np.int64)
 
 
-_of_thread = _Workspace()
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+_of_thread = _OfThread()

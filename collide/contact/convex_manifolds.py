@@ -43,11 +43,13 @@ _ERRORS, _SHARE = 64.0, 2.0**-30
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
-# two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs, and rows.
+# two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs,
+# and rows; of single calls the bits of the margin, and max_contacts.
 (
     INTS_AT, NUMBERS_AT, FACES_AT, POSES_AT, SHAPE_OF_AT, DOUBLES_AT, INTEGERS_AT, LARGEST, PAIRS_DONE, ROWS_DONE,
-) = range(10)  # fmt: skip
-HEADER = 10
+    MARGIN, MAX_CONTACTS,
+) = range(12)  # fmt: skip
+HEADER = 12
 
 
 def _at(field: str, unit: int) -> int:
@@ -112,7 +114,7 @@ def convex_manifolds(
             set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), False)
             set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), False)
             poses[POSE_SLOP] = slack
-            n_rows += _put_manifold(header, row, margin + slack, max_contacts, out_at + _CONTACT * n_rows)
+            n_rows += put_manifold(header, row, margin + slack, max_contacts, out_at + _CONTACT * n_rows)
         ends[k] = n_rows
     header[PAIRS_DONE] = n
     header[ROWS_DONE] = n_rows
@@ -120,7 +122,7 @@ def convex_manifolds(
 
 
 @kernel
-def _put_manifold(header, row, margin, max_contacts, out_at):
+def put_manifold(header, row, margin, max_contacts, out_at):
     """Write the contacts of one pair; how many."""
     ordered = ordered_pair(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], 0, 1)
     pair, flip = ordered.pair, ordered.flip
