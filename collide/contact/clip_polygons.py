@@ -96,11 +96,11 @@ def clip_segment(face, is_b, u0, v0, u1, v1, tolerance):
     """
     low, high = 0.0, 1.0
     low_side, high_side = -1, -1
-    turn = -1.0 if is_b else 1.0  # B's corners run clockwise here
+    sense = -1.0 if is_b else 1.0  # B's corners run clockwise here
     for side in range(face.n):
         following = 3 * (side + 1 if side + 1 < face.n else 0)
         u, v = face.corners[3 * side], face.corners[3 * side + 1]
-        du, dv = turn * (face.corners[following] - u), turn * (face.corners[following + 1] - v)
+        du, dv = sense * (face.corners[following] - u), sense * (face.corners[following + 1] - v)
         length = math.sqrt(du * du + dv * dv)
         if length == 0.0:
             continue

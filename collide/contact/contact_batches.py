@@ -65,7 +65,9 @@ def contact_batch(
     A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, threads=threads)
-    shapes, which = (A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)) if isinstance(A, Picked) else ((A, B), None)
+    shapes, which = (A, B), None
+    if isinstance(A, Picked):
+        shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
     singles: list[Shape] = []
     part_pairs = _part_pairs(shapes, which, X_WA, X_WB, n, margin, singles)
     rows, ends = _rows_of_parts(singles, part_pairs, margin, max_contacts, threads)
@@ -97,7 +99,7 @@ def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[
         return numbers[id(shape)]
 
     keys = np.zeros(n, dtype=np.int64) if which is None else which[:, 0] * len(shapes) + which[:, 1]
-    found: list[PartPairs] = []
+    of_keys: list[PartPairs] = []
     for key in np.unique(keys).tolist():
         poses = np.flatnonzero(keys == key)
         shape_a, shape_b = (shapes[0], shapes[1]) if which is None else (shapes[k] for k in which[poses[0]])
@@ -112,13 +114,13 @@ def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[
                 slack = at_a.slop + at_b.slop
                 near = _may_come_within(part_a, part_b, at_a.X, at_b.X, margin + slack)
                 some = poses[near]
-                found.append(
+                of_keys.append(
                     PartPairs(
                         some, np.full(len(some), i), np.full(len(some), j), np.full(len(some), number(part_a.shape)),
                         np.full(len(some), number(part_b.shape)), at_a.X[near], at_b.X[near], slack[near],
                     )
                 )  # fmt: skip
-    together = PartPairs(*(np.concatenate(columns) for columns in zip(*found)))
+    together = PartPairs(*(np.concatenate(columns) for columns in zip(*of_keys)))
     return together.take(np.lexsort((together.part_b, together.part_a, together.pair)))
 
 

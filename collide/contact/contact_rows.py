@@ -60,7 +60,8 @@ def no_rows() -> np.ndarray:
 def flipped_contacts(rows: np.ndarray) -> np.ndarray:
     """The same contacts with A and B exchanged."""
     swapped = rows.copy()
-    for of_a, of_b in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("facet_a", "facet_b"), ("feature_a", "feature_b")):
+    pairs = [(f"{field}_a", f"{field}_b") for field in ("part", "point", "facet", "feature")]
+    for of_a, of_b in (("a", "b"), *pairs):
         swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
     swapped["normal"] = 0.0 - rows["normal"]
     return swapped

@@ -74,14 +74,14 @@ def manifolds_of_rows(
     header = np.zeros(HEADER, dtype=np.int64)
     header[:PAIRS_DONE] = _addresses(table, faces, space)
     ends = np.zeros(n, dtype=np.int64)
-    most = min(max_contacts, 2 * faces.largest + 8)
-    out = np.zeros(_ROWS_PER_PAIR * n + most, dtype=CONTACT_DTYPE)
+    max_rows = min(max_contacts, 2 * faces.largest + 8)
+    out = np.zeros(_ROWS_PER_PAIR * n + max_rows, dtype=CONTACT_DTYPE)
     while n and convex_manifolds(
         address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
         address_of(X_WB), 16 * (len(X_WB) > 1), 0 if slack is None else address_of(slack), address_of(rows), n, margin,
         max_contacts, address_of(out), len(out), address_of(ends),
     ):  # fmt: skip
-        out = np.concatenate([out, np.zeros(len(out) + most, dtype=CONTACT_DTYPE)])
+        out = np.concatenate([out, np.zeros(len(out) + max_rows, dtype=CONTACT_DTYPE)])
     return out[: header[ROWS_DONE]], ends
 
 
@@ -117,7 +117,7 @@ class SingleContacts:
         self._faces = face_table_of(table, ROUND)
         self._space = _Workspace()
         self._space.fit(self._faces.largest)
-        self.room = 2 * self._faces.largest + 8
+        self.max_rows = 2 * self._faces.largest + 8
         self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
         self._header[: len(header)] = header
         self._of_manifold = self._header[len(header) :]
@@ -127,7 +127,7 @@ class SingleContacts:
 
     def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
         """Rows; None where more than doubles, or an error, is called for."""
-        rows = np.zeros(min(max_contacts, self.room), dtype=CONTACT_DTYPE)
+        rows = np.zeros(min(max_contacts, self.max_rows), dtype=CONTACT_DTYPE)
         self._margin[0], self._of_manifold[MAX_CONTACTS] = margin, max_contacts
         if self._ask(X_WA, X_WB, rows, False) is None:
             return None

@@ -43,7 +43,7 @@ _ERRORS, _SHARE = 64.0, 2.0**-30
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
-# two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs,
+# two shape numbers, of the workspace; max_rows corners of a face. Then what a call has done: pairs,
 # and rows; of single calls the bits of the margin, and max_contacts.
 (
     INTS_AT, NUMBERS_AT, FACES_AT, POSES_AT, SHAPE_OF_AT, DOUBLES_AT, INTEGERS_AT, LARGEST, PAIRS_DONE, ROWS_DONE,
@@ -66,15 +66,15 @@ _FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", 
 
 def workspace_doubles(largest: int) -> int:
     """How many doubles the kernel works in, for faces of so many corners."""
-    return 2 * 3 * largest + 2 * 2 * _room(largest) + POINT * _room(largest)
+    return 2 * 3 * largest + 2 * 2 * max_corners(largest) + POINT * max_corners(largest)
 
 
 def workspace_integers(largest: int) -> int:
-    return 2 * 2 * largest + 2 * _room(largest) + 2 * _room(largest) + _room(largest)
+    return 2 * 2 * largest + 2 * max_corners(largest) + 2 * max_corners(largest) + max_corners(largest)
 
 
 @kernel(inline=True)
-def _room(largest):
+def max_corners(largest):
     """Corners that an overlap may have, and one point more."""
     return 2 * largest + 8
 
@@ -84,7 +84,7 @@ def convex_manifolds(
     header_at, which_at, XA_at, step_a, XB_at, step_b, slack_at, rows_at, n, margin, max_contacts, out_at, capacity,
     ends_at,
 ):  # fmt: skip
-    """Contacts of pairs from header[PAIRS_DONE] on, of n, as long as there is room; 1 where there is none left.
+    """Contacts of pairs from header[PAIRS_DONE] on, of n, as long as there is space for them; 1 where there is none left.
 
     which : 0, or two shape rows a pair.   XA, XB : matrices; step 16 or, for a single pose, 0.
     slack : 0, or by how much rounding may have moved the bodies of each pair towards each other [m].
@@ -97,10 +97,10 @@ def convex_manifolds(
     ends = view_i64(ends_at, n)
     poses = view_f64(header[POSES_AT], 2 * POSE)
     shape_of = view_i64(header[SHAPE_OF_AT], 2)
-    most = min(max_contacts, _room(header[LARGEST]))
+    max_rows = min(max_contacts, max_corners(header[LARGEST]))
     n_rows = header[ROWS_DONE]
     for k in range(header[PAIRS_DONE], n):
-        if capacity - n_rows < most:
+        if capacity - n_rows < max_rows:
             header[PAIRS_DONE] = k
             header[ROWS_DONE] = n_rows
             return 1
@@ -131,7 +131,7 @@ def put_manifold(header, row, margin, max_contacts, out_at):
     error = _error(pair, row)
     largest = header[LARGEST]
     doubles, integers = header[DOUBLES_AT], header[INTEGERS_AT]
-    room = _room(largest)
+    n_max = max_corners(largest)
     of_b = support_face(
         pair, pair.B, header[FACES_AT], axes, -1.0, pair.t, largest, doubles + 24 * largest, integers + 16 * largest
     )
@@ -145,10 +145,10 @@ def put_manifold(header, row, margin, max_contacts, out_at):
             pair, pair.A, header[FACES_AT], axes, 1.0, Vec3(0.0, 0.0, 0.0), largest, doubles, integers
         )
     polygons, flags = doubles + 48 * largest, integers + 32 * largest
-    first = Clipped(view_f64(polygons, 2 * room), view_i64(flags, room))
-    second = Clipped(view_f64(polygons + 16 * room, 2 * room), view_i64(flags + 8 * room, room))
-    manifold = ManifoldPoints(view_f64(polygons + 32 * room, POINT * room), view_i64(flags + 16 * room, 2 * room))
-    order = view_i64(flags + 32 * room, room)
+    first = Clipped(view_f64(polygons, 2 * n_max), view_i64(flags, n_max))
+    second = Clipped(view_f64(polygons + 16 * n_max, 2 * n_max), view_i64(flags + 8 * n_max, n_max))
+    manifold = ManifoldPoints(view_f64(polygons + 32 * n_max, POINT * n_max), view_i64(flags + 16 * n_max, 2 * n_max))
+    order = view_i64(flags + 32 * n_max, n_max)
     radius = radius_a + radius_b
     bound = _bound(error, of_a, of_b)
     if pair.A.kind == HALFSPACE:
@@ -172,8 +172,8 @@ def put_manifold(header, row, margin, max_contacts, out_at):
         bound = max(bound, bracket)
     tolerance = max(_ERRORS * error, _SHARE * _extent(manifold, n))
     n = drop_repeated(manifold, n, bound, tolerance)
-    chosen = deepest_point(manifold, n, bound, tolerance)
-    n = select_points(manifold, n, chosen, max_contacts, order)
+    first_point = deepest_point(manifold, n, bound, tolerance)
+    n = select_points(manifold, n, first_point, max_contacts, order)
     bound += 8.0 * error + pair.numbers[NUMBERS * pair.A.shape + SLOP] + pair.numbers[NUMBERS * pair.B.shape + SLOP]
     bound += pair.poses[POSE_SLOP]
     for k in range(n):
@@ -209,9 +209,9 @@ def _error(pair, row):
 def _bound(error, of_a, of_b):
     """How far a gap measured may be off.
 
-    Two heights, and for each face twice the error of a place times its slope, at most 1.02; a slope is good to 32u, and
-    extends over 2S at most: 6 errors and 8. A face's corners are off its plane by its flatness, measured along its
-    normal, of which the gap is the slant, at most 1.5 times as long.
+    Two heights, and for each face twice the error of a place times its slope, at max_rows 1.02; a slope is good to 32u, and
+    extends over 2S at max_rows: 6 errors and 8. A face's corners are off its plane by its flatness, measured along its
+    normal, of which the gap is the slant, at max_rows 1.5 times as long.
     """
     return 16.0 * error + 2.0 * (of_a.flatness + of_b.flatness)
 

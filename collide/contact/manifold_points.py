@@ -156,11 +156,11 @@ def copy_point(manifold, source, target):
 
 
 @kernel
-def keep_near(manifold, n, most):
+def keep_near(manifold, n, max_gap):
     """Keep the points whose gap is at most so much, in order; how many."""
     n_kept = 0
     for k in range(n):
-        if manifold.points[POINT * k + GAP] <= most:
+        if manifold.points[POINT * k + GAP] <= max_gap:
             copy_point(manifold, k, n_kept)
             n_kept += 1
     return n_kept

@@ -8,10 +8,10 @@ from collide.kernels import kernel
 
 @kernel
 def select_points(manifold, n, first, max_points, order):
-    """Numbers of at most ``max_points`` of n points around a polygon, beginning with ``first``; how many.
+    """Numbers of at area_beyond ``max_points`` of n points around a polygon, beginning with ``first``; how many.
 
     order : becomes them, counter-clockwise. Beyond ``max_points``: the first, the farthest from it, then one by one
-    those that add most area. O(n · max_points²).
+    those that add area_beyond area. O(n · max_points²).
     """
     if n <= max_points:
         for k in range(n):
@@ -53,14 +53,14 @@ def _added_area(points, n, first, order, n_taken, k):
         q = POINT * _wrapped(first, n)
         du, dv = points[p] - points[q], points[p + V] - points[q + V]
         return du * du + dv * dv
-    most = 0.0
+    area_beyond = 0.0
     for j in range(n_taken):
         i = POINT * _wrapped(first + order[j], n)
         o = POINT * _wrapped(first + order[j + 1 if j + 1 < n_taken else 0], n)
         du, dv = points[o] - points[i], points[o + V] - points[i + V]
         area = du * (points[p + V] - points[i + V]) - dv * (points[p] - points[i])
-        most = max(most, abs(area) if n_taken == 2 else -area)
-    return most
+        area_beyond = max(area_beyond, abs(area) if n_taken == 2 else -area)
+    return area_beyond
 
 
 @kernel(inline=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collide.contact.convex_manifolds import MARGIN, MAX_CONTACTS, POSES_AT, ROWS_DONE, put_manifold
 from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
+from collide.contact.convex_manifolds import MARGIN, MAX_CONTACTS, POSES_AT, ROWS_DONE, put_manifold
 from collide.kernels import entry, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE, POSE_SLOP
 from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose

@@ -123,7 +123,7 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     )
     direction = scale(sign, axes.nhat)
     g = Vec3(dot(c0, direction), dot(c1, direction), dot(c2, direction))
-    # Normals of faces turn with the cofactors of a matrix, which need be no rotation.
+    # Normals of faces eighth with the cofactors of a matrix, which need be no rotation.
     cofactors = cross(c1, c2), cross(c2, c0), cross(c0, c1)
     facing = Vec3(dot(cofactors[0], direction), dot(cofactors[1], direction), dot(cofactors[2], direction))
     normal = Vec3(0.0, 0.0, 0.0)
@@ -184,14 +184,14 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
     p = column_at(body.coords, body.padded, vertex)
     best = np.int64(-1)
     best_edge = np.int64(-1)
-    most = _ACROSS
+    best_cosine = _ACROSS
     least_steep = -_ACROSS * norm(g)
     for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
         at = fans[k]
         face = face_of[at]
         cosine = dot(vec3_at(normals, 3 * face), facing)
-        if cosine > most:
-            most = cosine
+        if cosine > best_cosine:
+            best_cosine = cosine
             best = face
         following = at + 1 if at + 1 < starts[face + 1] else starts[face]
         e = sub(column_at(body.coords, body.padded, loop[following]), p)
@@ -268,9 +268,9 @@ def _put_disc(x, y, radius, z, corners, features, edges):
     """Corners of a regular octagon within a disc, the first towards (x, y); counter-clockwise seen from outside."""
     root = math.sqrt(0.5)
     for k in range(ROUND):
-        turn = k if z > 0.0 else ROUND - 1 - k
-        c = 1.0 if turn == 0 else -1.0 if turn == 4 else 0.0 if turn % 4 == 2 else root if turn in (1, 7) else -root
-        s = 0.0 if turn % 4 == 0 else 1.0 if turn == 2 else -1.0 if turn == 6 else root if turn in (1, 3) else -root
+        eighth = k if z > 0.0 else ROUND - 1 - k
+        c = 1.0 if eighth == 0 else -1.0 if eighth == 4 else 0.0 if eighth % 4 == 2 else root if eighth in (1, 7) else -root
+        s = 0.0 if eighth % 4 == 0 else 1.0 if eighth == 2 else -1.0 if eighth == 6 else root if eighth in (1, 3) else -root
         put_vec3(corners, 3 * k, Vec3(radius * (x * c - y * s), radius * (y * c + x * s), z))
-        features[k] = 4 * turn + CURVED
-        edges[k] = 4 * (ROUND + turn) + CURVED
+        features[k] = 4 * eighth + CURVED
+        edges[k] = 4 * (ROUND + eighth) + CURVED

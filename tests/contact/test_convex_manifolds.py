@@ -1,4 +1,4 @@
-"""Manifolds of convex polytopes judged by fractions and by naive clipping: brackets, completeness, features, reduction."""
+"""Manifolds of convex polytopes judged by fractions and by naive clipping: brackets, features, reduction."""
 
 from __future__ import annotations
 
