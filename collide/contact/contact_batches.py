@@ -106,8 +106,8 @@ def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[
         X_WAs, X_WBs = (np.broadcast_to(X, (n, 4, 4))[poses] for X in (X_WA, X_WB))
         apart = np.sqrt(np.square(X_WBs[:, :3, 3] - X_WAs[:, :3, 3]).sum(axis=1))
         placed_a, placed_b = (
-            [(part, part.at(X, _reach(other) + apart)) for part in compound_parts(shape).parts]
-            for shape, X, other in ((shape_a, X_WAs, shape_b), (shape_b, X_WBs, shape_a))
+            [(part, part.at(X, _reach(opposite) + apart)) for part in compound_parts(shape).parts]
+            for shape, X, opposite in ((shape_a, X_WAs, shape_b), (shape_b, X_WBs, shape_a))
         )
         for i, (part_a, at_a) in enumerate(placed_a):
             for j, (part_b, at_b) in enumerate(placed_b):
@@ -192,15 +192,15 @@ def _within_margin(rows, of_pair, part_pairs: PartPairs, A, B, X_WA, X_WB, margi
     keep = np.ones(len(rows), dtype=bool)
     moved = np.unique(part_pairs.pair[part_pairs.slack > 0.0])
     for k in moved.tolist():
-        own = of_pair == k
-        if not own.any():
+        of_k = of_pair == k
+        if not of_k.any():
             continue
         shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])
         X_A, X_B = pose_at(X_WA, k), pose_at(X_WB, k)
         size = 4.0 * (_reach(shape_a) + _reach(shape_b)) + float(np.abs(X_B[:3, 3] - X_A[:3, 3]).sum())
-        if rows["upper"][own].min() <= margin - _ROUNDING * size:
+        if rows["upper"][of_k].min() <= margin - _ROUNDING * size:
             continue
         row = answer_batch(shape_a, shape_b, X_A[None], X_B[None], Question(False, math.inf))
         if row["lower"][0] > margin:
-            keep[own] = False
+            keep[of_k] = False
     return keep

@@ -43,7 +43,7 @@ _ERRORS, _SHARE = 64.0, 2.0**-30
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
-# two shape numbers, of the workspace; max_rows corners of a face. Then what a call has done: pairs,
+# two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs,
 # and rows; of single calls the bits of the margin, and max_contacts.
 (
     INTS_AT, NUMBERS_AT, FACES_AT, POSES_AT, SHAPE_OF_AT, DOUBLES_AT, INTEGERS_AT, LARGEST, PAIRS_DONE, ROWS_DONE,
@@ -84,7 +84,7 @@ def convex_manifolds(
     header_at, which_at, XA_at, step_a, XB_at, step_b, slack_at, rows_at, n, margin, max_contacts, out_at, capacity,
     ends_at,
 ):  # fmt: skip
-    """Contacts of pairs from header[PAIRS_DONE] on, of n, as long as there is space for them; 1 where there is none left.
+    """Contacts of pairs from header[PAIRS_DONE] on, of n, while there is space for rows; 1 where there is none left.
 
     which : 0, or two shape rows a pair.   XA, XB : matrices; step 16 or, for a single pose, 0.
     slack : 0, or by how much rounding may have moved the bodies of each pair towards each other [m].
@@ -209,9 +209,9 @@ def _error(pair, row):
 def _bound(error, of_a, of_b):
     """How far a gap measured may be off.
 
-    Two heights, and for each face twice the error of a place times its slope, at max_rows 1.02; a slope is good to 32u, and
-    extends over 2S at max_rows: 6 errors and 8. A face's corners are off its plane by its flatness, measured along its
-    normal, of which the gap is the slant, at max_rows 1.5 times as long.
+    Two heights, and for each face twice the error of a place times its slope, at most 1.02; a slope is good to 32u,
+    and extends over 2S at most: 6 errors and 8. A face's corners are off its plane by its flatness, measured along its
+    normal, of which the gap is the slant, at most 1.5 times as long.
     """
     return 16.0 * error + 2.0 * (of_a.flatness + of_b.flatness)
 

@@ -266,11 +266,19 @@ def _round_corners(pair, body, g, corners, features, edges):
 @kernel(inline=True)
 def _put_disc(x, y, radius, z, corners, features, edges):
     """Corners of a regular octagon within a disc, the first towards (x, y); counter-clockwise seen from outside."""
-    root = math.sqrt(0.5)
     for k in range(ROUND):
         eighth = k if z > 0.0 else ROUND - 1 - k
-        c = 1.0 if eighth == 0 else -1.0 if eighth == 4 else 0.0 if eighth % 4 == 2 else root if eighth in (1, 7) else -root
-        s = 0.0 if eighth % 4 == 0 else 1.0 if eighth == 2 else -1.0 if eighth == 6 else root if eighth in (1, 3) else -root
+        c, s = _cosine_of_eighths(eighth), _cosine_of_eighths(eighth + ROUND - 2)
         put_vec3(corners, 3 * k, Vec3(radius * (x * c - y * s), radius * (y * c + x * s), z))
         features[k] = 4 * eighth + CURVED
         edges[k] = 4 * (ROUND + eighth) + CURVED
+
+
+@kernel(inline=True)
+def _cosine_of_eighths(k):
+    """Of k eighths of a full rotation."""
+    k = k % ROUND
+    if k % 4 == 2:
+        return 0.0
+    value = 1.0 if k % 4 == 0 else math.sqrt(0.5)
+    return value if k < 2 or k == 7 else -value
