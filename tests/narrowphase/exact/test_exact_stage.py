@@ -36,7 +36,8 @@ class Scene:
 
     def __init__(self, rng, n: int):
         self.shape_of = rng.integers(0, len(SHAPES), n)
-        shifts = rng.integers(-2, 3, size=(n, 3)) * 0.5 * (1.0 + rng.choice([0.0] * 6 + [2.0**-52, -(2.0**-53)], (n, 1)))
+        ulps = rng.choice([0.0] * 6 + [2.0**-52, -(2.0**-53)], (n, 1))
+        shifts = rng.integers(-2, 3, size=(n, 3)) * 0.5 * (1.0 + ulps)
         turns = rng.integers(0, 24, n)
         self.X = np.array([pose(LATTICE_ROTATIONS[turn], shift) for turn, shift in zip(turns, shifts)])
         packed = [parts_of(shape)[0] for shape in SHAPES]
