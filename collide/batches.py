@@ -10,7 +10,7 @@ from collide.errors import InvalidPose
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.convex_bodies import Question, answer_parts
 from collide.narrowphase.pair_queries import OF_ONE_PAIR, Answer, answer_of
-from collide.narrowphase.prepared_pairs import keep_prepared
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -57,8 +57,8 @@ def answer_batch(
     answer = None
     if isinstance(A, Shape) and isinstance(B, Shape):
         answer = answer_of(A, B)
-        if prepare:
-            keep_prepared(A, B, answer.prepare)
+        if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
+            _prepare(A, B, answer)
     else:
         A, B = _of_one_set(A, B, n)
 
@@ -93,6 +93,12 @@ def answer_batch(
         order = _pairs_together(A, B)
         share_if_it_helps(n, work if order is None else lambda piece: work(order[piece]), threads)
     return out
+
+
+def _prepare(A: Shape, B: Shape, answer: Answer) -> None:
+    pair = answer.prepare(A, B)
+    if pair is not None:
+        keep_prepared(A, B, pair)
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:

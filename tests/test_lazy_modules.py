@@ -18,7 +18,7 @@ def module_on_path(tmp_path, monkeypatch):
 
 
 def test_a_module_is_loaded_when_an_attribute_is_used(module_on_path):
-    late = lazy_module(module_on_path)
+    late = lazy_module("loaded_late")
     assert module_on_path not in sys.modules
     assert late.answer == 42 and module_on_path in sys.modules
     sys.modules[module_on_path].answer = 43
@@ -27,6 +27,6 @@ def test_a_module_is_loaded_when_an_attribute_is_used(module_on_path):
 
 def test_what_is_not_there_says_so(module_on_path):
     with pytest.raises(AttributeError, match="question"):
-        _ = lazy_module(module_on_path).question
+        _ = lazy_module("loaded_late").question
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         _ = lazy_module("no_such_module").answer

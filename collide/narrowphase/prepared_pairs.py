@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import weakref
-from collections.abc import Callable
 from typing import Any
 
 from collide.kernels import PLAIN_PYTHON
@@ -25,13 +24,7 @@ def single_calls_are_safe() -> bool:
     return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
-def keep_prepared(A: Shape, B: Shape, prepare: Callable[[Shape, Shape], Any]) -> None:
-    """Have a pair made ready for single calls and keep it, unless it is kept.
-
-    prepare : ``prepare(A, B)`` makes the pair; None where its single calls are batches of one.
-    """
-    if prepared_pair(A, B) is not None or not single_calls_are_safe() or (pair := prepare(A, B)) is None:
-        return
+def keep_prepared(A: Shape, B: Shape, pair: Any) -> None:
     if not hasattr(A, "_prepared"):
         A._store(_prepared={})
     if not hasattr(B, "_serial"):

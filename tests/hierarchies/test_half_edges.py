@@ -20,9 +20,9 @@ from collide.hierarchies.half_edges import (
     read_ring,
 )
 from collide.hierarchies.independent_sets import by_degree, change_degrees, is_anchor, raises
-from collide.hierarchies.symbolic_perturbation import CloudView
 from collide.hierarchies.true_facets import Cloud, twins_of
 from collide.hull.exact_hull import convex_hull
+from collide.numerics.orientation import CloudView
 
 pytestmark = pytest.mark.plain_kernels
 

@@ -11,8 +11,9 @@ import pytest
 from naive import rng_of
 from naive_triangles import cross, inner, minus
 
-from collide.hierarchies.symbolic_perturbation import CENTRES, CloudView, exact_side, rank_of, side
+from collide.hierarchies.symbolic_perturbation import CENTRES, exact_side, rank_of, side
 from collide.hierarchies.true_facets import Cloud
+from collide.numerics.orientation import CloudView
 
 pytestmark = pytest.mark.plain_kernels
 
