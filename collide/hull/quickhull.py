@@ -429,7 +429,8 @@ def quickhull(
     capacity = count + APICES
     originals, points = view_f64(originals_at, 3 * capacity), view_f64(points_at, 3 * capacity)
     work = view_f64(work_at, WORK)
-    cloud = CloudView(points, originals, work, view_i64(digits_at, DIGITS), 0, survey(originals, points, count, work))
+    exponent = np.int64(survey(originals, points, count, work))
+    cloud = CloudView(points, originals, work, view_i64(digits_at, DIGITS), 0, exponent)
     hull = GrowingHull(
         cloud, view_i32(facets_at, 2 * FACET * capacity), view_f64(planes_at, 2 * PLANE * capacity),
         view_i64(state_at, STATE), view_i32(following_at, capacity), view_i32(owner_at, capacity),

@@ -462,6 +462,7 @@ def answer_compounds(
     limit : larger distances are not looked for [m].   check : refuse matrices that are no rotation.
     every : leave nothing to balls, and stop after every list: tests want the exact stage to have it all.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed.
+    Arguments are flat: single calls come by address.
     """
     block = _open(header_at)
     header = block.header

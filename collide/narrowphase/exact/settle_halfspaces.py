@@ -30,8 +30,10 @@ from collide.results import EXACT, UNDECIDED
 def settle_halfspaces(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Settle the undecided rows of half-spaces against hulls, in place; returns how many. Arguments as in
-    `settle_hulls`."""
+    """Settle the undecided rows of half-spaces against hulls, in place; returns how many.
+
+    Arguments as in `settle_hulls`, and flat as there.
+    """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)
     n_settled = 0

@@ -41,6 +41,7 @@ def settle_hulls(
     Arguments as there; without depths bodies that meet get a point of both.   terms, n_terms : of the `PoseTable`.
     requests : what `answer_pairs` wrote.   digits : workspace of WORKSPACE integers.
     What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
+    Arguments are flat: entries are called by address, from C too.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)

@@ -320,6 +320,7 @@ def gap_poses(
     are looked for: next above the limit and the radii [m].   depths : whether it is wanted how deep overlaps are.
     hulls : 0, or rows of the bodies' hulls, for directions.   rows : of PAIR_DTYPE, zeroed.
     lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     space = open_space(header_at)
     lacks = view_u8(lacks_at, n)

@@ -60,7 +60,7 @@ class Surface:
             return False
         apex = self._put(corner)
         self.starts[2 * apex + 1] = -1
-        seen = E.find_patch(self.views, f, apex, 0.0)
+        seen = E.find_patch(self.views, self.views, f, E.point_at(self.views.points, apex), 0.0)
         self.count, nearest, reach = E.expand(self.views, f, apex, self.count, seen, math.inf, 0.0, math.inf)
         assert reach == min(self.reaches[int(f)] for f in self.around(apex)) == self.reaches[int(nearest)]
         return True
