@@ -17,14 +17,7 @@ from collide.narrowphase.exact.exact_stage import settle_rows
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finalize_rows import close_rows
-from collide.narrowphase.pose_batches import (
-    ANSWERED,
-    BAD_POSE,
-    BLOCK,
-    HEADER,
-    POSES_AT,
-    answer_poses,
-)
+from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, answer_poses
 from collide.narrowphase.single_call import collide_single, distance_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
