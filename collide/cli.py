@@ -194,7 +194,7 @@ def _say_what_was_taken(report) -> None:
 
 
 def _make(args, **limits) -> list:
-    """Load the scene of the arguments and report on it, in each state asked for: `states.Stated`."""
+    """Load the scene of the arguments and report on it, in each state asked for: `state_reports.Stated`."""
     progress = _progress(args.quiet)
     scenes = _load(args, progress)
     trajectory = _trajectory(args, scenes)

@@ -181,7 +181,8 @@ class BuildLibrary(build_ext):
             self.spawn([compiler, *kind, "-o", str(out), *objects])
         else:
             kind = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{LIBRARY}"]
-            self.spawn([compiler, "-shared", "-s", "-Wl,-z,relro", "-o", str(out), *objects, *kind])
+            strip = [] if os.environ.get("COLLIDE_SYMBOLS") else ["-s"]
+            self.spawn([compiler, "-shared", *strip, "-Wl,-z,relro", "-o", str(out), *objects, *kind])
 
 
 def _compiled_kernels() -> dict:

@@ -23,9 +23,8 @@ struct buffers {
 
 static void begin_header(collide_workspace *space)
 {
-    int64_t code = 0;
-    memcpy(&code, &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
-    space->header[CORE] = code;
+    memcpy(&space->header[CORE], &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
+    memcpy(&space->header[SETTLE], &space->kernels->settle_hulls, sizeof space->kernels->settle_hulls);
     space->header[POSES_AT] = address_of(space->poses);
     space->header[SHAPE_OF_AT] = address_of(space->shape_of);
     space->header[PAIRS_AT] = address_of(space->pairs);
@@ -70,7 +69,7 @@ static int furnish(collide_workspace *space)
     space->header[DOUBLES_AT] = address_of(doubles);
     space->header[INTEGERS_AT] = address_of(integers);
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
-    space->digits_at = address_of(digits);
+    space->digits_at = space->header[DIGITS_AT] = address_of(digits);
     space->room = digits + measures[M_WORKSPACE];
     furnish_meshes(space, (char *)space->room + ROOM_OF_HALFSPACES, measures);
     begin_pairs(space);

@@ -3,7 +3,7 @@
 `convex_hull` gives flat facets as some triangles, and may keep points that lie on a facet or an edge. Here
 triangles in one plane are put together again. A vertex where three true facets or more meet is strictly
 extreme; the others are dropped. What is left of a facet's border is a strictly convex polygon, and it is
-triangulated as `perturbed` says: vertices are cut off in the order in which they move inwards.
+triangulated as `symbolic_perturbation.py` says: vertices are cut off in the order in which they move inwards.
 """
 
 from __future__ import annotations

@@ -5,84 +5,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from half_edge_surface import Surface
 from naive import rng_of
 
 from collide.hierarchies.half_edges import (
-    FREE,
-    USED,
-    HalfEdges,
     degree_of,
     drop_star,
     fill_hole,
     following,
     plan_hole,
-    preceding,
     read_ring,
 )
 from collide.hierarchies.independent_sets import by_degree, change_degrees, is_anchor, raises
-from collide.hierarchies.true_facets import Cloud, twins_of
-from collide.hull.exact_hull import convex_hull
-from collide.numerics.orientation import CloudView
 
 pytestmark = pytest.mark.plain_kernels
-
-
-class Surface:
-    """The hull of points as half-edges, its cloud, and rings by dictionaries."""
-
-    def __init__(self, points: np.ndarray):
-        triangles = np.ascontiguousarray(convex_hull(points).facets, dtype=np.int32)
-        cloud = Cloud(points)
-        self.points, self.kept = points, cloud
-        self.cloud = CloudView(
-            cloud.scaled.ravel(), cloud.originals.ravel(), cloud.work, cloud.digits, cloud.count, cloud.exponent
-        )
-        leaving = np.full(len(points), -1)
-        leaving[triangles.ravel()] = np.arange(triangles.size)
-        state = np.array([-1, len(triangles), *[-1] * 4, 0])
-        self.mesh = HalfEdges(triangles.ravel().astype(np.int64), twins_of(triangles).astype(np.int64), leaving, state)
-        self.vertices = sorted(set(triangles.ravel().tolist()))
-
-    def triangles(self) -> list[tuple[int, int, int]]:
-        rows = self.mesh.corners[: 3 * self.mesh.state[USED]].reshape(-1, 3).tolist()
-        return [tuple(row) for row in rows if row[0] >= 0]
-
-    def ring(self, v: int) -> list[int]:
-        """Neighbours in order, from the triangles alone, beginning with the least."""
-        after = {}
-        for a, b, c in self.triangles():
-            for x, y, z in ((a, b, c), (b, c, a), (c, a, b)):
-                if x == v:
-                    after[y] = z
-        ring = [min(after)]
-        while after[ring[-1]] != ring[0]:
-            ring.append(after[ring[-1]])
-        assert len(ring) == len(after)
-        return ring
-
-    def check(self) -> None:
-        corners, twins, leaving, state = self.mesh
-        free, t = set(), state[FREE]
-        while t >= 0:
-            assert corners[3 * t] == -1 and t not in free
-            free.add(t)
-            t = twins[3 * t]
-        there = [h for h in range(3 * state[USED]) if h // 3 not in free]
-        for h in there:
-            g = twins[h]
-            assert twins[g] == h and corners[g] == corners[following(h)] and corners[following(g)] == corners[h]
-            assert following(preceding(h)) == h == preceding(following(h)) and h // 3 == following(h) // 3
-        for v in self.vertices:
-            assert corners[leaving[v]] == v and leaving[v] // 3 not in free
-        assert len(self.vertices) - len(there) // 2 + len(there) // 3 == 2, "Euler"
-
-    def is_hull(self, slack: float) -> bool:
-        """Every vertex is behind every triangle."""
-        P = self.points
-        return all(
-            ((P[self.vertices] - P[a]) @ np.cross(P[b] - P[a], P[c] - P[a])).max() <= slack
-            for a, b, c in self.triangles()
-        )
 
 
 def points_of(rng, kind: str) -> np.ndarray:

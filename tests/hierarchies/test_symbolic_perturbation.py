@@ -8,19 +8,14 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from half_edge_surface import view_of
 from naive import rng_of
 from naive_triangles import cross, inner, minus
 
 from collide.hierarchies.symbolic_perturbation import CENTRES, exact_side, rank_of, side
 from collide.hierarchies.true_facets import Cloud
-from collide.numerics.orientation import CloudView
 
 pytestmark = pytest.mark.plain_kernels
-
-
-def view_of(cloud: Cloud) -> CloudView:
-    originals, scaled = cloud.originals.ravel(), cloud.scaled.ravel()
-    return CloudView(scaled, originals, cloud.work, cloud.digits, cloud.count, cloud.exponent)
 
 
 def moved(cloud: Cloud) -> list[list[Fraction]]:

@@ -7,10 +7,10 @@ import pytest
 from mesh_families import grid, soup
 from mesh_shapes import bumpy_sphere
 from naive import pose, rng_of, rotation
+from validate_bvh import validate_mesh_tree
 
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.scaled_bvh import scaled_tree
-from collide.mesh.validate_bvh import validate_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits
 
 FACTORS = (0.1, 1 / 3, 0.999, 1.0000000001, 7.3, 1e-12, 1e12, 2.0, 2.0**-30)

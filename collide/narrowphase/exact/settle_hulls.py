@@ -30,8 +30,13 @@ from collide.narrowphase.rows import (
 )
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
+#: How `settle_hulls` is called.
+SIGNATURE = (
+    "int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)"
+)
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)")
+
+@entry(SIGNATURE)
 def settle_hulls(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,

@@ -251,7 +251,10 @@ def _write_core_hit(space, pair, depths, row_at):
 
 @kernel
 def _forget_gap(row_at, proven):
-    """Make the row of bodies that their radii make meet, or may, one without a depth, at a point between the cores."""
+    """Bodies that meet because of their radii, or may meet: the row becomes an overlap of unknown depth, at distance 0.
+
+    Both points become the middle between the cores.   proven : they do meet.
+    """
     row, _, flags = view_row(row_at)
     middle = scale(0.5, add(vec3_at(row, rows.POINT_A), vec3_at(row, rows.POINT_B)))
     put_vec3(row, rows.POINT_A, middle)

@@ -97,8 +97,9 @@ def clear_queue(integers_at):
 def enqueue(ordered, query, work, n, how, row_number, error):
     """Put a row into the queue whose gap is to be refined; returns its kind.
 
-    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`: of its n vertex pairs those
-        with a weight are the feature, of four of two segments three corners.
+    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`.
+    n : vertex pairs of the workspace. Those with a weight are the feature; of four, where two segments cross, it takes
+        three.
     how : what the row says if its digits are proven.   error : of a bound in doubles [m].
     """
     pair = ordered.pair

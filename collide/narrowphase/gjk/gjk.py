@@ -246,11 +246,10 @@ def _next_point(pair, points, ids, places, v, square, asked, limits, is_last):
 
 @kernel(inline=True)
 def _same_lists_cosine(pair):
-    """The squared cosine of the angle within which lists are asked again; 2, so that there is none, beside a curved
-    core.
+    """The squared cosine of the angle within which lists are asked again. 2, which no angle has, beside a curved core.
 
-    A curved core never repeats a point. Runs would converge towards what lies in one list, and again in the next: some
-    came to the last iteration.
+    A curved core never repeats a point. GJK would converge to the best point of one list, then to that of the next, and
+    some runs used up their iterations.
     """
     if pair.A.kind != POINTS or pair.B.kind != POINTS:
         return 2.0
