@@ -83,7 +83,7 @@ def distance(case: Case) -> Fraction | None:
 @pytest.mark.parametrize(("boolean", "depths"), [(True, False), (False, False), (False, True)])
 def test_planted_ties(boolean, depths):
     rng = rng_of("exact stage", boolean, depths)
-    scene = Scene(rng, 120)
+    scene = Scene(rng, 160)
     rows = scene.settle(boolean=boolean, depths=depths)
     seen: Counter = Counter()
     for k, row in enumerate(rows):
