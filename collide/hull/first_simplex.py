@@ -119,7 +119,7 @@ def farthest(points, low, high, corners, dimension):
 @kernel
 def write_apices(points, originals, count, exponent):
     """The points behind the cloud. Half of the scaled unit is a double in the originals too."""
-    unit = math.ldexp(0.5, exponent)
+    unit = math.ldexp(0.5, int(exponent))
     for i in range(APICES):
         for k in range(3):
             points[3 * (count + i) + k] = 0.5 if k == i else 0.0

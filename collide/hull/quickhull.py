@@ -19,150 +19,37 @@ Distances in doubles only choose the next corner.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
-from collide.hull.first_simplex import APICES, before, first_simplex
+from collide.hull.first_simplex import APICES, first_simplex
+from collide.hull.growing_hull import (
+    ACROSS,
+    CORNERS,
+    CURSOR,
+    FACET,
+    FIRST,
+    FREE,
+    LAST,
+    NOW,
+    PLANE,
+    POINT,
+    ROUND,
+    STATE,
+    TESTS,
+    USED,
+    GrowingHull,
+    above,
+    free_facet,
+    make_facet,
+    put,
+)
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.numerics.orientation import DIGITS, UNDERFLOW, WORK, CloudView, orientation, survey
-from collide.numerics.vec3 import Vec3, dot, norm1, put_vec3, sub, vec3_at
+from collide.numerics.orientation import DIGITS, WORK, CloudView, orientation, survey
 
-#: Integers of a facet: three corners, counter-clockwise from outside; the facet across each edge
-#: (corner k to k + 1); the first point of its list; its neighbours in the queue; the round
-#: in which it was last tested, negative where it was not visible.
-FACET = 10
-_ACROSS, _POINT, _BEFORE, _AFTER, _ROUND = 3, 6, 7, 8, 9
-#: Doubles of a facet: normal, a corner, how far its plane's doubles may be off, its farthest point's distance.
-PLANE = 8
-_CORNER, _ERROR, _FARTHEST = 3, 6, 7
 #: Fans of more facets than this are searched by halving; at least 4, since the first four facets are no fan.
 WIDE_FAN = 48
 #: Tests per point after which corners are no longer chosen by distance. Ordinary clouds need 10 to 50.
 BUDGET = 100
-#: As `orientation`'s, for differences up to 2: 8 u times the terms' magnitudes, doubled, times 2.
-_PLANE_ERROR = 2.0**-48
-
-#: Integers of the state: free facets as a chain, facets ever used, first and last of the queue of
-#: facets with points, the round, tests of a point against a plane, facets made, how far the shuffled order
-#: was followed (−1: not begun), four corners to begin with.
-STATE = 12
-_FREE, _USED, _FIRST, _LAST, _NOW, _TESTS, _MADE, _CURSOR, _CORNERS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-
-
-class GrowingHull(NamedTuple):
-    """A hull on its way: views of all that its steps read and write.
-
-    cloud : a `CloudView`.   facets, planes : FACET integers and PLANE doubles a facet.   state : STATE integers.
-    following : by point, the next one of its list.   owner : by point, the facet whose list it stands in, or −1.
-    orphans : points that stood in lists of removed facets.   region : facets that are being removed.
-    rim : two integers an edge of the region's rim, see `visible_region`.   fan : facets put in the region's place.
-    starting : by point, the facet of the fan that begins there, or −1.   order : the points shuffled (`next_corner`).
-    """
-
-    cloud: Any
-    facets: Any
-    planes: Any
-    state: Any
-    following: Any
-    owner: Any
-    orphans: Any
-    region: Any
-    rim: Any
-    fan: Any
-    starting: Any
-    order: Any
-
-
-@kernel
-def make_facet(hull, a, b, c):
-    """Number of a new facet with no neighbours and no points."""
-    points, facets, planes, state = hull.cloud.scaled, hull.facets, hull.planes, hull.state
-    f = state[_FREE]
-    if f >= 0:
-        state[_FREE] = facets[FACET * f + _AFTER]
-    else:
-        f = state[_USED]
-        state[_USED] += 1
-    state[_MADE] += 1
-    at = FACET * f
-    facets[at] = a
-    facets[at + 1] = b
-    facets[at + 2] = c
-    facets[at + _POINT] = -1
-    facets[at + _ROUND] = 0
-    corner = vec3_at(points, 3 * a)
-    u, v = sub(vec3_at(points, 3 * b), corner), sub(vec3_at(points, 3 * c), corner)
-    terms, subtracted = Vec3(u.y * v.z, u.z * v.x, u.x * v.y), Vec3(u.z * v.y, u.x * v.z, u.y * v.x)
-    at = PLANE * f
-    put_vec3(planes, at, sub(terms, subtracted))
-    put_vec3(planes, at + _CORNER, corner)
-    planes[at + _ERROR] = _PLANE_ERROR * (norm1(terms) + norm1(subtracted)) + UNDERFLOW
-    planes[at + _FARTHEST] = -1.0
-    return f
-
-
-@kernel
-def free_facet(hull, f):
-    """Take facet f out of the queue, if it has points; its number may be used again."""
-    facets, state = hull.facets, hull.state
-    at = FACET * f
-    if facets[at + _POINT] >= 0:
-        previous = facets[at + _BEFORE]
-        following_one = facets[at + _AFTER]
-        if previous >= 0:
-            facets[FACET * previous + _AFTER] = following_one
-        else:
-            state[_FIRST] = following_one
-        if following_one >= 0:
-            facets[FACET * following_one + _BEFORE] = previous
-        else:
-            state[_LAST] = previous
-    facets[at] = -1
-    facets[at + _AFTER] = state[_FREE]
-    state[_FREE] = f
-
-
-@kernel
-def above(hull, f, i):
-    """(whether point i lies strictly above facet f, its distance in some unit of the facet's)."""
-    cloud, facets, planes = hull.cloud, hull.facets, hull.planes
-    at = PLANE * f
-    value = dot(vec3_at(planes, at), sub(vec3_at(cloud.scaled, 3 * i), vec3_at(planes, at + _CORNER)))
-    margin = planes[at + _ERROR]
-    if value > margin:
-        return True, value
-    if value < -margin or abs(value) + margin < cloud.work[1]:
-        return False, value
-    at = FACET * f
-    a, b, c = np.int64(facets[at]), np.int64(facets[at + 1]), np.int64(facets[at + 2])
-    return orientation(cloud, a, b, c, i, -1) > 0, value
-
-
-@kernel
-def put(hull, f, i, distance):
-    """Put point i into the list of facet f: at its head if it is the farthest, else behind that."""
-    facets, planes, following, state = hull.facets, hull.planes, hull.following, hull.state
-    at = FACET * f
-    head = np.int64(facets[at + _POINT])
-    if head < 0:
-        last = state[_LAST]
-        facets[at + _BEFORE] = last
-        facets[at + _AFTER] = -1
-        if last >= 0:
-            facets[FACET * last + _AFTER] = f
-        else:
-            state[_FIRST] = f
-        state[_LAST] = f
-    # Of points equally far, one that is extreme in another direction: a corner of a flat side, not a point on it.
-    far = planes[PLANE * f + _FARTHEST]
-    if head < 0 or distance > far or (distance == far and before(hull.cloud.scaled, head, i, 0)):
-        following[i] = head
-        facets[at + _POINT] = i
-        planes[PLANE * f + _FARTHEST] = distance
-    else:
-        following[i] = following[head]
-        following[head] = i
 
 
 @kernel
@@ -179,7 +66,7 @@ def distribute(hull, n_orphans, k):
             if certain:
                 tries = 1
         for _ in range(tries):
-            state[_TESTS] += 1
+            state[TESTS] += 1
             f = np.int64(fan[t])
             over, distance = above(hull, f, i)
             if over:
@@ -211,7 +98,7 @@ def locate(hull, k, i):
         high = k
         place = 1
         while high - low > 1:
-            hull.state[_TESTS] += 1
+            hull.state[TESTS] += 1
             corner = np.int64(facets[FACET * fan[(start + place) % k]])
             sign = orientation(hull.cloud, apex, first, corner, i, -1)
             if sign == 0 and (low == 0 or high == k):
@@ -234,10 +121,10 @@ def visible_region(hull, f, i):
     rim : each edge as the facet beyond it and the edge's place there.
     """
     facets, state, region, rim = hull.facets, hull.state, hull.region, hull.rim
-    state[_NOW] += 1
-    now = state[_NOW]
+    state[NOW] += 1
+    now = state[NOW]
     region[0] = f
-    facets[FACET * f + _ROUND] = now
+    facets[FACET * f + ROUND] = now
     n_visible = 1
     edges = 0
     k = 0
@@ -245,13 +132,13 @@ def visible_region(hull, f, i):
         at = FACET * region[k]
         k += 1
         for e in range(3):
-            g = np.int64(facets[at + _ACROSS + e])
-            stamp = facets[FACET * g + _ROUND]
+            g = np.int64(facets[at + ACROSS + e])
+            stamp = facets[FACET * g + ROUND]
             if stamp != now and stamp != -now:
-                state[_TESTS] += 1
+                state[TESTS] += 1
                 over, _ = above(hull, g, i)
                 stamp = now if over else -now
-                facets[FACET * g + _ROUND] = stamp
+                facets[FACET * g + ROUND] = stamp
                 if over:
                     region[n_visible] = g
                     n_visible += 1
@@ -270,7 +157,7 @@ def gather(hull, n_visible, corner):
     """All points in the lists of the region's facets but ``corner`` become orphans; returns how many."""
     n_gathered = 0
     for k in range(n_visible):
-        i = hull.facets[FACET * hull.region[k] + _POINT]
+        i = hull.facets[FACET * hull.region[k] + POINT]
         while i >= 0:
             if i != corner:
                 hull.orphans[n_gathered] = i
@@ -300,15 +187,15 @@ def next_corner(hull, count):
     which the expected number of facets made is below 6 per corner whatever the cloud.
     """
     order, owner, state = hull.order, hull.owner, hull.state
-    if state[_TESTS] <= BUDGET * count:
-        f = state[_FIRST]
-        return f, np.int64(hull.facets[FACET * f + _POINT]) if f >= 0 else -1
-    if state[_CURSOR] < 0:
+    if state[TESTS] <= BUDGET * count:
+        f = state[FIRST]
+        return f, np.int64(hull.facets[FACET * f + POINT]) if f >= 0 else -1
+    if state[CURSOR] < 0:
         shuffle(order, count)
-        state[_CURSOR] = 0
-    while state[_CURSOR] < count:
-        i = np.int64(order[state[_CURSOR]])
-        state[_CURSOR] += 1
+        state[CURSOR] = 0
+    while state[CURSOR] < count:
+        i = np.int64(order[state[CURSOR]])
+        state[CURSOR] += 1
         if owner[i] >= 0:
             return np.int64(owner[i]), i
     return -1, -1
@@ -324,8 +211,8 @@ def build_fan(hull, i, edges):
         a = np.int64(facets[FACET * g + (place + 1) % 3])
         b = np.int64(facets[FACET * g + place])
         f = make_facet(hull, a, b, i)
-        facets[FACET * f + _ACROSS] = g
-        facets[FACET * g + _ACROSS + place] = f
+        facets[FACET * f + ACROSS] = g
+        facets[FACET * g + ACROSS + place] = f
         fan[k] = f
         starting[a] = f
     for k in range(edges):
@@ -333,15 +220,15 @@ def build_fan(hull, i, edges):
         g = starting[facets[FACET * f + 1]]
         if g < 0:
             return False
-        facets[FACET * f + _ACROSS + 1] = g
-        facets[FACET * g + _ACROSS + 2] = f
+        facets[FACET * f + ACROSS + 1] = g
+        facets[FACET * g + ACROSS + 2] = f
     for k in range(edges):
         a = facets[FACET * fan[k]]
         if starting[a] != fan[k]:
             return False
         starting[a] = -1
     for k in range(1, edges):
-        fan[k] = facets[FACET * fan[k - 1] + _ACROSS + 1]
+        fan[k] = facets[FACET * fan[k - 1] + ACROSS + 1]
     return True
 
 
@@ -355,8 +242,8 @@ def first_facets(hull, corners):
     fan[2] = make_facet(hull, b, d, c)
     fan[3] = make_facet(hull, c, d, a)
     for k in range(3):
-        facets[_ACROSS + k] = k + 1
-        at = FACET * (k + 1) + _ACROSS
+        facets[ACROSS + k] = k + 1
+        at = FACET * (k + 1) + ACROSS
         facets[at] = (k + 2) % 3 + 1
         facets[at + 1] = (k + 1) % 3 + 1
         facets[at + 2] = 0
@@ -367,7 +254,7 @@ def write_surface(hull, count, surface):
     """The facets of points of the cloud, and their corners marked; their number."""
     facets, marks = hull.facets, hull.starting
     n_facets = 0
-    for f in range(hull.state[_USED]):
+    for f in range(hull.state[USED]):
         at = FACET * f
         if facets[at] < 0 or max(facets[at], facets[at + 1], facets[at + 2]) >= count:
             continue
@@ -391,8 +278,8 @@ def begin(hull, count, corners):
             n_orphans += 1
     for k in range(count, count + APICES):
         starting[k] = -1
-    for k in range(_CORNERS):
-        state[k] = -1 if k == _FREE or k == _FIRST or k == _LAST or k == _CURSOR else 0
+    for k in range(CORNERS):
+        state[k] = -1 if k == FREE or k == FIRST or k == LAST or k == CURSOR else 0
     first_facets(hull, corners)
     return n_orphans
 
@@ -437,7 +324,7 @@ def quickhull(
         view_i32(orphans_at, capacity), view_i32(region_at, 2 * capacity), view_i32(rim_at, 2 * capacity),
         view_i32(fan_at, capacity), view_i32(starting_at, capacity), view_i32(order_at, capacity),
     )  # fmt: skip
-    corners = view_i64(state_at + 8 * _CORNERS, 4)
+    corners = view_i64(state_at + 8 * CORNERS, 4)
     starting = hull.starting
     dimension = first_simplex(cloud, count, corners)
     for k in range(capacity):

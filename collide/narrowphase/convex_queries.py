@@ -18,15 +18,7 @@ from collide.narrowphase.exact.settle_hulls import settle_hulls
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finalize_rows import close_rows
-from collide.narrowphase.pose_batches import (
-    ANSWERED,
-    BAD_POSE,
-    BLOCK,
-    HEADER,
-    POSES_AT,
-    SETTLE,
-    answer_poses,
-)
+from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
 from collide.narrowphase.single_call import collide_single, distance_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST

@@ -9,6 +9,7 @@ import pytest
 from exact_simplex import determinant, exact
 from naive import rng_of
 
+from collide.hull import growing_hull as G
 from collide.hull import quickhull as Q
 from collide.hull.first_simplex import APICES, first_simplex
 from collide.numerics import orientation as O
@@ -25,12 +26,12 @@ class Growing:
         originals, scaled = [*points.ravel().tolist(), *[0.0] * (3 * APICES)], [0.0] * (3 * capacity)
         work, corners = [0.0] * O.WORK, [0] * 4
         exponent = O.survey(originals, scaled, n, work)
-        self.facets, self.state = np.zeros(2 * Q.FACET * capacity, dtype=np.int64), [0] * Q.STATE
+        self.facets, self.state = np.zeros(2 * G.FACET * capacity, dtype=np.int64), [0] * G.STATE
         self.owner, self.following = [-1] * capacity, [-1] * capacity
         self.region, self.rim, self.fan = [0] * capacity, [0] * (2 * capacity), [0] * capacity
-        self.hull = Q.GrowingHull(
+        self.hull = G.GrowingHull(
             O.CloudView(scaled, originals, work, [0] * O.DIGITS, 0, exponent), self.facets,
-            np.zeros(2 * Q.PLANE * capacity), self.state, self.following, self.owner, [0] * capacity, self.region,
+            np.zeros(2 * G.PLANE * capacity), self.state, self.following, self.owner, [0] * capacity, self.region,
             self.rim, self.fan, [-1] * capacity, [0] * capacity,
         )  # fmt: skip
         assert first_simplex(self.hull.cloud, n, corners) == 3
@@ -39,7 +40,7 @@ class Growing:
         self.n_fan = 4
 
     def alive(self) -> dict[int, list[int]]:
-        rows = self.facets.reshape(-1, Q.FACET)[: self.state[Q._USED]]
+        rows = self.facets.reshape(-1, G.FACET)[: self.state[G.USED]]
         return {f: row[:3].tolist() for f, row in enumerate(rows) if row[0] >= 0}
 
     def is_above(self, i: int, triangle) -> bool:
@@ -57,7 +58,7 @@ class Growing:
         n_orphans = Q.gather(self.hull, n_region, i)
         self.owner[i] = -1
         for g in self.region[:n_region]:
-            Q.free_facet(self.hull, int(g))
+            G.free_facet(self.hull, int(g))
         assert Q.build_fan(self.hull, i, n_edges)
         self.n_fan = n_edges
         Q.distribute(self.hull, n_orphans, n_edges)
@@ -65,7 +66,7 @@ class Growing:
     def check_rim(self, n_edges: int, seen: set[int]) -> None:
         """Every edge between what is seen and what is not, once."""
         found = {(int(self.rim[2 * k]), int(self.rim[2 * k + 1])) for k in range(n_edges)}
-        across = self.facets.reshape(-1, Q.FACET)[:, 3:6]
+        across = self.facets.reshape(-1, G.FACET)[:, 3:6]
         alive = self.alive()
         true = {(g, e) for g in alive if g not in seen for e in range(3) if int(across[g, e]) in seen}
         assert found == true and len(found) == n_edges
@@ -79,14 +80,14 @@ class Growing:
                 edges[triangle[e], triangle[(e + 1) % 3]] = f
         for (i, j), f in edges.items():
             e = alive[f].index(i)
-            assert int(self.facets[Q.FACET * f + 3 + e]) == edges[j, i]
+            assert int(self.facets[G.FACET * f + 3 + e]) == edges[j, i]
         vertices = {v for triangle in alive.values() for v in triangle}
         assert len(edges) == 3 * len(alive) and len(alive) == 2 * len(vertices) - 4
         for i in range(self.n):
             above = [f for f, triangle in alive.items() if self.is_above(i, triangle)]
             assert (self.owner[i] in above) if above else self.owner[i] == -1
         for f in alive:
-            listed, i = [], int(self.facets[Q.FACET * f + Q._POINT])
+            listed, i = [], int(self.facets[G.FACET * f + G.POINT])
             while i >= 0:
                 listed.append(i)
                 i = int(self.following[i])

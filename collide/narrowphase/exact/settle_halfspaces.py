@@ -12,17 +12,7 @@ from collide.narrowphase.exact.settle_hulls import keep_proven_sign
 from collide.narrowphase.exact.settle_space import bracket_of_gap, settle_space
 from collide.narrowphase.halfspace_convex import reach_of_plane
 from collide.narrowphase.posed_pair import ordered_pair
-from collide.narrowphase.rows import (
-    EXACT_ROUNDS,
-    HIT,
-    HOW,
-    LOWER,
-    ROW,
-    UPPER,
-    view_row,
-    write_verdict,
-    write_vertices,
-)
+from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, view_row, write_verdict, write_vertices
 from collide.results import EXACT, UNDECIDED
 
 
