@@ -26,9 +26,13 @@ class PosedBodies:
     [m].   X : the poses of the bodies as worked on, and shapes : those.
     """
 
-    def __init__(self, A: collide.Shape, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):
+    def __init__(
+        self, A: collide.Shape, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, with_trees: bool = False
+    ):
         (packed_a, X_AP), (packed_b, X_BP) = (parts_of(shape)[0] for shape in (A, B))
         self.table = ShapeTable([packed_a, packed_b])
+        if with_trees:
+            self.table.build_trees(np.arange(2))
         self.poses = pose_table(
             np.array([X_WA, X_WB]), np.array([X_AP, X_BP]), np.array([packed_a.reach, packed_b.reach])
         )

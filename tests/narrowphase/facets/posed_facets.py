@@ -18,7 +18,7 @@ from collide.narrowphase.facets.exact_corners import (
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
 from collide.narrowphase.facets.posed_surfaces import PLACING, Extent, place, put_in_frame_of_a
 
-FAMILIES = ("lattice", "coplanar", "touching", "near touching", "random", "degenerate")
+FAMILIES = ("lattice", "coplanar", "touching", "near touching", "random", "degenerate", "in line")
 
 
 def numbers_of(points: np.ndarray) -> np.ndarray:
@@ -70,6 +70,11 @@ def posed_pair(rng, family: str):
             Q[1] = 0.5 * (Q[0] + Q[2])
         if rng.random() < 0.5:
             X_WB = X_WA = random_pose(rng)
+    if family == "in line":  # along an axis, a diagonal or any other direction of a lattice
+        along, start = rng.choice([0, 0, 1, -2], 3), rng.integers(-2, 3, 3)
+        P, Q = (start + rng.integers(-3, 4, (3, 1)) * along for _ in "AB")
+        P, Q = P.astype(float), Q.astype(float) + (rng.random() < 0.2)
+        X_WB = X_WA
     if family == "touching":  # a corner of Q is a dyadic combination of P's corners
         P, Q = rng.integers(-8, 9, (2, 3, 3)).astype(float)
         a, b = rng.choice([-0.25, 0.0, 0.0, 0.25, 0.5, 1.0, 1.25], 2)

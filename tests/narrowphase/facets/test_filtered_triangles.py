@@ -55,6 +55,39 @@ def test_verdicts_hold_within_the_error(family):
         assert seen[AMBIGUOUS] > 100, seen
 
 
+def axes_between(P, Q) -> np.ndarray:
+    """Unit vectors among which one parts two triangles in general position, where they are apart."""
+    edges = [T - np.roll(T, 1, axis=0) for T in (P, Q)]
+    normals = [np.cross(e[0], e[1]) for e in edges]
+    across = [np.cross(e, f) for e in edges[0] for f in edges[1]]
+    within = [np.cross(n, e) for n, side in zip(normals, edges) for e in side]
+    axes = np.array([*normals, *across, *within])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    return np.concatenate([axes, -axes])
+
+
+def test_verdicts_hold_on_the_brink():
+    """B a few errors before or behind touching, moved by all of the error towards the other side."""
+    rng = rng_of("brink of triangles")
+    seen: Counter = Counter()
+    for k in range(600):
+        P, Q = rng.uniform(-1.0, 1.0, (2, 3, 3))
+        if k % 3 == 0:  # no plane of either parts slender ones
+            P[2], Q[2] = P[1] + 0.1 * P[2], Q[0] + 0.1 * Q[2]
+        axes = axes_between(P, Q)
+        gaps = (Q @ axes.T).min(axis=0) - (P @ axes.T).max(axis=0)
+        best, error = int(np.argmax(gaps)), float(rng.choice([1e-3, 1e-9]))
+        share = rng.uniform(-1.5, 1.5)
+        # Rounded, so that the brink is where it is said to be.
+        Q = Q + (share * np.abs(axes[best]).sum() * error - gaps[best]) * axes[best]
+        verdict = meeting_in_doubles(P.ravel(), 0, Q.ravel(), 0, error)
+        where = Q - np.copysign(error * (1 - 1e-9), share) * np.sign(axes[best])
+        told = f"P, Q, B, error = {P.tolist()}, {Q.tolist()}, {where.tolist()}, {error}"
+        assert verdict in (AMBIGUOUS, MEETING if triangles_meet(*exact(P, where)) else APART), told
+        seen[verdict, triangles_meet(*exact(P, where)) != triangles_meet(*exact(P, Q))] += 1
+    assert seen[AMBIGUOUS, True] > 200, seen
+
+
 def test_random_pairs_are_nearly_all_decided():
     rng = rng_of("decided triangles")
     verdicts = [meeting_in_doubles(*rng.normal(size=9)[None], 0, rng.normal(size=9), 0, 1e-15) for _ in range(1000)]

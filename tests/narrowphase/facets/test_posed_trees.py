@@ -97,6 +97,14 @@ def test_the_traversal_comes_to_every_pair_that_meets():
     assert found > 200 and looked < 0.35 * all_pairs, (found, looked, all_pairs)
 
 
+def bits_at_corners(rng):
+    """A mesh of bits, each where a facet of the other one has a corner: at the rim of what any probe of it may keep."""
+    (vb, fb), X, Y = soup(rng, 20, 1.0, 0.6), random_pose(rng, 0.5), random_pose(rng, 0.5)
+    there = (vb @ Y[:3, :3].T + Y[:3, 3] - X[:3, 3]) @ X[:3, :3]
+    bits = there[:, None] + 2e-3 * rng.normal(size=(len(there), 3, 3))
+    return (bits.reshape(-1, 3), np.arange(3 * len(bits)).reshape(-1, 3)), (vb, fb), X, Y
+
+
 def runs_below(tree: MeshTree, link: int) -> list[int]:
     """Facets behind a link, in the order of the leaves."""
     if link < 0:
@@ -109,8 +117,8 @@ def test_probes_keep_what_meets_and_prisms_are_the_sharper_ones():
     """Of every facet of B and the leaf that it is in against every node of A, by the facets of all below."""
     rng = rng_of("probes")
     kept = {"box": 0, "leaf": 0, "prism": 0, "true": 0}
-    for k in range(6):
-        (va, fa), (vb, fb), X, Y = posed_meshes(rng, k)
+    for k in range(8):
+        (va, fa), (vb, fb), X, Y = posed_meshes(rng, k) if k < 5 else bits_at_corners(rng)
         A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
         trees = Workspace(A, B, X, Y).trees
         place_of_a, place_of_b = np.argsort(A.ids), np.argsort(B.ids)
