@@ -54,18 +54,13 @@ def answer_batch(
             copy[:] = X
     if n == 0:
         return out
-<<<<<<< HEAD
-    A, B = of_one_set(A, B, n)
-    answer = None if isinstance(A, Picked) else answer_of(A, B)
-=======
     answer = None
     if isinstance(A, Shape) and isinstance(B, Shape):
         answer = answer_of(A, B)
         if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
             _prepare(A, B, answer)
     else:
-        A, B = _of_one_set(A, B, n)
->>>>>>> main
+        A, B = of_one_set(A, B, n)
 
     def work(piece: slice | np.ndarray) -> None:
         """Answer the poses of these numbers."""
@@ -116,15 +111,8 @@ def _pairs_together(A, B) -> np.ndarray | None:
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 
-<<<<<<< HEAD
 def of_one_set(A, B, n: int):
-    """The shapes as they are, or where one side is a sequence, both as picked from one set."""
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        return A, B
-=======
-def _of_one_set(A, B, n: int):
     """Shapes of which one side or both are sequences, as picked from one set."""
->>>>>>> main
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A, B
     numbers: dict[int, int] = {}

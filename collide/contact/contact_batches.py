@@ -62,7 +62,8 @@ def contact_batch(
     """
     if n == 0:
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
-    A, B = of_one_set(A, B, n)
+    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+        A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, threads=threads)
     shapes, which = (A, B), None

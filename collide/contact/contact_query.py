@@ -13,7 +13,6 @@ from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
 from collide.contact.convex_contacts import single_contacts
 from collide.errors import InvalidArgument
-from collide.narrowphase.pair_queries import prepare
 from collide.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
 from collide.threads import check_threads
@@ -83,7 +82,6 @@ def contacts(
         rows = single_contacts(A, B, X_WA, X_WB, margin, max_contacts)
         if rows is not None:
             return Contacts(rows, np.array([0, len(rows)]))
-        prepare(A, B)
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
     n = length_of(A, B, X_WA, X_WB)

@@ -45,7 +45,7 @@ def convex_contacts(
     towards each other [m]: the margin is larger by that. Raises UnsupportedQuery.
     """
     limit = margin if slack is None else margin + float(slack.max(initial=0.0))
-    rows = answer_batch(A, B, X_WA, X_WB, Question(False, limit), threads)
+    rows = answer_batch(A, B, X_WA, X_WB, Question(False, limit), threads, prepare=True)
     if np.isneginf(rows["distance"]).any():
         k = int(np.argmax(np.isneginf(rows["distance"])))
         names = [type(S if isinstance(S, Shape) else S[k]).__name__ for S in (A, B)]

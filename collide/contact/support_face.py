@@ -160,9 +160,9 @@ def _hull_vertex(body, row, g):
     """Id of a hull's vertex farthest in direction g of the body's own frame."""
     if body.tree != 0:
         listed = extreme_vertex_listed(body.tree, -1, g, view_i64(0, 0))
-        return settled_vertex(body.coords, body.n, body.padded, body.tree, listed.id, g)
+        return settled_vertex(body.coords, body.padded, body.tree, listed.id, g)
     padded = row[PADDED]
-    k = support_vertex(view_f64(row[COLUMNS_AT], 3 * padded), row[N_VERTICES], padded, g)
+    k = support_vertex(view_f64(row[COLUMNS_AT], 3 * padded), padded, g)
     return view_i64(row[VERTEX_IDS_AT], row[N_VERTICES])[k]
 
 

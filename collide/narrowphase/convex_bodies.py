@@ -68,15 +68,19 @@ def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, quest
     """
     if convex_queries.distrust_doubles:
         return _answer_compounds(out, A, B, X_WA, X_WB, question)
-    if isinstance(A, Picked):
-        table, which = tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
-    else:
-        pair, which = prepared_pair(A, B), None
-        table = pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])
+    table, which = shape_table(A, B)
     boolean, limit, depths, check, axes = question
     return convex_queries.run_poses(
         out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
     )
+
+
+def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
+    """(table, rows of it pose by pose) of convex sets in their own frames; None for rows 0 and 1 throughout."""
+    if isinstance(A, Picked):
+        return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
+    pair = prepared_pair(A, B)
+    return (pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
 
 
 def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
@@ -89,15 +93,6 @@ def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, ques
 def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
     if not len(out):
         return True
-<<<<<<< HEAD
-    boolean, limit, depths, check, axes = question
-    if _one_part(A) and _one_part(B) and not convex_queries.distrust_doubles:
-        table, which = shape_table(A, B)
-        return convex_queries.run_poses(
-            out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
-        )
-=======
->>>>>>> main
     compounds, which = _compound_table(A, B)
     boolean, limit, depths, check, _ = question
     return answer_compound_batch(
@@ -117,28 +112,11 @@ def prepare_parts(A: Shape, B: Shape) -> convex_queries.SinglePair | CompoundPai
     return CompoundPair(layout_of(A), layout_of(B))
 
 
-<<<<<<< HEAD
-def _one_part(shapes) -> bool:
-    return (
-        bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
-        if isinstance(shapes, Picked)
-        else is_single_convex(shapes)
-    )
-
-
-def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
-    """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
-    if isinstance(A, Picked):
-        return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
-    prepared = prepared_pair(A, B)
-    return (prepared.table if prepared else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
-=======
 def _are_single(shapes) -> bool:
     """Whether a shape, or all that are picked, are one convex set in their own frame."""
     if isinstance(shapes, Picked):
         return bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
     return is_single_convex(shapes)
->>>>>>> main
 
 
 def _compound_table(A, B) -> tuple[CompoundTable, np.ndarray | None]:
