@@ -77,7 +77,7 @@ def contact_batch(
     rows["part_a"] = np.repeat(part_pairs.part_a, ends - starts)
     rows["part_b"] = np.repeat(part_pairs.part_b, ends - starts)
     _number_patches(rows, of_pair)
-    keep = _within_margin(rows, of_pair, part_pairs, A, B, X_WA, X_WB, margin)
+    keep = _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin)
     rows, of_pair = rows[keep], of_pair[keep]
     return rows, np.cumsum(np.bincount(of_pair, minlength=n))
 
@@ -185,17 +185,14 @@ def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:
     rows["patch"] = number - np.repeat(number[first], np.diff(np.flatnonzero(np.append(first, True))))
 
 
-def _within_margin(rows, of_pair, part_pairs: PartPairs, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
+def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
     """(k,) bool: rows of pairs within the margin.
 
-    Parts whose poses are rounded are asked a little beyond it; where that matters, `distance` of the pair decides.
+    Facets, and parts whose poses are rounded, are asked a little beyond it; where that matters, `distance` decides.
     """
     keep = np.ones(len(rows), dtype=bool)
-    moved = np.unique(part_pairs.pair[part_pairs.slack > 0.0])
-    for k in moved.tolist():
-        of_k = of_pair == k
-        if not of_k.any():
-            continue
+    for k in np.unique(of_pair).tolist():
+        of_k = slice(*np.searchsorted(of_pair, [k, k + 1]))
         shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])
         X_A, X_B = pose_at(X_WA, k), pose_at(X_WB, k)
         size = 4.0 * (_reach(shape_a) + _reach(shape_b)) + float(np.abs(X_B[:3, 3] - X_A[:3, 3]).sum())
