@@ -21,6 +21,7 @@ from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
+from collide.transforms import as_poses
 
 #: What makes the contacts of two bodies at one pose, by the method that answers the pair; other methods are of convex
 #: sets, which go together, or of compounds, which are taken apart.
@@ -54,18 +55,21 @@ class PartPairs(NamedTuple):
 
 
 def contact_batch(
-    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, threads: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, *, check: bool = False,
+    threads: int = 1,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where those of each pair end.
 
-    A, B : shapes, or sequences of n shapes.   X_WA, X_WB : checked, (n, 4, 4) or (1, 4, 4). Raises UnsupportedQuery.
+    A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4), finite.   check : refuse matrices
+    that are no rotation. Raises InvalidPose, UnsupportedQuery.
     """
     if n == 0:
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
-        return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, threads=threads)
+        return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
+    X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
     shapes, which = (A, B), None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
