@@ -133,7 +133,8 @@ def test_two_halfspaces():
     for _ in range(60):
         A = collide.Halfspace(unit(rng.normal(size=3)), float(rng.normal()))
         tilt = float(rng.choice([0.0, 1e-15, 1e-12, 1.0]))
-        B = collide.Halfspace(unit(-A.normal + tilt * unit(rng.normal(size=3))), float(rng.normal()))
+        facing = float(rng.choice([-1.0, -1.0, 1.0]))
+        B = collide.Halfspace(unit(facing * A.normal + tilt * unit(rng.normal(size=3))), float(rng.normal()))
         X = random_pose(rng)
         case = Case(A, B, X, pose(X[:3, :3], rng.normal(size=3)))
         bodies = PosedBodies(*case)
@@ -151,4 +152,4 @@ def test_two_halfspaces():
             assert np.abs(row["normal"] - unit(outwards)).max() <= 1e-15
             assert (row["point_a"] == case.X_WA[:3, 3]).all() and (row["point_b"] == case.X_WB[:3, 3]).all()
             seen["opposite" if opposite else "askew"] += 1
-    assert ROW == rows.nbytes and min(seen.values()) >= 15, seen
+    assert ROW == rows.nbytes and min(seen.values()) >= 12, seen

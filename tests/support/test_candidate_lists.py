@@ -65,6 +65,27 @@ def test_lists_hold_whoever_may_be_farthest(kind):
     assert seen[True] >= len(fine) and seen[False] >= 3, seen
 
 
+def test_lists_along_long_arcs():
+    """Edges of a cap turn a quarter, past dozens of coarse vertices: whoever leads both subsets in a direction is
+    listed."""
+    rng = rng_of("long arcs")
+    angle = np.arange(90) * (np.pi / 45)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.ones(90)]) * (1.0, 0.7, 0.1)
+    points = np.ascontiguousarray(np.concatenate([ring, ring * (1.0, 1.0, -1.0)]) @ rotation(rng))
+    hull = convex_hull(points)
+    fine, coarse = np.sort(hull.vertices).astype(np.int32), np.arange(180, dtype=np.int32)[::2] + np.arange(90) // 45
+    coarse = np.ascontiguousarray(rng.permutation(coarse), dtype=np.int32)
+    rings = build.Rings(points, np.ascontiguousarray(hull.facets, dtype=np.int32))
+    partial = build._TreeInProgress(points)
+    partial.add_level(np.array([0, len(coarse)]), coarse, 1 + np.arange(len(coarse)))
+    starts, rows = build._lists(partial, fine, rings, coarse, 1)
+    listed = {(v, w) for i, v in enumerate(coarse.tolist()) for w in rows[starts[i] : starts[i + 1]].tolist()}
+    directions = rng.normal(size=(20000, 3))
+    owners = coarse[(points[coarse] @ directions.T).argmax(axis=0)]
+    met = set(zip(owners.tolist(), (points @ directions.T).argmax(axis=0).tolist()))
+    assert met <= listed and len(met) >= 200, (len(met), met - listed)
+
+
 @pytest.mark.parametrize("kind", ["ball", "prism", "box"])
 def test_rings(kind):
     """Neighbours one after another span the facet that is named, with unit normals outwards."""

@@ -123,3 +123,12 @@ CLOUDS = {
     "needle": lambda rng: rng.normal(size=(60, 3)) * (20.0, 1.0, 1.0),
     "cube": lambda rng: rng.integers(-2, 3, size=(60, 3)) * 1.0,
 }
+
+
+def triangles(surface, facet: int) -> dict[int, list[int]]:
+    """Facets that neighbours lead to from one of them."""
+    slots = [facet]
+    for f in slots:
+        across = (surface.facets[E.FACET * f + E.TWIN : E.FACET * f + E.TWIN + 3] // E.FACET).tolist()
+        slots += [g for g in dict.fromkeys(across) if g not in slots]
+    return {f: surface.facets[E.FACET * f : E.FACET * f + 3].tolist() for f in slots}

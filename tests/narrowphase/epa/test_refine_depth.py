@@ -8,6 +8,8 @@ from fractions import Fraction
 import naive
 import numpy as np
 import pytest
+from exact_simplex import inner
+from growing_surface import triangles
 from naive import LATTICE_ROTATIONS, Case, pose, random_pose, rng_of
 from posed_bodies import PosedBodies
 
@@ -38,17 +40,19 @@ def overlap(rng, kind: str) -> Case:
 
 
 def refined(bodies: PosedBodies):
-    """(EPA's result, what refining makes of it)."""
+    """(EPA's result, what refining makes of it, the facets it leaves)."""
     surface = surface_at(bodies.work.epa_at, bodies.work.epa_integers_at)
     size, error = bodies.ordered.size, bodies.error
     seed = Seed(bodies.work.points, bodies.work.ids, False, False, False, 0)
     result = epa(bodies.pair, surface, seed, Goal(False, size, error, 0.25 * error))
     assert result.status == EXPANDED
     bodies.work.request[:2] = 0
-    return result, refine(
+    fine = refine(
         bodies.pair, address_of(bodies.poses.terms), bodies.work, surface, result.n_facets, result.n_vertices, size,
         bodies.ordered.slop, error,
     )  # fmt: skip
+    facets = triangles(surface, fine.facet).values() if fine.sound else []
+    return result, fine, [[tuple(surface.ids[2 * v : 2 * v + 2].tolist()) for v in facet] for facet in facets]
 
 
 @pytest.mark.parametrize("kind", ["any", "boxes", "lattice", "1e-9", "1e-13", "1e-15"])
@@ -63,7 +67,7 @@ def test_brackets(kind):
             continue
         bodies = PosedBodies(*case)
         with naive.reproducible(case):
-            result, fine = refined(bodies)
+            result, fine, facets = refined(bodies)
             seen["sound", bool(fine.sound)] += 1
             if not fine.sound:
                 continue
@@ -77,25 +81,32 @@ def test_brackets(kind):
             seen["proven"] += fine.lower > 0.0
             seen["requested"] += bodies.work.request[1] > 0
             assert bodies.work.request[1] > 0 or fine.depth >= 4 * bodies.error
-            check_request(bodies, true)
+            check_request(bodies, true, facets)
     assert seen["sound", True] >= 15 and seen["sound", False] <= 2, seen
     assert seen["proven"] >= (15 if kind != "1e-15" else 3), seen
     assert (seen["requested"] > 0) == (kind in ("1e-13", "1e-15")), seen
 
 
-def check_request(bodies: PosedBodies, true: Fraction) -> None:
-    """Where it is complete, its facets' planes include the nearest one: by their least distance, exactly."""
+def square_of_distance(corners) -> Fraction | None:
+    """Squared distance of a plane from the origin, None where three points span none."""
+    a, b, c = corners
+    e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
+    n = [e[k - 2] * f[k - 1] - e[k - 1] * f[k - 2] for k in range(3)]
+    return inner(n, a) ** 2 / inner(n, n) if any(n) else None
+
+
+def check_request(bodies: PosedBodies, true: Fraction, facets) -> None:
+    """Where it is complete it names every facet of the surface whose plane is as near as the nearest one, exactly."""
     complete, n_facets = (int(k) for k in bodies.work.request[:2])
     if not n_facets:
         return
     difference = bodies.difference()
-    squares = []
-    for at in range(2, 2 + 6 * n_facets, 6):
-        i = [int(k) for k in bodies.work.request[at : at + 6]]
-        a, b, c = (difference[i[k], i[k + 1]] for k in (0, 2, 4))
-        e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
-        n = [e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3] for k in range(3)]
-        if any(n):
-            squares.append(sum(x * y for x, y in zip(n, a)) ** 2 / sum(x * x for x in n))
+    pairs = bodies.work.request[2 : 2 + 6 * n_facets].reshape(-1, 3, 2).tolist()
+    named = [[tuple(ij) for ij in facet] for facet in pairs]
+    squares = [square_of_distance([difference[ij] for ij in facet]) for facet in named]
     assert complete
-    assert abs(float(min(squares) / true**2) - 1.0) <= 1e-12
+    assert abs(float(min(s for s in squares if s is not None) / true**2) - 1.0) <= 1e-12
+    named_corners = [set(facet) for facet in named]
+    for facet in facets:
+        square = square_of_distance([difference[ij] for ij in facet])
+        assert set(facet) in named_corners or square is None or square > true**2

@@ -87,6 +87,32 @@ def test_nearest_planes(kind):
     assert seen[wanted] >= 8, seen
 
 
+def test_requests_are_not_trusted():
+    """Three points whose plane cuts A ⊖ B, or that are named clockwise, prove nothing, whatever the entry says."""
+    rng = rng_of("requests that lie")
+    seen: Counter = Counter()
+    for case, true in overlaps(rng, "any", 30):
+        bodies = ExactBodies(*case)
+        names, points = list(bodies.difference()), list(bodies.difference().values())
+        if len(names) <= 3:
+            continue
+        corners = [int(k) for k in rng.choice(len(names), 3, replace=False)]
+        if rng.random() < 0.5:  # the nearest facet: its plane is outermost
+            nearest = surface_requests(bodies)[2:8]
+            corners = [names.index((nearest[k], nearest[k + 1])) for k in (0, 2, 4)] if nearest else corners
+        for order in (corners, corners[::-1]):
+            a, b, c = (points[k] for k in order)
+            e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
+            n = [e[k - 2] * f[k - 1] - e[k - 1] * f[k - 2] for k in range(3)]
+            outermost = inner(n, a) > 0 and all(inner(n, p) <= inner(n, a) for p in points)
+            request = [0, 1, 1, *(k for at in order for k in names[at])]
+            with reproducible(case):
+                depth = nearest_plane(bodies.ordered, bodies.poses.terms.ravel(), bodies.digits, request, 1)
+                assert depth.proven == outermost or (any(n) and inner(n, a) == true == 0)
+            seen[bool(depth.proven)] += 1
+    assert min(seen[True], seen[False]) >= 5, seen
+
+
 def planes_that_may_decide(bodies: ExactBodies, depth: float) -> tuple[int, int]:
     """How many pairs of edges span a plane, and how many have no plane or one as near the origin as the depth."""
     difference = np.array([[float(x) for x in p] for p in bodies.difference().values()])

@@ -27,6 +27,8 @@ pytestmark = pytest.mark.plain_kernels
 SOURCE = "points, g = {points}, {g}  # tests/narrowphase/gap/test_tied_vertices.py"
 #: 48 corners, faces of four, six and eight: a truncated cuboctahedron, on a lattice.
 SOLID = np.array([p for p in product((-3, -2, -1, 1, 2, 3), repeat=3) if sorted(map(abs, p)) == [1, 2, 3]]) * 0.5
+#: 384 points of a lattice on a sphere: so many that neighbours are fewer than a scan takes.
+BALL = np.array([p for p in product(range(-31, 32), repeat=3) if p[0] ** 2 + p[1] ** 2 + p[2] ** 2 == 953]) * 0.5
 STRAIGHT = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0), (2.0, 1.0, 0.0), (3.0, 2.0, 1.0))
 
 
@@ -75,14 +77,14 @@ def test_all_level_vertices_are_listed(with_tree):
 def test_no_other_is_tied(with_tree):
     """True exactly where the level vertices are those named: also where one of these is not level itself."""
     rng = rng_of("no other is tied", with_tree)
-    points = SOLID
+    points = BALL if with_tree else SOLID
     vertices, held = body(points, with_tree)
     seen: Counter = Counter()
-    for _ in range(400):
+    for _ in range(200):
         g = np.array(STRAIGHT[int(rng.integers(len(STRAIGHT)))]) @ LATTICE_ROTATIONS[int(rng.integers(24))]
         g = g + rng.choice([0.0, 0.125]) * rng.integers(-2, 3, 3)
         heights = points @ g
-        limit = float(heights.min() + rng.choice([0.0, 0.25, 1.0]))
+        limit = float(np.unique(heights)[int(rng.integers(2))])
         true = level(points, g, limit)
         n = min(int(rng.integers(1, 4)), len(true))
         named = [int(k) for k in rng.choice(sorted(true), n, replace=False)]
@@ -97,7 +99,7 @@ def test_no_other_is_tied(with_tree):
             found = T.no_other_is_tied(vertices, ids, n, which, len(set(named)), Vec3(*g.tolist()), limit)
             assert found == (true == set(named))
         seen[bool(found)] += 1
-    assert min(seen[True], seen[False]) >= 40, (seen, held[1])
+    assert min(seen[True], seen[False]) > 20, (seen, held[1])
 
 
 def test_distinct_vertices():
