@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from threading import local
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from collide.narrowphase.convex_bodies import Question, shape_table
 from collide.narrowphase.convex_queries import SinglePair
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.shapes.shape import Shape
-from collide.threads import share
+from collide.threads import pieces_of, share
 from collide.transforms import as_poses
 
 #: Pairs that go through together: their rows stay in the cache.
@@ -51,35 +52,76 @@ def convex_contacts(
     Raises InvalidPose, UnsupportedQuery.
     """
     limit = margin if slack is None else margin + float(slack.max(initial=0.0))
-    question = Question(False, limit, check=check)
+    asked = _Asked(A, B, X_WA, X_WB, slack, margin, max_contacts, Question(False, limit, check=check))
     n = length_of(A, B, X_WA, X_WB)
-    blocks = [slice(begin, min(begin + _BLOCK, n)) for begin in range(0, n, _BLOCK)]
-    answered: list = [None] * len(blocks)
-
-    def work(number: int) -> None:
-        block = blocks[number]
-        A_k, B_k = (S if isinstance(S, Shape) else S[block] for S in (A, B))
-        X_WAk, X_WBk = (X if len(X) == 1 else X[block] for X in (X_WA, X_WB))
-        rows = answer_batch(A_k, B_k, X_WAk, X_WBk, question, prepare=True)
-        _refuse_endless(rows, A_k, B_k)
-        table, which = shape_table(A_k, B_k)
-        slack_k = None if slack is None else slack[block]
-        answered[number] = _manifolds_of_rows(table, which, X_WAk, X_WBk, rows, margin, max_contacts, slack_k)
-
+    threads = min(threads, n // _BLOCK)
     try:
-        if threads > 1 and len(blocks) > 1:
-            share(range(len(blocks)), work, threads)
-        else:
-            for number in range(len(blocks)):
-                work(number)
+        if threads < 2:
+            return _contacts_of(asked, slice(0, n))
+        pieces = pieces_of(n, threads, _BLOCK)
+        answered: list = [None] * len(pieces)
+
+        def work(number: int) -> None:
+            answered[number] = _contacts_of(asked, pieces[number])
+
+        share(range(len(pieces)), work, threads)
     except InvalidPose:
         for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
             as_poses(X, name, check=check)  # named by its place in the whole batch
         raise
-    if len(answered) == 1:
-        return answered[0]
-    counts = np.concatenate([np.diff(ends, prepend=0) for _, ends in answered] or [np.zeros(0, dtype=np.int64)])
-    return np.concatenate([rows for rows, _ in answered] or [np.zeros(0, dtype=CONTACT_DTYPE)]), np.cumsum(counts)
+    counts = [np.diff(ends, prepend=0) for _, ends in answered]
+    return np.concatenate([rows for rows, _ in answered]), np.cumsum(np.concatenate(counts))
+
+
+class _Asked(NamedTuple):
+    """What `convex_contacts` is asked."""
+
+    A: Any
+    B: Any
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+    slack: np.ndarray | None
+    margin: float
+    max_contacts: int
+    question: Question
+
+
+def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of the pairs of a piece, in this thread: a block of rows of `distance` at a time."""
+    n = piece.stop - piece.start
+    header = np.zeros(HEADER, dtype=np.int64)
+    ends = np.empty(n, dtype=np.int64)
+    out = np.empty(0, dtype=CONTACT_DTYPE)
+    for begin in range(0, n, _BLOCK):
+        pairs = slice(piece.start + begin, min(piece.start + begin + _BLOCK, piece.stop))
+        A, B = (S if isinstance(S, Shape) else S[pairs] for S in (asked.A, asked.B))
+        X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
+        slack = None if asked.slack is None else asked.slack[pairs]
+        rows = answer_batch(A, B, X_WA, X_WB, asked.question, prepare=True)
+        _refuse_endless(rows, A, B)
+        table, which = shape_table(A, B)
+        faces = face_table_of(table, ROUND)
+        header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
+        header[PAIRS_DONE] = 0
+        max_rows = min(asked.max_contacts, max_corners(faces.largest))
+        out = _with_space(out, int(header[ROWS_DONE]), min(max_rows, _USUAL) * (n - begin) + max_rows)
+        while convex_manifolds(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), 0 if slack is None else address_of(slack), address_of(rows),
+            len(rows), asked.margin, asked.max_contacts, address_of(out), len(out), address_of(ends) + 8 * begin,
+        ):  # fmt: skip
+            out = _with_space(out, int(header[ROWS_DONE]), len(out) + max_rows)
+    n_rows = int(header[ROWS_DONE])
+    return out[:n_rows] if 2 * n_rows >= len(out) else out[:n_rows].copy(), ends
+
+
+def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
+    """The first rows, and space for so many more behind them, in the same memory where that is large enough."""
+    if n_rows + n_more <= len(rows):
+        return rows
+    larger = np.empty(n_rows + n_more, dtype=CONTACT_DTYPE)
+    larger[:n_rows] = rows[:n_rows]
+    return larger
 
 
 def _refuse_endless(rows: np.ndarray, A, B) -> None:
@@ -91,32 +133,6 @@ def _refuse_endless(rows: np.ndarray, A, B) -> None:
             f"contacts of {names[0]} and {names[1]}: their overlap has no end, so no normal tells the way out; "
             "collide() still answers"
         )
-
-
-def _manifolds_of_rows(
-    table: ShapeTable, which: np.ndarray | None, X_WA: np.ndarray, X_WB: np.ndarray, rows: np.ndarray, margin: float,
-    max_contacts: int, slack: np.ndarray | None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """(contacts, ends) of pairs whose rows of `distance` are known.
-
-    which : (n, 2) int64 rows of ``table``, None for 0 and 1 throughout.   slack : as in `convex_contacts`.
-    """
-    n = len(rows)
-    faces = face_table_of(table, ROUND)
-    space = _of_thread.space
-    space.fit(faces.largest)
-    header = np.zeros(HEADER, dtype=np.int64)
-    header[:PAIRS_DONE] = _addresses(table, faces, space)
-    ends = np.empty(n, dtype=np.int64)
-    max_rows = min(max_contacts, max_corners(faces.largest))
-    out = np.empty(min(max_rows, _USUAL) * n + max_rows, dtype=CONTACT_DTYPE)
-    while convex_manifolds(
-        address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
-        address_of(X_WB), 16 * (len(X_WB) > 1), 0 if slack is None else address_of(slack), address_of(rows), n, margin,
-        max_contacts, address_of(out), len(out), address_of(ends),
-    ):  # fmt: skip
-        out = np.concatenate([out, np.empty(len(out) + max_rows, dtype=CONTACT_DTYPE)])
-    return out[: header[ROWS_DONE]].copy(), ends
 
 
 def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tuple[int, ...]:
@@ -176,13 +192,14 @@ class _Workspace:
         self.doubles, self.integers = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
 
-    def fit(self, largest: int) -> None:
-        """Have room for faces of so many corners."""
+    def fit(self, largest: int) -> _Workspace:
+        """Itself, with space for faces of so many corners."""
         self.shape_of[:] = 0, 1
         if largest > self.largest:
             self.largest = largest
             self.doubles = np.zeros(workspace_doubles(largest))
             self.integers = np.zeros(workspace_integers(largest), dtype=np.int64)
+        return self
 
 
 class _OfThread(local):
