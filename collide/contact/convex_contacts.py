@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.batches import answer_batch, length_of
+from collide.contact.box_box import box_rows
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
     HEADER,
@@ -26,10 +27,12 @@ from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
-from collide.lowering.shape_table import POSE, ShapeTable
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
 from collide.narrowphase.convex_bodies import Question, shape_table
 from collide.narrowphase.convex_queries import SinglePair
 from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
@@ -97,8 +100,7 @@ def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
         A, B = (S if isinstance(S, Shape) else S[pairs] for S in (asked.A, asked.B))
         X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
         slack = None if asked.slack is None else asked.slack[pairs]
-        rows = answer_batch(A, B, X_WA, X_WB, asked.question, prepare=True)
-        _refuse_unbounded(rows, A, B)
+        rows = _rows(asked, A, B, X_WA, X_WB)
         table, which = shape_table(A, B)
         faces = face_table_of(table, ROUND)
         header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
@@ -122,6 +124,33 @@ def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
     larger = np.empty(n_rows + n_more, dtype=CONTACT_DTYPE)
     larger[:n_rows] = rows[:n_rows]
     return larger
+
+
+def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of `distance`; of pairs of boxes as good as contacts need them, where a face tells (`box_box.py`)."""
+    table, which = shape_table(A, B)
+    is_box = (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
+    both = is_box[which].all(axis=1) if which is not None else np.array([is_box.all()])
+    if not both.any():
+        return _general_rows(asked.question, A, B, X_WA, X_WB)
+    n = length_of(A, B, X_WA, X_WB)
+    rows = np.zeros(n, dtype=PAIR_DTYPE)
+    n_open = box_rows(
+        *table.addresses, 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+        address_of(X_WB), 16 * (len(X_WB) > 1), n, asked.question.limit, address_of(rows),
+    )  # fmt: skip
+    if n_open or not both.all():
+        remaining = np.flatnonzero((rows["how"] == UNDECIDED) | ~both)
+        A, B = (S if isinstance(S, Shape) else S[remaining] for S in (A, B))
+        X_WA, X_WB = (X if len(X) == 1 else np.ascontiguousarray(X[remaining]) for X in (X_WA, X_WB))
+        rows[remaining] = _general_rows(asked.question, A, B, X_WA, X_WB)[: len(remaining)]
+    return rows
+
+
+def _general_rows(question: Question, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    rows = answer_batch(A, B, X_WA, X_WB, question, prepare=True)
+    _refuse_unbounded(rows, A, B)
+    return rows
 
 
 def _refuse_unbounded(rows: np.ndarray, A, B) -> None:
