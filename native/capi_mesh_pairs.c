@@ -1,10 +1,10 @@
-/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/body_pairs.py. What kernels leave to Python is
+/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/facet_kernel_calls.py. What kernels leave to Python is
    said to be unsupported. */
 #include "capi_mesh.h"
 
 #include <string.h>
 
-/* Header of the kernels (collide/narrowphase/facets/surface_pairs.py). */
+/* Header of the kernels (collide/narrowphase/facets/collide_kernel.py). */
 enum {
     TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B, SAME_TREE, SAME_BODY, EXCHANGED,
     SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, HEAP_AT, N_HEAP,

@@ -16,7 +16,7 @@ from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfs
 from collide.errors import InvalidArgument
 from collide.lowering.kinds import kind_of
 from collide.lowering.parts import bounding_parts_of
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.shapes.compound import Compound

@@ -21,7 +21,7 @@ from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import body_of, hull_of
 from collide.lowering.packed_convex import CONE, CYLINDER, HALFSPACE, POINTS, PackedConvex
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_queries import NearPairs
 from collide.shapes.shape import Shape
 

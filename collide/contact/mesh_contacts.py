@@ -12,7 +12,7 @@ from collide.contact.convex_contacts import against_plane
 from collide.contact.reduce_manifold import reduce_manifold
 from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace
-from collide.narrowphase.facets.mesh_rows import mesh_rows
+from collide.narrowphase.facets.mesh_methods import mesh_rows
 from collide.shapes.shape import Shape
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
