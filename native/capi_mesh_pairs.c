@@ -11,7 +11,7 @@ enum {
     SCRATCH_AT, MESH_HEADER
 };
 /* More points than this are left to a batch. */
-enum { MOST_POINTS = 64 };
+enum { MAX_POINTS = 64 };
 
 /* Room of a workspace for meshes (collide_workspace.mesh). */
 struct mesh_workspace {
@@ -97,7 +97,7 @@ static collide_status check_pair(const collide_workspace *space, const collide_m
     if (space == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || !(A->given || B->given) ||
         (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
-    if ((A->solid && B->n_points > MOST_POINTS) || (B->solid && A->n_points > MOST_POINTS)) return COLLIDE_UNSUPPORTED;
+    if ((A->solid && B->n_points > MAX_POINTS) || (B->solid && A->n_points > MAX_POINTS)) return COLLIDE_UNSUPPORTED;
     return COLLIDE_OK;
 }
 
