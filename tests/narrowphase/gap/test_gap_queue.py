@@ -74,8 +74,9 @@ class Pairs:
         return convex_convex(ordered, method(A.kind, A.n, B.kind, B.n) == CAPSULES, query, row, k, 0, self.work)
 
     def refine(self, rows: np.ndarray, kind: int) -> None:
-        Q.refine_queued(*self.tables, kind, True, np.inf, address_of(rows), self.work.queue_at,
-                        self.work.queue_integers_at)  # fmt: skip
+        queue = self.work.queue_at, self.work.queue_integers_at
+        with np.errstate(all="ignore"):  # lanes that hold no question are zeros
+            Q.refine_queued(*self.tables, kind, True, np.inf, address_of(rows), *queue)
 
     def answer(self, order, together: int) -> tuple[np.ndarray, list[int]]:
         """Rows of the pairs in some order, so many of a kind finished at once; their kinds."""
