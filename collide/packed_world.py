@@ -21,6 +21,7 @@ from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
+from collide.shapes.shape_set import Picked, ShapeSet
 from collide.world_bodies import Roster
 
 #: Half of the engine, which scenes without meshes never load.
@@ -57,6 +58,7 @@ class PackedWorld:
         is_meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
         self._meshed = is_meshed[self._shape_of]
         self._any_meshed = bool(is_meshed.any())
+        self._shape_set: ShapeSet | None = None
         self._lay_out_parts()
         self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
         self._part_boxes = boxes_of(self._table, self._poses.rows, self._row_of)
@@ -124,6 +126,14 @@ class PackedWorld:
         keys = pairs[:, 0] * len(self.roster.ids) + pairs[:, 1]
         at = np.minimum(np.searchsorted(allowed, keys), len(allowed) - 1)
         return pairs[allowed[at] != keys]
+
+    def posed_shapes(self, pairs: np.ndarray) -> tuple[Picked, Picked, np.ndarray, np.ndarray]:
+        """(A, B, X_WA, X_WB) of pairs (k, 2) of positions, as batches of pair queries take them."""
+        if self._shape_set is None:
+            self._shape_set = ShapeSet(self._shapes)
+        a, b = pairs.T
+        X_WA, X_WB = self.X_WBs[a], self.X_WBs[b]
+        return self._shape_set[self._shape_of[a]], self._shape_set[self._shape_of[b]], X_WA, X_WB
 
     def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
         """Rows of candidates (k, 2).

@@ -68,15 +68,19 @@ def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, quest
     """
     if convex_kernel_calls.distrust_doubles:
         return _answer_compounds(out, A, B, X_WA, X_WB, question)
-    if isinstance(A, Picked):
-        table, which = tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
-    else:
-        pair, which = prepared_pair(A, B), None
-        table = pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])
+    table, which = shape_table(A, B)
     boolean, limit, depths, check, axes = question
     return convex_kernel_calls.run_poses(
         out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
     )
+
+
+def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
+    """(table, rows of it pose by pose) of convex sets in their own frames; None for rows 0 and 1 throughout."""
+    if isinstance(A, Picked):
+        return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
+    pair = prepared_pair(A, B)
+    return (pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
 
 
 def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from threading import local
+from typing import Any
 
 import numpy as np
 
@@ -229,7 +230,8 @@ class SinglePair:
     def __init__(self, table: ShapeTable):
         table.build_trees(np.arange(2))
         self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
-        header = self._space.header_of(table)
+        header = self.header = self._space.header_of(table)
+        self.of_contacts: Any = None  # `contact.convex_contacts.SingleContacts`, once contacts are asked for
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
