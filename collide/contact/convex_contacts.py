@@ -98,7 +98,7 @@ def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
         X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
         slack = None if asked.slack is None else asked.slack[pairs]
         rows = answer_batch(A, B, X_WA, X_WB, asked.question, prepare=True)
-        _refuse_endless(rows, A, B)
+        _refuse_unbounded(rows, A, B)
         table, which = shape_table(A, B)
         faces = face_table_of(table, ROUND)
         header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
@@ -124,10 +124,10 @@ def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
     return larger
 
 
-def _refuse_endless(rows: np.ndarray, A, B) -> None:
-    endless = np.isneginf(rows["distance"])
-    if endless.any():
-        k = int(np.argmax(endless))
+def _refuse_unbounded(rows: np.ndarray, A, B) -> None:
+    unbounded = np.isneginf(rows["distance"])
+    if unbounded.any():
+        k = int(np.argmax(unbounded))
         names = [type(S if isinstance(S, Shape) else S[k]).__name__ for S in (A, B)]
         raise UnsupportedQuery(
             f"contacts of {names[0]} and {names[1]}: their overlap has no end, so no normal tells the way out; "
