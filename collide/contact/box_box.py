@@ -8,7 +8,7 @@ are no rotations but for rounding, are left to the general narrowphase.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, PARAMS, RANK
@@ -26,7 +26,7 @@ from collide.narrowphase.rows import (
     UPPER,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, absolute, add, cross, dot, neg, norm1, put_vec3, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, absolute, add, component, cross, dot, neg, norm1, put_vec3, scale, sub, vec3_at
 from collide.results import PLANE, SIMPLEX, UNDECIDED
 from collide.transforms import LARGEST
 
@@ -34,7 +34,7 @@ _U = 2.0**-53
 #: Matrices farther from a rotation than this are none.
 _ORTHONORMAL = 2.0**-44
 #: Edges are parallel where the sine of their angle is below this: what their axis could tell is bounded instead.
-_PARALLEL = 2.0**-20
+_PARALLEL = 2.0**-46
 #: A bracket wider than this part of the size is left to the general narrowphase.
 _WIDEST = 2.0**-40
 
@@ -51,10 +51,16 @@ class PosedBox(NamedTuple):
 
 
 class EdgeAxes(NamedTuple):
-    """The widest gap along axes across two edges, and what it is at most; how much wider another may be that was left
-    out, for edges too nearly parallel."""
+    """The widest gap along axes across two edges.
+
+    gap, sine : along that axis, and of the edges' angle.   a, b : the boxes' axes along these edges.
+    upper : what no such gap exceeds.   missed : by how much one may that was left out, its edges too nearly parallel.
+    """
 
     gap: float
+    sine: float
+    a: int
+    b: int
     upper: float
     missed: float
 
@@ -152,27 +158,30 @@ def _put_row(A, B, limit, row):
         row.flags[BEYOND] = 1
         row.flags[HOW] = PLANE
         return True
-    if abs(best.gap) <= error:
-        return False  # touching, or nearly: exact arithmetic decides
-    upper = best.gap + error
-    if best.gap < 0.0:
-        edges = _edges(A, B, c0, c1, c2, t_A, error)
-        if edges.gap > upper + error:
-            return False
-        upper = max(upper, edges.upper) + edges.missed
-        if upper >= 0.0 or upper - best.gap > _WIDEST * size:
-            return False
-    if best.axis < 3:
-        found = _put_face(A, B, best, t, error, False, row)
-    else:
-        found = _put_face(B, A, FaceAxis(best.axis - 3, best.gap), neg(t), error, True, row)
     row.doubles[LOWER] = best.gap - error
+    row.doubles[UPPER] = best.gap + error
     row.doubles[DISTANCE] = best.gap
-    row.doubles[UPPER] = upper
-    row.flags[HIT] = 1 if best.gap < 0.0 else 0
+    is_proven = best.gap > error
+    if best.axis < 3:
+        is_proven = _put_face(A, B, best, t, error, False, row) and is_proven
+    else:
+        of_b = FaceAxis(best.axis - 3, best.gap)
+        is_proven = _put_face(B, A, of_b, neg(t), error, True, row) and is_proven
+    if not is_proven:  # a corner over a face, at its distance, needs no look at edges
+        edges = _edges(A, B, c0, c1, c2, t_A, error)
+        if edges.gap - error / edges.sine > row.doubles[UPPER]:
+            row.doubles[LOWER] = edges.gap - error / edges.sine
+            row.doubles[DISTANCE] = edges.gap
+            is_proven = _put_edges(A, B, edges, t, error, row)
+        else:
+            is_proven = best.gap < 0.0
+        row.doubles[UPPER] = max(row.doubles[UPPER], edges.upper) + edges.missed
+    lower, upper = row.doubles[LOWER], row.doubles[UPPER]
+    row.flags[HIT] = 1 if upper < 0.0 else 0
     row.flags[CERTIFIED] = 1
-    row.flags[HOW] = SIMPLEX if best.gap < 0.0 else PLANE
-    return found
+    row.flags[HOW] = SIMPLEX if upper < 0.0 else PLANE
+    # What touches, or nearly, is left to exact arithmetic.
+    return is_proven and (lower > 0.0 or upper < 0.0) and upper - lower <= _WIDEST * size
 
 
 @kernel(inline=True)
@@ -201,32 +210,35 @@ def _best_face(A, B, r0, r1, r2, c0, c1, c2, t_A, t_B, error):
 def _edges(A, B, c0, c1, c2, t, error):
     """`EdgeAxes` of all nine.   c0, c1, c2, t : B's axes and centre in A."""
     h = B.half
-    first = _edges_along(A, c0, h.x, h.y, c2, h.z, c1, t, error)
-    second = _edges_along(A, c1, h.y, h.z, c0, h.x, c2, t, error)
-    third = _edges_along(A, c2, h.z, h.x, c1, h.y, c0, t, error)
+    first = _edges_along(A, c0, 0, h.x, h.y, c2, h.z, c1, t, error)
+    second = _edges_along(A, c1, 1, h.y, h.z, c0, h.x, c2, t, error)
+    third = _edges_along(A, c2, 2, h.z, h.x, c1, h.y, c0, t, error)
     return _wider(_wider(first, second), third)
 
 
 @kernel(inline=True)
 def _wider(a, b):
-    return EdgeAxes(max(a.gap, b.gap), max(a.upper, b.upper), a.missed + b.missed)
+    widest = a if a.gap >= b.gap else b
+    upper, missed = max(a.upper, b.upper), a.missed + b.missed
+    return EdgeAxes(widest.gap, widest.sine, widest.a, widest.b, upper, missed)
 
 
 @kernel(inline=True)
-def _edges_along(A, c, length, h, c_of_h, k, c_of_k, t, error):
-    """`EdgeAxes` of B's edges along c, of half the length, with A's three.
+def _edges_along(A, c, b, length, h, c_of_h, k, c_of_k, t, error):
+    """`EdgeAxes` of B's edges along its axis b, with A's three.
 
+    c, length : that axis in A, and B's half size along it.
     h, k : half sizes of B along its other axes, each with the column that its product with the axis is found in:
     of a × c with the second axis it is that of a with the third.
     """
-    x = _edge_pair(c.y, c.z, A.half.y, A.half.z, t.y, t.z, h * abs(c_of_h.x) + k * abs(c_of_k.x), length, error)
-    y = _edge_pair(c.z, c.x, A.half.z, A.half.x, t.z, t.x, h * abs(c_of_h.y) + k * abs(c_of_k.y), length, error)
-    z = _edge_pair(c.x, c.y, A.half.x, A.half.y, t.x, t.y, h * abs(c_of_h.z) + k * abs(c_of_k.z), length, error)
+    x = _edge_pair(0, b, c.y, c.z, A.half.y, A.half.z, t.y, t.z, h * abs(c_of_h.x) + k * abs(c_of_k.x), length, error)
+    y = _edge_pair(1, b, c.z, c.x, A.half.z, A.half.x, t.z, t.x, h * abs(c_of_h.y) + k * abs(c_of_k.y), length, error)
+    z = _edge_pair(2, b, c.x, c.y, A.half.x, A.half.y, t.x, t.y, h * abs(c_of_h.z) + k * abs(c_of_k.z), length, error)
     return _wider(_wider(x, y), z)
 
 
 @kernel(inline=True)
-def _edge_pair(u, v, h_u, h_v, t_u, t_v, radius, length, error):
+def _edge_pair(a, b, u, v, h_u, h_v, t_u, t_v, radius, length, error):
     """`EdgeAxes` of an edge of A and one of B whose direction has the components (u, v) across A's.
 
     Nearly parallel edges span a facet of the Minkowski difference, narrow by what one of them is off the other. Were it
@@ -234,22 +246,20 @@ def _edge_pair(u, v, h_u, h_v, t_u, t_v, radius, length, error):
     """
     sine = math.sqrt(u * u + v * v)
     if sine < _PARALLEL:
-        return EdgeAxes(-math.inf, -math.inf, 2.0 * length * (sine + 8.0 * _U))
+        return EdgeAxes(-math.inf, 1.0, a, b, -math.inf, 2.0 * length * (sine + 8.0 * _U))
     gap = (abs(t_u * v - t_v * u) - h_u * abs(v) - h_v * abs(u) - radius) / sine
-    return EdgeAxes(gap, gap + error / sine, 0.0)
+    return EdgeAxes(gap, sine, a, b, gap + error / sine, 0.0)
 
 
 @kernel(inline=True)
 def _put_face(F, G, face, t, error, exchanged, row):
-    """Normal and points of the row, from the corner of G that is nearest to a face of F; False where that does not tell.
+    """Normal and points of the row, from the corner of G nearest to a face of F; whether it is over that face.
 
     t : from F's centre to G's.   exchanged : F is B.
     """
-    a = F.x if face.axis == 0 else F.y if face.axis == 1 else F.z
-    e = F.y if face.axis == 0 else F.z if face.axis == 1 else F.x
-    f = F.z if face.axis == 0 else F.x if face.axis == 1 else F.y
-    h_e = F.half.y if face.axis == 0 else F.half.z if face.axis == 1 else F.half.x
-    h_f = F.half.z if face.axis == 0 else F.half.x if face.axis == 1 else F.half.y
+    i, j, k = face.axis, (face.axis + 1) % 3, (face.axis + 2) % 3
+    a, e, f = _axis_of(F, i), _axis_of(F, j), _axis_of(F, k)
+    h_e, h_f = component(F.half, j), component(F.half, k)
     n = scale((1.0 if dot(a, t) >= 0.0 else -1.0) / math.sqrt(dot(a, a)), a)
     is_over = False
     corner = t
@@ -264,7 +274,7 @@ def _put_face(F, G, face, t, error, exchanged, row):
     put_vec3(row.doubles, NORMAL, add(scale(-1.0 if exchanged else 1.0, n), Vec3(0.0, 0.0, 0.0)))
     put_vec3(row.doubles, POINT_B if exchanged else POINT_A, on_f)
     put_vec3(row.doubles, POINT_A if exchanged else POINT_B, on_g)
-    return is_over or face.gap < 0.0
+    return is_over
 
 
 @kernel(inline=True)
@@ -275,3 +285,46 @@ def _corner(axis, half, n, error, other_end):
     if abs(half * along) <= error and other_end == 1:
         end = -end
     return scale(end, axis)
+
+
+@kernel
+def _put_edges(A, B, edges, t, error, row):
+    """Normal and points of the row, from two edges; False where bodies are apart and other points are nearer.
+
+    t : from A's centre to B's.
+    """
+    a, b = _axis_of(A, edges.a), _axis_of(B, edges.b)
+    c = cross(a, b)
+    n = scale((1.0 if dot(c, t) >= 0.0 else -1.0) / math.sqrt(dot(c, c)), c)
+    h_a, h_b = component(A.half, edges.a), component(B.half, edges.b)
+    # The middles of the edges farthest towards each other: corners less what lies along the edge itself.
+    p = sub(_farthest_corner(A, n), scale(h_a * _sign(dot(a, n)), a))
+    q = add(sub(t, _farthest_corner(B, n)), scale(h_b * _sign(dot(b, n)), b))
+    w = sub(q, p)
+    along = dot(a, b)
+    square = 1.0 - along * along
+    at_a = (dot(a, w) - along * dot(b, w)) / square
+    at_b = (along * dot(a, w) - dot(b, w)) / square
+    is_within = abs(at_a) <= h_a - error / edges.sine and abs(at_b) <= h_b - error / edges.sine
+    on_a = add(add(p, scale(min(max(at_a, -h_a), h_a), a)), A.p)
+    put_vec3(row.doubles, NORMAL, add(n, Vec3(0.0, 0.0, 0.0)))
+    put_vec3(row.doubles, POINT_A, on_a)
+    put_vec3(row.doubles, POINT_B, add(on_a, scale(edges.gap, n)))
+    return is_within or edges.gap < 0.0
+
+
+@kernel(inline=True)
+def _axis_of(box, k):
+    return box.x if k == 0 else box.y if k == 1 else box.z
+
+
+@kernel(inline=True)
+def _sign(value):
+    return 1.0 if value >= 0.0 else -1.0
+
+
+@kernel(inline=True)
+def _farthest_corner(box, n):
+    """The corner farthest along n, from the centre."""
+    x, y, z = scale(_sign(dot(box.x, n)), box.x), scale(_sign(dot(box.y, n)), box.y), scale(_sign(dot(box.z, n)), box.z)
+    return add(add(scale(box.half.x, x), scale(box.half.y, y)), scale(box.half.z, z))

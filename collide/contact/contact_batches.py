@@ -16,7 +16,7 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.composite_parts import Part, compound_parts
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
 from collide.shapes.shape import Shape

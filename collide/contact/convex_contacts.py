@@ -29,8 +29,8 @@ from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
-from collide.narrowphase.convex_bodies import Question, shape_table
-from collide.narrowphase.convex_queries import SinglePair
+from collide.narrowphase.convex_batches import Question, shape_table
+from collide.narrowphase.convex_kernel_calls import SinglePair
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape

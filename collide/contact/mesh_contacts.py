@@ -14,7 +14,7 @@ from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import VERTEX
 from collide.lowering.facet_bodies import Body, body_of, has_facets, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.mesh_rows import mesh_rows
+from collide.narrowphase.facets.mesh_methods import mesh_rows
 from collide.shapes.shape import Shape
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
