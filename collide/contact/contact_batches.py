@@ -70,7 +70,8 @@ def contact_batch(
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    shapes, which = (A, B), None
+    shapes: tuple[Shape, ...] = (A, B)
+    which = None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
     singles: list[Shape] = []
