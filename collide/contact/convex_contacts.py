@@ -11,6 +11,7 @@ from collide.batches import answer_batch, length_of
 from collide.contact.box_box import box_rows
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
+    ARE_BOXES,
     HEADER,
     MARGIN,
     MAX_CONTACTS,
@@ -129,7 +130,7 @@ def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
 def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """Rows of `distance`; of pairs of boxes as good as contacts need them, where a face tells (`box_box.py`)."""
     table, which = shape_table(A, B)
-    is_box = (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
+    is_box = _boxes(table)
     both = is_box[which].all(axis=1) if which is not None else np.array([is_box.all()])
     if not both.any():
         return _general_rows(asked.question, A, B, X_WA, X_WB)
@@ -145,6 +146,11 @@ def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray
         X_WA, X_WB = (X if len(X) == 1 else np.ascontiguousarray(X[remaining]) for X in (X_WA, X_WB))
         rows[remaining] = _general_rows(asked.question, A, B, X_WA, X_WB)[: len(remaining)]
     return rows
+
+
+def _boxes(table: ShapeTable) -> np.ndarray:
+    """(rows,) bool: which of the sets are boxes."""
+    return (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
 
 
 def _general_rows(question: Question, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
@@ -172,16 +178,12 @@ def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tu
     )  # fmt: skip
 
 
-def single_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
-    """Rows of two shapes prepared for single calls, at one pair of poses; None where that is not what was asked, or
-    takes the long way.
-    """
-    pair = prepared_pair(A, B)
-    if not isinstance(pair, SinglePair):
-        return None
-    if pair.of_contacts is None:
-        pair.of_contacts = SingleContacts(pair)
-    return pair.of_contacts.contacts(X_WA, X_WB, margin, max_contacts)
+def prepare_contacts(A, B) -> None:
+    """Have two shapes that are prepared for single calls prepared for contacts as well."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        pair = prepared_pair(A, B)
+        if isinstance(pair, SinglePair) and pair.of_contacts is None:
+            pair.of_contacts = SingleContacts(pair)
 
 
 class SingleContacts:
@@ -201,6 +203,7 @@ class SingleContacts:
         self._header[: len(header)] = header
         self._of_manifold = self._header[len(header) :]
         self._of_manifold[:PAIRS_DONE] = _addresses(table, self._faces, self._space)
+        self._of_manifold[ARE_BOXES] = _boxes(table).all()
         self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
         self._ask = prepared_row(contacts_single, self._header)
 
