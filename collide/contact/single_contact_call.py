@@ -38,12 +38,12 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     block = block_of(header_at)
     rows_at = block.header[ROWS_AT]
     row = view_row(rows_at)
-    _clear(rows_at)
+    _zero_row(rows_at)
     is_known = header[ARE_BOXES] != 0 and put_box_row(
         header[INTS_AT], header[NUMBERS_AT], 0, 1, X_WA, X_WB, margin, row
     )
     if not is_known:
-        _clear(rows_at)
+        _zero_row(rows_at)
         if not (set_pose(block.poses, 0, X_WA, True) and set_pose(block.poses, BLOCK * POSE, X_WB, True)):
             return -1
         answer_block(block.header, 1, False, True, margin, rows_at)
@@ -60,7 +60,7 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
 
 
 @kernel(inline=True)
-def _clear(row_at):
+def _zero_row(row_at):
     words = view_i64(row_at, ROW // 8)
     for k in range(ROW // 8):
         words[k] = 0
