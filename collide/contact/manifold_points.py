@@ -11,8 +11,9 @@ from collide.kernels import kernel
 #: Doubles of a point: place across the normal, gap along it, height of the middle between both bodies.
 U, V, GAP, HEIGHT = range(4)
 POINT = 4
-#: Sines up to this are those of parallel lines: where these overlap they touch along a line.
-_PARALLEL = 2.0**-30
+#: Sines up to this are those of parallel lines: where these overlap they touch along a line, and each end lies off the
+#: other line by so much of its length at most.
+_PARALLEL = 2.0**-36
 
 
 class ManifoldPoints(NamedTuple):
