@@ -16,7 +16,7 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.composite_parts import Part, compound_parts
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
 from collide.shapes.shape import Shape
@@ -70,7 +70,8 @@ def contact_batch(
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    shapes, which = (A, B), None
+    shapes: tuple[Shape, ...] = (A, B)
+    which = None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
     singles: list[Shape] = []

@@ -14,7 +14,7 @@ from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import VERTEX
 from collide.lowering.facet_bodies import Body, body_of, has_facets, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.mesh_rows import mesh_rows
+from collide.narrowphase.facets.mesh_methods import mesh_rows
 from collide.shapes.shape import Shape
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
@@ -23,9 +23,9 @@ _ERRORS, _SHARE = 64.0, 2.0**-30
 
 def halfspace_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
     """Rows of a mesh and a half-space at single poses (4, 4): those of the mesh's hull, with facets of the mesh."""
-    bodies = [S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B)]
-    rows, _ = convex_contacts(*bodies, X_WA[None], X_WB[None], margin, max_contacts)
-    for side, shape, hull in (("a", A, bodies[0]), ("b", B, bodies[1])):
+    hull_a, hull_b = (S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B))
+    rows, _ = convex_contacts(hull_a, hull_b, X_WA[None], X_WB[None], margin, max_contacts)
+    for side, shape, hull in (("a", A, hull_a), ("b", B, hull_b)):
         if hull is not shape:
             facet_of = _facet_of_hull_points(shape, hull)
             vertex = rows[f"feature_{side}"]

@@ -66,7 +66,8 @@ def test_overlaps_of_polygons(seed):
     for k, (p, side) in enumerate(zip(points, sides.tolist())):  # each side lies on the side it is said to be of
         a, b = (P[side], P[(side + 1) % len(P)]) if side >= 0 else (Q[-1 - side], Q[(-side) % len(Q)])
         for q in (p, points[(k + 1) % len(points)]):
-            assert abs(np.cross(b - a, q - a)) < 1e-9, (seed, k, side)
+            d, w = b - a, q - a
+            assert abs(d[0] * w[1] - d[1] * w[0]) < 1e-9, (seed, k, side)
         if side < 0:
             corner = corner_of_b(face(Q[::-1]), -1 - side)
             assert np.array_equal(Q[::-1][corner], Q[-1 - side])
@@ -76,10 +77,10 @@ def test_equal_and_touching_polygons():
     square = np.array([(0.0, 0), (1, 0), (1, 1), (0, 1)])
     assert abs(area(clip(square, square)[0]) - 1.0) < 1e-15
     assert len(clip(square, square + 3.0)[0]) == 0
-    beside, _ = clip(square, (*square, 1.0, 0.25))
+    beside, _ = clip(square, square + np.array((1.0, 0.25)))
     assert len(beside) >= 2 and np.abs(beside[:, 0] - 1.0).max() == 0.0
-    assert len(clip(square, (*square, 1.0 + 1e-09, 0.25))[0]) == 0
-    assert len(clip(square, (*square, 1.0 + 1e-09, 0.25), 1e-8)[0]) >= 2
+    assert len(clip(square, square + np.array((1.0 + 1e-09, 0.25)))[0]) == 0
+    assert len(clip(square, square + np.array((1.0 + 1e-09, 0.25)), 1e-8)[0]) >= 2
 
 
 @pytest.mark.parametrize("seed", range(60))
