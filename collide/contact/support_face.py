@@ -234,7 +234,8 @@ def _round_corners(pair, body, g, corners, features, edges):
     aside = math.sqrt(g.x * g.x + g.y * g.y)
     length = norm(g)
     x, y = 1.0, 0.0
-    if aside > _UPRIGHT * length:
+    is_upright = aside <= _UPRIGHT * length
+    if not is_upright:
         x = g.x / aside
         y = g.y / aside
     up = g.z / length
@@ -242,7 +243,7 @@ def _round_corners(pair, body, g, corners, features, edges):
     is_cone = body.kind == CONE
     if -up >= _ACROSS or (up >= _ACROSS and not is_cone):
         z = half if up > 0.0 else -half
-        _put_disc(x, y, radius, z, corners, features, edges)
+        _put_disc(x, y, is_upright, radius, z, corners, features, edges)
         return np.int64(ROUND), Vec3(0.0, 0.0, 1.0 if up > 0.0 else -1.0)
     # A line on the side, from the lower end to the upper one; a cone's apex where that is what is in front.
     put_vec3(corners, 0, Vec3(x * radius, y * radius, -half))
@@ -264,12 +265,22 @@ def _round_corners(pair, body, g, corners, features, edges):
 
 
 @kernel(inline=True)
-def _put_disc(x, y, radius, z, corners, features, edges):
-    """Corners of a regular octagon within a disc, the first towards (x, y); counter-clockwise seen from outside."""
+def _put_disc(x, y, is_upright, radius, z, corners, features, edges):
+    """Corners of a regular octagon within a disc, the nearest to (x, y) moved there; counter-clockwise from outside.
+
+    The octagon turns with the body: at rest (x, y) is the direction of a tilt of rounding size, another one each time.
+    """
+    lowest, farthest = -1, 0.0
+    for k in range(ROUND):
+        along = x * _cosine_of_eighths(k) + y * _cosine_of_eighths(k + ROUND - 2)
+        if along > farthest and not is_upright:
+            lowest, farthest = k, along
     for k in range(ROUND):
         eighth = k if z > 0.0 else ROUND - 1 - k
         c, s = _cosine_of_eighths(eighth), _cosine_of_eighths(eighth + ROUND - 2)
-        put_vec3(corners, 3 * k, Vec3(radius * (x * c - y * s), radius * (y * c + x * s), z))
+        if eighth == lowest:
+            c, s = x, y
+        put_vec3(corners, 3 * k, Vec3(radius * c, radius * s, z))
         features[k] = 4 * eighth + CURVED
         edges[k] = 4 * (ROUND + eighth) + CURVED
 
