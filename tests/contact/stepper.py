@@ -13,6 +13,7 @@ compared, so a feature number that changed its meaning would throw the bodies ab
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -125,9 +126,15 @@ class Stepper:
 
 
 def keys_of(contacts) -> list[Key]:
-    """What each contact is known by: the bodies, their parts, and what of each meets."""
+    """What each contact is known by: the bodies, their parts, and what of each meets; where neither has a number of
+    its own, the how manieth of the pair it is."""
     fields = ["a", "b", "part_a", "part_b", "feature_a", "feature_b"]
-    return list(zip(*(contacts[field].tolist() for field in fields)))
+    seen: Counter[Key] = Counter()
+    keys = []
+    for key in zip(*(contacts[field].tolist() for field in fields)):
+        keys.append((*key, seen[key] if key[4:] == (-1, -1) else 0))
+        seen[key] += 1
+    return keys
 
 
 def axes_of(n: np.ndarray) -> np.ndarray:
@@ -154,11 +161,12 @@ def sweep(A: np.ndarray, free: np.ndarray, push, softness, x: np.ndarray, fricti
         i, p, soft = 3 * k, push[k], softness[k]
         rows = A[i : i + 3]
         w, u, v = (rows @ x + free[i : i + 3]).tolist()
-        (nn, _, _), (en, ee, _), (fn, fe, ff) = rows[:, i : i + 3].tolist()
+        (nn, _, _), (en, ee, ef), (fn, _, ff) = rows[:, i : i + 3].tolist()
         n0, e0, f0 = x[i : i + 3].tolist()
         n = max(0.0, n0 - (w + p + soft * nn * n0) / (nn * (1.0 + soft)))
-        e = e0 - (u + en * (n - n0)) / ee
-        f = f0 - (v + fn * (n - n0) + fe * (e - e0)) / ff
+        inverse_mass = max(ee, ff) + abs(ef)  # one for both, or what slides would not be held against its direction
+        e = e0 - (u + en * (n - n0)) / inverse_mass
+        f = f0 - (v + fn * (n - n0)) / inverse_mass
         across, most = (e * e + f * f) ** 0.5, friction * n
         if across > most:
             e, f = e * most / across, f * most / across
