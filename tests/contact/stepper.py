@@ -74,18 +74,18 @@ class Stepper:
         keys, axes = keys_of(contacts), axes_of(contacts["normal"])
         J = self._jacobian(contacts, axes)
         JM = (J.reshape(len(J), len(self.X), 1, 6) @ self._inverse_masses()).reshape(J.shape)  # by blocks of bodies
-        A = JM @ J.T
+        blocks = blocks_of(JM @ J.T)
         last = np.array([self.impulses.get(key, np.zeros(3)) for key in keys]).reshape(-1, 3)
         x = np.einsum("kij,kj->ki", axes, last).ravel()
         h = self.dt / self.substeps
         moved = np.zeros(self.V.size)
         for _ in range(self.substeps):
             self.V[self.mass > 0, :3] += h * GRAVITY
-            free = J @ self.V.ravel()
+            free = (J @ self.V.ravel()).tolist()
             push, softness = spring(contacts["distance"] + (J @ moved)[::3], h)
-            sweep(A, free, push, softness, x, self.friction, range(len(keys)))
+            sweep(blocks, free, push.tolist(), softness.tolist(), x, self.friction)
             moved += h * (self.V.ravel() + x @ JM)
-            sweep(A, free, np.maximum(push, 0.0), 0.0 * softness, x, self.friction, reversed(range(len(keys))))
+            sweep(blocks[::-1], free, np.maximum(push, 0.0).tolist(), [0.0] * len(keys), x, self.friction)
             self.V += (x @ JM).reshape(-1, 6)
         self._move(moved.reshape(-1, 6))
         self.impulses = dict(zip(keys, np.einsum("kij,ki->kj", axes, x.reshape(-1, 3))))
@@ -151,23 +151,32 @@ def spring(gap: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
     return np.where(gap > 0.0, gap / h, np.maximum(omega / damped * gap, -FASTEST)), (gap <= 0.0) / (h * omega * damped)
 
 
-def sweep(A: np.ndarray, free: np.ndarray, push, softness, x: np.ndarray, friction: float, order) -> None:
+class Block(NamedTuple):
+    """A contact's three rows of A (`sweep`), and the part of them that is its own."""
+
+    at: int
+    rows: np.ndarray
+    own: list[list[float]]
+
+
+def blocks_of(A: np.ndarray) -> list[Block]:
+    return [Block(i, A[i : i + 3], A[i : i + 3, i : i + 3].tolist()) for i in range(0, len(A), 3)]
+
+
+def sweep(blocks: list[Block], free: list[float], push, softness, x: np.ndarray, friction: float) -> None:
     """Change impulses x (3k,), contact by contact, so that A x + free + push ≥ 0 along normals, in the friction cones.
 
     A : (3k, 3k), normal and two vectors across it of each contact.   softness : of a contact's own mass, added to it.
     """
-    push, softness = push.tolist(), softness.tolist()
-    for k in order:
-        i, p, soft = 3 * k, push[k], softness[k]
-        rows = A[i : i + 3]
-        w, u, v = (rows @ x + free[i : i + 3]).tolist()
-        (nn, _, _), (en, ee, ef), (fn, _, ff) = rows[:, i : i + 3].tolist()
+    for i, rows, ((nn, _, _), (en, ee, ef), (fn, _, ff)) in blocks:
+        w, u, v = (rows @ x).tolist()
         n0, e0, f0 = x[i : i + 3].tolist()
-        n = max(0.0, n0 - (w + p + soft * nn * n0) / (nn * (1.0 + soft)))
+        soft = softness[i // 3]
+        n = max(0.0, n0 - (w + free[i] + push[i // 3] + soft * nn * n0) / (nn * (1.0 + soft)))
         inverse_mass = max(ee, ff) + abs(ef)  # one for both, or what slides would not be held against its direction
-        e = e0 - (u + en * (n - n0)) / inverse_mass
-        f = f0 - (v + fn * (n - n0)) / inverse_mass
+        e = e0 - (u + free[i + 1] + en * (n - n0)) / inverse_mass
+        f = f0 - (v + free[i + 2] + fn * (n - n0)) / inverse_mass
         across, most = (e * e + f * f) ** 0.5, friction * n
         if across > most:
             e, f = e * most / across, f * most / across
-        x[i], x[i + 1], x[i + 2] = n, e, f
+        x[i : i + 3] = n, e, f
