@@ -1,0 +1,127 @@
+"""Motions of bodies of convex parts, from Python: jobs for `impact_jobs.py`, in as many threads as asked for."""
+
+from __future__ import annotations
+
+from threading import local
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of, code_of
+from collide.lowering.compound_layout import layout_of
+from collide.lowering.shape_table import POSE, ShapeTable
+from collide.motion.convex_impact import FREE
+from collide.motion.impact_jobs import clear_impacts, find_impacts
+from collide.motion.impact_rows import IMPACT_DTYPE
+from collide.motion.moving_body import BODY
+from collide.narrowphase.convex_pairs import answer_pairs
+from collide.narrowphase.convex_queries import scratch
+from collide.results import PAIR_DTYPE
+from collide.shapes.shape import Shape
+from collide.threads import pieces_of, share
+
+#: Jobs done in one call of the kernel: their list stays small beside the motions.
+_JOBS_AT_ONCE = 1 << 16
+#: A thread is handed at least so many motions.
+_MIN_MOTIONS_PER_THREAD = 200
+
+
+class Motions(NamedTuple):
+    """n motions, checked: poses (n, 4, 4) or (1, 4, 4) of A and B at both ends; angular velocities (n, 3), (1, 3) or
+    None."""
+
+    X_WA0: np.ndarray
+    X_WA1: np.ndarray
+    X_WB0: np.ndarray
+    X_WB1: np.ndarray
+    omega_WA: np.ndarray | None
+    omega_WB: np.ndarray | None
+
+    def picked(self, some: np.ndarray) -> Motions:
+        """Those of these numbers; what goes with all stays as it is."""
+        return Motions(*(X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self))
+
+
+class _Workspace:
+    """Scratch memory of the kernels."""
+
+    def __init__(self) -> None:
+        self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
+        self.pair, self.bodies = np.array([0, 1], dtype=np.int64), np.zeros(2 * BODY)
+        self.rows = np.zeros(2, dtype=PAIR_DTYPE)
+
+    def header_of(self, bodies: _Bodies, motions: Motions) -> np.ndarray:
+        """What the kernel reads first."""
+        poses = motions[:4]
+        omegas = motions[4:]
+        return np.array(
+            (
+                code_of(answer_pairs), *bodies.table.addresses, address_of(self.poses), address_of(self.shape_of),
+                address_of(self.pair), *scratch(), address_of(self.bodies), address_of(self.rows),
+                address_of(self.rows[1:]), address_of(bodies.parts), len(bodies.parts),
+                *(address_of(X) for X in poses), *(16 * (len(X) > 1) for X in poses),
+                *(0 if w is None else address_of(w) for w in omegas),
+                *(0 if w is None else 3 * (len(w) > 1) for w in omegas), len(bodies.table.packed),
+            ),
+            dtype=np.int64,
+        )  # fmt: skip
+
+
+class _OfThread(local):
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+_of_thread = _OfThread()
+
+
+class _Bodies:
+    """Distinct shapes, part by part, in the tables that kernels read."""
+
+    def __init__(self, shapes: list[Shape]):
+        layouts = [layout_of(shape) for shape in shapes]
+        self.counts = np.array([len(layout.packed) for layout in layouts], dtype=np.int64)
+        self.first = np.cumsum(self.counts) - self.counts
+        self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
+        self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
+        self.table.build_trees(np.arange(len(self.table.packed)))
+
+    def jobs(self, a: np.ndarray, b: np.ndarray, first: int) -> np.ndarray:
+        """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
+        on."""
+        n_b, counts = self.counts[b], self.counts[a] * self.counts[b]
+        motion = np.repeat(np.arange(len(a)), counts)
+        which = np.arange(len(motion)) - np.repeat(np.cumsum(counts) - counts, counts)
+        part_a, part_b = self.first[a][motion] + which // n_b[motion], self.first[b][motion] + which % n_b[motion]
+        return np.ascontiguousarray(np.stack([motion + first, part_a, part_a, part_b, part_b], axis=1))
+
+
+def convex_impacts(
+    shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions, tolerance: float, threads: int
+) -> np.ndarray:
+    """Rows of `IMPACT_DTYPE` for n motions of bodies of convex parts.
+
+    shapes : distinct ones.   a, b : (n,) int64, which of them A and B are.
+    """
+    n = len(a)
+    rows = np.zeros(n, dtype=IMPACT_DTYPE)
+    bodies = _Bodies(shapes)
+    clear_impacts(address_of(rows), n)
+    per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
+    at_once = max(_JOBS_AT_ONCE // per_motion, 1)
+
+    def work(piece: slice) -> None:
+        header = _of_thread.space.header_of(bodies, motions)
+        for first in range(piece.start, piece.stop, at_once):
+            some = slice(first, min(first + at_once, piece.stop))
+            jobs = bodies.jobs(a[some], b[some], first)
+            find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
+
+    workers = min(threads, n * per_motion // _MIN_MOTIONS_PER_THREAD)
+    if workers < 2:
+        work(slice(0, n))
+    else:
+        share(pieces_of(n, workers, max(_MIN_MOTIONS_PER_THREAD // per_motion, 1)), work, workers)
+    rows["part_a"] -= np.where(rows["status"] == FREE, 0, bodies.first[a])
+    rows["part_b"] -= np.where(rows["status"] == FREE, 0, bodies.first[b])
+    return rows
