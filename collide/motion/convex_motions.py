@@ -11,8 +11,8 @@ from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.shape_table import POSE, ShapeTable
 from collide.motion.convex_impact import FREE
-from collide.motion.impact_jobs import clear_impacts, find_impacts
-from collide.motion.impact_rows import IMPACT_DTYPE
+from collide.motion.impact_jobs import find_impacts
+from collide.motion.impact_rows import free_rows
 from collide.motion.moving_body import BODY
 from collide.narrowphase.convex_pairs import answer_pairs
 from collide.narrowphase.convex_queries import scratch
@@ -42,6 +42,14 @@ class Motions(NamedTuple):
         return Motions(*(X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self))
 
 
+class Tables(NamedTuple):
+    """addresses : of a `ShapeTable`'s integers and numbers.   n_shapes : its rows.   parts : (k, PART)."""
+
+    addresses: tuple[int, int]
+    n_shapes: int
+    parts: np.ndarray
+
+
 class _Workspace:
     """Scratch memory of the kernels."""
 
@@ -50,22 +58,6 @@ class _Workspace:
         self.pair, self.bodies = np.array([0, 1], dtype=np.int64), np.zeros(2 * BODY)
         self.rows = np.zeros(2, dtype=PAIR_DTYPE)
 
-    def header_of(self, bodies: _Bodies, motions: Motions) -> np.ndarray:
-        """What the kernel reads first."""
-        poses = motions[:4]
-        omegas = motions[4:]
-        return np.array(
-            (
-                code_of(answer_pairs), *bodies.table.addresses, address_of(self.poses), address_of(self.shape_of),
-                address_of(self.pair), *scratch(), address_of(self.bodies), address_of(self.rows),
-                address_of(self.rows[1:]), address_of(bodies.parts), len(bodies.parts),
-                *(address_of(X) for X in poses), *(16 * (len(X) > 1) for X in poses),
-                *(0 if w is None else address_of(w) for w in omegas),
-                *(0 if w is None else 3 * (len(w) > 1) for w in omegas), len(bodies.table.packed),
-            ),
-            dtype=np.int64,
-        )  # fmt: skip
-
 
 class _OfThread(local):
     def __init__(self) -> None:
@@ -73,6 +65,22 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
+
+
+def header_of(tables: Tables, motions: Motions) -> np.ndarray:
+    """What `find_impacts` reads first; it works in the scratch memory of this thread."""
+    space, poses, omegas = _of_thread.space, motions[:4], motions[4:]
+    return np.array(
+        (
+            code_of(answer_pairs), *tables.addresses, address_of(space.poses), address_of(space.shape_of),
+            address_of(space.pair), *scratch(), address_of(space.bodies), address_of(space.rows),
+            address_of(space.rows[1:]), address_of(tables.parts), len(tables.parts),
+            *(address_of(X) for X in poses), *(16 * (len(X) > 1) for X in poses),
+            *(0 if w is None else address_of(w) for w in omegas),
+            *(0 if w is None else 3 * (len(w) > 1) for w in omegas), tables.n_shapes,
+        ),
+        dtype=np.int64,
+    )  # fmt: skip
 
 
 class _Bodies:
@@ -104,14 +112,13 @@ def convex_impacts(
     shapes : distinct ones.   a, b : (n,) int64, which of them A and B are.
     """
     n = len(a)
-    rows = np.zeros(n, dtype=IMPACT_DTYPE)
+    rows = free_rows(n)
     bodies = _Bodies(shapes)
-    clear_impacts(address_of(rows), n)
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
     at_once = max(_JOBS_AT_ONCE // per_motion, 1)
 
     def work(piece: slice) -> None:
-        header = _of_thread.space.header_of(bodies, motions)
+        header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
         for first in range(piece.start, piece.stop, at_once):
             some = slice(first, min(first + at_once, piece.stop))
             jobs = bodies.jobs(a[some], b[some], first)

@@ -1,0 +1,299 @@
+"""Motions of bodies with meshes among their pieces: spans of time, facets that may meet in them, and a job a facet.
+
+A piece is a mesh or a convex shape at a pose in its body. In a span of length h around its middle no point of one body
+comes nearer the other than μ h / 2, μ a bound of the speed of one body seen from the world, from A or from B (motion
+bounds, Mirtich 1996). Facets farther apart than that at the middle are free in all of the span (facets_within: a
+traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span is
+cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are apart
+at the start first meet in their surfaces, and a surface is its facets.
+
+A half-space meets a mesh where it meets the mesh's hull.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.compound_table import PART, TURNED
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import body_of, is_halfspace
+from collide.lowering.facet_table import Facets, FacetTable
+from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.parts import convex_set_of
+from collide.lowering.shape_table import RANK, SLOP, ShapeTable
+from collide.motion.convex_motions import Motions, Tables, header_of
+from collide.motion.impact_jobs import find_impacts
+from collide.motion.impact_rows import flipped_impacts
+from collide.motion.placed_motion import poses_at, velocity_between
+from collide.mesh.bvh import MeshTree
+from collide.narrowphase.facets.facet_queries import facets_within
+from collide.shapes.compound import Compound
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+
+#: So many pairs of facets at most are jobs of one span, unless it is shorter than _SHORTEST.
+_MAX_JOBS, _SHORTEST = 96, 2.0**-40
+_MAX_JOBS_OF_SHORTEST = 1 << 20
+_ULP = 2.0**-53
+
+
+class Piece(NamedTuple):
+    """A mesh or a convex shape in a body.
+
+    X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
+    reach : greatest distance of its points from the body's origin, a swept radius included [m].
+    slop : how far rounding of X_CS may have moved it.   tree, radius : its facets, or those of a polytope around it,
+    and the ball swept over them; None for half-spaces.   packed : as a convex set; None of meshes.
+    """
+
+    shape: Shape
+    X_CS: np.ndarray
+    number: int
+    reach: float
+    slop: float
+    tree: MeshTree | None
+    radius: float
+    packed: PackedConvex | None
+
+    @property
+    def is_mesh(self) -> bool:
+        return self.packed is None
+
+    def corners(self, facets: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) of a mesh's facets by their numbers."""
+        mesh: Any = self.shape
+        return mesh.vertices[mesh.faces[facets]]
+
+
+@kept_with_shape("_pieces")
+def pieces_of(shape: Shape) -> tuple[Piece, ...]:
+    """The meshes and convex shapes that a shape is made of."""
+    flat = list(_flattened(shape, IDENTITY, 0.0))
+    return tuple(_piece(item, X, slop, k) for k, (item, X, slop) in enumerate(flat))
+
+
+def _flattened(shape: Shape, X: np.ndarray, slop: float) -> Iterator[tuple[Shape, np.ndarray, float]]:
+    if not isinstance(shape, Compound):
+        yield shape, X, slop
+        return
+    for item, X_CS in shape.items:
+        exact = np.array_equal(X, IDENTITY)
+        lost = 0.0 if exact else 16 * _ULP * float(np.abs(X_CS[:3, 3]).sum() + np.abs(X[:3, 3]).sum() + _extent(item))
+        yield from _flattened(item, X_CS if exact else X @ X_CS, slop + lost)
+
+
+def _extent(shape: Shape) -> float:
+    """Greatest distance of a shape's points from its origin; 0 of a half-space."""
+    if isinstance(shape, Compound):
+        return max(float(np.linalg.norm(X[:3, 3])) + 1.001 * _extent(item) for item, X in shape.items)
+    if isinstance(shape, Mesh):
+        return float(np.sqrt(np.square(shape.vertices).sum(axis=1).max()))
+    packed = convex_set_of(shape)
+    return packed.reach + packed.radius
+
+
+def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
+    reach = (float(np.linalg.norm(X_CS[:3, 3])) + (1.0 + 2e-4) * _extent(shape)) * (1 + 1e-12)
+    if isinstance(shape, Mesh):
+        return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, None)
+    packed = convex_set_of(shape)
+    if is_halfspace(shape):
+        return Piece(shape, X_CS, number, reach, slop, None, 0.0, packed)
+    if kind_of(shape) in WITH_FACETS:
+        body = body_of(shape)
+        return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, packed)
+    return Piece(shape, X_CS, number, reach, slop, enclosure_of(shape).outer.tree, 0.0, packed)
+
+
+def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """Fill rows of `IMPACT_DTYPE` for n motions of two bodies that are apart at the start.
+
+    motions : poses (n, 4, 4).   rows : (n,) as `clear_impacts` leaves them.
+    """
+    if _order(B) < _order(A):  # swapped questions are worked out on the same numbers
+        swapped = Motions(
+            motions.X_WB0, motions.X_WB1, motions.X_WA0, motions.X_WA1, motions.omega_WB, motions.omega_WA
+        )
+        surface_impacts(B, A, swapped, tolerance, rows)
+        rows[:] = flipped_impacts(rows)
+        return
+    pieces = [(a, b) for a in pieces_of(A) for b in pieces_of(B)]
+    convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
+    for a, b in convex:
+        _convex_pieces(a, b, motions, tolerance, rows)
+    for k in range(len(rows)):
+        motion = _Motion(motions, k)
+        for a, b in pieces:
+            if _needs_facets(a, b):
+                _search(a, b, motions, motion, tolerance, rows[k : k + 1], isinstance(A, Compound), isinstance(B, Compound))
+
+
+def _order(shape: Shape) -> list[bytes]:
+    return [
+        piece.tree.content if piece.packed is None and piece.tree is not None else piece.packed.content
+        for piece in pieces_of(shape)
+    ]  # type: ignore[union-attr]
+
+
+def _needs_facets(a: Piece, b: Piece) -> bool:
+    return (a.is_mesh and b.tree is not None) or (b.is_mesh and a.tree is not None)
+
+
+def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """Pieces that are convex, or a half-space and a mesh, for all motions."""
+    packed = [p.packed if p.packed is not None else convex_set_of(p.shape.convex_hull) for p in (a, b)]  # type: ignore[attr-defined]
+    table = ShapeTable([p._replace(slop=p.slop + piece.slop) for p, piece in zip(packed, (a, b))])
+    table.build_trees(np.arange(2))
+    n = len(rows)
+    jobs = np.zeros((n, 5), dtype=np.int64)
+    jobs[:, 0], jobs[:, 3:] = np.arange(n), 1
+    before = rows["lower"].copy()
+    _do(table, 2, _parts(a, b), motions, jobs, 0.0, 1.0, tolerance, rows)
+    earlier = rows["lower"] < before
+    rows["part_a"][earlier], rows["part_b"][earlier] = a.number, b.number
+
+
+def _parts(a: Piece, b: Piece) -> np.ndarray:
+    parts = np.zeros((2, PART))
+    for row, piece in zip(parts, (a, b)):
+        row[:9], row[9:12] = piece.X_CS[:3, :3].ravel(), piece.X_CS[:3, 3]
+        row[TURNED] = not np.array_equal(piece.X_CS, IDENTITY)
+    return parts
+
+
+def _do(table, n_shapes: int, parts, motions: Motions, jobs, begin: float, end: float, tolerance: float, rows) -> None:
+    header = header_of(Tables(table.addresses, n_shapes, parts), motions)
+    find_impacts(address_of(header), address_of(jobs), len(jobs), begin, end, tolerance, address_of(rows))
+
+
+class _Motion:
+    """One motion, positions from A's origin at the start.
+
+    omega_a, omega_b, v : velocities.   d0 : from A's origin to B's.   drift : what poses at the end miss the motion by.
+    """
+
+    def __init__(self, motions: Motions, k: int):
+        self.whole = motions.picked(np.array([k]))
+        some = [None if X is None else X.copy() for X in self.whole]
+        origin = some[0][0, :3, 3].copy()
+        for X in some[:4]:
+            X[0, :3, 3] -= origin
+        self.X_WA0, self.X_WA1, self.X_WB0, self.X_WB1, self.given_a, self.given_b = some
+        self.d0 = self.X_WB0[0, :3, 3] - self.X_WA0[0, :3, 3]
+        self.v_a = self.X_WA1[0, :3, 3] - self.X_WA0[0, :3, 3]
+        self.v = self.X_WB1[0, :3, 3] - self.X_WA1[0, :3, 3] - self.d0
+        self.omega_a, self.drift_a = velocity_between(self.X_WA0, self.X_WA1, self.given_a)
+        self.omega_b, self.drift_b = velocity_between(self.X_WB0, self.X_WB1, self.given_b)
+        self.farthest = float(np.linalg.norm(self.d0) + np.linalg.norm(self.v)) * (1 + 1e-12)
+
+    def places(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """(X_WA, X_WB), (4, 4) each."""
+        at = np.array([time])
+        return tuple(
+            poses_at(X0, X1, omega, at)[0][0]
+            for X0, X1, omega in (
+                (self.X_WA0, self.X_WA1, self.given_a), (self.X_WB0, self.X_WB1, self.given_b)
+            )
+        )  # fmt: skip
+
+    def speed(self, a: Piece, b: Piece, begin: float, end: float) -> float:
+        """A bound of how fast points of one piece come nearer the other in a span of time [m in unit time]."""
+        w_a, w_b, w = (float(np.linalg.norm(w)) for w in (self.omega_a, self.omega_b, self.omega_b - self.omega_a))
+        ends = [self.d0 + time * self.v for time in (begin, end)]
+        from_world = float(np.linalg.norm(self.v)) + w_a * a.reach + w_b * b.reach
+        from_a = max(float(np.linalg.norm(self.v - np.cross(self.omega_a, d))) for d in ends) + w * b.reach
+        from_b = max(float(np.linalg.norm(self.v - np.cross(self.omega_b, d))) for d in ends) + w * a.reach
+        drift = 2.0 * (1.0 + w_a + w_b) * (self.drift_a * a.reach + self.drift_b * b.reach)
+        rounding = 1e-13 * (w_a + w_b) * self.farthest
+        return (min(from_world, from_a, from_b) + drift + rounding) * (1 + 1e-12)
+
+    def slop(self, a: Piece, b: Piece) -> float:
+        """How far rounding moves points of a piece, against the other [m]."""
+        angle = float(np.linalg.norm(self.omega_a) + np.linalg.norm(self.omega_b))
+        size = a.reach + b.reach + self.farthest + float(np.linalg.norm(self.v_a))
+        return 512 * _ULP * (1.0 + angle) * size + a.slop + b.slop
+
+    def time_of_balls(self, reach: float) -> tuple[float, float]:
+        """The time in which the bodies' origins are within a reach of each other, no shorter than it is; begin > end
+        where they never are."""
+        reach = reach * (1 + 1e-6) + 1e-7 * self.farthest  # far beyond what rounding does to the quadratic
+        square, along = float(self.v @ self.v), float(self.d0 @ self.v)
+        outside = float(self.d0 @ self.d0) - reach * reach
+        if square == 0.0:
+            return (1.0, 0.0) if outside > 0.0 else (0.0, 1.0)
+        discriminant = along * along - square * outside
+        if discriminant < 0.0:
+            return 1.0, 0.0
+        half = math.sqrt(discriminant)
+        return max((-along - half) / square, 0.0), min((-along + half) / square, 1.0)
+
+
+def _search(
+    a: Piece, b: Piece, motions: Motions, motion: _Motion, tolerance: float, row: np.ndarray, of_a: bool, of_b: bool
+) -> None:
+    """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far."""
+    begin, end = motion.time_of_balls(a.reach + b.reach + motion.slop(a, b))
+    spans = [(begin, end)] if begin <= end else []
+    while spans:
+        begin, end = spans.pop()
+        end = min(end, float(row["upper"][0]))
+        if begin > end:
+            continue
+        middle = 0.5 * (begin + end)
+        near = _near_facets(a, b, motion, begin, end, middle)
+        if near is None:
+            spans += [(middle, end), (begin, middle)]
+            continue
+        if len(near) == 0:
+            continue
+        before = float(row["lower"][0])
+        table, jobs, ids = _jobs(a, b, near)
+        _do(table, len(table.ints), _parts(a, b), motion.whole, jobs, begin, end, tolerance, row)
+        if row["lower"][0] < before:
+            row["part_a"] = a.number if of_a else ids[int(row["part_a"][0])]
+            row["part_b"] = b.number if of_b else ids[int(row["part_b"][0])]
+
+
+def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
+    """(table of facets, jobs of one motion, which facet each row of the table is) for pairs of facets that are near.
+
+    A convex piece is one shape beside the facets of the mesh, not facet by facet.
+    """
+    if a.is_mesh and b.is_mesh:
+        (ids_a, which_a), (ids_b, which_b) = (np.unique(column, return_inverse=True) for column in near.T)
+        table: Any = Facets(np.concatenate([a.corners(ids_a), b.corners(ids_b)]))
+        table.ints[len(ids_a) :, RANK] = 1
+        table.numbers[: len(ids_a), SLOP] = a.slop
+        table.numbers[len(ids_a) :, SLOP] = b.slop
+        ids = np.concatenate([ids_a, ids_b])
+        rows_a, rows_b = which_a.ravel(), which_b.ravel() + len(ids_a)
+    else:
+        mesh, other = (a, b) if a.is_mesh else (b, a)
+        facets = np.unique(near[:, 0 if a.is_mesh else 1])
+        table = FacetTable(mesh.corners(facets), other.packed)  # type: ignore[arg-type]
+        table.numbers[:-1, SLOP] = mesh.slop
+        table.numbers[-1, SLOP] += other.slop
+        ids = np.append(facets, 0)
+        of_mesh, of_other = np.arange(len(facets)), np.full(len(facets), len(facets))
+        rows_a, rows_b = (of_mesh, of_other) if a.is_mesh else (of_other, of_mesh)
+    zeros = np.zeros(len(rows_a), dtype=np.int64)
+    jobs = np.ascontiguousarray(np.stack([zeros, rows_a, zeros, rows_b, zeros + 1], axis=1), dtype=np.int64)
+    return table, jobs, ids
+
+
+def _near_facets(a: Piece, b: Piece, motion: _Motion, begin: float, end: float, middle: float) -> np.ndarray | None:
+    """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
+    half = 0.5 * (end - begin) * (1 + 1e-12) + 2.0**-52
+    reach = motion.speed(a, b, begin, end) * half + motion.slop(a, b) + a.radius + b.radius
+    X_WA, X_WB = motion.places(middle)
+    most = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
+    near = facets_within(a.tree, b.tree, X_WA @ a.X_CS, X_WB @ b.X_CS, reach, most)  # type: ignore[arg-type]
+    if near is None or len(near.facets) > most and end - begin > _SHORTEST:
+        return None
+    return near.facets
