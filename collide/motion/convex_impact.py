@@ -29,7 +29,8 @@ from collide.motion.kept_axis import (
     turned_axis,
 )
 from collide.motion.moving_body import ANGLE, DRIFT_REACH, REACH_OF_CORE
-from collide.motion.moving_pair import omega_of, origin_error, origin_of_b, place_pair
+from collide.motion.moving_pair import omega_of, place_pair
+from collide.motion.swept_balls import time_of_balls
 from collide.narrowphase.convex_pairs import SIGNATURE
 from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, ROW, UPPER, VERTICES_A, VERTICES_B, view_row
 from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, norm, rotate, scale, sub, vec3_at
@@ -113,7 +114,10 @@ def search_contact(motion, asking, begin, end, tolerance):
     Before ``begin`` the pair is known to be free.   tolerance : the bracket's width [unit time] that is to be reached if it can be.
     """
     first = begin
-    begin, end = _time_of_balls(motion, begin, end)
+    if not motion.is_plane:
+        reach = motion.a[REACH_OF_CORE] + motion.b[REACH_OF_CORE] + motion.a[DRIFT_REACH] + motion.b[DRIFT_REACH]
+        reach += motion.radius + motion.error
+        begin, end = time_of_balls(motion.d0, motion.v, motion.farthest, reach, begin, end)
     if begin > end:
         return Search(FREE, end, end, 0)
     place_pair(motion, begin)
@@ -309,51 +313,3 @@ def _find_contact(motion, asking, time, gap, end, max_probes):
             return math.inf, k + 1
         passed *= _PROBE_GROWTH
     return math.inf, max_probes
-
-
-@kernel
-def _time_of_balls(motion, begin, end):
-    """(begin, end) of the time between these in which balls about the bodies' origins meet, no shorter than it is; begin
-    > end where they never do."""
-    if motion.is_plane:
-        return begin, end
-    reach = motion.a[REACH_OF_CORE] + motion.b[REACH_OF_CORE] + motion.a[DRIFT_REACH] + motion.b[DRIFT_REACH]
-    reach += motion.radius + motion.error + origin_error(motion.farthest)
-    reach *= 1.0 + 2.0**-40
-    d0, v = motion.d0, motion.v
-    along, square = dot(d0, v), dot(v, v)
-    outside = dot(d0, d0) - reach * reach
-    if not square > 0.0:
-        return (1.0, 0.0) if norm(d0) > reach else (begin, end)
-    middle = -along / square
-    nearest = norm(origin_of_b(motion, min(max(middle, begin), end)))
-    if nearest > reach + 2.0**-40 * motion.farthest:  # rounding of the middle moves the distance by less than this
-        return 1.0, 0.0
-    discriminant = along * along - square * outside
-    half = math.sqrt(max(discriminant, 0.0)) / square
-    last = end
-    before = middle - half * (1.0 + 2.0**-30) - 2.0**-40 * abs(middle)
-    if begin < before < end and _is_outside(motion, before, reach) and _closes(motion, before):
-        begin = before
-    after = middle + half * (1.0 + 2.0**-30) + 2.0**-40 * abs(middle)
-    if begin < after < end and _is_outside(motion, after, reach) and _parts(motion, after):
-        last = after
-    return begin, last
-
-
-@kernel(inline=True)
-def _is_outside(motion, time, reach):
-    return norm(origin_of_b(motion, time)) > reach
-
-
-@kernel(inline=True)
-def _closes(motion, time):
-    """Whether the origins come nearer at a time, by more than rounding: the distance is convex, they did before."""
-    d = origin_of_b(motion, time)
-    return dot(d, motion.v) < -(2.0**-40) * motion.farthest * norm(motion.v)
-
-
-@kernel(inline=True)
-def _parts(motion, time):
-    d = origin_of_b(motion, time)
-    return dot(d, motion.v) > 2.0**-40 * motion.farthest * norm(motion.v)

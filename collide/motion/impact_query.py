@@ -308,13 +308,10 @@ def _ask_start(question: _Question, rows: np.ndarray, some: np.ndarray) -> None:
     """Motions that are in contact at the start, decided as `collide` does, become contacts at time 0."""
     if not len(some):
         return
-    hit = some[_for_all(answer_batch(*_start_of(question, some), Question(True), question.threads), len(some))]
+    hits = answer_batch(*_start_of(question, some), Question(True), question.threads)
+    hit = some[np.broadcast_to(hits, len(some))]
     rows["lower"][hit] = rows["upper"][hit] = 0.0
     rows["status"][hit] = CONTACT
-
-
-def _for_all(answers: np.ndarray, n: int) -> np.ndarray:
-    return np.broadcast_to(answers, n) if len(answers) != n else answers
 
 
 def _describe_start(question: _Question, rows: np.ndarray) -> None:
@@ -323,15 +320,26 @@ def _describe_start(question: _Question, rows: np.ndarray) -> None:
     some = np.flatnonzero((rows["status"] == CONTACT) & (rows["upper"] == 0.0))
     if not len(some):
         return
-    pairs = answer_batch(*_start_of(question, some), Question(False, np.inf), question.threads)
-    pairs = _for_all(pairs, len(some))
+    meshed = np.array([shape.meshed for shape in question.shapes])
+    of_facets = meshed[question.a[some]] | meshed[question.b[some]]
+    for depths in (True, False):  # a depth of meshes takes milliseconds
+        _describe_as_distance(question, rows, some[of_facets != depths], depths)
+
+
+def _describe_as_distance(question: _Question, rows: np.ndarray, some: np.ndarray, depths: bool) -> None:
+    if not len(some):
+        return
+    pairs = answer_batch(*_start_of(question, some), Question(False, np.inf, depths), question.threads)
+    pairs = np.broadcast_to(pairs, len(some))
     for field in ("normal", "point_a", "point_b", "part_a", "part_b"):
         rows[field][some] = pairs[field]
     unbounded = ~np.isfinite(pairs["distance"])
     for field in ("normal", "point_a", "point_b"):
         rows[field][some[unbounded]] = 0.0
-    rows["upper"][some[pairs["how"] == UNDECIDED]] = np.inf
-    rows["status"][some[pairs["how"] == UNDECIDED]] = OPEN_START
+    if not depths:
+        rows["normal"][some] = 0.0
+    undecided = some[pairs["how"] == UNDECIDED]
+    rows["upper"][undecided], rows["status"][undecided] = np.inf, OPEN_START
 
 
 def _refuse_planes(question: _Question, some: np.ndarray) -> None:

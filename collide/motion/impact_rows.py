@@ -31,7 +31,7 @@ class TimeOfImpact(NamedTuple):
         for free motions. ``upper`` is inf where contact is not proven: the bodies come within rounding of each other
         at ``lower``, and what follows is open.
     certified : the answer is proven, and upper − lower is within the tolerance.
-    normal : unit vector from A to B in W at ``time``; zeros for free motions.
+    normal : unit vector from A to B in W at ``time``; zeros for free motions, and for meshes that overlap at the start.
     point_a, point_b : nearest points of A and B in W at ``time`` [m]; zeros for free motions.
     part_a, part_b : which parts of compounds meet, which facets of meshes; 0 elsewhere.
     queries : questions to GJK, for diagnosis.

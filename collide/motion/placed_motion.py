@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from collide.kernels import address_of, entry, view_f64, view_i64
 from collide.lowering.compound_table import PART
 from collide.lowering.shape_table import POSE
-from collide.motion.moving_body import BODY, DRIFT, OMEGA, place_body, set_body
+from collide.motion.moving_body import BODY, place_body, set_body
 from collide.numerics.vec3 import Vec3, add, scale, sub
 
 #: Doubles of workspace: a body, a row of parts that is none, a pose.
@@ -46,33 +44,6 @@ def place_motions(ends_at, step0, step1, omega_at, step_omega, times_at, step_ti
             out[12 + i] = 0.0
         out[15] = 1.0
     return worst
-
-
-@entry("int64(int64, int64, int64, boolean, int64, int64)")
-def describe_motion(X0_at, X1_at, omega_at, has_omega, work_at, out_at):
-    """Four doubles become ω of one motion, and Frobenius' norm of D; returns 0. Arguments as of `place_motions`."""
-    body, parts = view_f64(work_at, BODY), view_f64(work_at + 8 * _PARTS_AT, PART)
-    omega = view_f64(omega_at if has_omega else X0_at, 3)
-    set_body(body, view_f64(X0_at, 16), view_f64(X1_at, 16), omega, has_omega, parts, 0, 0.0)
-    out = view_f64(out_at, 4)
-    square = 0.0
-    for k in range(9):
-        square += body[DRIFT + k] * body[DRIFT + k]
-    for k in range(3):
-        out[k] = body[OMEGA + k]
-    out[3] = math.sqrt(square)
-    return 0
-
-
-def velocity_between(X0: np.ndarray, X1: np.ndarray, given: np.ndarray | None) -> tuple[np.ndarray, float]:
-    """(ω (3,), norm of D) of poses (1, 4, 4) and an angular velocity (1, 3) or None, as `moving_body.py` has them."""
-    work, out = np.zeros(WORKSPACE), np.zeros(4)
-    has_omega = given is not None
-    describe_motion(
-        address_of(X0), address_of(X1), address_of(given) if given is not None else 0, has_omega, address_of(work),
-        address_of(out),
-    )  # fmt: skip
-    return out[:3], float(out[3])
 
 
 def poses_at(X0: np.ndarray, X1: np.ndarray, omega: np.ndarray | None, time: np.ndarray) -> tuple[np.ndarray, float]:

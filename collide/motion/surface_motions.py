@@ -12,7 +12,6 @@ A half-space meets a mesh where it meets the mesh's hull.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -30,7 +29,7 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.motion.convex_motions import Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
-from collide.motion.placed_motion import poses_at, velocity_between
+from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
 from collide.mesh.bvh import MeshTree
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.shapes.compound import Compound
@@ -47,7 +46,7 @@ class Piece(NamedTuple):
     """A mesh or a convex shape in a body.
 
     X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
-    reach : greatest distance of its points from the body's origin, a swept radius included [m].
+    reach : greatest distance of its points from its own origin, a swept radius included [m].
     slop : how far rounding of X_CS may have moved it.   tree, radius : its facets, or those of a polytope around it,
     and the ball swept over them; None for half-spaces.   packed : as a convex set; None of meshes.
     """
@@ -99,7 +98,7 @@ def _extent(shape: Shape) -> float:
 
 
 def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
-    reach = (float(np.linalg.norm(X_CS[:3, 3])) + (1.0 + 2e-4) * _extent(shape)) * (1 + 1e-12)
+    reach = _extent(shape) * (1 + 1e-12)
     if isinstance(shape, Mesh):
         return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, None)
     packed = convex_set_of(shape)
@@ -127,11 +126,12 @@ def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows
     convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
     for a, b in convex:
         _convex_pieces(a, b, motions, tolerance, rows)
+    is_part = isinstance(A, Compound), isinstance(B, Compound)
+    of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
     for k in range(len(rows)):
-        motion = _Motion(motions, k)
-        for a, b in pieces:
-            if _needs_facets(a, b):
-                _search(a, b, motions, motion, tolerance, rows[k : k + 1], isinstance(A, Compound), isinstance(B, Compound))
+        motion = motions.picked(np.array([k]))
+        for a, b in of_facets:
+            _search(a, b, motion, tolerance, rows[k : k + 1], is_part)
 
 
 def _order(shape: Shape) -> list[bytes]:
@@ -172,92 +172,61 @@ def _do(table, n_shapes: int, parts, motions: Motions, jobs, begin: float, end: 
     find_impacts(address_of(header), address_of(jobs), len(jobs), begin, end, tolerance, address_of(rows))
 
 
-class _Motion:
-    """One motion, positions from A's origin at the start.
+class _Spans:
+    """Spans of one motion of two pieces."""
 
-    omega_a, omega_b, v : velocities.   d0 : from A's origin to B's.   drift : what poses at the end miss the motion by.
+    def __init__(self, a: Piece, b: Piece, motion: Motions):
+        self.a, self.b = a, b
+        self.parts, self.reaches = _parts(a, b), np.array([a.reach, b.reach, a.slop + b.slop])
+        self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
+        self._held = motion
+        addresses = [0 if X is None else address_of(X) for X in motion]
+        self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
+
+    def _describe(self, begin: float, end: float) -> np.ndarray:
+        describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
+        return self._out
+
+    def time_of_balls(self) -> tuple[float, float]:
+        """The time in which balls about both bodies' origins meet; begin > end where they never do."""
+        return tuple(self._describe(0.0, 1.0)[BEGIN : END + 1].tolist())
+
+    def near_facets(self, begin: float, end: float) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
+        out = self._describe(begin, end)
+        most = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
+        X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
+        reach = float(out[REACH]) + self.a.radius + self.b.radius
+        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, most)  # type: ignore[arg-type]
+        return None if near is None or (len(near.facets) > most and end - begin > _SHORTEST) else near.facets
+
+
+def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
+    """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far.
+
+    is_part : whether A and B are compounds, of which rows name the part; else the facet.
     """
-
-    def __init__(self, motions: Motions, k: int):
-        self.whole = motions.picked(np.array([k]))
-        some = [None if X is None else X.copy() for X in self.whole]
-        origin = some[0][0, :3, 3].copy()
-        for X in some[:4]:
-            X[0, :3, 3] -= origin
-        self.X_WA0, self.X_WA1, self.X_WB0, self.X_WB1, self.given_a, self.given_b = some
-        self.d0 = self.X_WB0[0, :3, 3] - self.X_WA0[0, :3, 3]
-        self.v_a = self.X_WA1[0, :3, 3] - self.X_WA0[0, :3, 3]
-        self.v = self.X_WB1[0, :3, 3] - self.X_WA1[0, :3, 3] - self.d0
-        self.omega_a, self.drift_a = velocity_between(self.X_WA0, self.X_WA1, self.given_a)
-        self.omega_b, self.drift_b = velocity_between(self.X_WB0, self.X_WB1, self.given_b)
-        self.farthest = float(np.linalg.norm(self.d0) + np.linalg.norm(self.v)) * (1 + 1e-12)
-
-    def places(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """(X_WA, X_WB), (4, 4) each."""
-        at = np.array([time])
-        return tuple(
-            poses_at(X0, X1, omega, at)[0][0]
-            for X0, X1, omega in (
-                (self.X_WA0, self.X_WA1, self.given_a), (self.X_WB0, self.X_WB1, self.given_b)
-            )
-        )  # fmt: skip
-
-    def speed(self, a: Piece, b: Piece, begin: float, end: float) -> float:
-        """A bound of how fast points of one piece come nearer the other in a span of time [m in unit time]."""
-        w_a, w_b, w = (float(np.linalg.norm(w)) for w in (self.omega_a, self.omega_b, self.omega_b - self.omega_a))
-        ends = [self.d0 + time * self.v for time in (begin, end)]
-        from_world = float(np.linalg.norm(self.v)) + w_a * a.reach + w_b * b.reach
-        from_a = max(float(np.linalg.norm(self.v - np.cross(self.omega_a, d))) for d in ends) + w * b.reach
-        from_b = max(float(np.linalg.norm(self.v - np.cross(self.omega_b, d))) for d in ends) + w * a.reach
-        drift = 2.0 * (1.0 + w_a + w_b) * (self.drift_a * a.reach + self.drift_b * b.reach)
-        rounding = 1e-13 * (w_a + w_b) * self.farthest
-        return (min(from_world, from_a, from_b) + drift + rounding) * (1 + 1e-12)
-
-    def slop(self, a: Piece, b: Piece) -> float:
-        """How far rounding moves points of a piece, against the other [m]."""
-        angle = float(np.linalg.norm(self.omega_a) + np.linalg.norm(self.omega_b))
-        size = a.reach + b.reach + self.farthest + float(np.linalg.norm(self.v_a))
-        return 512 * _ULP * (1.0 + angle) * size + a.slop + b.slop
-
-    def time_of_balls(self, reach: float) -> tuple[float, float]:
-        """The time in which the bodies' origins are within a reach of each other, no shorter than it is; begin > end
-        where they never are."""
-        reach = reach * (1 + 1e-6) + 1e-7 * self.farthest  # far beyond what rounding does to the quadratic
-        square, along = float(self.v @ self.v), float(self.d0 @ self.v)
-        outside = float(self.d0 @ self.d0) - reach * reach
-        if square == 0.0:
-            return (1.0, 0.0) if outside > 0.0 else (0.0, 1.0)
-        discriminant = along * along - square * outside
-        if discriminant < 0.0:
-            return 1.0, 0.0
-        half = math.sqrt(discriminant)
-        return max((-along - half) / square, 0.0), min((-along + half) / square, 1.0)
-
-
-def _search(
-    a: Piece, b: Piece, motions: Motions, motion: _Motion, tolerance: float, row: np.ndarray, of_a: bool, of_b: bool
-) -> None:
-    """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far."""
-    begin, end = motion.time_of_balls(a.reach + b.reach + motion.slop(a, b))
-    spans = [(begin, end)] if begin <= end else []
-    while spans:
-        begin, end = spans.pop()
+    spans = _Spans(a, b, motion)
+    begin, end = spans.time_of_balls()
+    waiting = [(begin, end)] if begin <= end else []
+    while waiting:
+        begin, end = waiting.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
-        middle = 0.5 * (begin + end)
-        near = _near_facets(a, b, motion, begin, end, middle)
+        near = spans.near_facets(begin, end)
         if near is None:
-            spans += [(middle, end), (begin, middle)]
+            middle = 0.5 * (begin + end)
+            waiting += [(middle, end), (begin, middle)]
             continue
         if len(near) == 0:
             continue
         before = float(row["lower"][0])
         table, jobs, ids = _jobs(a, b, near)
-        _do(table, len(table.ints), _parts(a, b), motion.whole, jobs, begin, end, tolerance, row)
+        _do(table, len(table.ints), spans.parts, motion, jobs, begin, end, tolerance, row)
         if row["lower"][0] < before:
-            row["part_a"] = a.number if of_a else ids[int(row["part_a"][0])]
-            row["part_b"] = b.number if of_b else ids[int(row["part_b"][0])]
+            row["part_a"] = a.number if is_part[0] else ids[int(row["part_a"][0])]
+            row["part_b"] = b.number if is_part[1] else ids[int(row["part_b"][0])]
 
 
 def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
@@ -285,15 +254,3 @@ def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.nda
     zeros = np.zeros(len(rows_a), dtype=np.int64)
     jobs = np.ascontiguousarray(np.stack([zeros, rows_a, zeros, rows_b, zeros + 1], axis=1), dtype=np.int64)
     return table, jobs, ids
-
-
-def _near_facets(a: Piece, b: Piece, motion: _Motion, begin: float, end: float, middle: float) -> np.ndarray | None:
-    """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
-    half = 0.5 * (end - begin) * (1 + 1e-12) + 2.0**-52
-    reach = motion.speed(a, b, begin, end) * half + motion.slop(a, b) + a.radius + b.radius
-    X_WA, X_WB = motion.places(middle)
-    most = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
-    near = facets_within(a.tree, b.tree, X_WA @ a.X_CS, X_WB @ b.X_CS, reach, most)  # type: ignore[arg-type]
-    if near is None or len(near.facets) > most and end - begin > _SHORTEST:
-        return None
-    return near.facets
