@@ -29,11 +29,12 @@ from collide.motion.kept_axis import (
     turned_axis,
 )
 from collide.motion.moving_body import ANGLE, DRIFT_REACH, REACH_OF_CORE
-from collide.motion.moving_pair import omega_of, place_pair
+from collide.motion.moving_pair import omega_of, origin_of_b, place_pair
+from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
 from collide.narrowphase.convex_pairs import SIGNATURE
 from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, ROW, UPPER, VERTICES_A, VERTICES_B, view_row
-from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, norm, rotate, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, norm, rotate, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
 _answer_pairs_at = native_call(SIGNATURE)
@@ -47,13 +48,15 @@ MAX_QUERIES = 20000
 #: Spans tried along one axis.
 _MAX_SPANS = 24
 #: An axis is used up where so much of its gap is left.
-_USED_UP = 0.5
+_USED_UP = 0.1
 #: Times asked for a contact behind the gap's root, each a _PROBE_GROWTH farther.
 _MAX_PROBES, _PROBES_ON_THE_WAY, _PROBE_GROWTH = 40, 2, 4.0
 #: Squared sine of the angle between two edges that count as parallel.
 _NEARLY_PARALLEL = 1e-6
 #: Squared change of a unit vector that is too much to go on from.
 _LARGE_TURN = 0.25
+#: An axis of GJK that is worse than its bound is mixed with the one kept, in so many parts.
+_AXES_BETWEEN = 8
 #: How far a time is moved at least, in units of its own last place.
 _LEAST_STEP = 2.0**-52
 
@@ -111,7 +114,8 @@ def _is_contact(row):
 def search_contact(motion, asking, begin, end, tolerance):
     """The `Search` for the first contact in begin … end; the row at ``asking.row_at`` becomes that of its lower time.
 
-    Before ``begin`` the pair is known to be free.   tolerance : the bracket's width [unit time] that is to be reached if it can be.
+    Before ``begin`` the pair is known to be free.
+    tolerance : the bracket's width [unit time] that is to be reached if it can be.
     """
     first = begin
     if not motion.is_plane:
@@ -132,14 +136,21 @@ def search_contact(motion, asking, begin, end, tolerance):
         return Search(OPEN_START, 0.0, upper, n_queries + more)
     time, upper = begin, math.inf
     axis = _axis_of(motion, row)
+    kept = AxisGap(-math.inf, 0.0, axis)
     while n_queries < MAX_QUERIES:
         last = min(end, upper)
-        gap = gap_along(motion, time, axis)
+        if time == last and upper == math.inf and row.doubles[LOWER] > 0.0:
+            return Search(FREE, end, end, n_queries)
+        gap = _good_axis(motion, time, gap_along(motion, time, axis), kept, row.doubles[LOWER])
         later = time
         if gap.gap > 0.0:
             later, gap = _follow_axis(motion, time, gap, last)
-            if later == last and upper == math.inf:
-                return Search(FREE, end, end, n_queries)
+            kept = gap
+        elif row.doubles[LOWER] > 0.0 and not motion.is_plane:
+            later = _go_slowly(motion, time, row.doubles[LOWER], last)
+            kept = AxisGap(-math.inf, 0.0, axis)
+        if later == last and later > time and upper == math.inf:
+            return Search(FREE, end, end, n_queries)
         is_stuck = not later > time
         if later > time:
             place_pair(motion, later)
@@ -270,6 +281,36 @@ def _follow_axis(motion, time, gap, end):
             missed = 0.5 * bound * root * root + 4.0 * motion.error
             passed = min(root * (1.0 - min(0.5, missed / gap.gap)), _longest_span(gap.gap, 0.0, bound))
     return time, gap
+
+
+@kernel
+def _good_axis(motion, time, gap, kept, lower):
+    """The `AxisGap` of the pair as it is placed, of the better of two axes and of some between them.
+
+    gap : along the normal that GJK ends with. Beside curved cores that may be worse than the plane that proved its
+    bound ``lower``: the simplex is thin, the normal that of its last sliver.   kept : at the same time, or without a gap.
+    """
+    if gap.gap > 0.5 * lower or motion.is_plane or not kept.gap > -math.inf:
+        return gap
+    best = gap if gap.gap > kept.gap else kept
+    for k in range(1, _AXES_BETWEEN):
+        share = k / _AXES_BETWEEN
+        n = add(scale(1.0 - share, kept.axis.n), scale(share, gap.axis.n))
+        length = norm(n)
+        if length > 0.5:
+            between = gap_along(motion, time, axis_turning(divide(n, length), kept.axis.turning))
+            if between.gap > best.gap:
+                best = between
+    return best
+
+
+@kernel
+def _go_slowly(motion, time, lower, end):
+    """A later time, no later than ``end``, up to which the pair is free by its distance and a bound of its speed."""
+    d_begin, d_end = origin_of_b(motion, time), origin_of_b(motion, end)
+    speed = speed_bound(motion.a, motion.b, motion.v, d_begin, d_end)
+    passed = 0.99 * lower / speed if speed > 0.0 else end
+    return time + passed if passed < end - time else end
 
 
 @kernel(inline=True)

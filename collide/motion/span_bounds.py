@@ -1,13 +1,6 @@
 """A span of time of two pieces in motion: where they are at its middle, and how near that lets them come.
 
-In a span of length h around its middle no point of one piece moves more than μ h / 2 against the other, μ a bound of its
-speed: Mirtich's motion bound ("Impulse-based dynamic simulation of rigid body systems", 1996), the least of three, as
-seen from the world, from A and from B. From A, whose origin is where positions are taken from, a point r of B's, at d
-from there, moves by
-
-    v + ω_B × r − ω_A × (d + r)  =  (v − ω_A × d) + (ω_B − ω_A) × r :
-
-bodies that turn together stand still.
+Facets that may meet in the span are within μ h / 2 at its middle, h its length, μ of `speed_bound.py`.
 """
 
 from __future__ import annotations
@@ -16,7 +9,6 @@ from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.compound_table import PART
 from collide.lowering.shape_table import POSE, POSE_SLOP
 from collide.motion.moving_body import (
-    ANGLE,
     BODY,
     DRIFT_REACH,
     OUTWARD,
@@ -24,9 +16,10 @@ from collide.motion.moving_body import (
     place_body,
     set_body,
 )
-from collide.motion.moving_pair import omega_of, origin_error
+from collide.motion.moving_pair import origin_error
+from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
-from collide.numerics.vec3 import Vec3, add, cross, norm, scale, sub
+from collide.numerics.vec3 import Vec3, add, norm, scale, sub
 
 # Addresses of a motion: poses of A and B at both ends, angular velocities or 0; two rows of parts, and three doubles:
 # how far points of each piece are from the piece's own origin, and what is added to what they reach [m].
@@ -92,19 +85,3 @@ def _put_matrix(poses, at, out, to):
         out[to + 4 * i + 3] = poses[at + 9 + i]
         out[to + 12 + i] = 0.0
     out[to + 15] = 1.0
-
-
-@kernel
-def speed_bound(a, b, v, d_begin, d_end):
-    """μ of two moving bodies whose origins are from d_begin to d_end apart, in a straight line [m in unit time]."""
-    omega_a, omega_b = omega_of(a), omega_of(b)
-    reach_a, reach_b = a[REACH_OF_CORE], b[REACH_OF_CORE]
-    turning = norm(sub(omega_b, omega_a))
-    from_world = norm(v) + a[ANGLE] * reach_a + b[ANGLE] * reach_b
-    # what is linear in time is largest at one of the ends
-    moved_a = max(norm(sub(v, cross(omega_a, d_begin))), norm(sub(v, cross(omega_a, d_end))))
-    moved_b = max(norm(sub(v, cross(omega_b, d_begin))), norm(sub(v, cross(omega_b, d_end))))
-    from_a, from_b = moved_a + turning * reach_b, moved_b + turning * reach_a
-    drift = (1.0 + a[ANGLE] + b[ANGLE]) * (a[DRIFT_REACH] + b[DRIFT_REACH])
-    size = norm(v) + (a[ANGLE] + b[ANGLE]) * (reach_a + reach_b + norm(d_begin) + norm(d_end))
-    return min(from_world, from_a, from_b) * OUTWARD + drift + 2.0**-46 * size

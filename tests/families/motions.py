@@ -85,7 +85,7 @@ def _sphere_and_round(rng) -> Pair:
 
 
 def _half_space(rng) -> Pair:
-    normal, offset = rng.normal(size=3), float(rng.uniform(-0.5, 0.5))
+    normal, offset = rng.normal(size=3), float(rng.uniform(-2.5, -0.5))
     points = rng.normal(0.0, 0.5, (rng.integers(4, 20), 3))
     radius = float(rng.choice([0.0, 0.2]))
     B = collide.ConvexHull(points, radius=radius)
@@ -139,16 +139,19 @@ def _group(name, rng, n, pair: Pair, *, spread=1.5, turn=None, omega=None, fast=
 
 
 def _grazing(name, rng, n, pair: Pair) -> Group:
-    """Motions whose least gap is moved to within 1e-9 of 0: B's path is shifted along the direction of the least gap,
-    bisected until it is."""
+    """Motions whose least gap is all but 0: bodies whose origins meet half-way, B's path then shifted to the side by as
+    much as just clears it, and a little."""
     group = _group(name, rng, n, pair, spread=1.5, turn=0.5)
+    A, B = group.motions()
+    half = np.full(n, 0.5)
+    group = _shifted(group, A.at(half)[1] - B.at(half)[1])
     shift = rng.normal(size=(n, 3))
     shift /= np.linalg.norm(shift, axis=1)[:, None]
     low, high = np.zeros(n), np.full(n, 8.0)  # overlapping (mostly), free
     for _ in range(42):
         middle = 0.5 * (low + high)
         A, B = _shifted(group, middle[:, None] * shift).motions()
-        free = oracle.judge(group.gap, A, B, np.ones(n), np.ones(n), samples=24, rounds=8).least > 0.0
+        free = oracle.judge(group.gap, A, B, np.ones(n), np.ones(n), samples=48, rounds=12).least > 0.0
         low, high = np.where(free, low, middle), np.where(free, middle, high)
     off = rng.choice([-1e-7, -1e-10, 0.0, 1e-10, 1e-7], n)
     return _shifted(group, (high + off)[:, None] * shift)

@@ -60,7 +60,7 @@ def test_no_contact_is_missed_and_none_is_made_up(family):
 def test_grazing_motions_are_decided_or_said_to_be_open():
     group = motions.FAMILIES["grazing"](np.random.default_rng(3), 120)
     r = asked(group)
-    least = oracle.judge(group.gap, *group.motions(), np.ones(120), np.ones(120), samples=64, rounds=9).least
+    least = oracle.judge(group.gap, *group.motions(), np.ones(120), np.ones(120), samples=96, rounds=12).least
     near = np.abs(least) < 1e-6
     assert near.sum() >= 60, "they are to graze"
     clear = least > 1e-11
