@@ -33,7 +33,7 @@ from collide.motion.moving_pair import omega_of, origin_of_b, place_pair
 from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
 from collide.narrowphase.convex_pairs import SIGNATURE
-from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, ROW, UPPER, VERTICES_A, VERTICES_B, view_row
+from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, UPPER, VERTICES_A, VERTICES_B, view_row
 from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, norm, rotate, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
@@ -76,8 +76,8 @@ class Search(NamedTuple):
 class Asking(NamedTuple):
     """What a question to `answer_pairs` takes: its address, the addresses of its arguments, and those of two rows.
 
-    header : view of addresses: the kernel, a `ShapeTable`'s integers and numbers, poses, shape rows, the pair, workspace
-    of doubles and of integers.   row_at : of the last free time.   probe_at : of times tried.
+    header : view of addresses: the kernel, a `ShapeTable`'s integers and numbers, poses, shape rows, the pair,
+    workspace of doubles and of integers.   row_at : of the last free time.   probe_at : of times tried.
     """
 
     header: Any
@@ -126,21 +126,35 @@ def search_contact(motion, asking, begin, end, tolerance):
         return Search(FREE, end, end, 0)
     place_pair(motion, begin)
     row = ask_pair(asking, asking.row_at)
-    n_queries = 1
     if row.flags[HOW] == REFUSED:
-        return Search(TOO_SMALL, begin, begin, n_queries)
+        return Search(TOO_SMALL, begin, begin, 1)
     if _is_contact(row) and begin == first:
-        return Search(CONTACT, begin, begin, n_queries)
+        return Search(CONTACT, begin, begin, 1)
     if not row.doubles[LOWER] > 0.0 and begin == 0.0:
         upper, more = _find_contact(motion, asking, 0.0, AxisGap(0.0, 0.0, _axis_of(motion, row)), end, _MAX_PROBES)
-        return Search(OPEN_START, 0.0, upper, n_queries + more)
-    time, upper = begin, math.inf
+        return Search(OPEN_START, 0.0, upper, 1 + more)
+    return _search_from(motion, asking, row, Time(begin, end, tolerance))
+
+
+class Time(NamedTuple):
+    """begin : a time when the pair is free, or not proven to meet.   end : of the search.   tolerance : of a
+    bracket."""
+
+    begin: float
+    end: float
+    tolerance: float
+
+
+@kernel
+def _search_from(motion, asking, row, span):
+    """`search_contact` from a time on whose row is known."""
+    time, upper, n_queries = span.begin, math.inf, 1
     axis = _axis_of(motion, row)
     kept = AxisGap(-math.inf, 0.0, axis)
     while n_queries < MAX_QUERIES:
-        last = min(end, upper)
+        last = min(span.end, upper)
         if time == last and upper == math.inf and row.doubles[LOWER] > 0.0:
-            return Search(FREE, end, end, n_queries)
+            return Search(FREE, last, last, n_queries)
         gap = _good_axis(motion, time, gap_along(motion, time, axis), kept, row.doubles[LOWER])
         later = time
         if gap.gap > 0.0:
@@ -149,25 +163,23 @@ def search_contact(motion, asking, begin, end, tolerance):
         elif row.doubles[LOWER] > 0.0 and not motion.is_plane:
             later = _go_slowly(motion, time, row.doubles[LOWER], last)
             kept = AxisGap(-math.inf, 0.0, axis)
-        if later == last and later > time and upper == math.inf:
-            return Search(FREE, end, end, n_queries)
         is_stuck = not later > time
-        if later > time:
+        if later == last and upper == math.inf and not is_stuck:
+            return Search(FREE, last, last, n_queries)
+        if not is_stuck:
             place_pair(motion, later)
             row = ask_pair(asking, asking.row_at)
             n_queries += 1
             axis = _next_axis(motion, row, axis.n, later - time)
             time = later
-        if is_stuck or _is_near(gap, tolerance):
-            if upper == math.inf or is_stuck:
-                proven, more = _find_contact(motion, asking, time, gap, last, _MAX_PROBES if is_stuck else _PROBES_ON_THE_WAY)
-                upper = min(upper, proven)
-                n_queries += more
-                place_pair(motion, time)
-            if is_stuck:
-                return Search(OPEN if upper == math.inf else CONTACT, time, upper, n_queries)
-        if upper - time <= tolerance:
-            return Search(CONTACT, time, upper, n_queries)
+        if is_stuck or (upper == math.inf and _is_near(gap, span.tolerance)):
+            max_probes = _MAX_PROBES if is_stuck else _PROBES_ON_THE_WAY
+            proven, n_probes = _find_contact(motion, asking, time, gap, last, max_probes)
+            upper = min(upper, proven)
+            n_queries += n_probes
+            place_pair(motion, time)
+        if is_stuck or upper - time <= span.tolerance:
+            break
     return Search(OPEN if upper == math.inf else CONTACT, time, upper, n_queries)
 
 
@@ -288,7 +300,8 @@ def _good_axis(motion, time, gap, kept, lower):
     """The `AxisGap` of the pair as it is placed, of the better of two axes and of some between them.
 
     gap : along the normal that GJK ends with. Beside curved cores that may be worse than the plane that proved its
-    bound ``lower``: the simplex is thin, the normal that of its last sliver.   kept : at the same time, or without a gap.
+    bound ``lower``: the simplex is thin, the normal that of its last sliver.   kept : at the same time, or without a
+    gap.
     """
     if gap.gap > 0.5 * lower or motion.is_plane or not kept.gap > -math.inf:
         return gap

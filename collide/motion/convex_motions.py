@@ -16,6 +16,7 @@ from collide.motion.impact_rows import free_rows
 from collide.motion.moving_body import BODY
 from collide.narrowphase.convex_pairs import answer_pairs
 from collide.narrowphase.convex_queries import scratch
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
@@ -40,6 +41,10 @@ class Motions(NamedTuple):
     def picked(self, some: np.ndarray) -> Motions:
         """Those of these numbers; what goes with all stays as it is."""
         return Motions(*(X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self))
+
+    def spread(self, n: int) -> Motions:
+        """The same with n of everything."""
+        return Motions(*(X if X is None else np.broadcast_to(X, (n, *X.shape[1:])) for X in self))
 
 
 class Tables(NamedTuple):
@@ -90,6 +95,7 @@ class _Bodies:
         layouts = [layout_of(shape) for shape in shapes]
         self.counts = np.array([len(layout.packed) for layout in layouts], dtype=np.int64)
         self.first = np.cumsum(self.counts) - self.counts
+        self.is_simple = len(layouts) == int(self.counts.sum())
         self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
         self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
         self.table.build_trees(np.arange(len(self.table.packed)))
@@ -97,11 +103,25 @@ class _Bodies:
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
         on."""
+        if self.is_simple:
+            row_a, row_b = self.first[a], self.first[b]
+            return np.ascontiguousarray(np.array([np.arange(first, first + len(a)), row_a, row_a, row_b, row_b]).T)
         n_b, counts = self.counts[b], self.counts[a] * self.counts[b]
         motion = np.repeat(np.arange(len(a)), counts)
         which = np.arange(len(motion)) - np.repeat(np.cumsum(counts) - counts, counts)
         part_a, part_b = self.first[a][motion] + which // n_b[motion], self.first[b][motion] + which % n_b[motion]
         return np.ascontiguousarray(np.stack([motion + first, part_a, part_a, part_b, part_b], axis=1))
+
+
+def _bodies_of(shapes: list[Shape]) -> _Bodies:
+    """Those of one pair are kept with A: a simulator asks about the same two again and again."""
+    if len(shapes) > 2:
+        return _Bodies(shapes)
+    bodies = prepared_pair(shapes[0], shapes[-1], "_moving")
+    if bodies is None:
+        bodies = _Bodies(shapes)
+        keep_prepared(shapes[0], shapes[-1], bodies, "_moving")
+    return bodies
 
 
 def convex_impacts(
@@ -113,7 +133,7 @@ def convex_impacts(
     """
     n = len(a)
     rows = free_rows(n)
-    bodies = _Bodies(shapes)
+    bodies = _bodies_of(shapes)
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
     at_once = max(_JOBS_AT_ONCE // per_motion, 1)
 

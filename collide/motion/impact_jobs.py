@@ -9,7 +9,18 @@ from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
 from collide.lowering.compound_table import PART
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, RANK
-from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL, Asking, search_contact
+from collide.motion.convex_impact import (
+    CONTACT,
+    FREE,
+    INTS_AT,
+    NUMBERS_AT,
+    OPEN_START,
+    POSES_AT,
+    SHAPE_OF_AT,
+    TOO_SMALL,
+    Asking,
+    search_contact,
+)
 from collide.motion.moving_body import BODY
 from collide.motion.moving_pair import Given, moving_pair
 from collide.narrowphase.rows import NORMAL, POINT_A, POINT_B, view_row
@@ -60,13 +71,13 @@ class Span(NamedTuple):
 def find_impacts(header_at, jobs_at, n, begin, end, tolerance, rows_at):
     """Do n jobs, those of one motion one after another, for the time begin … end; returns 0. Before they are free.
 
-    rows : one a motion, as `clear_impacts` leaves it. A row keeps the earliest of what its jobs find, and what is proven
-    to be no earlier than a proven contact is not looked at.
+    rows : one a motion, as `clear_impacts` leaves it. A row keeps the earliest of what its jobs find, and what is
+    proven to be no earlier than a proven contact is not looked at.
     """
     header = view_i64(header_at, HEADER)
     motions = Motions(
-        header, view_f64(header[PARTS_AT], PART * header[N_PARTS]), view_i64(header[1], INTS * header[N_SHAPES]),
-        view_f64(header[2], NUMBERS * header[N_SHAPES]), view_f64(header[3], 2 * POSE),
+        header, view_f64(header[PARTS_AT], PART * header[N_PARTS]), view_i64(header[INTS_AT], INTS * header[N_SHAPES]),
+        view_f64(header[NUMBERS_AT], NUMBERS * header[N_SHAPES]), view_f64(header[POSES_AT], 2 * POSE),
     )  # fmt: skip
     asking = Asking(header, header[ROW_AT], header[PROBE_AT])
     for k in range(n):
@@ -105,7 +116,8 @@ def _given(motions, job, is_b):
 
 @kernel(inline=True)
 def _exchange(motions, job):
-    """Whether to work on (B, A): a half-space first, then by content of the shapes, then by the numbers of the motion."""
+    """Whether to work on (B, A): a half-space first, then by content of the shapes, then by the numbers of the
+    motion."""
     ints = motions.ints
     sa, sb = job[SHAPE_A], job[SHAPE_B]
     is_plane_a, is_plane_b = ints[INTS * sa + KIND] == HALFSPACE, ints[INTS * sb + KIND] == HALFSPACE
@@ -140,7 +152,7 @@ def _do_job(motions, asking, job, span, answer_at):
     a = view_f64(motions.header[BODIES_AT], BODY)
     b = view_f64(motions.header[BODIES_AT] + 8 * BODY, BODY)
     sa, sb = job[SHAPE_B if flip else SHAPE_A], job[SHAPE_A if flip else SHAPE_B]
-    shape_of = view_i64(motions.header[4], 2)
+    shape_of = view_i64(motions.header[SHAPE_OF_AT], 2)
     shape_of[0] = sa
     shape_of[1] = sb
     given_a = _given(motions, job, flip)

@@ -14,7 +14,7 @@ from collide.lowering.kinds import Kind, kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import Motions, convex_impacts
 from collide.motion.impact_jobs import WRONG_TURN
-from collide.motion.impact_rows import IMPACT_DTYPE, TimeOfImpact, as_result, free_rows
+from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.placed_motion import poses_at
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_bodies import Question
@@ -24,7 +24,7 @@ from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.threads import check_threads, share_if_it_helps
-from collide.transforms import LARGEST, SMALLEST, poses_as_given
+from collide.transforms import LARGEST, SMALLEST, as_pose, poses_as_given
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -77,23 +77,23 @@ def time_of_impact(
     InvalidPose
         Naming the pose of the batch that is no rigid transform.
     UnsupportedQuery
-        For two half-spaces that are apart at the start (the slightest tilt lets them meet, somewhere), and pairs smaller
-        than 1e-50 m.
+        For two half-spaces that are apart at the start (the slightest tilt lets them meet, somewhere), and pairs
+        smaller than 1e-50 m.
 
     Notes
     -----
-    Conservative advancement (Mirtich 1996; Zhang et al. 2006; Tang, Kim and Manocha 2009) along separating axes that are
-    kept, with spans proven by the chord of a function of bounded curvature (`motion/kept_axis.py`); facets of meshes
-    are culled span by span with motion bounds. Convex pairs: 2 to 8 questions to GJK, some microseconds. Spins: steps
-    are about √(gap / (|ω|² reach)), so a pair of many turns takes some steps a turn.
+    Conservative advancement (Mirtich 1996; Zhang et al. 2006; Tang, Kim and Manocha 2009) along separating axes that
+    are kept, with spans proven by the chord of a function of bounded curvature (`motion/kept_axis.py`); facets of
+    meshes are culled span by span with motion bounds. Convex pairs: 2 to 8 questions to GJK, some microseconds. Spins:
+    steps are about √(gap / (|ω|² reach)), so a pair of many turns takes some steps a turn.
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)
     given = {"X_WA0": X_WA0, "X_WA1": X_WA1, "X_WB0": X_WB0, "X_WB1": X_WB1}
-    poses, singles = zip(*(poses_as_given(X, name, check=check_poses) for name, X in given.items()))
-    omegas, single_omegas = zip(*(_checked_omega(w, name) for name, w in (("omega_WA", omega_WA), ("omega_WB", omega_WB))))
-    counts = {name: len(X) for name, X in zip(given, poses)}
-    counts |= {name: len(w) for name, w in zip(("omega_WA", "omega_WB"), omegas) if w is not None}
+    poses, singles = zip(*(_checked_poses(X, name, check_poses) for name, X in given.items()))
+    turns = {"omega_WA": omega_WA, "omega_WB": omega_WB}
+    omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
+    counts = {name: len(X) for name, X in zip((*given, *turns), (*poses, *omegas)) if X is not None}
     single = all(singles) and all(single_omegas)
     n, are_shapes = matched_counts(A, B, counts)
     question = _Question(*_distinct(A, B, n), Motions(*poses, *omegas), width, n_threads)
@@ -127,7 +127,8 @@ def poses_in_motion(
     InvalidPose
         Where a matrix is no rigid transform.
     """
-    (X0, single0), (X1, single1) = poses_as_given(X_WA0, "X_WA0", check=True), poses_as_given(X_WA1, "X_WA1", check=True)
+    X0, single0 = _checked_poses(X_WA0, "X_WA0", True)
+    X1, single1 = _checked_poses(X_WA1, "X_WA1", True)
     omega, single_omega = _checked_omega(omega_WA, "omega_WA")
     array = checks.array("poses_in_motion: time", time, "() or (N,)", InvalidArgument)
     times = np.ascontiguousarray(array.reshape(-1))
@@ -165,7 +166,7 @@ def moved_poses(X_WA0: PoseLike, velocity_WA: ArrayLike, omega_WA: ArrayLike) ->
     InvalidArgument, InvalidPose
         Where numbers are not finite, or lengths do not match.
     """
-    X, single = poses_as_given(X_WA0, "X_WA0", check=True)
+    X, single = _checked_poses(X_WA0, "X_WA0", True)
     omega, single_omega = _checked_omega(omega_WA, "omega_WA")
     velocity, single_velocity = _vectors(velocity_WA, "velocity_WA")
     if omega is None:
@@ -186,6 +187,13 @@ def moved_poses(X_WA0: PoseLike, velocity_WA: ArrayLike, omega_WA: ArrayLike) ->
 
 #: Entries of a matrix at the end that miss the motion by more are not where the motion leads.
 _LARGEST_MISFIT = 4e-4
+
+
+def _checked_poses(X, name: str, check: bool) -> tuple[np.ndarray, bool]:
+    """(poses (n, 4, 4), whether a single one was given)."""
+    if check and type(X) is np.ndarray and X.shape == (4, 4):
+        return np.ascontiguousarray(as_pose(X, name))[None], True
+    return poses_as_given(X, name, check=check)
 
 
 def _checked_tolerance(tolerance) -> float:
@@ -346,8 +354,8 @@ def _refuse_planes(question: _Question, some: np.ndarray) -> None:
     if len(some):
         names = " and ".join(type(question.shapes[side[some[0]]]).__name__ for side in (question.a, question.b))
         raise UnsupportedQuery(
-            f"time_of_impact of {names} (motion {some[0]}): two half-spaces that start apart meet as soon as one tilts, "
-            "however far away; a large Box can stand in for one of them"
+            f"time_of_impact of {names} (motion {some[0]}): two half-spaces that start apart meet as soon as one "
+            "tilts, however far away; a large Box can stand in for one of them"
         )
 
 
@@ -356,7 +364,7 @@ def _surfaces(question: _Question, rows: np.ndarray, some: np.ndarray) -> None:
     for key in np.unique(a * len(shapes) + b).tolist():
         which = some[a * len(shapes) + b == key]
         A, B = shapes[key // len(shapes)], shapes[key % len(shapes)]
-        motions = Motions(*(X if X is None else np.broadcast_to(X, (len(rows), *X.shape[1:])) for X in question.motions))
+        motions = question.motions.spread(len(rows))
 
         def work(piece: slice, A=A, B=B, which=which, motions=motions) -> None:
             part = free_rows(len(which[piece]))
@@ -381,5 +389,6 @@ def _refuse(question: _Question, rows: np.ndarray) -> None:
         kind = InvalidArgument if given else InvalidPose
         raise kind(f"motion {k}: " + _leads_elsewhere("omega_WA or omega_WB", "the first pose", "the second", given))
     raise UnsupportedQuery(
-        f"motion {k}: a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
+        f"motion {k}: a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range; "
+        "scale it"
     )

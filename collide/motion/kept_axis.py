@@ -2,14 +2,14 @@
 
 Let n(τ) be a unit vector that turns with a constant angular velocity Ω: with the world (Ω = 0), with A or with B. For
 points a of A and b of B let f(τ) = n(τ)·(x_b(τ) − x_a(τ)), and F(τ) the least of all f(τ) less the radii: the gap along
-n, a lower bound of the distance. If f″ ≤ K for all points, f lies above its chord by no less than −K/2 (τ − t0)(t1 − τ),
-and so does the least of them. With s0 = F(t0) > 0 and s1 = F(t1) > 0 therefore
+n, a lower bound of the distance. If f″ ≤ K for all points, f lies above its chord by no less than −K/2 (τ − t0)(t1 −
+τ), and so does the least of them. With s0 = F(t0) > 0 and s1 = F(t1) > 0 therefore
 
     F > 0 on the whole of [t0, t1]   if   K (t1 − t0)² / 2  <  (√s0 + √s1)².
 
 Proof: (1 − x) s0 + x s1 − c x (1 − x), c the left side, has its minimum s0 − (s0 + c − s1)² / 4c, if that lies within
-0 < x < 1; it is positive where s0 + c − s1 < 2 √(c s0), which is (√c − √s0)² < s1. A step is long as the root of the gap,
-where motion bounds of first order (Mirtich 1996; Zhang et al. 2006, C2A: Tang, Kim and Manocha 2009) allow one in
+0 < x < 1; it is positive where s0 + c − s1 < 2 √(c s0), which is (√c − √s0)² < s1. A step is long as the root of the
+gap, where motion bounds of first order (Mirtich 1996; Zhang et al. 2006, C2A: Tang, Kim and Manocha 2009) allow one in
 proportion to the gap; for translations K = 0, and one axis proves all of a motion that it separates at both ends.
 Between features that stay the same one axis serves up to the contact (Catto, "Continuous collision", 2013: axes of
 points and of faces), here by a chord that is proven instead of samples.

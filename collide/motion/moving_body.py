@@ -14,8 +14,8 @@ problem. Everything else is exact reals, and the poses computed here miss them b
 
 Derivation: û is good to 4u, the angle to 3u·|ω|, sine and cosine to 2u; so an entry of Rot is good to 20u and 3u·|ω| of
 its row's turn, its product with R0 to 3u more of what it sums; Frobenius' norm of all nine is at most 70u + 3u·|ω|. D
-is off by as much at the end of the motion, in proportion before, and its sum with the rest by a rounding: 144u + 6u·|ω|.
-d0, d1, their difference, product with τ and sum round once each, coordinate by coordinate.
+is off by as much at the end of the motion, in proportion before, and its sum with the rest by a rounding: 144u +
+6u·|ω|. d0, d1, their difference, product with τ and sum round once each, coordinate by coordinate.
 
 Positions are taken from A's origin as it moves, so that precision does not depend on where in the world the bodies are.
 """
@@ -31,9 +31,9 @@ from collide.motion.rotations import Matrix3, apply, rotation_about, rotation_be
 from collide.narrowphase.posed_pair import stretch_of
 from collide.numerics.vec3 import Vec3, add, divide, norm, put_vec3, rotate, scale, vec3_at
 
-# Doubles of a body: ω, û, |ω|; R0 and D of its core, row by row; where the core's frame is from the body's origin at the
-# start, and what D adds to that; bounds of how far a point of the core is from the origin but for D, and of what D adds;
-# slop of a pose.
+# Doubles of a body: ω, û, |ω|; R0 and D of its core, row by row; where the core's frame is from the body's origin at
+# the start, and what D adds to that; bounds of how far a point of the core is from the origin but for D, and of what D
+# adds; slop of a pose.
 OMEGA, AXIS, ANGLE, START, DRIFT, ARM, ARM_DRIFT, REACH_OF_CORE, DRIFT_REACH, POSE_ERROR = (
     0, 3, 6, 7, 16, 25, 28, 31, 32, 33,
 )  # fmt: skip

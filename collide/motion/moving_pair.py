@@ -8,7 +8,6 @@ from collide.kernels import kernel
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import NUMBERS, POSE, RADIUS, REACH, SLOP
 from collide.motion.moving_body import (
-    ANGLE,
     DRIFT_REACH,
     OMEGA,
     OUTWARD,

@@ -3,9 +3,9 @@
 A piece is a mesh or a convex shape at a pose in its body. In a span of length h around its middle no point of one body
 comes nearer the other than μ h / 2, μ a bound of the speed of one body seen from the world, from A or from B (motion
 bounds, Mirtich 1996). Facets farther apart than that at the middle are free in all of the span (facets_within: a
-traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span is
-cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are apart
-at the start first meet in their surfaces, and a surface is its facets.
+traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span
+is cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are
+apart at the start first meet in their surfaces, and a surface is its facets.
 
 A half-space meets a mesh where it meets the mesh's hull.
 """
@@ -26,11 +26,11 @@ from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
+from collide.mesh.bvh import MeshTree
 from collide.motion.convex_motions import Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
-from collide.mesh.bvh import MeshTree
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh

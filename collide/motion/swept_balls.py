@@ -16,8 +16,8 @@ def time_of_balls(d0, v, farthest, reach, begin, end):
 
     d0, v : from one origin to the other at time 0, and how that changes in unit time.   farthest : bound of its length.
 
-    The distance is a convex function of time: where it is more than the reach and grows, it has passed; where it is more
-    and falls, nothing was before.
+    The distance is a convex function of time: where it is more than the reach and grows, it has passed; where it is
+    more and falls, nothing was before.
     """
     reach = (reach + origin_error(farthest)) * (1.0 + 2.0**-40)
     along, square = dot(d0, v), dot(v, v)

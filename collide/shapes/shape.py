@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_pieces", "_prepared", "_serial", "_surface",
-        "_topology", "_union", "_walk",
+        "__weakref__", "_bounds", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial",
+        "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -33,6 +33,8 @@ class Shape:
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
+    #: The same for times of impact (`motion/convex_motions.py`).
+    _moving: dict[int, Any]
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.

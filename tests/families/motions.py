@@ -78,9 +78,11 @@ def _sphere_and_round(rng) -> Pair:
         distance = oracle.box_distance(0.5 * size)
         extent = float(np.linalg.norm(size))
     elif kind == 1:
-        B, distance, extent = collide.Cylinder(radius, length), oracle.cylinder_distance(radius, length), radius + length
+        B, distance = collide.Cylinder(radius, length), oracle.cylinder_distance(radius, length)
+        extent = radius + length
     else:
-        B, distance, extent = collide.Cone(radius, length), oracle.cone_distance(radius, length), radius + length
+        B, distance = collide.Cone(radius, length), oracle.cone_distance(radius, length)
+        extent = radius + length
     return collide.Sphere(r), B, oracle.point_gap(distance, r), float(r + extent)
 
 
@@ -148,10 +150,10 @@ def _grazing(name, rng, n, pair: Pair) -> Group:
     shift = rng.normal(size=(n, 3))
     shift /= np.linalg.norm(shift, axis=1)[:, None]
     low, high = np.zeros(n), np.full(n, 8.0)  # overlapping (mostly), free
-    for _ in range(42):
+    for _ in range(36):
         middle = 0.5 * (low + high)
         A, B = _shifted(group, middle[:, None] * shift).motions()
-        free = oracle.judge(group.gap, A, B, np.ones(n), np.ones(n), samples=48, rounds=12).least > 0.0
+        free = oracle.judge(group.gap, A, B, np.ones(n), np.ones(n), samples=32, rounds=10).least > 0.0
         low, high = np.where(free, low, middle), np.where(free, middle, high)
     off = rng.choice([-1e-7, -1e-10, 0.0, 1e-10, 1e-7], n)
     return _shifted(group, (high + off)[:, None] * shift)

@@ -1,7 +1,7 @@
 """First contacts by dense sampling and subdivision: no code of the engine, numpy and scipy alone.
 
-A body's pose at a time is worked out with scipy's rotations; how far two bodies are apart comes from separating axes, all
-of them, or from closed forms. Where bodies overlap the value is negative. `contact_before` and `judge` look at many
+A body's pose at a time is worked out with scipy's rotations; how far two bodies are apart comes from separating axes,
+all of them, or from closed forms. Where bodies overlap the value is negative. `contact_before` and `judge` look at many
 times, and ever closer at those around the least values and around the first contact found.
 """
 
@@ -51,8 +51,8 @@ def judge(
 ) -> Judged:  # fmt: skip
     """Look for contacts before ``lower`` (1 where a motion is said to be free).
 
-    tolerance : gaps below minus this are contacts [m].   samples : times to begin with, evenly.   rounds : of subdivision:
-    each looks at eight times between the neighbours of the least gap so far.
+    tolerance : gaps below minus this are contacts [m].   samples : times to begin with, evenly.   rounds : of
+    subdivision: each looks at eight times between the neighbours of the least gap so far.
     """
 
     def at(time: np.ndarray) -> np.ndarray:

@@ -1,0 +1,171 @@
+"""Meshes in motion: judged by sampling of the convex pieces they are made of, and beside the same bodies as hulls."""
+
+from __future__ import annotations
+
+import motion_oracle as oracle
+import motions
+import numpy as np
+import pytest
+
+import collide
+
+
+def box_mesh(size, centre=(0.0, 0.0, 0.0)) -> collide.Mesh:
+    vertices, faces = collide.tessellate(collide.Box(size), tolerance=1.0)
+    return collide.Mesh(vertices + np.array(centre), faces)
+
+
+#: An L of two boxes: its profile in x and y, extruded along z.
+L_PROFILE = np.array([(0, 0), (2, 0), (2, 0.5), (0.5, 0.5), (0.5, 1.5), (0, 1.5)], dtype=float)
+L_BOXES = (((2.0, 0.5, 0.6), (1.0, 0.25, 0.0)), ((0.5, 1.5, 0.6), (0.25, 0.75, 0.0)))
+
+
+def l_mesh(solid: bool = True) -> collide.Mesh:
+    low, high = np.c_[L_PROFILE, np.full(6, -0.3)], np.c_[L_PROFILE, np.full(6, 0.3)]
+    cap = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
+    sides = [f for k in range(6) for f in ((k, (k + 1) % 6, 6 + (k + 1) % 6), (k, 6 + (k + 1) % 6, 6 + k))]
+    faces = np.concatenate([cap[:, ::-1], cap + 6, np.array(sides)])
+    mesh = collide.Mesh(np.concatenate([low, high]), faces)
+    assert mesh.solid == solid
+    return mesh
+
+
+def moved_features(features, centre):
+    points, normals, edges = features
+    return points + np.array(centre), normals, edges
+
+
+def l_gap(features) -> oracle.Gap:
+    return oracle.union_gap(
+        [oracle.polytope_gap(*moved_features(oracle.box_features(size), at), *features) for size, at in L_BOXES]
+    )
+
+
+def judge(A, B, gap, seed: int, n: int = 50, least_hits: int = 10, **options):
+    """Ask and judge; returns the answer."""
+    group = motions._group("meshes", np.random.default_rng(seed), n, (A, B, gap, 4.0), spread=2.0, **options)
+    r = collide.time_of_impact(A, B, *group.poses, omega_WA=group.omega_WA, omega_WB=group.omega_WB)
+    verdict = oracle.judge(gap, *group.motions(), r.lower, r.upper, tolerance=1e-10)
+    for k in np.flatnonzero(verdict.missed):
+        raise AssertionError(
+            f"missed by {verdict.depth[k]:.3g} m at {verdict.time[k]!r}: seed {seed}, motion {k}, {r.lower[k]!r}, "
+            f"{[X[k].tolist() for X in group.poses]}"
+        )
+    moving = r.hit & (r.lower > 0.0)
+    proven = moving & np.isfinite(r.upper)
+    assert (verdict.at_upper[proven] <= 1e-10).all()
+    assert moving.sum() >= least_hits and (~r.hit).sum() >= 5
+    assert r.certified.mean() >= 0.95
+    return r, group
+
+
+def test_an_l_and_a_box():
+    size = (0.6, 0.4, 0.3)
+    judge(l_mesh(), collide.Box(size), l_gap(oracle.box_features(size)), 1)
+
+
+def test_an_l_spins_around_a_tetrahedron():
+    points = np.array([(0, 0, 0), (0.4, 0, 0), (0, 0.4, 0), (0, 0, 0.4)])
+    gap = l_gap(oracle.simplex_features(points))
+    judge(l_mesh(), collide.ConvexHull(points), gap, 2, n=30, omega=30.0, least_hits=8)
+
+
+def test_two_meshes():
+    size = (0.5, 0.5, 0.9)
+    r, _ = judge(l_mesh(), box_mesh(size), l_gap(oracle.box_features(size)), 3)
+    assert (r.part_a >= 0).all() and r.part_a[r.hit].max() > 0
+
+
+def test_an_open_surface():
+    """Two triangles that make no solid: bodies may pass beside them, not through."""
+    points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.5)], dtype=float)
+    faces = np.array([(0, 1, 2), (1, 3, 2)])
+    size = (0.5, 0.4, 0.3)
+    gap = oracle.union_gap(
+        [oracle.polytope_gap(*oracle.simplex_features(points[f]), *oracle.box_features(size)) for f in faces]
+    )
+    judge(collide.Mesh(points, faces), collide.Box(size), gap, 4, n=80)
+
+
+UNION = collide.Compound([(collide.Box((0.3, 0.3, 1)), collide.pose((0, 0.4, 0))), (collide.Sphere(0.2), np.eye(4))])
+OTHERS = [
+    collide.Sphere(0.3), collide.Capsule(0.2, 0.6), collide.Cylinder(0.3, 0.5), collide.Cone(0.3, 0.8),
+    collide.Ellipsoid((0.3, 0.2, 0.5)), collide.Halfspace((0.2, 0.1, 1), -1.0), UNION,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("other", OTHERS, ids=lambda shape: type(shape).__name__)
+def test_a_box_of_facets_moves_as_a_box(other):
+    """Every other kind of shape: brackets of both overlap, for the truth is one."""
+    size = (1.0, 0.8, 0.6)
+    group = motions._group("twins", np.random.default_rng(5), 50, (None, other, None, 3.0), spread=1.5)
+    mesh, box = (collide.time_of_impact(A, other, *group.poses) for A in (box_mesh(size), collide.Box(size)))
+    moving = box.hit & (box.lower > 0.0)
+    assert moving.sum() >= 8
+    both = mesh.certified & box.certified
+    assert both.mean() >= 0.9
+    assert (mesh.hit == box.hit)[both].all()
+    assert (mesh.lower <= box.upper + 1e-14)[both].all() and (box.lower <= mesh.upper + 1e-14)[both].all()
+    swapped = collide.time_of_impact(other, box_mesh(size), *(group.poses[k] for k in (2, 3, 0, 1)))
+    for x, y in ((mesh.lower, swapped.lower), (mesh.upper, swapped.upper), (mesh.point_a, swapped.point_b)):
+        assert x.tobytes() == y.tobytes()
+    assert (mesh.normal + 0.0).tobytes() == (0.0 - swapped.normal).tobytes()
+
+
+def test_unions_of_meshes_and_hulls():
+    """An L as one mesh, as a compound of two meshes, and of a mesh and a box: one truth."""
+    parts = [(box_mesh(size), collide.pose(at)) for size, at in L_BOXES]
+    mixed = [parts[0], (collide.Box(L_BOXES[1][0]), collide.pose(L_BOXES[1][1]))]
+    other = collide.Box((0.5, 0.4, 0.3))
+    group = motions._group("unions", np.random.default_rng(6), 25, (None, other, None, 3.0), spread=1.5)
+    answers = [
+        collide.time_of_impact(A, other, *group.poses)
+        for A in (l_mesh(), collide.Compound(parts), collide.Compound(mixed))
+    ]  # fmt: skip
+    for r in answers[1:]:
+        assert (r.hit == answers[0].hit).all()
+        assert (r.lower <= answers[0].upper + 1e-14).all() and (answers[0].lower <= r.upper + 1e-14).all()
+    parts_met = {int(p) for p in answers[2].part_a[answers[2].hit & (answers[2].lower > 0.0)]}
+    assert parts_met == {0, 1}
+
+
+def test_a_rod_flies_through_a_ring():
+    """A ring of facets is no hull: what flies through its hole is free, what is a little off is not."""
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    profile = np.array([(1.0, -0.1), (1.2, 0.0), (1.0, 0.1)])
+    r, z = profile[:, 0], profile[:, 1]
+    rings = np.outer(np.cos(angle), r), np.outer(np.sin(angle), r), np.tile(z, (24, 1))
+    vertices = np.stack(rings, axis=-1).reshape(-1, 3)
+    faces = []
+    for k in range(24):
+        for j in range(3):
+            a, b = 3 * k + j, 3 * k + (j + 1) % 3
+            c, d = 3 * ((k + 1) % 24) + j, 3 * ((k + 1) % 24) + (j + 1) % 3
+            faces += [(a, c, d), (a, d, b)]
+    ring = collide.Mesh(vertices, np.array(faces))
+    assert ring.solid
+    rod = collide.Capsule(0.05, 1.0)
+    through = collide.time_of_impact(
+        ring, rod, np.eye(4), np.eye(4), collide.pose((0, 0, 2)), collide.pose((0.3, 0, -2), rpy=(0.4, 0, 1))
+    )
+    I = np.eye(4)
+    against = collide.time_of_impact(ring, rod, I, I, collide.pose((1.05, 0, 2)), collide.pose((1.05, 0, -2)))
+    far = collide.time_of_impact(ring, rod, I, I, collide.pose((3e3, 0, 2)), collide.pose((-3e3, 0, 2)))
+    assert not through.hit and not far.hit and through.certified
+    assert against.hit and against.certified and 0.3 < against.time < 0.5
+    assert against.normal[2] > 0.5
+
+
+def test_one_inside_a_solid_starts_in_contact():
+    here = [np.eye(4)] * 4
+    inside = collide.time_of_impact(box_mesh((2, 2, 2)), collide.Sphere(0.1), *here)
+    assert inside.hit and inside.time == 0.0 and inside.upper == 0.0 and inside.certified
+
+
+def test_threads_give_the_same_bits():
+    group = motions._group("threads", np.random.default_rng(8), 60, (None, None, None, 3.0), spread=1.5)
+    A, B = l_mesh(), collide.Box((0.5, 0.4, 0.3))
+    one, two = (collide.time_of_impact(A, B, *group.poses, threads=t) for t in (1, 2))
+    lists = collide.time_of_impact([A] * 60, B, *group.poses)
+    for x, y, z in zip(one, two, lists):
+        assert x.tobytes() == y.tobytes() == z.tobytes()
