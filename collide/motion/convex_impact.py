@@ -150,19 +150,19 @@ def _search_from(motion, asking, row, span):
     """`search_contact` from a time on whose row is known."""
     time, upper, n_queries = span.begin, math.inf, 1
     axis = _axis_of(motion, row)
-    kept = AxisGap(-math.inf, 0.0, axis)
+    last_gap = AxisGap(-math.inf, 0.0, axis)
     while n_queries < MAX_QUERIES:
         last = min(span.end, upper)
         if time == last and upper == math.inf and row.doubles[LOWER] > 0.0:
             return Search(FREE, last, last, n_queries)
-        gap = _good_axis(motion, time, gap_along(motion, time, axis), kept, row.doubles[LOWER])
+        gap = _good_axis(motion, time, gap_along(motion, time, axis), last_gap, row.doubles[LOWER])
         later = time
         if gap.gap > 0.0:
             later, gap = _follow_axis(motion, time, gap, last)
-            kept = gap
+            last_gap = gap
         elif row.doubles[LOWER] > 0.0 and not motion.is_plane:
             later = _go_slowly(motion, time, row.doubles[LOWER], last)
-            kept = AxisGap(-math.inf, 0.0, axis)
+            last_gap = AxisGap(-math.inf, 0.0, axis)
         is_stuck = not later > time
         if later == last and upper == math.inf and not is_stuck:
             return Search(FREE, last, last, n_queries)
@@ -296,22 +296,22 @@ def _follow_axis(motion, time, gap, end):
 
 
 @kernel
-def _good_axis(motion, time, gap, kept, lower):
+def _good_axis(motion, time, gap, last_gap, lower):
     """The `AxisGap` of the pair as it is placed, of the better of two axes and of some between them.
 
     gap : along the normal that GJK ends with. Beside curved cores that may be worse than the plane that proved its
-    bound ``lower``: the simplex is thin, the normal that of its last sliver.   kept : at the same time, or without a
-    gap.
+    bound ``lower``: the simplex is thin, the normal that of its last sliver.
+    last_gap : at the same time, or without a gap.
     """
-    if gap.gap > 0.5 * lower or motion.is_plane or not kept.gap > -math.inf:
+    if gap.gap > 0.5 * lower or motion.is_plane or not last_gap.gap > -math.inf:
         return gap
-    best = gap if gap.gap > kept.gap else kept
+    best = gap if gap.gap > last_gap.gap else last_gap
     for k in range(1, _AXES_BETWEEN):
         share = k / _AXES_BETWEEN
-        n = add(scale(1.0 - share, kept.axis.n), scale(share, gap.axis.n))
+        n = add(scale(1.0 - share, last_gap.axis.n), scale(share, gap.axis.n))
         length = norm(n)
         if length > 0.5:
-            between = gap_along(motion, time, axis_turning(divide(n, length), kept.axis.turning))
+            between = gap_along(motion, time, axis_turning(divide(n, length), last_gap.axis.turning))
             if between.gap > best.gap:
                 best = between
     return best

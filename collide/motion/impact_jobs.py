@@ -22,7 +22,7 @@ from collide.motion.convex_impact import (
     search_contact,
 )
 from collide.motion.moving_body import BODY
-from collide.motion.moving_pair import Given, moving_pair
+from collide.motion.moving_pair import BodyMotion, moving_pair
 from collide.narrowphase.rows import NORMAL, POINT_A, POINT_B, view_row
 from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
 from collide.transforms import ROTATION_TOLERANCE
@@ -101,8 +101,8 @@ def clear_impacts(rows_at, n):
 
 
 @kernel(inline=True)
-def _given(motions, job, is_b):
-    """What is said of one body of a job: `moving_pair.Given`."""
+def _body_motion(motions, job, is_b):
+    """What is said of one body of a job: `moving_pair.BodyMotion`."""
     header = motions.header
     k = job[MOTION]
     at = 1 if is_b else 0
@@ -111,7 +111,7 @@ def _given(motions, job, is_b):
     omega_at = header[OMEGA_A_AT + at]
     has_omega = omega_at != 0
     omega = view_f64(omega_at + 8 * header[OMEGA_A_STEP + at] * k if has_omega else header[XA0_AT], 3)
-    return Given(X0, X1, omega, has_omega, motions.parts, PART * job[PART_B if is_b else PART_A])
+    return BodyMotion(X0, X1, omega, has_omega, motions.parts, PART * job[PART_B if is_b else PART_A])
 
 
 @kernel(inline=True)
@@ -125,7 +125,7 @@ def _exchange(motions, job):
         return is_plane_b
     if ints[INTS * sa + RANK] != ints[INTS * sb + RANK]:
         return ints[INTS * sa + RANK] > ints[INTS * sb + RANK]
-    a, b = _given(motions, job, False), _given(motions, job, True)
+    a, b = _body_motion(motions, job, False), _body_motion(motions, job, True)
     order = _compare(a.X0, 0, b.X0, 0, 12)
     if order == 0:
         order = _compare(a.X1, 0, b.X1, 0, 12)
@@ -155,9 +155,9 @@ def _do_job(motions, asking, job, span, answer_at):
     shape_of = view_i64(motions.header[SHAPE_OF_AT], 2)
     shape_of[0] = sa
     shape_of[1] = sb
-    given_a = _given(motions, job, flip)
+    motion_a = _body_motion(motions, job, flip)
     motion = moving_pair(
-        motions.ints, motions.numbers, motions.poses, sa, sb, given_a, _given(motions, job, not flip), a, b
+        motions.ints, motions.numbers, motions.poses, sa, sb, motion_a, _body_motion(motions, job, not flip), a, b
     )
     if motion.off > 4.0 * ROTATION_TOLERANCE:
         words[STATUS] = WRONG_TURN
@@ -174,15 +174,15 @@ def _do_job(motions, asking, job, span, answer_at):
         words[JOB_A] = job[SHAPE_A]
         words[JOB_B] = job[SHAPE_B]
         words[STATUS] = search.status
-        _write_touch(numbers, given_a, search.lower, view_row(asking.row_at), flip)
+        _write_touch(numbers, motion_a, search.lower, view_row(asking.row_at), flip)
     numbers[LOWER] = min(numbers[LOWER], search.lower)
     numbers[UPPER] = min(numbers[UPPER], search.upper)
 
 
 @kernel(inline=True)
-def _write_touch(numbers, given_a, time, row, flip):
+def _write_touch(numbers, motion_a, time, row, flip):
     """Normal and points of a row whose positions are from the origin of the first body worked on."""
-    X0, X1 = given_a.X0, given_a.X1
+    X0, X1 = motion_a.X0, motion_a.X1
     p0 = Vec3(X0[3], X0[7], X0[11])
     origin = add(p0, scale(time, sub(Vec3(X1[3], X1[7], X1[11]), p0)))
     sign = -1.0 if flip else 1.0

@@ -89,11 +89,11 @@ def time_of_impact(
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)
-    given = {"X_WA0": X_WA0, "X_WA1": X_WA1, "X_WB0": X_WB0, "X_WB1": X_WB1}
-    poses, singles = zip(*(_checked_poses(X, name, check_poses) for name, X in given.items()))
+    matrices = {"X_WA0": X_WA0, "X_WA1": X_WA1, "X_WB0": X_WB0, "X_WB1": X_WB1}
+    poses, singles = zip(*(_checked_poses(X, name, check_poses) for name, X in matrices.items()))
     turns = {"omega_WA": omega_WA, "omega_WB": omega_WB}
     omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
-    counts = {name: len(X) for name, X in zip((*given, *turns), (*poses, *omegas)) if X is not None}
+    counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     single = all(singles) and all(single_omegas)
     n, are_shapes = matched_counts(A, B, counts)
     question = _Question(*_distinct(A, B, n), Motions(*poses, *omegas), width, n_threads)
@@ -177,8 +177,8 @@ def moved_poses(X_WA0: PoseLike, velocity_WA: ArrayLike, omega_WA: ArrayLike) ->
     axis = omega / np.where(angle > 0.0, angle, 1.0)
     sine, cosine = np.sin(angle)[:, :, None], np.cos(angle)[:, :, None]
     across = np.cross(axis[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)
-    turn = cosine * np.eye(3) + sine * across + (1.0 - cosine) * axis[:, :, None] * axis[:, None, :]
-    moved[:, :3, :3] = turn @ moved[:, :3, :3]
+    rotation = cosine * np.eye(3) + sine * across + (1.0 - cosine) * axis[:, :, None] * axis[:, None, :]
+    moved[:, :3, :3] = rotation @ moved[:, :3, :3]
     moved[:, :3, 3] += velocity
     return moved[0] if single and single_omega and single_velocity else moved
 
@@ -234,8 +234,8 @@ def _checked_omega(omega, name: str) -> tuple[np.ndarray | None, bool]:
     return rows, single
 
 
-def _leads_elsewhere(name: str, start: str, end: str, given: bool) -> str:
-    if given:
+def _leads_elsewhere(name: str, start: str, end: str, has_omega: bool) -> str:
+    if has_omega:
         return f"{name} does not turn {start} into the orientation of {end}; collide.moved_poses makes end poses"
     return f"no rotation turns {start} into {end}: both must be rotations to 1e-4"
 
@@ -385,9 +385,10 @@ def _refuse(question: _Question, rows: np.ndarray) -> None:
     k = int(bad[0])
     if rows["status"][k] == WRONG_TURN:
         motions = question.motions
-        given = motions.omega_WA is not None or motions.omega_WB is not None
-        kind = InvalidArgument if given else InvalidPose
-        raise kind(f"motion {k}: " + _leads_elsewhere("omega_WA or omega_WB", "the first pose", "the second", given))
+        has_omega = motions.omega_WA is not None or motions.omega_WB is not None
+        kind = InvalidArgument if has_omega else InvalidPose
+        where = _leads_elsewhere("omega_WA or omega_WB", "the first pose", "the second", has_omega)
+        raise kind(f"motion {k}: {where}")
     raise UnsupportedQuery(
         f"motion {k}: a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range; "
         "scale it"

@@ -59,11 +59,11 @@ def set_body(body, X0, X1, omega_given, has_omega, part, at, reach):
     put_vec3(body, OMEGA, omega)
     put_vec3(body, AXIS, axis)
     body[ANGLE] = angle
-    turn = rotation_about(axis, angle)
+    rotation = rotation_about(axis, angle)
     off = 0.0
     for j in range(3):
         column = Vec3(X0[j], X0[4 + j], X0[8 + j])
-        turned = apply(turn, column)
+        turned = apply(rotation, column)
         if angle == 0.0:
             turned = column
         drift = Vec3(X1[j] - turned.x, X1[4 + j] - turned.y, X1[8 + j] - turned.z)
@@ -114,7 +114,7 @@ def _stretch(body):
 
 
 @kernel(inline=True)
-def turn_of(body, time):
+def rotation_at(body, time):
     """Rot(τω)."""
     return rotation_about(vec3_at(body, AXIS), time * body[ANGLE])
 
@@ -126,15 +126,15 @@ def place_body(body, time, poses, at, origin, slop):
     slop : of the origin, to be added to that of the rotation.
     """
     if body[ANGLE] == 0.0:
-        turn = Matrix3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+        rotation = Matrix3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     else:
-        turn = turn_of(body, time)
+        rotation = rotation_at(body, time)
     for j in range(3):
-        column = apply(turn, Vec3(body[START + j], body[START + 3 + j], body[START + 6 + j]))
+        column = apply(rotation, Vec3(body[START + j], body[START + 3 + j], body[START + 6 + j]))
         poses[at + j] = column.x + time * body[DRIFT + j]
         poses[at + 3 + j] = column.y + time * body[DRIFT + 3 + j]
         poses[at + 6 + j] = column.z + time * body[DRIFT + 6 + j]
-    arm = add(apply(turn, vec3_at(body, ARM)), scale(time, vec3_at(body, ARM_DRIFT)))
+    arm = add(apply(rotation, vec3_at(body, ARM)), scale(time, vec3_at(body, ARM_DRIFT)))
     put_vec3(poses, at + 9, add(origin, arm))
     poses[at + POSE_SLOP] = body[POSE_ERROR] + slop
     poses[at + POSE_TERMS] = -1.0

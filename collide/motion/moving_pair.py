@@ -23,7 +23,7 @@ from collide.numerics.vec3 import Vec3, add, norm, scale, sub, vec3_at
 _UNIT = 2.0**-53
 
 
-class Given(NamedTuple):
+class BodyMotion(NamedTuple):
     """What is said of one body's motion: views of X0 and X1 (16 doubles each), ω (3) and whether it counts; a view of
     rows of parts, and where the row of its part begins."""
 
@@ -62,22 +62,22 @@ class MovingPair(NamedTuple):
 
 
 @kernel(inline=True)
-def moving_pair(ints, numbers, poses, sa, sb, given_a, given_b, a, b):
+def moving_pair(ints, numbers, poses, sa, sb, motion_a, motion_b, a, b):
     """The `MovingPair` of two shapes, rows of the `ShapeTable`; a and b, views of BODY doubles, are written.
 
     poses : view of two pose rows.
     """
     pair = posed_pair(ints, numbers, poses, sa, 0, sb, 1)
     off_a = set_body(
-        a, given_a.X0, given_a.X1, given_a.omega, given_a.has_omega, given_a.parts, given_a.part_at,
+        a, motion_a.X0, motion_a.X1, motion_a.omega, motion_a.has_omega, motion_a.parts, motion_a.part_at,
         numbers[NUMBERS * sa + REACH],
     )  # fmt: skip
     off_b = set_body(
-        b, given_b.X0, given_b.X1, given_b.omega, given_b.has_omega, given_b.parts, given_b.part_at,
+        b, motion_b.X0, motion_b.X1, motion_b.omega, motion_b.has_omega, motion_b.parts, motion_b.part_at,
         numbers[NUMBERS * sb + REACH],
     )  # fmt: skip
-    d0 = sub(_translation(given_b.X0), _translation(given_a.X0))
-    d1 = sub(_translation(given_b.X1), _translation(given_a.X1))
+    d0 = sub(_translation(motion_b.X0), _translation(motion_a.X0))
+    d1 = sub(_translation(motion_b.X1), _translation(motion_a.X1))
     farthest = max(norm(d0), norm(d1)) * OUTWARD
     radius = numbers[NUMBERS * sa + RADIUS] + numbers[NUMBERS * sb + RADIUS]
     size = (

@@ -194,11 +194,11 @@ class _Spans:
     def near_facets(self, begin: float, end: float) -> np.ndarray | None:
         """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
         out = self._describe(begin, end)
-        most = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
+        max_pairs = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
-        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, most)  # type: ignore[arg-type]
-        return None if near is None or (len(near.facets) > most and end - begin > _SHORTEST) else near.facets
+        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
+        return None if near is None or (len(near.facets) > max_pairs and end - begin > _SHORTEST) else near.facets
 
 
 def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
@@ -208,16 +208,16 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    waiting = [(begin, end)] if begin <= end else []
-    while waiting:
-        begin, end = waiting.pop()
+    spans_to_do = [(begin, end)] if begin <= end else []
+    while spans_to_do:
+        begin, end = spans_to_do.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
         near = spans.near_facets(begin, end)
         if near is None:
             middle = 0.5 * (begin + end)
-            waiting += [(middle, end), (begin, middle)]
+            spans_to_do += [(middle, end), (begin, middle)]
             continue
         if len(near) == 0:
             continue
@@ -243,14 +243,14 @@ def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.nda
         ids = np.concatenate([ids_a, ids_b])
         rows_a, rows_b = which_a.ravel(), which_b.ravel() + len(ids_a)
     else:
-        mesh, other = (a, b) if a.is_mesh else (b, a)
+        mesh, convex = (a, b) if a.is_mesh else (b, a)
         facets = np.unique(near[:, 0 if a.is_mesh else 1])
-        table = FacetTable(mesh.corners(facets), other.packed)  # type: ignore[arg-type]
+        table = FacetTable(mesh.corners(facets), convex.packed)  # type: ignore[arg-type]
         table.numbers[:-1, SLOP] = mesh.slop
-        table.numbers[-1, SLOP] += other.slop
+        table.numbers[-1, SLOP] += convex.slop
         ids = np.append(facets, 0)
-        of_mesh, of_other = np.arange(len(facets)), np.full(len(facets), len(facets))
-        rows_a, rows_b = (of_mesh, of_other) if a.is_mesh else (of_other, of_mesh)
+        of_mesh, of_convex = np.arange(len(facets)), np.full(len(facets), len(facets))
+        rows_a, rows_b = (of_mesh, of_convex) if a.is_mesh else (of_convex, of_mesh)
     zeros = np.zeros(len(rows_a), dtype=np.int64)
     jobs = np.ascontiguousarray(np.stack([zeros, rows_a, zeros, rows_b, zeros + 1], axis=1), dtype=np.int64)
     return table, jobs, ids

@@ -30,11 +30,11 @@ def time_of_balls(d0, v, farthest, reach, begin, end):
     discriminant = along * along - square * (dot(d0, d0) - reach * reach)
     half = math.sqrt(max(discriminant, 0.0)) / square * (1.0 + 2.0**-30) + 2.0**-40 * abs(middle)
     before, after = middle - half, middle + half
-    clear = 2.0**-40 * farthest * norm(v)
+    rounding = 2.0**-40 * farthest * norm(v)
     last = end
-    if begin < before < end and _distance(d0, v, before) > reach and _growth(d0, v, before) < -clear:
+    if begin < before < end and _distance(d0, v, before) > reach and _growth(d0, v, before) < -rounding:
         begin = before
-    if begin < after < end and _distance(d0, v, after) > reach and _growth(d0, v, after) > clear:
+    if begin < after < end and _distance(d0, v, after) > reach and _growth(d0, v, after) > rounding:
         last = after
     return begin, last
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 from collide.kernels import kernel
 
-#: Angles up to this [rad]: a quarter turn's first part, of 33 bits, times their number of quarter turns is exact.
+#: Angles up to this [rad]: a quarter quadrant's first part, of 33 bits, times their number of quarter turns is exact.
 LARGEST_ANGLE = 1e6
 
-#: A quarter turn in two parts: 33 bits, and the rest to 2⁻⁸⁶.
+#: A quarter quadrant in two parts: 33 bits, and the rest to 2⁻⁸⁶.
 _QUARTER, _QUARTER_REST = 1.57079632673412561417, 6.07710050650619224932e-11
 _PER_QUARTER = 0.636619772367581382433
 
@@ -42,12 +42,12 @@ def sine_cosine(angle):
     half = 0.5 * z
     w = 1.0 - half
     cosine = w + (((1.0 - w) - half) + (z * r - x * low))
-    turn = int(quarters) & 3
-    if turn == 0:
+    quadrant = int(quarters) & 3
+    if quadrant == 0:
         return SineCosine(sine, cosine)
-    if turn == 1:
+    if quadrant == 1:
         return SineCosine(cosine, -sine)
-    if turn == 2:
+    if quadrant == 2:
         return SineCosine(-sine, -cosine)
     return SineCosine(-cosine, sine)
 

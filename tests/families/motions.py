@@ -140,6 +140,13 @@ def _group(name, rng, n, pair: Pair, *, spread=1.5, turn=None, omega=None, fast=
     return Group(name, A, B, *X, omegas[0], omegas[1], gap, size)
 
 
+def resolution(group: Group) -> float:
+    """How small a gap or depth the oracle can tell from none [m]: rounding of positions and turned points."""
+    moved = max(1.0, float(np.abs(group.X_WB1[:, :3, 3] - group.X_WB0[:, :3, 3]).max()))
+    turns = [1.0] + [float(np.linalg.norm(w, axis=1).max()) for w in (group.omega_WA, group.omega_WB) if w is not None]
+    return 1e-12 * (moved + group.size * max(turns))
+
+
 def _grazing(name, rng, n, pair: Pair) -> Group:
     """Motions whose least gap is all but 0: bodies whose origins meet half-way, B's path then shifted to the side by as
     much as just clears it, and a little."""

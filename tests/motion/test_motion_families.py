@@ -16,9 +16,7 @@ GROUPS, N = 4, 40
 
 def judged(group: motions.Group, r) -> tuple[oracle.Judged, float]:
     """What the oracle says of a result, and within how much [m] it can tell."""
-    moved = max(1.0, float(np.abs(group.X_WB1[:, :3, 3] - group.X_WB0[:, :3, 3]).max()))
-    turns = [1.0] + [float(np.linalg.norm(w, axis=1).max()) for w in (group.omega_WA, group.omega_WB) if w is not None]
-    tolerance = 1e-12 * (moved + group.size * max(turns))
+    tolerance = motions.resolution(group)
     return oracle.judge(group.gap, *group.motions(), r.lower, r.upper, tolerance=tolerance), tolerance
 
 
