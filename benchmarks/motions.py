@@ -87,8 +87,8 @@ def ask_collide(group: motions.Group) -> tuple[np.ndarray, float]:
 
 def misses(group: motions.Group, times: np.ndarray) -> int:
     """Motions in which there is a contact before the time said, but for a thousandth."""
-    said = np.where(times < 0.0, 1.0, np.maximum(times - 1e-3, 0.0))
-    return int(oracle.judge(group.gap, *group.motions(), said, said, tolerance=1e-6).missed.sum())
+    lower = np.where(times < 0.0, 1.0, np.maximum(times - 1e-3, 0.0))
+    return int(oracle.judge(group.gap, *group.motions(), lower, lower, tolerance=1e-6).missed.sum())
 
 
 def main() -> None:
@@ -124,8 +124,8 @@ def main() -> None:
         of_fcl = medians.get("fcl", float("nan"))
         rows.append([name, n, hits, medians["collide"], of_fcl, ratio, missed["collide"], missed.get("fcl", "")])
         print(
-            f"{name:26} {hits:5} of {n} hit; µs: collide {medians['collide']:8.2f}  fcl {of_fcl:8.2f}  ratio {ratio:6.1f}; "
-            f"missed: {missed}"
+            f"{name:26} {hits:5} of {n} hit; µs: collide {medians['collide']:8.2f}  fcl {of_fcl:8.2f}  "
+            f"ratio {ratio:6.1f}; missed: {missed}"
         )
     if not quick:
         with (RESULTS / "motions.csv").open("w", newline="", encoding="utf-8") as file:

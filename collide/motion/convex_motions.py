@@ -42,6 +42,23 @@ class Motions(NamedTuple):
         """Those of these numbers; what goes with all stays as it is."""
         return Motions(*(X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self))
 
+    def swapped(self) -> Motions:
+        """Those of B and A."""
+        return Motions(self.X_WB0, self.X_WB1, self.X_WA0, self.X_WA1, self.omega_WB, self.omega_WA)
+
+    def exchanged(self, is_larger: np.ndarray, is_equal: np.ndarray) -> np.ndarray:
+        """(n,) bool: motions to be worked on as those of B and A: where A's shape is the larger, or is equal and its
+        poses are."""
+        out = is_larger.copy()
+        some = np.flatnonzero(is_equal)
+        if len(some):
+            of = self.picked(some).spread(len(some))
+            a, b = (np.concatenate([X0, X1], axis=1).reshape(len(some), -1) for X0, X1 in (of[:2], of[2:4]))
+            first = (a != b).argmax(axis=1)
+            rows = np.arange(len(some))
+            out[some] = a[rows, first] > b[rows, first]
+        return out
+
     def spread(self, n: int) -> Motions:
         """The same with n of everything."""
         return Motions(*(X if X is None else np.broadcast_to(X, (n, *X.shape[1:])) for X in self))
@@ -96,20 +113,26 @@ class _Bodies:
         self.counts = np.array([len(layout.packed) for layout in layouts], dtype=np.int64)
         self.first = np.cumsum(self.counts) - self.counts
         self.is_simple = len(layouts) == int(self.counts.sum())
+        contents = [b"".join(packed.content for packed in layout.packed) for layout in layouts]
+        self.ranks = np.array([sorted(contents).index(content) for content in contents], dtype=np.int64)
         self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
         self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
         self.table.build_trees(np.arange(len(self.table.packed)))
 
-    def jobs(self, a: np.ndarray, b: np.ndarray, first: int) -> np.ndarray:
+    def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
-        on."""
+        on; in an order that does not depend on which of them is A."""
         if self.is_simple:
             row_a, row_b = self.first[a], self.first[b]
             return np.ascontiguousarray(np.array([np.arange(first, first + len(a)), row_a, row_a, row_b, row_b]).T)
         n_b, counts = self.counts[b], self.counts[a] * self.counts[b]
         motion = np.repeat(np.arange(len(a)), counts)
         which = np.arange(len(motion)) - np.repeat(np.cumsum(counts) - counts, counts)
-        part_a, part_b = self.first[a][motion] + which // n_b[motion], self.first[b][motion] + which % n_b[motion]
+        some = motions.picked(np.arange(first, first + len(a)))
+        flip = some.exchanged(self.ranks[a] > self.ranks[b], self.ranks[a] == self.ranks[b])[motion]
+        n_a, n_b = self.counts[a][motion], n_b[motion]
+        part_a = self.first[a][motion] + np.where(flip, which % n_a, which // n_b)
+        part_b = self.first[b][motion] + np.where(flip, which // n_a, which % n_b)
         return np.ascontiguousarray(np.stack([motion + first, part_a, part_a, part_b, part_b], axis=1))
 
 
@@ -141,7 +164,7 @@ def convex_impacts(
         header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
         for first in range(piece.start, piece.stop, at_once):
             some = slice(first, min(first + at_once, piece.stop))
-            jobs = bodies.jobs(a[some], b[some], first)
+            jobs = bodies.jobs(a[some], b[some], first, motions)
             find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
 
     workers = min(threads, n * per_motion // _MIN_MOTIONS_PER_THREAD)

@@ -96,9 +96,9 @@ def turned_axis(axis, passed):
     """The axis after so much time."""
     if axis.speed == 0.0:
         return axis
-    return TurningAxis(
-        apply(rotation_about(axis.about, passed * axis.speed), axis.n), axis.turning, axis.speed, axis.about
-    )
+    n = apply(rotation_about(axis.about, passed * axis.speed), axis.n)
+    # its length would drift away from 1, turn by turn
+    return TurningAxis(divide(n, norm(n)), axis.turning, axis.speed, axis.about)
 
 
 @kernel

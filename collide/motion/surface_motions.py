@@ -31,10 +31,13 @@ from collide.motion.convex_motions import Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
+from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
+from collide.shapes.primitives import Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.transforms import SMALLEST
 
 #: So many pairs of facets at most are jobs of one span, unless it is shorter than _SHORTEST.
 _MAX_JOBS, _SHORTEST = 96, 2.0**-40
@@ -48,7 +51,7 @@ class Piece(NamedTuple):
     X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
     reach : greatest distance of its points from its own origin, a swept radius included [m].
     slop : how far rounding of X_CS may have moved it.   tree, radius : its facets, or those of a polytope around it,
-    and the ball swept over them; None for half-spaces.   packed : as a convex set; None of meshes.
+    and how far its surface may be from them: a swept ball, or the polytope's distance; None for half-spaces.   packed : as a convex set; None of meshes.
     """
 
     shape: Shape
@@ -107,7 +110,18 @@ def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
     if kind_of(shape) in WITH_FACETS:
         body = body_of(shape)
         return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, packed)
-    return Piece(shape, X_CS, number, reach, slop, enclosure_of(shape).outer.tree, 0.0, packed)
+    tree = enclosure_of(shape).outer.tree
+    return Piece(shape, X_CS, number, reach, slop, tree, _thickness(shape, tree), packed)
+
+
+def _thickness(shape: Shape, tree: MeshTree) -> float:
+    """How far a polytope around a convex shape is from it at most, at its corners [m]; its surface is as far from the
+    shape's."""
+    corners = np.unique(tree.triangles.reshape(-1, 3), axis=0)
+    places = np.tile(np.eye(4), (len(corners), 1, 1))
+    places[:, :3, 3] = corners
+    rows = convex_rows(Sphere(SMALLEST), shape, places, np.eye(4)[None], depths=False)
+    return float(rows["upper"].max(initial=0.0)) * (1 + 1e-12) + 1e-12 * _extent(shape)
 
 
 def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
@@ -115,13 +129,20 @@ def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows
 
     motions : poses (n, 4, 4).   rows : (n,) as `clear_impacts` leaves them.
     """
-    if _order(B) < _order(A):  # swapped questions are worked out on the same numbers
-        swapped = Motions(
-            motions.X_WB0, motions.X_WB1, motions.X_WA0, motions.X_WA1, motions.omega_WB, motions.omega_WA
-        )
-        surface_impacts(B, A, swapped, tolerance, rows)
-        rows[:] = flipped_impacts(rows)
-        return
+    order_a, order_b = _order(A), _order(B)
+    exchanged = motions.exchanged(np.full(len(rows), order_a > order_b), np.full(len(rows), order_a == order_b))
+    for flip in (False, True):  # swapped questions are worked out on the same numbers
+        some = np.flatnonzero(exchanged == flip)
+        part = rows[some]
+        if flip:
+            _search_all(B, A, motions.picked(some).swapped(), tolerance, part)
+        else:
+            _search_all(A, B, motions.picked(some), tolerance, part)
+        rows[some] = flipped_impacts(part) if flip else part
+
+
+def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """`surface_impacts` in the order worked on."""
     pieces = [(a, b) for a in pieces_of(A) for b in pieces_of(B)]
     convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
     for a, b in convex:

@@ -162,6 +162,43 @@ def test_one_inside_a_solid_starts_in_contact():
     assert inside.hit and inside.time == 0.0 and inside.upper == 0.0 and inside.certified
 
 
+def bumpy_cap(n: int) -> collide.Mesh:
+    """2 n² facets of a blunt tip that looks down, within 0.05 of its axis."""
+    x, y = np.meshgrid(*[np.linspace(-0.05, 0.05, n + 1)] * 2, indexing="ij")
+    vertices = np.stack([x, y, 2.0 * (x * x + y * y)], axis=-1).reshape(-1, 3)
+    k = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([k, k + n + 1, k + 1], 1), np.stack([k + 1, k + n + 1, k + n + 2], 1)])
+    return collide.Mesh(vertices, faces)
+
+
+def test_a_fine_tip_between_a_polytope_and_the_ball_in_it():
+    """Curved shapes are culled by a polytope around them, percents away from them in the middle of its facets; spans
+    against a fine mesh are so short that what moves in between would be overlooked, were that not counted."""
+    tip, rng = bumpy_cap(60), np.random.default_rng(12)
+    round_body, ball = collide.Ellipsoid((1.0, 1.0, 1.0)), collide.Sphere(1.0)
+    for _ in range(4):
+        X = collide.pose((0, 0, 0), rpy=rng.uniform(-3, 3, 3))
+        at = collide.pose((0.01, 0.02, 1.1)), collide.pose((0.01, 0.02, 0.95))
+        curved = collide.time_of_impact(tip, round_body, *at, X, X)
+        exact = collide.time_of_impact(tip, ball, *at, X, X)
+        assert exact.hit and exact.certified and 0.6 < exact.time < 0.7
+        assert curved.hit and curved.lower <= exact.upper and exact.lower <= curved.upper + 1e-9
+        assert abs(curved.lower - exact.lower) <= 1e-6
+
+
+def test_swapped_meshes_and_unions_of_one_shape():
+    """Equal shapes are told apart by their poses: the answer is mirrored exactly."""
+    mesh = l_mesh()
+    union = collide.Compound([(collide.Box(size), collide.pose(at)) for size, at in L_BOXES])
+    for shape in (mesh, union):
+        g = motions._group("equal", np.random.default_rng(13), 30, (shape, shape, None, 4.0), spread=2.0)
+        r = collide.time_of_impact(shape, shape, *g.poses)
+        s = collide.time_of_impact(shape, shape, *(g.poses[k] for k in (2, 3, 0, 1)))
+        for x, y in zip((r.lower, r.upper, r.point_a, r.part_a), (s.lower, s.upper, s.point_b, s.part_b)):
+            assert x.tobytes() == y.tobytes()
+        assert (r.normal + 0.0).tobytes() == (0.0 - s.normal).tobytes() and r.hit.sum() >= 8
+
+
 def test_threads_give_the_same_bits():
     group = motions._group("threads", np.random.default_rng(8), 60, (None, None, None, 3.0), spread=1.5)
     A, B = l_mesh(), collide.Box((0.5, 0.4, 0.3))
