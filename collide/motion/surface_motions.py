@@ -20,7 +20,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.lowering.compound_table import PART, TURNED
 from collide.lowering.enclosures import enclosure_of
-from collide.lowering.facet_bodies import body_of, is_halfspace
+from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
 from collide.lowering.facet_table import Facets, FacetTable
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import PackedConvex
@@ -33,6 +33,8 @@ from collide.motion.impact_rows import flipped_impacts
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
 from collide.narrowphase.convex_bodies import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
+from collide.narrowphase.facets.mesh_pairs import pair_rows
+from collide.narrowphase.facets.near_facets import near_facets
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
@@ -50,8 +52,10 @@ class Piece(NamedTuple):
 
     X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
     reach : greatest distance of its points from its own origin, a swept radius included [m].
-    slop : how far rounding of X_CS may have moved it.   tree, radius : its facets, or those of a polytope around it,
-    and how far its surface may be from them: a swept ball, or the polytope's distance; None for half-spaces.   packed : as a convex set; None of meshes.
+    slop : how far rounding of X_CS may have moved it.
+    tree, radius : its facets, or those of a polytope around it, and how far its surface may be from them: a swept ball,
+    or the polytope's distance. None for half-spaces.
+    is_curved : whether it is such a polytope.   packed : as a convex set; None of meshes.
     """
 
     shape: Shape
@@ -61,6 +65,7 @@ class Piece(NamedTuple):
     slop: float
     tree: MeshTree | None
     radius: float
+    is_curved: bool
     packed: PackedConvex | None
 
     @property
@@ -103,15 +108,15 @@ def _extent(shape: Shape) -> float:
 def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
     reach = _extent(shape) * (1 + 1e-12)
     if isinstance(shape, Mesh):
-        return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, None)
+        return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, False, None)
     packed = convex_set_of(shape)
     if is_halfspace(shape):
-        return Piece(shape, X_CS, number, reach, slop, None, 0.0, packed)
+        return Piece(shape, X_CS, number, reach, slop, None, 0.0, False, packed)
     if kind_of(shape) in WITH_FACETS:
         body = body_of(shape)
-        return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, packed)
+        return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, False, packed)
     tree = enclosure_of(shape).outer.tree
-    return Piece(shape, X_CS, number, reach, slop, tree, _thickness(shape, tree), packed)
+    return Piece(shape, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
 
 
 def _thickness(shape: Shape, tree: MeshTree) -> float:
@@ -215,11 +220,34 @@ class _Spans:
     def near_facets(self, begin: float, end: float) -> np.ndarray | None:
         """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
         out = self._describe(begin, end)
+        if (self.a.is_curved or self.b.is_curved) and out[REACH] < self.a.radius + self.b.radius:
+            return self._near_curved(out, end - begin <= _SHORTEST)
         max_pairs = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
         return None if near is None or (len(near.facets) > max_pairs and end - begin > _SHORTEST) else near.facets
+
+
+    def _near_curved(self, out: np.ndarray, all_of_them: bool) -> np.ndarray | None:
+        """The same where the polytope around a curved piece is farther from it than anything moves in the span.
+
+        The distance says whether anything is near at all, its normal which facets may be.
+        """
+        matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
+        side = 0 if self.a.is_mesh else 1
+        mesh, curved = (self.a, self.b) if side == 0 else (self.b, self.a)
+        X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
+        row = pair_rows(mesh.shape, curved.shape, X_M, X_C, limit=reach, depths=False)[0]
+        if row["lower"] > reach:
+            return np.zeros((0, 2), dtype=np.int64)
+        tree: Any = mesh.tree
+        near = near_facets(tree, curved.packed, as_given(X_M), as_given(X_C), row["normal"][None], np.array([reach]))  # type: ignore[arg-type]
+        if len(near.place) > _MAX_JOBS and not all_of_them:
+            return None
+        facets = np.zeros((len(near.place), 2), dtype=np.int64)
+        facets[:, side] = tree.ids[near.place]
+        return facets
 
 
 def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
