@@ -22,40 +22,40 @@ const char *collide_status_text(collide_status status)
     return "unknown status";
 }
 
-static const struct collide_kernels *chosen(const char **level)
+static const struct collide_kernels *kernels_of(const char **level)
 {
     const char *why = NULL;
     const struct collide_kernels *kernels = collide_kernels_of_level(getenv("COLLIDE_CPU"), level, &why);
     int64_t measures[MEASURES];
-    return kernels != NULL && rooms_of(kernels, measures) ? kernels : NULL;
+    return kernels != NULL && workspace_sizes(kernels, measures) ? kernels : NULL;
 }
 
 const struct collide_kernels *kernels_here(void)
 {
     const char *level = NULL;
-    return chosen(&level);
+    return kernels_of(&level);
 }
 
 collide_status collide_level(const char **level)
 {
     if (level == NULL) return COLLIDE_INVALID_ARGUMENT;
     *level = NULL;
-    return chosen(level) != NULL ? COLLIDE_OK : COLLIDE_NO_KERNELS;
+    return kernels_of(level) != NULL ? COLLIDE_OK : COLLIDE_NO_KERNELS;
 }
 
-int rooms_of(const struct collide_kernels *kernels, int64_t measures[MEASURES])
+int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEASURES])
 {
     if (kernels->write_constants(address_of(measures), MEASURES) != MEASURES) return 0;
     return measures[M_BLOCK] == BLOCK && measures[M_HEADER] == HEADER && measures[M_INTS] == INTS &&
-           measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_room_bytes(measures) > 0 &&
+           measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_workspace_bytes(measures) > 0 &&
            measures[M_ROW] == (int64_t)sizeof(collide_pair);
 }
 
 void *cache_lines(size_t bytes, void **held)
 {
-    char *room;
+    char *memory;
     *held = NULL;
-    if (bytes > (size_t)-1 - 64 || (room = calloc(bytes + 64, 1)) == NULL) return NULL;
-    *held = room;
-    return room + (64 - ((uintptr_t)room & 63)) % 64;
+    if (bytes > (size_t)-1 - 64 || (memory = calloc(bytes + 64, 1)) == NULL) return NULL;
+    *held = memory;
+    return memory + (64 - ((uintptr_t)memory & 63)) % 64;
 }

@@ -22,7 +22,7 @@ from collide.contact.shallow_overlaps import (
     separating_translations,
 )
 from collide.errors import UnsupportedQuery
-from collide.narrowphase.facets.body_pairs import core_hits
+from collide.narrowphase.facets.facet_kernel_calls import core_hits
 
 #: A pair belongs to a patch where the normal of one of its facets is this near to the patch's, as a cosine.
 _ALONG = 0.8
@@ -158,7 +158,7 @@ def _gaps(
     for k in order.tolist():
         if not starts[k]:
             continue
-        n = snapped(pairs, k, u[k], float(slack[k]), A, B)
+        n = snapped(pairs, k, u[k], float(slack[k]))
         seeds = np.zeros(len(pairs), dtype=bool)
         seeds[k] = True
         members, points = _grow_patch(frame, pairs, links, n, seeds, reach, 0.0)

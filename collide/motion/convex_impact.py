@@ -32,7 +32,7 @@ from collide.motion.moving_body import ANGLE, DRIFT_REACH, REACH_OF_CORE
 from collide.motion.moving_pair import omega_of, origin_of_b, place_pair
 from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
-from collide.narrowphase.convex_pairs import SIGNATURE
+from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, UPPER, VERTICES_A, VERTICES_B, view_row
 from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, norm, rotate, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED

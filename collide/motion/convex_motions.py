@@ -14,8 +14,8 @@ from collide.motion.convex_impact import FREE
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import free_rows
 from collide.motion.moving_body import BODY
-from collide.narrowphase.convex_pairs import answer_pairs
-from collide.narrowphase.convex_queries import scratch
+from collide.narrowphase.convex_kernel_calls import scratch
+from collide.narrowphase.pair_kernel import answer_pairs
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape

@@ -17,7 +17,7 @@ from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.placed_motion import poses_at
 from collide.motion.surface_motions import surface_impacts
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.numerics.sine_cosine import LARGEST_ANGLE
 from collide.pair_arguments import checked_shapes, matched_counts
 from collide.results import UNDECIDED

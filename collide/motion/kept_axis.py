@@ -149,11 +149,9 @@ def _rate(motion, time, axis, x_a, x_b):
 @kernel
 def _extreme(pair, body, g):
     """The point of a core farthest in a direction of its own frame, in W's axes from the core's origin."""
-    k, corner, _ = support(
-        body.kind, body.coords, body.n, body.padded, pair.numbers, body.params_at, body.tree, 0, -1, g
-    )
+    k, corner, _ = support(body.kind, body.coords, body.padded, pair.numbers, body.params_at, body.tree, 0, -1, g)
     if body.tree != 0:
-        k = settled_vertex(body.coords, body.n, body.padded, body.tree, k, g)
+        k = settled_vertex(body.coords, body.padded, body.tree, k, g)
         corner = column_at(body.coords, body.padded, k)
     return rotate(pair.poses, body.pose_at, corner)
 

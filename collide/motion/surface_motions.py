@@ -27,13 +27,14 @@ from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
+from collide.motion.convex_impact import OPEN
 from collide.motion.convex_motions import Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
-from collide.narrowphase.convex_bodies import convex_rows
+from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
-from collide.narrowphase.facets.mesh_pairs import pair_rows
+from collide.narrowphase.facets.mesh_batches import pair_rows
 from collide.narrowphase.facets.near_facets import near_facets
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
@@ -41,9 +42,11 @@ from collide.shapes.primitives import Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 from collide.transforms import SMALLEST
 
-#: So many pairs of facets at most are jobs of one span, unless it is shorter than _SHORTEST.
-_MAX_JOBS, _SHORTEST = 96, 2.0**-40
-_MAX_JOBS_OF_SHORTEST = 1 << 20
+#: So many pairs of facets at most are jobs of one span, and in proportion more where it is shorter than _SHORT: where
+#: flat and finely cut surfaces come together at once, no span is short enough for few.
+_MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
+#: Spans shorter than this are not cut any more.
+_SHORTEST = 2.0**-46
 _ULP = 2.0**-53
 
 
@@ -221,15 +224,15 @@ class _Spans:
         """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
         out = self._describe(begin, end)
         if (self.a.is_curved or self.b.is_curved) and out[REACH] < self.a.radius + self.b.radius:
-            return self._near_curved(out, end - begin <= _SHORTEST)
-        max_pairs = _MAX_JOBS if end - begin > _SHORTEST else _MAX_JOBS_OF_SHORTEST
+            return self._near_curved(out, _max_jobs(end - begin))
+        max_pairs = _max_jobs(end - begin)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
-        return None if near is None or (len(near.facets) > max_pairs and end - begin > _SHORTEST) else near.facets
+        return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
 
 
-    def _near_curved(self, out: np.ndarray, all_of_them: bool) -> np.ndarray | None:
+    def _near_curved(self, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
         """The same where the polytope around a curved piece is farther from it than anything moves in the span.
 
         The distance says whether anything is near at all, its normal which facets may be.
@@ -243,11 +246,15 @@ class _Spans:
             return np.zeros((0, 2), dtype=np.int64)
         tree: Any = mesh.tree
         near = near_facets(tree, curved.packed, as_given(X_M), as_given(X_C), row["normal"][None], np.array([reach]))  # type: ignore[arg-type]
-        if len(near.place) > _MAX_JOBS and not all_of_them:
+        if len(near.place) > max_pairs < _MAX_JOBS_OF_ALL:
             return None
         facets = np.zeros((len(near.place), 2), dtype=np.int64)
         facets[:, side] = tree.ids[near.place]
         return facets
+
+
+def _max_jobs(span: float) -> int:
+    return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
 
 def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
@@ -266,6 +273,10 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
         near = spans.near_facets(begin, end)
         if near is None:
             middle = 0.5 * (begin + end)
+            if end - begin < _SHORTEST:  # more facets together than can be looked at: open from here on
+                if begin < row["lower"][0]:
+                    row["lower"], row["status"] = begin, OPEN
+                continue
             spans_to_do += [(middle, end), (begin, middle)]
             continue
         if len(near) == 0:

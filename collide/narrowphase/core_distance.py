@@ -28,7 +28,7 @@ _MISS_OF_WIDTH = 2.0**-10
 _WELL_INSIDE = 2.0**-10
 #: With more vertices than this in two cores, a better seed for EPA than GJK's tetrahedron is worth its support points.
 _MAX_VERTICES_FOR_GJK_SEED = 48
-#: How often EPA begins at most, where there are so wants_cap vertices.
+#: How often EPA begins at most, where there are so many vertices.
 _MAX_STARTS = 4
 
 
@@ -39,7 +39,7 @@ class CoreDistance(NamedTuple):
     lower, upper : bounds of the signed distance.
     shallowest, deepest : proven bracket of the depth by `refine`, or (−∞, ∞).
     nhat : unit vector from A towards B.
-    n_points : of the deciding feature in the workspace.   n_vertices : how wants_cap of its vertex pairs the row names.
+    n_points : of the deciding feature in the workspace.   n_vertices : how many of its vertex pairs the row names.
     iterations : of GJK, plus 65536 times those of EPA.
     """
 
@@ -91,13 +91,13 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
     n = run.n_points
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     polytope = surface_at(work.epa_at, work.epa_integers_at)
-    wants_cap = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
+    use_capped_tetrahedron = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
     well_conditioned = enclosed and run.clearance > WELL_CONDITIONED * size
     iterations = run.iterations
     shallowest, deepest = -math.inf, math.inf
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
-        seed = Seed(points, ids, enclosed and start == 0, well_conditioned, wants_cap, start)
+        seed = Seed(points, ids, enclosed and start == 0, well_conditioned, use_capped_tetrahedron, start)
         result = epa(pair, polytope, seed, Goal(not query.depths, size, error, tolerance))
         iterations += 65536 * max(result.n_vertices - 4, 0)
         if result.status == FLAT:
@@ -119,7 +119,7 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         result = _refined_result(result, refined, error)
         start += 1
         # few vertices: `exact_depth.py` tries all planes instead
-        if refined.sound or not wants_cap or start == _MAX_STARTS:
+        if refined.sound or not use_capped_tetrahedron or start == _MAX_STARTS:
             break
     _weigh_foot(work, polytope, result, query.depths, not enclosed, curved, tolerance, size, error)
     if result.clearance > error:
@@ -174,7 +174,7 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, foot)) <= slack):
         facet = facet_of(polytope, result.n_facets, facet, foot, slack)
         load_facet(polytope, facet, work.points, work.ids, work.weights, with_ids, foot)
-    # The surface of curved cores keeps a width. Where wants_cap facets are as near, slivers mostly, none need hold the
+    # The surface of curved cores keeps a width. Where many facets are as near, slivers mostly, none need hold the
     # foot. Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
     tolerated = _NEAR_MISS * size
     if curved:

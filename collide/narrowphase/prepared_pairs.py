@@ -6,6 +6,7 @@ import itertools
 import weakref
 from typing import Any
 
+from collide.kernels import PLAIN_PYTHON
 from collide.shapes.shape import Shape
 
 #: Numbers of shapes within this process, never used again.
@@ -20,6 +21,10 @@ def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
     slot : of A, for what it was prepared.
     """
     return getattr(A, slot, {}).get(getattr(B, "_serial", None))
+
+
+def single_calls_are_safe() -> bool:
+    return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:

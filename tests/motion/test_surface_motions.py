@@ -186,6 +186,22 @@ def test_a_fine_tip_between_a_polytope_and_the_ball_in_it():
         assert abs(curved.lower - exact.lower) <= 1e-6
 
 
+def test_finely_cut_faces_come_together_at_once():
+    """Thousands of pairs of facets touch in the same moment: no span is so short that they are few."""
+    k, cells = 24, np.linspace(-0.5, 0.5, 25)
+    x, y = np.meshgrid(cells, cells, indexing="ij")
+    flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    at = (np.arange(k)[:, None] * (k + 1) + np.arange(k)).ravel()
+    faces = np.concatenate([np.stack([at, at + k + 1, at + 1], 1), np.stack([at + 1, at + k + 1, at + k + 2], 1)])
+    sheet = collide.Mesh(flat, faces)
+    r = collide.time_of_impact(sheet, sheet, np.eye(4), np.eye(4), collide.pose((0.01, 0, 1)), collide.pose((0, 0, -1)))
+    assert r.hit and r.lower <= 0.5 and r.lower >= 0.5 - 1e-9
+    flush = collide.time_of_impact(sheet, collide.Box((1, 1, 1)), *[np.eye(4)] * 2, *(
+        collide.pose((0, 0, z)) for z in (1.0, 0.25)
+    ))  # fmt: skip
+    assert flush.hit and flush.certified and flush.lower <= 2 / 3 <= flush.upper
+
+
 def test_swapped_meshes_and_unions_of_one_shape():
     """Equal shapes are told apart by their poses: the answer is mirrored exactly."""
     mesh = l_mesh()

@@ -1,0 +1,240 @@
+"""The narrowphase from Python: doubles first, the exact stage for what they leave open."""
+
+from __future__ import annotations
+
+from functools import cache
+from threading import local
+from typing import Any
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
+from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
+from collide.narrowphase.exact.exact_stage import settle_rows
+from collide.narrowphase.exact.settle_hulls import settle_hulls
+from collide.narrowphase.exact.settle_space import WORKSPACE
+from collide.narrowphase.fallback_searches import settle_by_other_searches
+from collide.narrowphase.finish_rows import finish_rows
+from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
+from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
+from collide.narrowphase.single_call import collide_single, distance_single
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.transforms import SMALLEST
+
+#: Set by tests: no pair of hulls is settled in doubles, whatever they have proven.
+distrust_doubles = False
+
+
+def run_pairs(
+    table: ShapeTable,
+    poses: PoseTable,
+    shape_of: np.ndarray,
+    pairs: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    stop_at_hit: bool = False,
+    depths: bool = True,
+) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
+
+    poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.
+    depths : whether it is wanted how deep overlaps are.
+    Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
+    """
+    pairs = np.ascontiguousarray(pairs, dtype=np.int64)
+    rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+    table.build_trees(shape_of[pairs])
+    tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+    depths = depths and not boolean
+    done = 0
+    while done < len(pairs):
+        last = len(pairs) if boolean else done + ROWS_PER_BATCH
+        todo, out = pairs[done:last], rows[done:last]
+        answered = answer_pairs(
+            *tables, address_of(todo), len(todo), boolean, depths, stop_at_hit, limit, address_of(out),
+            *_of_thread.space.addresses,
+        )  # fmt: skip
+        _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
+        done += answered
+        # The hit that stopped the kernel may have been an open one that turned out to be apart.
+        if stop_at_hit and out["hit"][answered - 1]:
+            break
+    return rows[:done]
+
+
+def settle_proposals(
+    table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray
+) -> None:
+    """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
+
+    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet
+    are told to, without a depth.
+    """
+    rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
+    _of_thread.space.integers[REQUESTS_AT] = 0
+    _finish(
+        rows,
+        np.ascontiguousarray(pairs, dtype=np.int64),
+        table,
+        poses,
+        shape_of,
+        boolean=False,
+        limit=np.inf,
+        depths=False,
+    )
+
+
+def _finish(
+    rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
+) -> None:
+    """Settle in place what doubles left open."""
+    if (rows["how"] == REFUSED).any():
+        raise UnsupportedQuery(
+            f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
+        )
+    if distrust_doubles:
+        rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
+    if (rows["how"] == UNDECIDED).any():
+        settle_rows(
+            rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit,
+            digits=_of_thread.space.digits,
+            requests_at=_of_thread.space.addresses[1] + 8 * REQUESTS_AT,
+        )  # fmt: skip
+        if not distrust_doubles:
+            shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
+            settle_by_other_searches(
+                rows, pairs, shapes_and_poses, _of_thread.space.addresses, boolean=boolean, depths=depths, limit=limit
+            )
+
+
+def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
+    """How many pairs two batches of poses make, of which either may be of one."""
+    return max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
+
+
+def run_poses(
+    out: np.ndarray,
+    table: ShapeTable,
+    which: np.ndarray | None,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    *,
+    boolean: bool,
+    limit: float,
+    check: bool,
+    axes: np.ndarray | None = None,
+    depths: bool = True,
+) -> bool:
+    """Answer two convex sets at n pairs of poses; False where a pose is no pose.
+
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
+    which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    check : refuse matrices that are no rotation.
+    axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
+    depths : of rows: whether it is wanted how deep overlaps are.
+    """
+    n = len(out)
+    table.build_trees(np.arange(2) if which is None else which)
+    space = _of_thread.space
+    header = space.header_of(table)
+    done = 0
+    while done < n:
+        status = answer_poses(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
+            0 if axes is None else address_of(axes), address_of(out),
+        )  # fmt: skip
+        if status == BAD_POSE:
+            return False
+        done = int(header[ANSWERED])
+        if status:
+            start = done - 1 - (done - 1) % BLOCK
+            rows = space.rows[: done - start] if boolean else out[start:done]
+            _finish(rows, space.pairs, table, space.poses, space.shape_of, boolean=boolean, limit=limit, depths=depths)
+            if boolean:
+                out[start:done] = rows["hit"]
+    return True
+
+
+def scratch() -> tuple[int, int]:
+    """Addresses of this thread's workspace, doubles and integers, as `answer_pairs` takes them."""
+    return _of_thread.space.addresses
+
+
+def settle_open(
+    rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
+) -> None:
+    """Settle in place what doubles left open of rows that `answer_pairs` has just made with this thread's workspace."""
+    _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
+
+
+def finish_distances(rows: np.ndarray, *, depths: bool) -> bool:
+    """`finish_rows` of `distance`; whether a depth has no end."""
+    return bool(finish_rows(address_of(rows), len(rows), depths))
+
+
+class _Workspace:
+    """Scratch memory of the kernels."""
+
+    def __init__(self) -> None:
+        self.doubles = np.zeros(DOUBLES)
+        self.integers = np.zeros(INTEGERS, dtype=np.int64)
+        self.digits = np.zeros(WORKSPACE, dtype=np.int64)
+        self.poses = PoseTable(np.zeros((2 * BLOCK, POSE)), NO_TERMS)
+        self.shape_of = np.zeros(2 * BLOCK, dtype=np.int64)
+        self.pairs = np.stack([np.arange(BLOCK), np.arange(BLOCK, 2 * BLOCK)], axis=1)
+        self.rows = np.zeros(BLOCK, dtype=PAIR_DTYPE)
+        self.addresses = address_of(self.doubles), address_of(self.integers)
+
+        self.shape_of[BLOCK:] = 1
+        buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
+        self._header = np.zeros(HEADER, dtype=np.int64)
+        self._header[POSES_AT:SETTLE] = *map(address_of, buffers), *self.addresses
+        self._header[SETTLE:ANSWERED] = code_of(settle_hulls), address_of(self.digits)
+
+    def header_of(self, table: ShapeTable) -> np.ndarray:
+        """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""
+        header = self._header.copy()
+        header[:POSES_AT] = code_of(answer_pairs), *table.addresses
+        return header
+
+
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+_of_thread = _OfThread()
+
+
+@cache
+def _space_of_single_calls() -> _Workspace:
+    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
+    is good as long as it is held."""
+    return _Workspace()
+
+
+class SinglePair:
+    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call.
+
+    collide : a built-in function of two poses; None where it leaves the answer to the long way.
+    """
+
+    def __init__(self, table: ShapeTable):
+        table.build_trees(np.arange(2))
+        self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
+        header = self.header = self._space.header_of(table)
+        self.of_contacts: Any = None  # `contact.convex_contacts.SingleContacts`, once contacts are asked for
+        self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
+
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows

@@ -1,0 +1,335 @@
+"""Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
+
+Kernels answer whole batches (`collide_kernel.py`, `distance_kernel.py`). Completed here, pose by pose, is what a row
+may still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
+surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
+that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so
+the bracket reaches up to 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.lowering.facet_bodies import Body, hull_of, reach_of
+from collide.mesh.bvh_slabs import make_slabs
+from collide.narrowphase.convex_batches import convex_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
+from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
+from collide.narrowphase.facets.collide_kernel import (
+    APART,
+    NO_POSE,
+    RADIUS_A,
+    RADIUS_B,
+    cull_poses,
+    meet_poses,
+    meet_single,
+)
+from collide.narrowphase.facets.distance_kernel import (
+    FARTHEST,
+    NEARLY_TOUCH,
+    PROMISE,
+    RADII_MEET,
+    ROW_NO_POSE,
+    TOO_FAR,
+    gap_poses,
+    gap_single,
+)
+from collide.narrowphase.facets.exact_triangles import decide_exactly
+from collide.narrowphase.facets.facet_queries import (
+    HEAP,
+    Workspace,
+    not_invertible,
+    stack_of,
+    surface_distances,
+    workspace,
+)
+from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
+from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
+from collide.transforms import as_poses
+
+#: Points of parts, more than which keep single calls from holding Python's lock.
+_MAX_POINTS = 64
+
+
+class Hits(NamedTuple):
+    """What is known of two bodies without their radii, at n poses.
+
+    core : (n,) bool, whether facets or insides meet.
+    inside : (n, 3) a point of the world in both bodies, NaN unless a part of one lies inside the other, surfaces apart.
+    """
+
+    core: np.ndarray
+    inside: np.ndarray
+
+
+def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> Hits:
+    """Exactly, for poses (n, 4, 4) or (1, 4, 4), whether two bodies without their radii share a point.
+
+    check : as in `states`.
+    """
+    inside = np.full((number_of_poses(X_WA, X_WB), 3), np.nan)
+    return Hits(_states(A, B, False, X_WA, X_WB, check=check, inside=inside) != APART, inside)
+
+
+def balls_farther(
+    numbers_a: np.ndarray,
+    numbers_b: np.ndarray,
+    X_WA: np.ndarray,
+    X_WB: np.ndarray,
+    margin: float,
+    *,
+    check: bool = False,
+) -> np.ndarray:
+    """(n,) bool: whether balls around two bodies are certainly farther apart than a margin [m].
+
+    numbers_a, numbers_b : (7,) as of a `MeshTree`.   poses, check : as of `states`. Raises InvalidPose.
+    """
+    out = np.zeros(number_of_poses(X_WA, X_WB), dtype=np.uint8)
+
+    def ask_from(first: int, check: bool) -> int:
+        return cull_poses(
+            address_of(numbers_a), address_of(X_WA), _step(X_WA), address_of(numbers_b), address_of(X_WB), _step(X_WB),
+            first, len(out), check, margin, address_of(out),
+        )  # fmt: skip
+
+    _ask_all(ask_from, len(out), X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
+    return out == APART
+
+
+def states(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) APART, HIT or OPEN for poses (n, 4, 4) or (1, 4, 4): rounding leaves open only bodies swept by balls.
+
+    check : refuse matrices that are no rotation. Raises InvalidPose.
+    """
+    if B.key < A.key:
+        return _states(B, A, True, X_WA, X_WB, check=check)
+    return _states(A, B, False, X_WA, X_WB, check=check)
+
+
+def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: False only where the bodies are proven apart."""
+    return states(A, B, X_WA, X_WB) != APART
+
+
+def _states(
+    A: Body, B: Body, exchanged: bool, X_WA, X_WB, *, check: bool, inside: np.ndarray | None = None
+) -> np.ndarray:
+    """States of bodies; exchanged: the poses are those of B and A.   inside : as of `Hits`, of bodies without radii."""
+    n = number_of_poses(X_WA, X_WB)
+    out = np.zeros(n, dtype=np.uint8)
+    if A.radius + B.radius > 0.0 and inside is None:
+        _make_slabs(A, B)
+    header = _header(A, B, exchanged, workspace(stack_of(A.tree, B.tree)))
+
+    def ask_from(first: int, check: bool) -> int:
+        return meet_poses(
+            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, n, check,
+            inside is not None, 0 if inside is None else address_of(inside), address_of(out),
+        )  # fmt: skip
+
+    _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
+    return out
+
+
+def _ask_all(
+    ask_from: Callable[[int, bool], int], n: int, X_WA, X_WB, check: bool, is_no_pose: Callable[[int], bool]
+) -> None:
+    """Have a kernel answer n poses. It stops at a matrix that is none, or places no mesh: raises InvalidPose."""
+    done = ask_from(0, check)
+    while done < n:
+        if not is_no_pose(done):
+            raise not_invertible(done)
+        for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
+            as_poses(X, name, check=check)
+        if not check:
+            raise AssertionError("a pose that is none")
+        check = False  # a pose after all, on the brink of the tolerance
+        done = ask_from(done, check)
+
+
+def _step(X: np.ndarray) -> int:
+    """Doubles from one pose to the next: none for one that goes with all of the other's."""
+    return 16 * (len(X) > 1)
+
+
+def _make_slabs(A: Body, B: Body) -> None:
+    """Distances look at slabs around the boxes' facets, made at most once."""
+    A.tree.need_slabs(make_slabs)
+    B.tree.need_slabs(make_slabs)
+
+
+def _header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
+    """What the kernels of `collide_kernel.py` read first; the caller keeps bodies and workspace alive."""
+    same_tree = A.tree.content == B.tree.content
+    header = np.array(
+        [
+            A.tree.address, B.tree.address, A.solid, B.solid, address_of(A.points), address_of(B.points), len(A.points),
+            len(B.points), 0, 0, same_tree, same_tree and A.key == B.key, exchanged,
+            code_of(surface_collision.walk_surfaces), code_of(winding_numbers.points_inside),
+            code_of(surface_distance.near_surfaces), code_of(decide_exactly), *space.addresses[:4],
+            space.heap_address, HEAP, space.scratch_address,
+        ],
+        dtype=np.int64,
+    )  # fmt: skip
+    header.view(np.float64)[RADIUS_A : RADIUS_B + 1] = A.radius, B.radius
+    return header
+
+
+# --- rows ---------------------------------------------------------------------------------------
+
+
+def body_rows(
+    A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool, check: bool = False,
+    out: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Rows (PAIR_DTYPE) for poses (n, 4, 4) or (1, 4, 4); part_a and part_b are facets, 0 where none decided.
+
+    limit, depths : as in `distance`.   check : as in `states`.   out : rows to fill, zeroed. Raises InvalidPose.
+    """
+    n = number_of_poses(X_WA, X_WB)
+    rows = np.zeros(n, dtype=PAIR_DTYPE) if out is None else out
+    lacks = _fill_rows(rows, A, B, X_WA, X_WB, limit, depths, check)
+    if lacks.any():
+        near = np.flatnonzero(lacks & NEARLY_TOUCH)
+        if len(near):
+            XA, XB = _poses_of(X_WA, near), _poses_of(X_WB, near)
+            again = np.zeros(len(near), dtype=PAIR_DTYPE)
+            lacks[near] = _fill_rows(again, A, B, XA, XB, limit, depths, False, hull_rows(A, B, XA, XB, math.inf))
+            rows[near] = again
+        for k in np.flatnonzero(lacks).tolist():
+            XA, XB = (X[k if len(X) > 1 else 0] for X in (X_WA, X_WB))
+            rows[k] = _completed(A, B, XA, XB, rows[k : k + 1], int(lacks[k]), limit)
+    return rows
+
+
+def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
+    return X if len(X) == 1 else X[some]
+
+
+def _fill_rows(
+    rows: np.ndarray, A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool, check: bool,
+    hulls: np.ndarray | None = None,
+) -> np.ndarray:
+    """(n,) uint8: what rows lack (`gap_poses`), having written them. hulls : their hulls' rows, for directions."""
+    lacks = np.zeros(len(rows), dtype=np.uint8)
+    exchanged = B.key < A.key
+    _make_slabs(A, B)
+    header = _header(*((B, A) if exchanged else (A, B)), exchanged, workspace(stack_of(A.tree, B.tree)))
+    reach = _reach_of_search(A, B, limit)
+
+    def ask_from(first: int, check: bool) -> int:
+        return gap_poses(
+            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, len(rows), check,
+            limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+        )  # fmt: skip
+
+    _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
+    return lacks
+
+
+def _reach_of_search(A: Body, B: Body, limit: float) -> float:
+    """How far apart cores may be and bodies no farther than the limit, rounded upwards [m]."""
+    return math.nextafter(math.nextafter(limit, math.inf) + (A.radius + B.radius), math.inf)
+
+
+def farthest_gap(A: Body, B: Body) -> float:
+    """The largest gap [m] that the boxes of two trees measure."""
+    return FARTHEST * math.ldexp(1.0, min(A.tree.exponent, B.tree.exponent))
+
+
+def hull_rows(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """Rows of the bodies' hulls."""
+    return convex_rows(hull_of(A), hull_of(B), X_WA, X_WB, limit=limit)
+
+
+def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float) -> np.ndarray:
+    """The row (1,) of one pair of poses (4, 4), whole: worked on in the order that the kernel took."""
+    if B.key < A.key or (B.key == A.key and X_WA[:3].tolist() > X_WB[:3].tolist()):
+        return flipped(_completed_in_order(B, A, X_WB, X_WA, flipped(row), lacks, limit))
+    return _completed_in_order(A, B, X_WA, X_WB, row.copy(), lacks, limit)
+
+
+def _completed_in_order(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float) -> np.ndarray:
+    """A far gap, or a row of bodies that meet, with a depth."""
+    if lacks & TOO_FAR:
+        return _far_gap(A, B, X_WA, X_WB, limit)
+    point = 0.5 * (row["point_a"][0] + row["point_b"][0])
+    steps: list[np.ndarray] = []
+    if lacks & RADII_MEET:
+        lower = surface_distances(A.tree, B.tree, X_WA, X_WB, _reach_of_search(A, B, limit)).lower[0]
+        overlap = (A.radius + B.radius - float(lower)) * (1 + 1e-12) + 1e-300
+        steps = [overlap * row["normal"][0]] if overlap > 0.0 else []
+    row["certified"] = decided = row["how"][0] != UNDECIDED
+    row["upper"] = 0.0 if decided else max(float(row["upper"][0]), 0.0)
+    row["beyond"] = False
+    hulls = hull_rows(A, B, X_WA[None], X_WB[None], math.inf)[0]
+    write_depth(row, point, separating_translation(A, B, X_WA, X_WB, hulls, steps, hits))
+    return row
+
+
+def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
+    """The row of bodies too far apart for boxes of floats: the distance of their hulls, and of one point of each."""
+    row = hull_rows(A, B, X_WA[None], X_WB[None], limit)
+    row["count"], row["part_a"], row["part_b"] = 0, 0, 0
+    row["vertices_a"] = row["vertices_b"] = -1
+    if not row["beyond"][0]:
+        p, q = (X[:3, 3] + (X[:3, :3] * body.points[0]).sum(axis=1) for body, X in ((A, X_WA), (B, X_WB)))
+        length = float(np.sqrt(np.square(q - p).sum()))
+        upper = length * (1 + 2.0**-45) - A.radius - B.radius
+        row["upper"] = max(upper, float(row["upper"][0]))
+        if row["lower"][0] <= 0.0:  # the hulls meet, and these points are all that is known
+            row["normal"] = (q - p) / length if length > 0.0 else (0.0, 0.0, 1.0)
+            row["lower"], row["distance"] = 0.0, row["upper"]
+            row["point_a"], row["point_b"] = p + A.radius * row["normal"], q - B.radius * row["normal"]
+        x, y, z = X_WB[:3, 3] - X_WA[:3, 3]
+        size = (reach_of(A) + reach_of(B)) + math.sqrt(x * x + y * y + z * z)
+        row["certified"] = bool(row["lower"][0] > 0.0 and row["upper"][0] <= row["lower"][0] + PROMISE * size)
+    row["hit"], row["how"] = False, FORMULA
+    return row
+
+
+# --- single calls -------------------------------------------------------------------------------
+
+
+class SinglePair:
+    """Two bodies prepared for one call at a time: nothing is left to do in Python but the call.
+
+    collide : a function of two poses (4, 4): bool, or None where the answer is left to the long way.
+    """
+
+    #: One for all single calls: their kernels keep Python's lock. A larger one takes its place where trees are deeper.
+    _space: Workspace | None = None
+
+    def __init__(self, A: Body, B: Body):
+        exchanged = B.key < A.key
+        if exchanged:
+            A, B = B, A
+        space, n_stack = SinglePair._space, stack_of(A.tree, B.tree)
+        if space is None or space.n_stack < n_stack:
+            space = SinglePair._space = Workspace(max(512, n_stack))
+        self._held = A, B, space
+        self._has_slabs = A.radius + B.radius > 0.0
+        if self._has_slabs:
+            _make_slabs(A, B)
+        header = _header(A, B, exchanged, space)
+        self.collide, self._gap = prepared_boolean(meet_single, header), prepared_row(gap_single, header)
+
+    @staticmethod
+    def serves(A: Body, B: Body) -> bool:
+        """Whether single calls are short enough to keep Python's lock."""
+        return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
+
+    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, bytes as of a batch; None of depths, and of what kernels do not complete."""
+        if not self._has_slabs:
+            _make_slabs(*self._held[:2])
+            self._has_slabs = True
+        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        return None if self._gap(X_WA, X_WB, rows, depths) is None else rows

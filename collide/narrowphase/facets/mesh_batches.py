@@ -1,0 +1,155 @@
+"""Two shapes with a mesh in one or both, at n pairs of poses: what pair queries and worlds ask.
+
+Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_methods.py`). Hulls
+settle what facets leave open: the convex engine gives them the last digit, and takes the poses of parts without
+rounding them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.lowering.facet_bodies import body_of
+from collide.lowering.kinds import Kind, kind_of
+from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
+from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
+from collide.narrowphase.dispatch import Method, method_of
+from collide.narrowphase.facets.collide_kernel import APART, OPEN
+from collide.narrowphase.facets.facet_kernel_calls import SinglePair, balls_farther
+from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.fallback_searches import lay_points_apart
+from collide.results import UNDECIDED
+from collide.shapes.shape import Shape
+
+
+def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) bool: whether two shapes share a point; True where that is open.
+
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    check : refuse matrices that are no rotation. Raises InvalidPose, UnsupportedQuery.
+    Costs 0.2 µs a pose of bodies of facets that are far apart.
+    """
+    return _states(A, B, X_WA, X_WB, check, parts_open=False) != APART
+
+
+def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+    """(n,) APART, HIT or OPEN: what `pair_hits` says, and whether that is proven."""
+    return _states(A, B, X_WA, X_WB, check, parts_open=True)
+
+
+def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:
+    """States of two shapes; parts_open: tell OPEN from HIT among convex parts, too."""
+    if _has_compound(A, B):
+        states = _compound_states(A, B, X_WA, X_WB, check, parts_open)
+    else:
+        states = mesh_states(A, B, X_WA, X_WB, check=check)
+    undecided = np.flatnonzero(states == OPEN)
+    covers = _convex_covers(A, B) if len(undecided) else None  # a mesh's hull is made when it is first needed
+    if covers is not None:
+        hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
+        states[undecided[~hulls_meet]] = APART
+    return states
+
+
+def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bool) -> np.ndarray:
+    """States of compounds, of which only those are taken apart that balls around them leave open."""
+    parts_a, parts_b = compound_parts(A), compound_parts(B)
+    if parts_a.ball is None or parts_b.ball is None:
+        return compound_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
+    near = np.flatnonzero(~balls_farther(parts_a.ball, parts_b.ball, X_WA, X_WB, 0.0, check=check))
+    states = np.full(number_of_poses(X_WA, X_WB), APART)
+    if len(near):
+        poses = (np.broadcast_to(X, (len(states), 4, 4))[near] for X in (X_WA, X_WB))
+        states[near] = compound_states(A, B, *poses, open_ones=parts_open)
+    return states
+
+
+def pair_rows(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool = True, check: bool = False,
+    out: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Rows (PAIR_DTYPE) of two shapes; poses and check as of `pair_hits`, limit and depths as in `distance`.
+
+    part_a, part_b : of a `Compound` the number of its part, in the order of its items, nested ones in their place; of
+    any other shape the facet.   out : (n,) zeroed rows, to be filled and returned.
+    """
+    if _has_compound(A, B):
+        rows = compound_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
+    else:
+        rows = mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+    undecided = np.flatnonzero(rows["how"] == UNDECIDED)
+    covers = _convex_covers(A, B) if len(undecided) else None
+    if covers is not None:
+        poses = _poses_of(X_WA, undecided), _poses_of(X_WB, undecided)
+        hulls = convex_rows(*covers, *poses, depths=False)
+        apart = hulls["lower"] > 0.0
+        _make_gaps(rows, undecided[apart], hulls[apart], limit)
+    if out is not None and rows is not out:
+        out[:] = rows
+        rows = out
+    return rows
+
+
+def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """What `pair_rows` gives for checked poses, but that pairs beyond ``limit`` [m] may have any proven bound.
+
+    Hulls that are proven farther apart answer for the bodies in them: then no facet is looked at, and no tree is built.
+    Raises UnsupportedQuery where the hulls are not enough and the shapes are not answered.
+    """
+    covers = _convex_covers(A, B) if limit < math.inf else None
+    if covers is None:
+        return pair_rows(A, B, X_WA, X_WB, limit=limit)
+    rows = convex_rows(*covers, X_WA, X_WB, limit=limit, depths=False)
+    beyond = rows["beyond"] | (rows["lower"] > limit)
+    rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1  # of the hulls, not of the meshes
+    rows["part_a"], rows["part_b"] = 0, 0
+    near = np.flatnonzero(~beyond)
+    if len(near):
+        rows[near] = pair_rows(A, B, _poses_of(X_WA, near), _poses_of(X_WB, near), limit=limit)
+    return rows
+
+
+def single_pair(A: Shape, B: Shape) -> SinglePair | None:
+    """Two bodies of facets made ready for single calls; None where these are batches of one: of very many parts.
+
+    The pair holds trees and points, not the shapes.
+    """
+    bodies = body_of(A), body_of(B)
+    return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
+
+
+def _has_compound(A: Shape, B: Shape) -> bool:
+    """Whether one is a `Compound`, to be taken apart."""
+    return method_of(kind_of(A), kind_of(B)) is Method.MESH_PARTS
+
+
+def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
+    """Two shapes of convex parts that hold the given ones, where there are such."""
+    cover_a, cover_b = _convex_cover(A), _convex_cover(B)
+    return None if cover_a is None or cover_b is None else (cover_a, cover_b)
+
+
+def _convex_cover(shape: Shape) -> Shape | None:
+    return None if kind_of(shape) is Kind.MESH_COMPOUND else hull_shape(shape)
+
+
+def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
+    return X if len(X) == 1 else X[some]
+
+
+def _make_gaps(rows: np.ndarray, which: np.ndarray, hulls: np.ndarray, limit: float) -> None:
+    """Make undecided rows gaps, in place, where their hulls are proven to be apart."""
+    row = rows[which]
+    row["hit"], row["how"], row["normal"] = False, hulls["how"], hulls["normal"]
+    row["lower"] = hulls["lower"]
+    row["beyond"] = row["lower"] > limit
+    row["certified"] = row["beyond"]
+    upper = np.maximum(row["upper"], row["lower"])
+    row["distance"] = np.where(row["beyond"], row["lower"], np.clip(hulls["distance"], row["lower"], upper))
+    row["upper"] = np.where(row["beyond"], math.inf, upper)
+    lay_points_apart(row, np.arange(len(row)))
+    rows[which] = row

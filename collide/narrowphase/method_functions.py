@@ -1,0 +1,76 @@
+"""Every method of the table (`dispatch.py`) with the functions that carry it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.lazy_modules import lazy_module
+from collide.lowering.kinds import kind_of
+from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
+from collide.narrowphase.dispatch import TABLE, Method
+from collide.shapes.shape import Shape
+
+#: Half of the engine, which scenes without meshes never load.
+mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
+
+
+class Answer(NamedTuple):
+    """How a method is asked.
+
+    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_batches.answer_sets` describes it.
+    prepare : ``prepare(A, B)`` gives the pair ready for single calls, or None where they are batches of one.
+    of_one_pair : whether a batch is of one pair of shapes; else shapes may be `Picked` from a set pose by pose.
+    """
+
+    batch: Callable[..., bool]
+    prepare: Callable[[Shape, Shape], Any]
+    of_one_pair: bool
+
+
+def _answer_meshes(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    if question.boolean:
+        out[:] = mesh_batches.pair_hits(A, B, X_WA, X_WB, check=question.check)
+    else:
+        limit, depths, check = question.limit, question.depths, question.check
+        mesh_batches.pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+    return True
+
+
+def _prepare_facets(A: Shape, B: Shape) -> Any:
+    return mesh_batches.single_pair(A, B)
+
+
+def _unprepared(A: Shape, B: Shape) -> None:
+    return None
+
+
+_SETS = Answer(answer_sets, prepare_sets, False)
+_PARTS = Answer(answer_parts, prepare_parts, False)
+_FACETS = Answer(_answer_meshes, _prepare_facets, True)
+_MESHES = Answer(_answer_meshes, _unprepared, True)
+
+ANSWERS: dict[Method, Answer] = {
+    Method.CLOSED: _SETS,
+    Method.PLANE: _SETS,
+    Method.PLANES: _SETS,
+    Method.CONVEX: _SETS,
+    Method.PARTS: _PARTS,
+    Method.FACETS: _FACETS,
+    Method.CURVED: _MESHES,
+    Method.HULL: _MESHES,
+    Method.MESH_PARTS: _MESHES,
+}
+
+
+#: [kind of A][kind of B]: the same by the table.
+_ANSWER_TABLE = tuple(tuple(ANSWERS[method] for method in row) for row in TABLE)
+#: [kind of A, kind of B]: whether a batch is of one pair of shapes.
+OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row in TABLE])
+
+
+def answer_of(A: Shape, B: Shape) -> Answer:
+    """What answers a pair of shapes."""
+    return _ANSWER_TABLE[kind_of(A)][kind_of(B)]
