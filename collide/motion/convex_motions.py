@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from threading import local
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,8 @@ class Motions(NamedTuple):
 
     def picked(self, some: np.ndarray) -> Motions:
         """Those of these numbers; what goes with all stays as it is."""
-        return Motions(*(X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self))
+        columns: list[Any] = [X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self]
+        return Motions(*columns)
 
     def swapped(self) -> Motions:
         """Those of B and A."""
@@ -61,7 +62,8 @@ class Motions(NamedTuple):
 
     def spread(self, n: int) -> Motions:
         """The same with n of everything."""
-        return Motions(*(X if X is None else np.broadcast_to(X, (n, *X.shape[1:])) for X in self))
+        columns: list[Any] = [X if X is None else np.broadcast_to(X, (n, *X.shape[1:])) for X in self]
+        return Motions(*columns)
 
 
 class Tables(NamedTuple):

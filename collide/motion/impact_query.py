@@ -316,7 +316,8 @@ def _ask_start(question: _Question, rows: np.ndarray, some: np.ndarray) -> None:
     """Motions that are in contact at the start, decided as `collide` does, become contacts at time 0."""
     if not len(some):
         return
-    hits = answer_batch(*_start_of(question, some), Question(True), question.threads)
+    A, B, X_WA, X_WB = _start_of(question, some)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True), question.threads)
     hit = some[np.broadcast_to(hits, len(some))]
     rows["lower"][hit] = rows["upper"][hit] = 0.0
     rows["status"][hit] = CONTACT
@@ -337,7 +338,8 @@ def _describe_start(question: _Question, rows: np.ndarray) -> None:
 def _describe_as_distance(question: _Question, rows: np.ndarray, some: np.ndarray, depths: bool) -> None:
     if not len(some):
         return
-    pairs = answer_batch(*_start_of(question, some), Question(False, np.inf, depths), question.threads)
+    A, B, X_WA, X_WB = _start_of(question, some)
+    pairs = answer_batch(A, B, X_WA, X_WB, Question(False, np.inf, depths), question.threads)
     pairs = np.broadcast_to(pairs, len(some))
     for field in ("normal", "point_a", "point_b", "part_a", "part_b"):
         rows[field][some] = pairs[field]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.motion.convex_impact import CONTACT, FREE
+from collide.motion.convex_impact import FREE
 from collide.motion.impact_jobs import clear_impacts
 
 #: One row a motion: bracket of the first contact, normal and points in W [m]; which parts meet; questions to GJK; how
@@ -70,10 +70,9 @@ def flipped_impacts(rows: np.ndarray) -> np.ndarray:
 
 def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
     """Rows as callers see them."""
-    free, proven = rows["status"] == FREE, rows["status"] == CONTACT
+    free = rows["status"] == FREE
     lower, upper = np.where(free, 1.0, rows["lower"]), np.where(free, 1.0, rows["upper"])
-    with np.errstate(invalid="ignore"):
-        certified = free | (proven & (upper - lower <= tolerance))
+    certified = upper - lower <= tolerance
     columns = (
         ~free, lower, lower.copy(), upper, certified, *(rows[name].copy() for name in (
             "normal", "point_a", "point_b", "part_a", "part_b", "queries")),

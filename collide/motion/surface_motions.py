@@ -164,10 +164,8 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
 
 def _order(shape: Shape) -> list[bytes]:
-    return [
-        piece.tree.content if piece.packed is None and piece.tree is not None else piece.packed.content
-        for piece in pieces_of(shape)
-    ]  # type: ignore[union-attr]
+    contents: list[Any] = [piece.tree if piece.packed is None else piece.packed for piece in pieces_of(shape)]
+    return [of.content for of in contents]
 
 
 def _needs_facets(a: Piece, b: Piece) -> bool:

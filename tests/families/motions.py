@@ -50,7 +50,7 @@ def poses(R: Rotation, p: np.ndarray) -> np.ndarray:
 Pair = tuple[collide.Shape, collide.Shape, Gap, float]
 
 
-def _boxes(rng) -> Pair:
+def boxes(rng) -> Pair:
     a, b = rng.uniform(0.1, 1.5, (2, 3))
     gap = oracle.polytope_gap(*oracle.box_features(a), *oracle.box_features(b))
     return collide.Box(a), collide.Box(b), gap, float(np.linalg.norm(a) + np.linalg.norm(b))
@@ -100,17 +100,17 @@ def _rods(rng) -> Pair:
     return collide.Box(a), collide.Box(b), gap, 6.0
 
 
-def _needle_and_plate(rng) -> Pair:
+def needle_and_plate(rng) -> Pair:
     a, b = np.array([1e-3, 1e-3, 0.2]), np.array([1.0, 1.0, 1e-6])
     gap = oracle.polytope_gap(*oracle.box_features(a), *oracle.box_features(b))
     return collide.Box(a), collide.Box(b), gap, 1.7
 
 
 def _any(rng) -> Pair:
-    return (_boxes, _simplices, _capsules, _sphere_and_round)[rng.integers(4)](rng)
+    return (boxes, _simplices, _capsules, _sphere_and_round)[rng.integers(4)](rng)
 
 
-def _group(name, rng, n, pair: Pair, *, spread=1.5, turn=None, omega=None, fast=0.0) -> Group:
+def random_group(name, rng, n, pair: Pair, *, spread=1.5, turn=None, omega=None, fast=0.0) -> Group:
     """Random positions within the spread at both ends, random orientations.
 
     turn : largest angle between both ends, π without.   omega : turns are given as angular velocities up to this.
@@ -150,7 +150,7 @@ def resolution(group: Group) -> float:
 def _grazing(name, rng, n, pair: Pair) -> Group:
     """Motions whose least gap is all but 0: bodies whose origins meet half-way, B's path then shifted to the side by as
     much as just clears it, and a little."""
-    group = _group(name, rng, n, pair, spread=1.5, turn=0.5)
+    group = random_group(name, rng, n, pair, spread=1.5, turn=0.5)
     A, B = group.motions()
     half = np.full(n, 0.5)
     group = _shifted(group, A.at(half)[1] - B.at(half)[1])
@@ -175,18 +175,18 @@ def _shifted(group: Group, by: np.ndarray) -> Group:
 
 #: By name: ``make(rng, n)`` gives a group.
 FAMILIES: dict[str, Callable[[np.random.Generator, int], Group]] = {
-    "boxes at random": lambda rng, n: _group("boxes at random", rng, n, _boxes(rng)),
-    "tetrahedra at random": lambda rng, n: _group("tetrahedra at random", rng, n, _simplices(rng)),
-    "capsules at random": lambda rng, n: _group("capsules at random", rng, n, _capsules(rng)),
-    "a sphere and a round or square body": lambda rng, n: _group("sphere", rng, n, _sphere_and_round(rng)),
-    "half-spaces": lambda rng, n: _group("half-spaces", rng, n, _half_space(rng), turn=1.0),
-    "translations": lambda rng, n: _group("translations", rng, n, _any(rng), turn=0.0),
-    "many turns": lambda rng, n: _group("many turns", rng, n, _any(rng), omega=60.0, spread=2.0),
-    "spinning rods": lambda rng, n: _group("spinning rods", rng, n, _rods(rng), omega=200.0, spread=2.0),
-    "ten kilometres": lambda rng, n: _group("ten kilometres", rng, n, _any(rng), spread=0.5, fast=1e4),
-    "needles and plates": lambda rng, n: _group("needles and plates", rng, n, _needle_and_plate(rng), spread=0.5),
-    "fast needles and plates": lambda rng, n: _group(
-        "fast needles and plates", rng, n, _needle_and_plate(rng), spread=0.3, turn=0.3, fast=1e4
+    "boxes at random": lambda rng, n: random_group("boxes at random", rng, n, boxes(rng)),
+    "tetrahedra at random": lambda rng, n: random_group("tetrahedra at random", rng, n, _simplices(rng)),
+    "capsules at random": lambda rng, n: random_group("capsules at random", rng, n, _capsules(rng)),
+    "a sphere and a round or square body": lambda rng, n: random_group("sphere", rng, n, _sphere_and_round(rng)),
+    "half-spaces": lambda rng, n: random_group("half-spaces", rng, n, _half_space(rng), turn=1.0),
+    "translations": lambda rng, n: random_group("translations", rng, n, _any(rng), turn=0.0),
+    "many turns": lambda rng, n: random_group("many turns", rng, n, _any(rng), omega=60.0, spread=2.0),
+    "spinning rods": lambda rng, n: random_group("spinning rods", rng, n, _rods(rng), omega=200.0, spread=2.0),
+    "ten kilometres": lambda rng, n: random_group("ten kilometres", rng, n, _any(rng), spread=0.5, fast=1e4),
+    "needles and plates": lambda rng, n: random_group("needles and plates", rng, n, needle_and_plate(rng), spread=0.5),
+    "fast needles and plates": lambda rng, n: random_group(
+        "fast needles and plates", rng, n, needle_and_plate(rng), spread=0.3, turn=0.3, fast=1e4
     ),
     "grazing": lambda rng, n: _grazing("grazing", rng, n, _any(rng)),
 }

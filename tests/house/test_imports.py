@@ -115,6 +115,7 @@ ROOMS = {
     },
     "motion": {
         "errors",
+        "support",
         "argument_checks",
         "kernels",
         "transforms",

@@ -43,7 +43,7 @@ def l_gap(features) -> oracle.Gap:
 
 def judge(A, B, gap, seed: int, n: int = 50, least_hits: int = 10, **options):
     """Ask and judge; returns the answer."""
-    group = motions._group("meshes", np.random.default_rng(seed), n, (A, B, gap, 4.0), spread=2.0, **options)
+    group = motions.random_group("meshes", np.random.default_rng(seed), n, (A, B, gap, 4.0), spread=2.0, **options)
     r = collide.time_of_impact(A, B, *group.poses, omega_WA=group.omega_WA, omega_WB=group.omega_WB)
     verdict = oracle.judge(gap, *group.motions(), r.lower, r.upper, tolerance=1e-10)
     for k in np.flatnonzero(verdict.missed):
@@ -98,7 +98,7 @@ OTHERS = [
 def test_a_box_of_facets_moves_as_a_box(other):
     """Every other kind of shape: brackets of both overlap, for the truth is one."""
     size = (1.0, 0.8, 0.6)
-    group = motions._group("twins", np.random.default_rng(5), 50, (None, other, None, 3.0), spread=1.5)
+    group = motions.random_group("twins", np.random.default_rng(5), 50, (None, other, None, 3.0), spread=1.5)
     mesh, box = (collide.time_of_impact(A, other, *group.poses) for A in (box_mesh(size), collide.Box(size)))
     moving = box.hit & (box.lower > 0.0)
     assert moving.sum() >= 8
@@ -117,7 +117,7 @@ def test_unions_of_meshes_and_hulls():
     parts = [(box_mesh(size), collide.pose(at)) for size, at in L_BOXES]
     mixed = [parts[0], (collide.Box(L_BOXES[1][0]), collide.pose(L_BOXES[1][1]))]
     other = collide.Box((0.5, 0.4, 0.3))
-    group = motions._group("unions", np.random.default_rng(6), 25, (None, other, None, 3.0), spread=1.5)
+    group = motions.random_group("unions", np.random.default_rng(6), 25, (None, other, None, 3.0), spread=1.5)
     answers = [
         collide.time_of_impact(A, other, *group.poses)
         for A in (l_mesh(), collide.Compound(parts), collide.Compound(mixed))
@@ -207,7 +207,7 @@ def test_swapped_meshes_and_unions_of_one_shape():
     mesh = l_mesh()
     union = collide.Compound([(collide.Box(size), collide.pose(at)) for size, at in L_BOXES])
     for shape in (mesh, union):
-        g = motions._group("equal", np.random.default_rng(13), 30, (shape, shape, None, 4.0), spread=2.0)
+        g = motions.random_group("equal", np.random.default_rng(13), 30, (shape, shape, None, 4.0), spread=2.0)
         r = collide.time_of_impact(shape, shape, *g.poses)
         s = collide.time_of_impact(shape, shape, *(g.poses[k] for k in (2, 3, 0, 1)))
         for x, y in zip((r.lower, r.upper, r.point_a, r.part_a), (s.lower, s.upper, s.point_b, s.part_b)):
@@ -216,7 +216,7 @@ def test_swapped_meshes_and_unions_of_one_shape():
 
 
 def test_threads_give_the_same_bits():
-    group = motions._group("threads", np.random.default_rng(8), 60, (None, None, None, 3.0), spread=1.5)
+    group = motions.random_group("threads", np.random.default_rng(8), 60, (None, None, None, 3.0), spread=1.5)
     A, B = l_mesh(), collide.Box((0.5, 0.4, 0.3))
     one, two = (collide.time_of_impact(A, B, *group.poses, threads=t) for t in (1, 2))
     lists = collide.time_of_impact([A] * 60, B, *group.poses)

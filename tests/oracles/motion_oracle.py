@@ -1,7 +1,7 @@
 """First contacts by dense sampling and subdivision: no code of the engine, numpy and scipy alone.
 
 A body's pose at a time is worked out with scipy's rotations; how far two bodies are apart comes from separating axes,
-all of them, or from closed forms. Where bodies overlap the value is negative. `contact_before` and `judge` look at many
+all of them, or from closed forms. Where bodies overlap the value is negative. `judge` looks at many
 times, and ever closer at those around the least values and around the first contact found.
 """
 

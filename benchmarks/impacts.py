@@ -1,6 +1,6 @@
 """Times of impact: `collide.time_of_impact` beside FCL's continuous collision, with the misses of both.
 
-    python benchmarks/motions.py [--quick]      # a minute; needs python-fcl for its columns
+    python benchmarks/impacts.py [--quick]      # a minute; needs python-fcl for its columns
 
 Random motions of two boxes and of two hulls of 48 vertices, of a box and a mesh, and thin plates that fast needles fly
 through. Engines take turns; times are the medians of several turns, a motion. Ours is one call of a batch; FCL is a
@@ -36,19 +36,19 @@ SEED = 21
 
 def box_group(n: int, *, still: bool) -> motions.Group:
     rng = np.random.default_rng(SEED)
-    return motions._group("boxes", rng, n, motions._boxes(rng), turn=0.0 if still else None)
+    return motions.random_group("boxes", rng, n, motions.boxes(rng), turn=0.0 if still else None)
 
 
 def hull_group(n: int) -> motions.Group:
     rng = np.random.default_rng(SEED + 1)
     A, B = (collide.ConvexHull(rng.normal(size=(48, 3)) * 0.4) for _ in range(2))
-    return motions._group("hulls", rng, n, (A, B, None, 3.0))
+    return motions.random_group("hulls", rng, n, (A, B, None, 3.0))
 
 
 def needle_group(n: int) -> motions.Group:
     rng = np.random.default_rng(SEED + 2)
-    pair = motions._needle_and_plate(rng)
-    return motions._group("needles", rng, n, pair, spread=0.3, turn=0.0, fast=1e4)
+    pair = motions.needle_and_plate(rng)
+    return motions.random_group("needles", rng, n, pair, spread=0.3, turn=0.0, fast=1e4)
 
 
 def fcl_geometry(fcl, shape: collide.Shape):
@@ -109,6 +109,7 @@ def main() -> None:
     }
     rows = []
     for name, (group, judged) in groups.items():
+        ask_collide(group)  # tables, and what is loaded when first used
         seconds: dict[str, list[float]] = {"collide": [], "fcl": []}
         answers = {}
         for _ in range(turns):
@@ -128,7 +129,7 @@ def main() -> None:
             f"ratio {ratio:6.1f}; missed: {missed}"
         )
     if not quick:
-        with (RESULTS / "motions.csv").open("w", newline="", encoding="utf-8") as file:
+        with (RESULTS / "impacts.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["motions", "n", "hits", "collide µs", "fcl µs", "ratio", "collide missed", "fcl missed"])
             writer.writerows(rows)
