@@ -180,10 +180,23 @@ def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows:
     n = len(rows)
     jobs = np.zeros((n, 5), dtype=np.int64)
     jobs[:, 0], jobs[:, 3:] = np.arange(n), 1
-    before = rows["lower"].copy()
+    before = _untold(rows)
     _do(table, 2, _parts(a, b), motions, jobs, 0.0, 1.0, tolerance, rows)
-    earlier = rows["lower"] < before
-    rows["part_a"][earlier], rows["part_b"][earlier] = a.number, b.number
+    _tell_parts(rows, before, np.full(2, a.number), np.full(2, b.number))
+
+
+def _untold(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Parts that rows name, which now name none: of what a kernel finds, the rows of its own table."""
+    before = rows["part_a"].copy(), rows["part_b"].copy()
+    rows["part_a"] = rows["part_b"] = -1
+    return before
+
+
+def _tell_parts(rows: np.ndarray, before: tuple[np.ndarray, np.ndarray], a: np.ndarray, b: np.ndarray) -> None:
+    """Rows name the parts that stand at the table's rows, a and b, where a kernel wrote any; else those before."""
+    for name, old, numbers in zip(("part_a", "part_b"), before, (a, b)):
+        told = rows[name]
+        rows[name] = np.where(told < 0, old, numbers[told])
 
 
 def _parts(a: Piece, b: Piece) -> np.ndarray:
@@ -220,15 +233,13 @@ class _Spans:
 
     def near_facets(self, begin: float, end: float) -> np.ndarray | None:
         """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
-        out = self._describe(begin, end)
+        out, max_pairs = self._describe(begin, end), _max_jobs(end - begin)
         if (self.a.is_curved or self.b.is_curved) and out[REACH] < self.a.radius + self.b.radius:
-            return self._near_curved(out, _max_jobs(end - begin))
-        max_pairs = _max_jobs(end - begin)
+            return self._near_curved(out, max_pairs)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
         return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
-
 
     def _near_curved(self, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
         """The same where the polytope around a curved piece is farther from it than anything moves in the span.
@@ -279,12 +290,10 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
             continue
         if len(near) == 0:
             continue
-        before = float(row["lower"][0])
         table, jobs, ids = _jobs(a, b, near)
+        before = _untold(row)
         _do(table, len(table.ints), spans.parts, motion, jobs, begin, end, tolerance, row)
-        if row["lower"][0] < before:
-            row["part_a"] = a.number if is_part[0] else ids[int(row["part_a"][0])]
-            row["part_b"] = b.number if is_part[1] else ids[int(row["part_b"][0])]
+        _tell_parts(row, before, *(np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)))
 
 
 def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import motion_oracle as oracle
 import motions
 import numpy as np
 import pytest
+from motions import L_BOXES, l_gap, l_mesh
 
 import collide
 
@@ -13,32 +14,6 @@ import collide
 def box_mesh(size, centre=(0.0, 0.0, 0.0)) -> collide.Mesh:
     vertices, faces = collide.tessellate(collide.Box(size), tolerance=1.0)
     return collide.Mesh(vertices + np.array(centre), faces)
-
-
-#: An L of two boxes: its profile in x and y, extruded along z.
-L_PROFILE = np.array([(0, 0), (2, 0), (2, 0.5), (0.5, 0.5), (0.5, 1.5), (0, 1.5)], dtype=float)
-L_BOXES = (((2.0, 0.5, 0.6), (1.0, 0.25, 0.0)), ((0.5, 1.5, 0.6), (0.25, 0.75, 0.0)))
-
-
-def l_mesh(solid: bool = True) -> collide.Mesh:
-    low, high = np.c_[L_PROFILE, np.full(6, -0.3)], np.c_[L_PROFILE, np.full(6, 0.3)]
-    cap = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
-    sides = [f for k in range(6) for f in ((k, (k + 1) % 6, 6 + (k + 1) % 6), (k, 6 + (k + 1) % 6, 6 + k))]
-    faces = np.concatenate([cap[:, ::-1], cap + 6, np.array(sides)])
-    mesh = collide.Mesh(np.concatenate([low, high]), faces)
-    assert mesh.solid == solid
-    return mesh
-
-
-def moved_features(features, centre):
-    points, normals, edges = features
-    return points + np.array(centre), normals, edges
-
-
-def l_gap(features) -> oracle.Gap:
-    return oracle.union_gap(
-        [oracle.polytope_gap(*moved_features(oracle.box_features(size), at), *features) for size, at in L_BOXES]
-    )
 
 
 def judge(A, B, gap, seed: int, n: int = 50, least_hits: int = 10, **options):

@@ -1,17 +1,20 @@
 """First contacts by dense sampling and subdivision: no code of the engine, numpy and scipy alone.
 
 A body's pose at a time is worked out with scipy's rotations; how far two bodies are apart comes from separating axes,
-all of them, or from closed forms. Where bodies overlap the value is negative. `judge` looks at many
-times, and ever closer at those around the least values and around the first contact found.
+all of them, or from closed forms. Where bodies overlap the value is negative. `judge` looks at many times, and ever
+closer at those around the least values. `subdivide` leaves no time out: a span is free where the gap at its middle is
+more than points can move in half of it, and is cut into shorter ones otherwise.
 """
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 #: gap(R_WA, p_WA, R_WB, p_WB) → (n,), of (n, 3, 3) and (n, 3).
@@ -26,6 +29,14 @@ class BodyMotion:
         self.p0, self.p1 = X0[:, :3, 3], X1[:, :3, 3]
         between = Rotation.from_matrix(X1[:, :3, :3]) * self.start.inv()
         self.omega = between.as_rotvec() if omega is None else omega
+
+    def some(self, which: np.ndarray) -> BodyMotion:
+        """Those of these numbers, which may repeat."""
+        body = copy.copy(self)
+        body.start, body.p0, body.p1, body.omega = (
+            self.start[which], self.p0[which], self.p1[which], self.omega[which]
+        )  # fmt: skip
+        return body
 
     def at(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """((n, 3, 3), (n, 3)) at n times."""
@@ -78,6 +89,65 @@ def judge(
     return Judged(missed, -least, when, at(lower), at(np.minimum(upper, 1.0)), least)
 
 
+class Subdivided(NamedTuple):
+    """Of n motions: whether a contact was seen before ``lower``, by how much and when; and how many gaps were asked."""
+
+    missed: np.ndarray
+    depth: np.ndarray
+    time: np.ndarray
+    n_gaps: int
+
+
+def speeds(A: BodyMotion, B: BodyMotion, reach_a: float, reach_b: float) -> np.ndarray:
+    """(n,) bounds of how fast any two points of A and B come nearer each other, seen from W or from A.
+
+    reach_a, reach_b : distances of their points from their origins at most; that of a half-space A is infinite.
+    """
+    turn_a, turn_b = (np.linalg.norm(body.omega, axis=1) for body in (A, B))
+    d0, d1 = B.p0 - A.p0, B.p1 - A.p1
+    v = np.linalg.norm(d1 - d0, axis=1)
+    farthest = np.maximum(np.linalg.norm(d0, axis=1), np.linalg.norm(d1, axis=1))
+    from_a = v + turn_a * (farthest + reach_b) + turn_b * reach_b
+    return from_a if np.isinf(reach_a) else np.minimum(from_a, v + turn_a * reach_a + turn_b * reach_b)
+
+
+def subdivide(
+    gap: Gap, A: BodyMotion, B: BodyMotion, lower: np.ndarray, speed: np.ndarray, floor: float,
+    tolerance: float | np.ndarray = 0.0,
+) -> Subdivided:  # fmt: skip
+    """Prove that there is no contact before ``lower`` (1 where a motion is said to be free), or find one.
+
+    speed : (n,) bounds of `speeds`.   tolerance : gaps below minus this are contacts [m].
+    floor : spans in which nothing moves by more than this [m] are not cut any more: a contact that is overlooked is
+        shallower than the floor.
+    """
+    n = len(lower)
+    missed, depth, when, n_gaps = np.zeros(n, dtype=bool), np.full(n, -np.inf), np.zeros(n), 0
+    tolerance = np.broadcast_to(tolerance, n)
+    motion = np.flatnonzero(lower > 0.0)
+    left, right = np.zeros(len(motion)), lower[motion] * (1.0 - 1e-12)
+    while len(motion):
+        middle, half = 0.5 * (left + right), 0.5 * (right - left) * speed[motion] * (1.0 + 1e-9)
+        gaps = np.empty(len(motion))
+        for some in np.array_split(np.arange(len(motion)), len(motion) // 4096 + 1):
+            at = middle[some]
+            gaps[some] = gap(*A.some(motion[some]).at(at), *B.some(motion[some]).at(at))
+        n_gaps += len(motion)
+        deepest = np.lexsort((-gaps, motion))[::-1]  # the least gap of each motion comes last
+        of, first = np.unique(motion[deepest], return_index=True)
+        least = deepest[first]
+        better = -gaps[least] > depth[of]
+        depth[of[better]], when[of[better]] = -gaps[least][better], middle[least][better]
+        missed = depth > tolerance
+        todo = (gaps <= half) & (half > floor) & ~missed[motion]
+        pieces = np.clip(np.ceil(half[todo] / np.maximum(gaps[todo], 1e-300)), 2, 8).astype(np.int64)
+        begin, width = np.repeat(left[todo], pieces), np.repeat((right - left)[todo] / pieces, pieces)
+        rank = np.arange(len(begin)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        motion = np.repeat(motion[todo], pieces)
+        left, right = begin + rank * width, begin + (rank + 1) * width
+    return Subdivided(missed, depth, when, n_gaps)
+
+
 # --- gaps ---------------------------------------------------------------------------------------
 
 
@@ -85,7 +155,15 @@ def polytope_gap(points_a, normals_a, edges_a, points_b, normals_b, edges_b) -> 
     """The gap along the best of all separating axes (Gottschalk, Lin and Manocha 1996): minus the depth of overlaps, a
     lower bound of the distance of bodies apart, positive where they are."""
 
-    def gap(R_WA, p_WA, R_WB, p_WB):
+    n_axes = len(normals_a) + len(normals_b) + len(edges_a) * len(edges_b)
+    at_once = max(4_000_000 // (n_axes * (len(points_a) + len(points_b))), 1)
+
+    def gap(*poses):
+        n = len(poses[0])
+        parts = [some_gaps(*(of[k : k + at_once] for of in poses)) for k in range(0, n, at_once)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def some_gaps(R_WA, p_WA, R_WB, p_WB):
         a = np.einsum("nij,kj->nki", R_WA, points_a)
         b = np.einsum("nij,kj->nki", R_WB, points_b) + (p_WB - p_WA)[:, None]
         faces = np.concatenate([normals_a @ R_WA.transpose(0, 2, 1), normals_b @ R_WB.transpose(0, 2, 1)], axis=1)
@@ -115,6 +193,20 @@ def simplex_features(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     if len(points) == 3:  # a flat body is separated in its own plane, too
         normals = np.concatenate([normals, np.cross(normals[0], edges)])
     return points, normals / np.linalg.norm(normals, axis=1)[:, None], edges
+
+
+def hull_features(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(vertices, normals, edges) of the hull of points in general position."""
+    hull = ConvexHull(points)
+    pairs = np.unique(np.sort(hull.simplices[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = points[pairs[:, 1]] - points[pairs[:, 0]]
+    return points[hull.vertices], hull.equations[:, :3], edges / np.linalg.norm(edges, axis=1)[:, None]
+
+
+def moved_features(features, R: np.ndarray, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Those of the polytope turned by R and moved by p."""
+    points, normals, edges = features
+    return points @ R.T + np.asarray(p), normals @ R.T, edges @ R.T
 
 
 def segment_gap(half_a: float, half_b: float, radius: float) -> Gap:
@@ -186,6 +278,25 @@ def cylinder_distance(radius: float, length: float) -> Callable[[np.ndarray], np
 def cone_distance(radius: float, length: float) -> Callable[[np.ndarray], np.ndarray]:
     h = 0.5 * length
     return round_distance(np.array([(-radius, -h), (radius, -h), (0.0, h)]))
+
+
+def ellipsoid_distance(radii: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """The nearest point is a² p / (t + a²), coordinate by coordinate, for the one t > −min a² that puts it on the
+    surface (Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013)."""
+    square = radii * radii
+
+    def distance(p):
+        p = np.abs(p)
+        low = (-square + radii * p).max(axis=1)  # one term alone is 1 there
+        high = -square.min() + np.linalg.norm(radii * p, axis=1)
+        for _ in range(64):
+            t = 0.5 * (low + high)
+            outside = (np.square(radii * p / np.maximum(t[:, None] + square, 1e-300))).sum(axis=1) > 1.0
+            low, high = np.where(outside, t, low), np.where(outside, high, t)
+        x = square * p / np.maximum(high[:, None] + square, 1e-300)
+        return np.sign(high) * np.linalg.norm(p - x, axis=1)
+
+    return distance
 
 
 def plane_gap(normal: np.ndarray, offset: float, points: np.ndarray, radius: float = 0.0) -> Gap:
