@@ -182,7 +182,7 @@ def measure(name: str, scene: Scene, n: int, turns: int, peers: list[str]) -> li
         ratio = spent / (statistics.median(seconds["collide"]) / n * 1e6)
         judged = verdict(group, answer[0], least)
         hits = int((answer[0] >= 0.0).sum())
-        rows.append([name, n, engine, states[engine], hits, f"{spent:.2f}", f"{ratio:.2f}", judged.missed, judged.made_up])
+        rows.append([name, n, engine, states[engine], hits, f"{spent:.2f}", f"{ratio:.2f}", *judged])
     return rows
 
 

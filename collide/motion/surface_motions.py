@@ -180,23 +180,23 @@ def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows:
     n = len(rows)
     jobs = np.zeros((n, 5), dtype=np.int64)
     jobs[:, 0], jobs[:, 3:] = np.arange(n), 1
-    before = _untold(rows)
+    before = _clear_parts(rows)
     _do(table, 2, _parts(a, b), motions, jobs, 0.0, 1.0, tolerance, rows)
-    _tell_parts(rows, before, np.full(2, a.number), np.full(2, b.number))
+    _name_parts(rows, before, np.full(2, a.number), np.full(2, b.number))
 
 
-def _untold(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Parts that rows name, which now name none: of what a kernel finds, the rows of its own table."""
+def _clear_parts(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts that rows name; from now on they name none, so that what a kernel finds can be told."""
     before = rows["part_a"].copy(), rows["part_b"].copy()
     rows["part_a"] = rows["part_b"] = -1
     return before
 
 
-def _tell_parts(rows: np.ndarray, before: tuple[np.ndarray, np.ndarray], a: np.ndarray, b: np.ndarray) -> None:
+def _name_parts(rows: np.ndarray, before: tuple[np.ndarray, np.ndarray], a: np.ndarray, b: np.ndarray) -> None:
     """Rows name the parts that stand at the table's rows, a and b, where a kernel wrote any; else those before."""
     for name, old, numbers in zip(("part_a", "part_b"), before, (a, b)):
-        told = rows[name]
-        rows[name] = np.where(told < 0, old, numbers[told])
+        at = rows[name]
+        rows[name] = np.where(at < 0, old, numbers[at])
 
 
 def _parts(a: Piece, b: Piece) -> np.ndarray:
@@ -291,9 +291,9 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
         if len(near) == 0:
             continue
         table, jobs, ids = _jobs(a, b, near)
-        before = _untold(row)
+        before = _clear_parts(row)
         _do(table, len(table.ints), spans.parts, motion, jobs, begin, end, tolerance, row)
-        _tell_parts(row, before, *(np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)))
+        _name_parts(row, before, *(np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)))
 
 
 def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
