@@ -41,6 +41,10 @@ def test_no_contact_is_missed_and_none_is_made_up(family):
         group = motions.FAMILIES[family](np.random.default_rng(seed), N)
         r = asked(group)
         verdict, tolerance = judged(group, r)
+        floor = 1e-5 * group.size
+        closer = oracle.subdivide(group.gap, *group.motions(), r.lower, group.speeds(), floor, tolerance)
+        late = np.flatnonzero(closer.missed)
+        assert not len(late), f"missed at {closer.time[late[0]]!r}: " + snippet(family, seed, late[0], r)
         bad = np.flatnonzero(verdict.missed)
         assert not len(bad), f"missed by {verdict.depth[bad[0]]:.3g} m at {verdict.time[bad[0]]!r}: " + snippet(
             family, seed, bad[0], r
@@ -76,7 +80,10 @@ def test_the_judge_sees_a_miss():
         late = r.hit & (r.lower > 0.0) & (r.lower < 0.99)
         by = np.where(late, 1e-3, 0.0)
         shifted = r._replace(lower=r.lower + by, upper=r.upper + by)
+        speed, floor = group.speeds(), 1e-5 * group.size
+        closer = oracle.subdivide(group.gap, *group.motions(), shifted.lower, speed, floor, motions.resolution(group))
         seen = judged(group, shifted)[0].missed
+        assert (closer.missed | ~seen).all(), "what sampling sees, subdivision sees"
         n_late, n_seen = n_late + late.sum(), n_seen + (seen & late).sum()
         assert not (seen & ~late).any()
     assert n_late >= 20 and n_seen >= 0.8 * n_late
