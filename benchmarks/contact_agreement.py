@@ -1,6 +1,6 @@
 """MuJoCo's and Bullet's manifolds beside ours on 10,000 resting pairs; where they differ, who is right.
 
-    python benchmarks/contact_agreement.py             # some minutes; prints tables, writes results/contact-agreement*.csv
+    python benchmarks/contact_agreement.py      # some minutes; prints tables, writes results/contact-agreement_*.csv
     python benchmarks/contact_agreement.py --pairs 900 --judge 40 --no-csv
 
 Boxes, hulls, cylinders standing and lying, capsules and spheres rest on boxes, hulls and cylinders, level or tilted by
@@ -57,16 +57,16 @@ def ask(pairs: list[Pair]) -> dict[str, list[Manifold]]:
     X_WAs, X_WBs = np.array([p.X_WA for p in pairs]), np.array([p.X_WB for p in pairs])
     c = collide.contacts(As, Bs, X_WAs, X_WBs, margin=MARGIN)
     ours = [manifold_of(r.point, r.normal, r.distance) for r in (c[k] for k in range(len(pairs)))]
-    found = {"collide": ours}
+    manifolds_of = {"collide": ours}
     for engine in installed([MujocoContacts, BulletContacts]):
-        found[engine.name] = []
+        manifolds_of[engine.name] = []
         for begin in range(0, len(pairs), CHUNK):
             some = slice(begin, begin + CHUNK)
             made = engine(As[some], Bs[some], X_WAs[some], X_WBs[some], MARGIN)
-            found[engine.name] += made.manifolds()
+            manifolds_of[engine.name] += made.manifolds()
             if engine is BulletContacts:
                 made.close()
-    return found
+    return manifolds_of
 
 
 def hull_of(flat: np.ndarray) -> tuple[float, np.ndarray]:
@@ -141,7 +141,7 @@ def deepest(m: Manifold) -> tuple[float, np.ndarray]:
 
 
 def differ(pair: Pair, manifolds: list[Manifold]) -> bool:
-    """Whether depths, or what normals are good for, differ, or somebody found nothing."""
+    """Whether depths, or what normals are good for, differ, or somebody has nothing."""
     if not all(len(m.distance) for m in manifolds):
         return any(len(m.distance) for m in manifolds)
     depths, normals = zip(*(deepest(m) for m in manifolds))
@@ -152,8 +152,8 @@ def differ(pair: Pair, manifolds: list[Manifold]) -> bool:
 def truth_of(pair: Pair, manifolds: list[Manifold]) -> float:
     """The middle of the proven bracket of the signed distance; NaN where it is wider than a tenth of what counts."""
     guesses = [tuple(deepest(m)[1].tolist()) for m in manifolds if len(m.distance)]
-    found = bracket(pair.A, pair.B, pair.X_WA, pair.X_WB, guesses=guesses)
-    low, high = float(found.lower), float(found.upper)
+    proven = bracket(pair.A, pair.B, pair.X_WA, pair.X_WB, guesses=guesses)
+    low, high = float(proven.lower), float(proven.upper)
     return 0.5 * (low + high) if high - low < 0.1 * AGREE else np.nan
 
 
@@ -165,18 +165,19 @@ def verdict(pair: Pair, m: Manifold, truth: float) -> tuple[float, float]:
     return abs(depth - truth), truth - separation(pair, n)
 
 
-def judged(pairs: list[Pair], found: dict[str, list[Manifold]], most: int) -> tuple[dict, dict, Counter]:
+def judged(pairs: list[Pair], manifolds_of: dict[str, list[Manifold]], max_judged: int) -> tuple[dict, dict, Counter]:
     """{(engine, k): (error, loss)}, what was judged {k: truth}, and how many differ by kind of top."""
-    differing = [k for k, pair in enumerate(pairs) if differ(pair, [found[name][k] for name in found])]
+    differing = [k for k, pair in enumerate(pairs) if differ(pair, [manifolds_of[name][k] for name in manifolds_of])]
     counts = Counter(pairs[k].kind[0] for k in differing)
     drawn = differing
-    if len(differing) > most:
-        drawn = sorted(np.random.default_rng(1).choice(differing, most, replace=False).tolist())
+    if len(differing) > max_judged:
+        drawn = sorted(np.random.default_rng(1).choice(differing, max_judged, replace=False).tolist())
     started, truths = time.perf_counter(), {}
     for k in drawn:
-        truths[k] = truth_of(pairs[k], [found[name][k] for name in found])
+        truths[k] = truth_of(pairs[k], [manifolds_of[name][k] for name in manifolds_of])
     say(f"{len(differing)} of {len(pairs)} pairs differ; {len(drawn)} judged in {time.perf_counter() - started:.0f} s")
-    return {(name, k): verdict(pairs[k], found[name][k], truths[k]) for name in found for k in drawn}, truths, counts
+    errors = {(name, k): verdict(pairs[k], manifolds_of[name][k], truths[k]) for name in manifolds_of for k in drawn}
+    return errors, truths, counts
 
 
 def summary(rows: list[Scores], key: str, of) -> float:
@@ -221,21 +222,19 @@ def main() -> int:
     parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
     options = parser.parse_args()
     pairs = resting_pairs(options.pairs, options.seed)
-    found = ask(pairs)
-    scores: dict[str, list[Scores]] = {name: [] for name in found}
+    manifolds_of = ask(pairs)
+    scores: dict[str, list[Scores]] = {name: [] for name in manifolds_of}
     for k, pair in enumerate(pairs):
-        best = max(
-            (separation(pair, n), tuple(n)) for n in (deepest(found[name][k])[1] for name in found if len(found[name][k].distance))
-        )[1] if any(len(found[name][k].distance) for name in found) else pair.X_WA[:3, 2]
-        region = Region(pair, np.array(best))
-        for name in found:
-            scores[name].append(score(pair, found[name][k], region))
-    errors, truths, counts = judged(pairs, found, options.judge)
+        normals = [deepest(some[k])[1] for some in manifolds_of.values() if len(some[k].distance)] or [pair.X_WA[:3, 2]]
+        region = Region(pair, max(normals, key=lambda n, pair=pair: separation(pair, n)))
+        for name in manifolds_of:
+            scores[name].append(score(pair, manifolds_of[name][k], region))
+    errors, truths, counts = judged(pairs, manifolds_of, options.judge)
     rows = table_rows(pairs, scores, errors, truths, counts)
     show(rows)
     worst = [k for (name, k), both in errors.items() if name == "collide" and max(both) > AGREE]
     for k in worst[:10]:
-        log(f"ours is wrong: resting_pairs({options.pairs}, {options.seed})[{k}], {pairs[k].kind}, {errors['collide', k]}")
+        log(f"ours is wrong: resting_pairs({k + 1}, {options.seed})[-1], {pairs[k].kind}, {errors['collide', k]}")
     if not options.no_csv:
         log(f"written: {write('contact-agreement', rows, machine()).name}")
     return 0

@@ -43,7 +43,7 @@ class CoalContacts:
 
     calls = True
 
-    def __init__(self, As: list[Shape], Bs: list[Shape], X_WAs, X_WBs, margin: float, patches=False, most=1):
+    def __init__(self, As: list[Shape], Bs: list[Shape], X_WAs, X_WBs, margin: float, patches=False, max_contacts=1):
         import coal
 
         self.coal, self.patches = coal, patches
@@ -57,7 +57,7 @@ class CoalContacts:
             for A, B, X, Y in zip(As, Bs, X_WAs, X_WBs)
         ]
         self.request = coal.CollisionRequest()
-        self.request.enable_contact, self.request.num_max_contacts = True, most
+        self.request.enable_contact, self.request.num_max_contacts = True, max_contacts
         self.request.security_margin = margin
         self.result, self.patch_request, self.patch_result = (
             coal.CollisionResult(), coal.ContactPatchRequest(), coal.ContactPatchResult(),
@@ -78,9 +78,8 @@ class CoalContacts:
             self.result.clear()
             self.coal.collide(A, X, B, Y, self.request, self.result)
             contacts = [self.result.getContact(k) for k in range(self.result.numContacts())]
-            out.append(
-                manifold_of([c.pos for c in contacts], [c.normal for c in contacts], [c.penetration_depth for c in contacts])
-            )
+            depths = [c.penetration_depth for c in contacts]  # negative ones
+            out.append(manifold_of([c.pos for c in contacts], [c.normal for c in contacts], depths))
         return out
 
 
@@ -125,9 +124,9 @@ class BulletContacts:
         self.detect()
         out = []
         for (a, b), shift in zip(self.pairs, self.shift):
-            found = [c for c in self.pybullet.getContactPoints(a, b, physicsClientId=self.client) if c[8] <= self.margin]
-            middles = [0.5 * (np.array(c[5]) + np.array(c[6])) - shift for c in found]
-            out.append(manifold_of(middles, [-np.array(c[7]) for c in found], [c[8] for c in found]))
+            near = [c for c in self.pybullet.getContactPoints(a, b, physicsClientId=self.client) if c[8] <= self.margin]
+            middles = [0.5 * (np.array(c[5]) + np.array(c[6])) - shift for c in near]
+            out.append(manifold_of(middles, [-np.array(c[7]) for c in near], [c[8] for c in near]))
         return out
 
     def closest_points(self, k: int = 0) -> None:
@@ -235,11 +234,11 @@ def qpos_of(X: np.ndarray) -> np.ndarray:
 def installed(classes) -> list:
     """Those of some engines whose package is here."""
     packages = {CoalContacts: "coal", BulletContacts: "pybullet", MujocoContacts: "mujoco"}
-    found = []
+    present = []
     for engine in classes:
         try:
             __import__(packages[engine])
-            found.append(engine)
+            present.append(engine)
         except ImportError:
             print(f"{packages[engine]} is not installed: left out")
-    return found
+    return present

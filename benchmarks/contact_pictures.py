@@ -40,11 +40,11 @@ def sharp_edges(points: np.ndarray, faces: np.ndarray, all_edges: bool) -> np.nd
         for k in range(3):
             i, j = sorted((face[k], face[(k + 1) % 3]))
             sides.setdefault((i, j), []).append(number)
-    kept = [
+    remaining = [
         edge for edge, both in sides.items()
         if all_edges or len(both) != 2 or normals[both[0]] @ normals[both[1]] < 0.9
     ]  # fmt: skip
-    return points[np.array(kept)]
+    return points[np.array(remaining, dtype=int).reshape(-1, 2)]
 
 
 def draw_body(axes, shape: collide.Shape, X: np.ndarray, colour: str, alpha: float) -> np.ndarray:
@@ -58,7 +58,8 @@ def draw_body(axes, shape: collide.Shape, X: np.ndarray, colour: str, alpha: flo
     faces_rgba = np.concatenate([shade, np.full((len(faces), 1), alpha)], axis=1)
     axes.add_collection3d(Poly3DCollection(corners, facecolors=faces_rgba, edgecolors="none"))
     edges = sharp_edges(points, faces, isinstance(shape, collide.Mesh))
-    axes.add_collection3d(Line3DCollection(edges, colors=colour, linewidths=0.7, alpha=0.8))
+    if len(edges):
+        axes.add_collection3d(Line3DCollection(edges, colors=colour, linewidths=0.7, alpha=0.8))
     return points
 
 
@@ -69,7 +70,8 @@ def draw_contacts(axes, contacts: collide.Contacts) -> None:
         axes.plot(*np.stack([a, b]).T, color=GREY, linewidth=0.8, linestyle=":", zorder=8)
         axes.plot(*np.stack([a, a + 0.07 * row["normal"]]).T, color="black", linewidth=1.6, zorder=9)
     first = contacts.rows[:1]
-    for points, colour in ((contacts.point_a, BLUE), (contacts.point_b + (0, 0, LIFTED), RED)):
+    lift = np.array([0, 0, LIFTED])
+    for points, colour in ((contacts.point_a, BLUE), (contacts.point_b + lift, RED)):
         axes.scatter(*points.T, color=colour, s=24, depthshade=False, zorder=10, edgecolors="black", linewidths=0.5)
     axes.scatter(*first["point_a"].T, s=90, facecolors="none", edgecolors="black", linewidths=1.0, zorder=11)
 
@@ -81,17 +83,20 @@ def scenes() -> dict[str, tuple[collide.Shape, np.ndarray, collide.Shape, np.nda
     floor = collide.Mesh(corners, [(0, 1, 2), (0, 2, 3)], solid=False)
     rng = np.random.default_rng(4)
     ring = np.array([(np.cos(a), np.sin(a)) for a in 2 * np.pi * (np.arange(7) + rng.uniform(-0.2, 0.2, 7)) / 7])
-    frustum = np.concatenate([np.column_stack([0.2 * ring, np.full(7, -0.08)]), np.column_stack([0.11 * ring, np.full(7, 0.08)])])
+    frustum = np.concatenate([np.column_stack([scale * ring, np.full(7, z)]) for scale, z in ((0.2, -0.08), (0.11, 0.08))])
     quarter = 0.5 * np.pi
     return {
-        "face to face, turned: 8 corners": (table, X_T, collide.Box((0.6, 0.6, 0.2)), collide.pose((0, 0, 0.1), rpy=(0, 0, 0.6))),
-        "an edge on a face": (table, X_T, collide.Box((0.3, 0.3, 0.3)), collide.pose((0, 0, 0.15 * 2**0.5), rpy=(0.25 * np.pi, 0, 0.4))),
-        "a hull on a face, over its edge": (table, X_T, collide.ConvexHull(frustum), collide.pose((0.2, -0.05, 0.08), rpy=(0, 0, 0.3))),
-        "a cylinder standing": (table, X_T, collide.Cylinder(0.18, 0.25), collide.pose((0, 0, 0.125), rpy=(0, 0, 0.2))),
-        "a cylinder lying": (table, X_T, collide.Cylinder(0.12, 0.4), collide.pose((0, 0, 0.12), rpy=(quarter, 0, 0.9))),
-        "a capsule lying, half over": (table, X_T, collide.Capsule(0.1, 0.4), collide.pose((0.2, 0, 0.1), rpy=(quarter, 0, 1.1))),
-        "a box over two triangles": (floor, np.eye(4), collide.Box((0.3, 0.25, 0.2)), collide.pose((0.02, -0.01, 0.1), rpy=(0, 0, 0.35))),
-        "a ball": (table, X_T, collide.Sphere(0.15), collide.pose((0.05, 0, 0.15))),
+        title: (floor if A is floor else table, np.eye(4) if A is floor else X_T, B, collide.pose(place, rpy=rpy))
+        for title, A, B, place, rpy in (
+            ("a box on a box, turned", table, collide.Box((0.6, 0.6, 0.2)), (0, 0, 0.1), (0, 0, 0.6)),
+            ("an edge on a face", table, collide.Box((0.3, 0.3, 0.3)), (0, 0, 0.15 * 2**0.5), (0.5 * quarter, 0, 0.4)),
+            ("a hull on a face, over its edge", table, collide.ConvexHull(frustum), (0.2, -0.05, 0.08), (0, 0, 0.3)),
+            ("a cylinder standing", table, collide.Cylinder(0.18, 0.25), (0, 0, 0.125), (0, 0, 0.2)),
+            ("a cylinder lying", table, collide.Cylinder(0.12, 0.4), (0, 0, 0.12), (quarter, 0, 0.9)),
+            ("a capsule lying, half over", table, collide.Capsule(0.1, 0.4), (0.2, 0, 0.1), (quarter, 0, 1.1)),
+            ("a box over two triangles", floor, collide.Box((0.3, 0.25, 0.2)), (0.02, -0.01, 0.1), (0, 0, 0.35)),
+            ("a ball", table, collide.Sphere(0.15), (0.05, 0, 0.15), (0, 0, 0)),
+        )
     }  # fmt: skip
 
 
@@ -110,7 +115,7 @@ def main() -> None:
         half = 0.5 * (points.max(axis=0) - points.min(axis=0)).max()
         middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
         axes.set(**{f"{x}lim": (middle[k] - half, middle[k] + half) for k, x in enumerate("xyz")})
-        axes.set_box_aspect((1, 1, 1), zoom=1.5)
+        axes.set_box_aspect((1, 1, 1), zoom=1.12)
         axes.view_init(elev=24, azim=-58)
         axes.set_axis_off()
         axes.set_title(f"{title}\n{len(contacts)} contact{'s' if len(contacts) > 1 else ''}", fontsize=10)

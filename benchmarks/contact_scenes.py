@@ -39,9 +39,8 @@ def hull_points(rng: np.random.Generator, k: int) -> np.ndarray:
         angles = (np.arange(n) + rng.uniform(-0.3, 0.3, n)) * 2 * np.pi / n
         ring = rng.uniform(0.1, 0.2) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         height = rng.uniform(0.05, 0.15)
-        points = np.concatenate(
-            [np.column_stack([ring, np.full(n, -height)]), np.column_stack([rng.uniform(0.6, 1) * ring, np.full(n, height)])]
-        )
+        ends = (1.0, -height), (rng.uniform(0.6, 1), height)
+        points = np.concatenate([np.column_stack([scale * ring, np.full(n, z)]) for scale, z in ends])
     return points - points.mean(axis=0)
 
 
@@ -98,7 +97,8 @@ def resting_pairs(n: int, seed: int) -> list[Pair]:
         X, Y = np.eye(4), np.eye(4)
         X[:3, :3] = collide.pose((0, 0, 0), rpy=(np.pi, 0, 0))[:3, :3] @ face_down(bottom, A, rng)
         X[2, 3] = -support(A, X[:3, :3], np.array([0.0, 0.0, 1.0]))
-        tilt = collide.pose((0, 0, 0), rpy=(*(10 ** rng.uniform(-7, -2) * rng.normal(size=2)), 0)) if k % 3 else np.eye(4)
+        angles = 10 ** rng.uniform(-7, -2) * rng.normal(size=2) * (k % 3 > 0)
+        tilt = collide.pose((0, 0, 0), rpy=(*angles, 0))
         Y[:3, :3] = tilt[:3, :3] @ face_down(top, B, rng)
         gap = (0.0, -1.0, -1.0, 1.0)[rng.integers(4)] * 10 ** rng.uniform(-6, -3)
         Y[2, 3] = support(B, Y[:3, :3], np.array([0.0, 0.0, -1.0])) + gap

@@ -37,12 +37,12 @@ def shapes_of_pit() -> list[collide.Shape]:
 def walls() -> list[tuple[collide.Box, np.ndarray]]:
     """The floor and four walls of a pit."""
     half = SIDE / 2 + 0.1
-    found = [(collide.Box((SIDE + 0.4, SIDE + 0.4, 0.2)), collide.pose((0, 0, -0.1)))]
+    bodies = [(collide.Box((SIDE + 0.4, SIDE + 0.4, 0.2)), collide.pose((0, 0, -0.1)))]
     for k in range(4):
         angle = 0.5 * math.pi * k
         place = (half * math.cos(angle), half * math.sin(angle), 1.5)
-        found.append((collide.Box((0.2, SIDE + 0.4, 3.0)), collide.pose(place, rpy=(0, 0, angle))))
-    return found
+        bodies.append((collide.Box((0.2, SIDE + 0.4, 3.0)), collide.pose(place, rpy=(0, 0, angle))))
+    return bodies
 
 
 def settled_pit() -> np.ndarray:
@@ -86,9 +86,8 @@ class Pits:
     def __init__(self, bodies: int):
         pit, some = settled_pit(), shapes_of_pit()
         n_pits = max(1, bodies // PER_PIT)
-        frames = [
-            collide.pose((BETWEEN * (k % 4), BETWEEN * (k // 4), 0), rpy=(0, 0, 0.5 * math.pi * k)) for k in range(n_pits)
-        ]
+        places = [(BETWEEN * (k % 4), BETWEEN * (k // 4), 0) for k in range(n_pits)]
+        frames = [collide.pose(place, rpy=(0, 0, 0.5 * math.pi * k)) for k, place in enumerate(places)]
         moving = [frame @ X for frame in frames for X in pit]
         still = [(shape, frame @ X) for frame in frames for shape, X in walls()]
         self.n_moving = len(moving)
@@ -115,7 +114,7 @@ class OurWorld:
     def detect(self) -> None:
         self.rows = self.world.contacts(MARGIN).rows
 
-    def found(self) -> tuple[int, int]:
+    def counts(self) -> tuple[int, int]:
         """(pairs, contacts)."""
         return len(np.unique(np.stack([self.rows["a"], self.rows["b"]], axis=1), axis=0)), len(self.rows)
 
@@ -155,7 +154,7 @@ class CoalWorld:
         self.managers[0].collide(self.callbacks[0])
         self.managers[0].collide(self.managers[1], self.callbacks[1])
 
-    def found(self) -> tuple[int, int]:
+    def counts(self) -> tuple[int, int]:
         contacts = sum(callback.data.result.numContacts() for callback in self.callbacks)
         return contacts, contacts
 
@@ -188,7 +187,7 @@ class BulletWorld:
     def detect(self) -> None:
         self.pybullet.performCollisionDetection(physicsClientId=self.client)
 
-    def found(self) -> tuple[int, int]:
+    def counts(self) -> tuple[int, int]:
         pairs, contacts = set(), 0
         for body in self.bodies[: self.pits.n_moving]:
             for c in self.pybullet.getContactPoints(body, physicsClientId=self.client):
@@ -232,7 +231,7 @@ class MujocoWorld:
     def detect(self) -> None:
         self.mujoco.mj_collision(self.model, self.data)
 
-    def found(self) -> tuple[int, int]:
+    def counts(self) -> tuple[int, int]:
         return len(np.unique(np.array(self.data.contact.geom).reshape(-1, 2), axis=0)), int(self.data.ncon)
 
 

@@ -9,8 +9,8 @@ pairs    µs a pair. Bodies rest on a box or a hull, sunk by 0.1 mm ("touching")
          its contact patches. Bullet and MuJoCo: all pairs by one call, declared or far from each other: no Python
 single   µs a call from Python of one pair: `contacts`, `coal.collide`, `getClosestPoints`, `mj_collision`
 batches  µs a pair of ours in batches of 1 to 10,000 boxes on boxes, beside coal's loop
-meshes   µs a pair: a box on a rough ground of 100,352 facets, and two bunnies that overlap by a thousandth of their size
-         (from ../shared/data). coal's contacts there are pairs of facets; MuJoCo has no meshes that are not convex
+meshes   µs a pair: a box on a rough ground of 100,352 facets, and two bunnies (from ../shared/data) that overlap by a
+         thousandth of their size. coal's contacts there are pairs of facets; MuJoCo has no meshes that are not convex
 world    ms a step of 5,000 bodies at rest in ten pits (`contact_worlds.py`): move, then find all contacts
 
 Engines take turns; medians of their turns, CPU time; × is theirs divided by ours. Checked first, and printed: how many
@@ -87,14 +87,14 @@ def medians(tasks: Tasks, seconds: float, least: int = 5) -> dict[str, list[floa
     """CPU seconds of every task, turn after turn, until the time is up; the first turn does not count."""
     taken: dict[str, list[float]] = {name: [] for name in tasks}
     gc.disable()
-    started, turn = time.perf_counter(), 0
-    while turn <= least or time.perf_counter() - started < seconds:
+    started, round_number = time.perf_counter(), 0
+    while round_number <= least or time.perf_counter() - started < seconds:
         for name, task in tasks.items():
-            begun = time.process_time()
+            before = time.process_time()
             task()
-            if turn:
-                taken[name].append(time.process_time() - begun)
-        turn += 1
+            if round_number:
+                taken[name].append(time.process_time() - before)
+        round_number += 1
     gc.enable()
     return taken
 
@@ -192,17 +192,18 @@ def ground(cells: int = 224, size: float = 4.0) -> collide.Mesh:
 def sunk_poses(A, B, n: int, depth: float, seed: int, spread: float) -> np.ndarray:
     """(n, 4, 4): B over A, let down until they touch, and by so much more [m]."""
     rng = np.random.default_rng(seed)
-    found = []
+    placed = []
     for _ in range(n):
-        Y = collide.pose((*rng.uniform(-spread, spread, 2), 2.0), rpy=(*rng.uniform(-0.02, 0.02, 2), rng.uniform(-3, 3)))
+        place, tilt = rng.uniform(-spread, spread, 2), rng.uniform(-0.02, 0.02, 2)
+        Y = collide.pose((*place, 2.0), rpy=(*tilt, rng.uniform(-3, 3)))
         for _ in range(200):
             gap = collide.distance(A, B, np.eye(4), Y, signed=False).distance
             Y[2, 3] -= gap
             if gap < 1e-7:
                 break
         Y[2, 3] -= depth
-        found.append(Y)
-    return np.array(found)
+        placed.append(Y)
+    return np.array(placed)
 
 
 def meshes_table(n: int, seconds: float) -> list[dict]:
@@ -222,8 +223,8 @@ def meshes_table(n: int, seconds: float) -> list[dict]:
         tasks: Tasks = {"collide": ours}
         contacts = {"collide": round(len(ours()) / n, 2)}
         for engine in installed([CoalContacts] if isinstance(B, collide.Mesh) else [CoalContacts, BulletContacts]):
-            most = {"most": 1 << 20} if engine is CoalContacts else {}
-            peer = engine([A] * n, [B] * n, Xs, Ys, 0.0, **most)
+            limits = {"max_contacts": 1 << 20} if engine is CoalContacts else {}
+            peer = engine([A] * n, [B] * n, Xs, Ys, 0.0, **limits)
             contacts[peer.name] = per_pair(peer.manifolds())
             tasks[peer.name] = peer.detect
         rows += rows_of("meshes", name, "touching", medians(tasks, seconds, least=3), 1e6 / n, contacts)
@@ -246,7 +247,7 @@ def world_table(bodies: int, seconds: float) -> list[dict]:
     taken = medians(tasks, seconds, least=5)
     contacts = {}
     for w in worlds:
-        n_pairs, n_contacts = w.found()
+        n_pairs, n_contacts = w.counts()
         contacts[w.name] = n_contacts
         say(f"{w.name}: {n_pairs} pairs within {1e3 * 2e-3:g} mm, {n_contacts} contacts")
     rows = []
@@ -262,19 +263,20 @@ def show(rows: list[dict]) -> None:
         lines = [list(columns)]
         for row in rows:
             if row["table"] == table:
-                lines.append([f"{v:.3f}" if isinstance(v := row[c], float) and c != "ratio" else str(v) for c in columns])
+                cells = [(row[c], c) for c in columns]
+                lines.append([f"{v:.3f}" if isinstance(v, float) and c != "ratio" else str(v) for v, c in cells])
         aligned(f"{table}: {'ms a step' if table == 'world' else 'µs a pair'}", lines)
 
 
 def versions() -> dict[str, str]:
     """Of the peers."""
-    found = {}
+    numbers = {}
     for name in ("coal", "pybullet", "mujoco"):
         try:
-            found[name] = metadata.version(name)
+            numbers[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "absent"
-    return found
+            numbers[name] = "absent"
+    return numbers
 
 
 def main() -> int:
@@ -293,9 +295,9 @@ def main() -> int:
     rows: list[dict] = []
     for table in TABLES if options.table == "all" else (options.table,):
         say(table)
-        found = measures[table]()
-        show(found)
-        rows += found
+        measured = measures[table]()
+        show(measured)
+        rows += measured
     if options.table == "all" and not (options.quick or options.no_csv):
         log(f"written: {write('contacts', rows, machine() | versions()).name}")
     return 0

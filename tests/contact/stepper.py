@@ -2,10 +2,10 @@
 
 Contacts are asked for once a step. The step is then cut into substeps of semi-implicit Euler, velocities first and
 poses by the new ones, in which contacts push by sequential impulses: each in turn is given the impulse that mends its
-velocity, and the sum is clamped to the friction cone (E. Catto, "Iterative dynamics with temporal coherence", GDC 2005).
-One sweep a substep is enough, since substeps are small (M. Macklin et al., "Small steps in physics simulation", SCA
-2019). A contact with a gap may close it within the substep and no more; an overlap is pushed out by a damped spring, and
-a second sweep takes back the velocity that the spring gave ("soft step": E. Catto, "Solver2D", 2024).
+velocity, and the sum is clamped to the friction cone (E. Catto, "Iterative dynamics with temporal coherence", GDC
+2005). One sweep a substep is enough, since substeps are small (M. Macklin et al., "Small steps in physics simulation",
+SCA 2019). A contact with a gap may close it within the substep and no more; an overlap is pushed out by a damped
+spring, and a second sweep takes back the velocity that the spring gave ("soft step": E. Catto, "Solver2D", 2024).
 
 Impulses of the last step are where the next one begins, contacts being known again by their features alone: no place is
 compared, so a feature number that changed its meaning would throw the bodies about.
@@ -145,7 +145,7 @@ def axes_of(n: np.ndarray) -> np.ndarray:
 
 
 def spring(gap: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) the speed that each contact must not fall below, negated, and how soft it is: 0 of gaps, as they are hard."""
+    """(k,) the speed that each contact must not fall below, negated, and how soft it is: 0 of gaps, which are hard."""
     omega = 2.0 * np.pi * min(HERTZ, 0.25 / h)
     damped = 2.0 * DAMPING + h * omega
     return np.where(gap > 0.0, gap / h, np.maximum(omega / damped * gap, -FASTEST)), (gap <= 0.0) / (h * omega * damped)

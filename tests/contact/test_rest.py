@@ -33,11 +33,12 @@ def rod_inertia(mass, radius, length):
 
 
 def run(stepper: Stepper, seconds: float) -> list[Step]:
-    """All steps; energy never rises above what there was: springs give back what they were given, or less."""
+    """All steps; energy never rises above what there was, springs giving back what they were given, or less, but for
+    the error of a substep of free fall: m (g h)² a body."""
     start = stepper.energy()
     steps = [stepper.step() for _ in range(round(seconds / stepper.dt))]
     highest = max(step.energy for step in steps)
-    assert highest <= start + 1e-9 * abs(start), (start, highest)
+    assert highest <= start + stepper.mass.sum() * (9.81 * stepper.dt / stepper.substeps) ** 2, (start, highest)
     return steps
 
 
@@ -69,25 +70,28 @@ def sag(load: float, contacts: int, inverse_mass: float) -> float:
     return load / contacts * inverse_mass / OMEGA**2
 
 
-@pytest.mark.parametrize(("turned", "max_contacts", "seconds"), [(0.3, 8, 10.0), (0.0, 4, 10.0)])
-def test_a_stack_of_ten_boxes(turned, max_contacts, seconds):
-    """Boxes turned against each other rest on up to 8 corners each; equal ones in line on 4, all at edges and
-    vertices of the other."""
+@pytest.mark.parametrize(("turned", "seconds", "rest"), [(0.3, 10.0, 5.0), (0.0, 7.0, 1.5)], ids=["turned", "in line"])
+def test_a_stack_of_ten_boxes(turned, seconds, rest):
+    """Boxes turned against each other rest on up to 8 corners each; equal ones in line on 4, each at an edge or a
+    vertex of the other, which takes longer to find its rest."""
     rng = np.random.default_rng(3)
     size, n = (0.4, 0.3, 0.2), 10
-    stepper = Stepper(max_contacts=max_contacts)
+    stepper = Stepper()
     stepper.add(FLOOR, X_FLOOR)
     for k in range(n):
         x, y, yaw = rng.uniform(-1, 1, 3) * (0.07 * turned, 0.07 * turned, turned)
-        stepper.add(collide.Box(size), collide.pose((x, y, size[2] * (k + 0.5)), rpy=(0, 0, yaw)), 1.0, box_inertia(1, size))
+        X = collide.pose((x, y, size[2] * (k + 0.5)), rpy=(0, 0, yaw))
+        stepper.add(collide.Box(size), X, 1.0, box_inertia(1, size))
     start = stepper.X.copy()
     steps = run(stepper, seconds)
-    check_steady(steps[-300:], speed=2e-3, moved=2e-5, places=2e-5)
+    last = steps[-round(rest / stepper.dt) :]
+    check_steady(last, speed=2e-3, moved=1e-4, places=3e-5)
     # A corner of a box of these sides feels 1/m + r²/I = (1 + 3 + 3)/m at most; two boxes meet there.
-    deepest = -min(step.contacts["distance"].min() for step in steps[-300:])
+    deepest = -min(step.contacts["distance"].min() for step in last)
     assert deepest <= sag(n * 9.81, 4, 14.0), deepest
     moved = np.abs(stepper.X - start)[:, :3, 3].max(axis=0)
-    assert moved[2] <= n * sag(n * 9.81, 4, 14.0) and moved[:2].max() < 2e-3, moved
+    # From no impulses at all it leans while it finds them, by less than a hundredth of its height.
+    assert moved[2] <= n * sag(n * 9.81, 4, 14.0) and moved[:2].max() < 0.01 * n * size[2], moved
     assert {(a, b) for a, b, *_ in steps[-1].keys} == {(k, k + 1) for k in range(n)}
 
 
@@ -167,8 +171,7 @@ def test_a_cylinder_stands(ground, tilt):
     X_WB = collide.pose((0, 0, 0.25 + 0.1 * np.sin(tilt)), rpy=(tilt, 0.4 * tilt, 0.3))
     body = stepper.add(shape, X_WB, 1.0, inertia)
     steps = run(stepper, 10.0)
-    # The corner nearest to the lowest point of the rim is moved there: by up to a sixteenth of the way around.
-    check_steady(steps[-300:], speed=1e-6, moved=1e-6, places=2 * 0.1 * np.sin(np.pi / 16))
+    check_steady(steps[-300:], speed=1e-6, moved=1e-6, places=1e-6)
     assert len(steps[-1].keys) == 8 and stepper.X[body, 2, 2] > 1 - 1e-9
     assert abs(stepper.X[body, 2, 3] - 0.25) < 1e-4
 
