@@ -83,7 +83,8 @@ def scenes() -> dict[str, tuple[collide.Shape, np.ndarray, collide.Shape, np.nda
     floor = collide.Mesh(corners, [(0, 1, 2), (0, 2, 3)], solid=False)
     rng = np.random.default_rng(4)
     ring = np.array([(np.cos(a), np.sin(a)) for a in 2 * np.pi * (np.arange(7) + rng.uniform(-0.2, 0.2, 7)) / 7])
-    frustum = np.concatenate([np.column_stack([scale * ring, np.full(7, z)]) for scale, z in ((0.2, -0.08), (0.11, 0.08))])
+    ends = (0.2, -0.08), (0.11, 0.08)
+    frustum = np.concatenate([np.column_stack([scale * ring, np.full(7, z)]) for scale, z in ends])
     quarter = 0.5 * np.pi
     return {
         title: (floor if A is floor else table, np.eye(4) if A is floor else X_T, B, collide.pose(place, rpy=rpy))
