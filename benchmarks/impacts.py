@@ -63,17 +63,17 @@ def resting(group: motions.Group) -> motions.Group:
     )  # fmt: skip
 
 
-def box_group(n: int, turn: float | None = None) -> motions.Group:
+def box_group(n: int, angle: float | None = None) -> motions.Group:
     rng = np.random.default_rng(SEED)
-    return motions.random_group("boxes", rng, n, motions.boxes(rng), turn=turn)
+    return motions.random_group("boxes", rng, n, motions.boxes(rng), turn=angle)
 
 
-def hull_group(n: int, turn: float | None = None) -> motions.Group:
+def hull_group(n: int, angle: float | None = None) -> motions.Group:
     rng = np.random.default_rng(SEED + 1)
     points = 0.4 * rng.normal(size=(2, 48, 3))
     A, B = (collide.ConvexHull(p) for p in points)
     gap = oracle.polytope_gap(*oracle.hull_features(points[0]), *oracle.hull_features(points[1]))
-    return motions.random_group("hulls", rng, n, (A, B, gap, 3.0), turn=turn)
+    return motions.random_group("hulls", rng, n, (A, B, gap, 3.0), turn=angle)
 
 
 def rod_group(n: int) -> motions.Group:
@@ -106,9 +106,9 @@ class Scene(NamedTuple):
 
 SCENES = {
     "two boxes": Scene(box_group, False),
-    "two boxes, one at rest": Scene(partial(box_group, turn=_SMALL_TURN), True),
+    "two boxes, one at rest": Scene(partial(box_group, angle=_SMALL_TURN), True),
     "two hulls of 48": Scene(hull_group, False, 0.1),
-    "two hulls of 48, one at rest": Scene(partial(hull_group, turn=_SMALL_TURN), True, 0.1),
+    "two hulls of 48, one at rest": Scene(partial(hull_group, angle=_SMALL_TURN), True, 0.1),
     "thin rods, one at rest": Scene(rod_group, True),
     "needles through a plate, 10 km": Scene(needle_group, True),
     "a box and an L of 20 facets at rest": Scene(mesh_group, True, 0.3),

@@ -102,19 +102,19 @@ def begin_single(header_at, XA0_at, XA1_at, XB0_at, XB1_at, row_at):
     for k in range(4):
         if not set_pose(poses, 0, view_f64(header[XA0_AT + k], 16), True):
             return -1
-    _clear(row_at, 1)
+    _empty_rows(row_at, 1)
     return 0
 
 
 @entry("int64(int64, int64)")
 def clear_impacts(rows_at, n):
     """Rows of answers become those of motions without any contact; returns 0."""
-    _clear(rows_at, n)
+    _empty_rows(rows_at, n)
     return 0
 
 
 @kernel
-def _clear(rows_at, n):
+def _empty_rows(rows_at, n):
     for k in range(n):
         numbers = view_f64(rows_at + ANSWER * k, DOUBLES_OF_ROW)
         words = view_i32(rows_at + ANSWER * k + 8 * DOUBLES_OF_ROW, 4)
