@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from collide import errors as errors
     from collide import results as results
     from collide import transforms as transforms
+    from collide.casts.ray_hits import RayHits
+    from collide.casts.raycast import raycast
+    from collide.casts.shape_cast import ShapeCasts, shape_cast
     from collide.certificates.certificate import Certificate, CertificateRefused
     from collide.certificates.make_certificate import certify
     from collide.certificates.verify import verify
@@ -57,7 +60,6 @@ if TYPE_CHECKING:
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
-    from collide.surface_queries.raycast import RayHits, raycast
     from collide.transforms import pose
     from collide.world import World
 
@@ -68,6 +70,9 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
+    "collide.casts.ray_hits": ("RayHits",),
+    "collide.casts.raycast": ("raycast",),
+    "collide.casts.shape_cast": ("ShapeCasts", "shape_cast"),
     "collide.certificates.certificate": ("Certificate", "CertificateRefused"),
     "collide.certificates.make_certificate": ("certify",),
     "collide.certificates.verify": ("verify",),
@@ -76,7 +81,6 @@ _HOMES = {
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
-    "collide.surface_queries.raycast": ("RayHits", "raycast"),
     "collide.hierarchies.hierarchy_queries": ("walk",),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
@@ -101,9 +105,9 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
     "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument",
     "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot",
-    "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World",
-    "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
-    "get_library", "overlay", "pose", "raycast", "self_collisions", "tessellate", "verify", "walk",
+    "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery",
+    "World", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "get_library", "overlay", "pose", "raycast", "self_collisions", "shape_cast", "tessellate", "verify", "walk",
 ]
 
 

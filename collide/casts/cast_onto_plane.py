@@ -7,7 +7,7 @@ from collide.kernels import kernel
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.halfspace_convex import plane_in_world, reach_of_plane
 from collide.narrowphase.posed_pair import radius_of
-from collide.numerics.vec3 import Vec3, add, column_at, divide, dot, neg, norm, rotate, rotate_back, scale, sub
+from collide.numerics.vec3 import add, column_at, divide, dot, neg, norm, rotate, rotate_back, scale, sub
 from collide.support.support_mapping import settled_vertex, support
 
 

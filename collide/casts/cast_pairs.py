@@ -19,7 +19,7 @@ from collide.numerics.vec3 import add, norm, put_vec3, vec3_at
 #: Doubles of a question: the direction of A's motion, and the largest t that counts.
 QUESTION = 4
 _LIMIT = 3
-#: Doubles of a row: the status of `portal.py`, t from below, t, t from above, unit normal from A to B, a point of B, and
+#: Doubles of a row: the status of `portal.py`, t from below, t, t from above, unit normal from A to B, a point of B,
 #: the size of the pair in units of t.
 CAST_ROW = 11
 STATUS, LOWER, VALUE, UPPER, NORMAL, TOUCHING, SIZE = 0, 1, 2, 3, 4, 7, 10
@@ -36,7 +36,7 @@ def cast_pair(pair, size, slop, question, row, doubles_at, integers_at):
             pair, direction, radius_of(pair, pair.A), radius_of(pair, pair.B), ERROR * size + slop, size, doubles_at,
             integers_at,
         )  # fmt: skip
-        met = cast_line(cast, question[_LIMIT])
+        met = cast_line(cast, question[_LIMIT], False)
     row[STATUS] = met.status
     row[LOWER] = met.lower
     row[VALUE] = met.value

@@ -108,13 +108,16 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
 
 
 def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
-    """Decide by pair queries which of the rows BEHIND touch at the start; others that are ahead are OPEN."""
-    behind = np.flatnonzero(rows[:, STATUS] == BEHIND)
+    """Decide by pair queries which rows touch at the start, of those BEHIND and of open ones that may; what is neither
+    behind nor touches is OPEN.
+    """
+    behind = np.flatnonzero((rows[:, STATUS] == BEHIND) | ((rows[:, STATUS] == OPEN) & (rows[:, LOWER] <= 0.0)))
     if not len(behind):
         return
     start = run_pairs(parts.table, parts.poses, parts.shape_of, pairs[behind], boolean=True, limit=0.0)
     apart = behind[~start["hit"]]
-    rows[apart, STATUS] = np.where(rows[apart, UPPER] <= 0.0, MISS, OPEN)
+    is_behind = (rows[apart, STATUS] == BEHIND) & (rows[apart, UPPER] <= 0.0)
+    rows[apart, STATUS] = np.where(is_behind, MISS, OPEN)
     rows[apart, LOWER] = np.maximum(rows[apart, LOWER], 0.0)
     touching = behind[start["hit"]]
     if not len(touching):

@@ -25,9 +25,9 @@ from collide.narrowphase.gjk.minkowski_difference import (
 )
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, scale, sub, vec3_at
 
-#: How a cast ends. MISS: nothing is met, proven. HIT: something is, λ > 0, proven. BEHIND: the line enters D at λ ≤ 0, or
-#: that cannot be told: whether the bodies meet at the start decides. OPEN: rounding leaves open whether they meet at
-#: all, or within the limit.
+#: How a cast ends. MISS: nothing is met, proven. HIT: something is, λ > 0, proven. BEHIND: the line enters D at λ ≤ 0,
+#: or that cannot be told: whether the bodies meet at the start decides. OPEN: rounding leaves open whether they meet
+#: at all, or within the limit.
 MISS, HIT, BEHIND, OPEN = range(4)
 
 #: A portal is near enough to a support plane at this part of the error.
@@ -108,7 +108,7 @@ def _farthest_of_ring(cast, n):
 
 @kernel(inline=True)
 def _dropped(seen, a, b, c, spare, error):
-    """Which of the portal's points (0, 1, 2) gives way to the spare one, so that the line passes through the new portal.
+    """Which of the portal's points (0, 1, 2) gives way to the spare one: the line passes through the new portal.
 
     Where it passes through an edge two will do: the one that leaves the larger portal, seen along the line. A spare
     point straight before one of the three takes its place.
@@ -215,16 +215,16 @@ def _across(seen, i, j, x, y):
 
 
 @kernel
-def cast_line(cast, limit):
-    """The `Entry` of the line into D.   limit : λ up to which it counts."""
+def cast_line(cast, limit, whole):
+    """The `Entry` of the line into D.   limit : λ up to which it counts.   whole : λ below 0 counts, too."""
     ahead = sample(cast, 0, cast.e)
-    if ahead < -cast.length * (cast.error + 2.0**-50 * cast.size):
+    if not whole and ahead < -cast.length * (cast.error + 2.0**-50 * cast.size):
         return _nothing(MISS)
     outline = line_through(cast)
     if outline.outcome == MISSED:
         return _nothing(MISS)
     if outline.outcome != CROSSED:
-        return _grazing(cast, outline.n, ahead)
+        return _grazing(cast, outline.n, ahead, -math.inf if whole else 0.0)
     far = _farthest_of_ring(cast, outline.n)
     _first_portal(cast, outline.n)
     front = _refine(cast)
@@ -247,9 +247,9 @@ def cast_line(cast, limit):
 
 
 @kernel(cold=True)
-def _grazing(cast, n, ahead):
+def _grazing(cast, n, ahead, least):
     """The `Entry` of a line that doubles can neither prove to pass D nor to pass through it: somewhere along D, if it
-    does.   ahead : how far D is along e.
+    does.   ahead : how far D is along e.   least : λ that counts.
     """
     ring, seen, points = cast.ring, cast.seen, cast.points
     nearest = 0
@@ -264,7 +264,7 @@ def _grazing(cast, n, ahead):
     square = cast.length * cast.length
     behind = -sample(cast, SLOTS - 1, neg(cast.e))
     error = cast.error / cast.length * (1.0 + 2.0**-40)
-    lower = max(behind / square - error, 0.0)
+    lower = max(behind / square - error, least)
     upper = ahead / square + error
     return Entry(OPEN, lower, min(max(dot(w, cast.e) / square, lower), upper), upper, normal, touching)
 

@@ -48,6 +48,18 @@ class PartPairs(NamedTuple):
     item_b: np.ndarray
 
 
+def posed_parts(items: list[tuple[PackedConvex, np.ndarray]], X_WA: np.ndarray) -> PosedParts:
+    """Convex parts (packed, pose in A) of one body at its poses (n, 4, 4): all of the first pose, then of the next."""
+    m, n = len(items), len(X_WA)
+    table = ShapeTable([packed for packed, _ in items])
+    shape_of = np.tile(np.arange(m), n)
+    table.build_trees(shape_of)
+    body_poses = np.repeat(X_WA, m, axis=0)
+    part_poses = np.tile(np.array([X for _, X in items]).reshape(-1, 4, 4), (n, 1, 1))
+    poses = pose_table(body_poses, part_poses, table.numbers[shape_of, REACH])
+    return PosedParts(table, poses, shape_of, body_poses, part_poses)
+
+
 class _Side(NamedTuple):
     """One side of n questions: parts of one shape, or of one a question.
 

@@ -28,7 +28,7 @@ class ShapeCasts(NamedTuple):
 
     hit : (N,) bool. Of polytopes and half-spaces decided exactly; where rounding leaves it open of others, True.
     distance : t of the first contact: A stands at its pose moved by t · direction, and touches B. Lengths in units of
-        the direction's, metres for unit directions. ``inf`` where nothing is met; 0 where the bodies touch at the start.
+        the direction's, metres for unit directions. ``inf`` where nothing is met; 0 where they touch at the start.
     lower, upper : lower ≤ truth ≤ upper is proven where ``certified``, or the hit is.
     point : in W [m], of B, where A touches it then; zeros where nothing is met.
     normal : unit normal from A to B in W there, never against the direction where t > 0; of bodies that overlap at the

@@ -1,8 +1,8 @@
 """Seen along a direction: whether a line passes through a Minkowski difference D = A ⊖ B, proven in doubles.
 
-A + λ d meets B where λ e is a point of D, e = −d. Seen along e, D is a convex set in the plane and the line a point, the
-origin. A polygon of support points grows towards the side where the origin is nearest to its outside, as GJK does in
-the plane (G. van den Bergen, "Ray casting against general convex objects with application to continuous collision
+A + λ d meets B where λ e is a point of D, e = −d. Seen along e, D is a convex set in the plane and the line a point,
+the origin. A polygon of support points grows towards the side where the origin is nearest to its outside, as GJK does
+in the plane (G. van den Bergen, "Ray casting against general convex objects with application to continuous collision
 detection", 2004), until a support line has the origin beyond it, or the polygon holds it with some clearance. Where
 rounding allows neither, the line grazes D: that is left open.
 """
@@ -88,8 +88,8 @@ def open_cast(pair, direction, radius_a, radius_b, error, size, doubles_at, inte
     up = cross(scale(1.0 / length, e), across)
     return Cast(
         pair, view_f64(doubles_at, POINT * SLOTS), view_f64(doubles_at + 8 * POINT * SLOTS, 2 * SLOTS),
-        view_i64(integers_at, 2 * SLOTS), view_i64(integers_at + 16 * SLOTS, 2 * SLOTS), e, length, across, up, radius_a,
-        radius_b, error, size,
+        view_i64(integers_at, 2 * SLOTS), view_i64(integers_at + 16 * SLOTS, 2 * SLOTS), e, length, across, up,
+        radius_a, radius_b, error, size,
     )  # fmt: skip
 
 
