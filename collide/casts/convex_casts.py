@@ -43,11 +43,11 @@ class CastRows(NamedTuple):
 
 
 class Marks(NamedTuple):
-    """(k,) bool each of rows: sure, that status is proven; certified, that the bracket is as narrow as promised, too;
+    """(k,) bool each of rows: proven, that status is proven; certified, that the bracket is as narrow as promised, too;
     at_start, whether the bodies touch before they move.
     """
 
-    sure: np.ndarray
+    proven: np.ndarray
     certified: np.ndarray
     at_start: np.ndarray
 
@@ -101,9 +101,9 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
         if _has_exact_numbers(parts, pairs[i]):
             settle_exactly(parts, pairs[i], questions[i], rows[i])
         elif rows[i, STATUS] == OPEN:
-            rows[i, STATUS], marks.sure[i] = HIT, False
+            rows[i, STATUS], marks.proven[i] = HIT, False
             rows[i, [LOWER, VALUE]] = np.minimum(rows[i, [LOWER, VALUE]], questions[i, 3])
-    marks.certified[:] = marks.sure & ~(hits & (rows[:, UPPER] - rows[:, LOWER] > width))
+    marks.certified[:] = marks.proven & ~(hits & (rows[:, UPPER] - rows[:, LOWER] > width))
     return rows, marks
 
 
@@ -128,7 +128,7 @@ def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
     rows[touching, NORMAL : NORMAL + 3] = depths["normal"]
     rows[touching, TOUCHING : TOUCHING + 3] = depths["point_b"]
     marks.at_start[touching] = True
-    marks.sure[touching] = start["how"][start["hit"]] != UNDECIDED
+    marks.proven[touching] = start["how"][start["hit"]] != UNDECIDED
 
 
 def _has_exact_numbers(parts: PosedParts, pair: np.ndarray) -> bool:
@@ -151,17 +151,17 @@ def settle_exactly(parts: PosedParts, pair: np.ndarray, question: np.ndarray, ro
 def settle_points(points_a, points_b, grid: int, question: np.ndarray, row: np.ndarray) -> None:
     """Write the row of two hulls of integer points times 2^grid."""
     d, exponent = integers(question[:3])
-    found = cast_exactly(points_a, points_b, d)
-    if found.t is None or found.t * Fraction(2) ** (grid - exponent) > float(question[3]):
+    contact = cast_exactly(points_a, points_b, d)
+    if contact.t is None or contact.t * Fraction(2) ** (grid - exponent) > float(question[3]):
         row[STATUS] = MISS
         return
     row[STATUS] = HIT
-    row[VALUE], row[LOWER], row[UPPER] = rounded(found.t, grid - exponent)
-    if any(found.normal):
-        largest = max(abs(v) for v in found.normal)
-        normal = np.array([float(v / largest) for v in found.normal])
+    row[VALUE], row[LOWER], row[UPPER] = rounded(contact.t, grid - exponent)
+    if any(contact.normal):
+        largest = max(abs(v) for v in contact.normal)
+        normal = np.array([float(v / largest) for v in contact.normal])
         row[NORMAL : NORMAL + 3] = normal / np.linalg.norm(normal)
-    point = [sum(weight * points_b[j][axis] for (_, j), weight in found.weights.items()) for axis in range(3)]
+    point = [sum(weight * points_b[j][axis] for (_, j), weight in contact.weights.items()) for axis in range(3)]
     row[TOUCHING : TOUCHING + 3] = [float(Fraction(v) * Fraction(2) ** grid) for v in point]
 
 
@@ -208,7 +208,7 @@ def _first_of_each(pairs: PartPairs, rows, marks: Marks, n: int) -> CastRows:
     out.hit[question] = True
     out.t[question, 1] = np.minimum.reduceat(rows[hits, LOWER], starts)
     # What may be no hit bounds nothing from above, unless there is nothing else.
-    upper = np.minimum.reduceat(np.where(marks.sure[hits], rows[hits, UPPER], np.inf), starts)
+    upper = np.minimum.reduceat(np.where(marks.proven[hits], rows[hits, UPPER], np.inf), starts)
     out.t[question, 2] = np.minimum(upper, np.where(np.isinf(upper), rows[first, UPPER], np.inf))
     out.t[question, 0] = np.clip(rows[first, VALUE], out.t[question, 1], out.t[question, 2])
     # An open pair that is farther than the first contact has no say in it.

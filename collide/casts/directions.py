@@ -46,14 +46,14 @@ def checked_directions(caller: str, name: str, values, thing: str) -> tuple[Dire
 
     thing : "a ray", for messages.
     """
-    given, single = checks.vectors(caller, name, values)
-    sizes = np.abs(given).max(axis=1)
-    checks.refuse_rows(caller, name, given, sizes == 0.0, f"has length 0: {thing} needs a direction")
+    values_read, single = checks.vectors(caller, name, values)
+    sizes = np.abs(values_read).max(axis=1)
+    checks.refuse_rows(caller, name, values_read, sizes == 0.0, f"has length 0: {thing} needs a direction")
     low, high = _DIRECTIONS
     complaint = f"has no component within [{low:g}, {high:g}]"
-    checks.refuse_rows(caller, name, given, (sizes < low) | (sizes > high), complaint)
+    checks.refuse_rows(caller, name, values_read, (sizes < low) | (sizes > high), complaint)
     exponents = np.frexp(sizes)[1].astype(np.int64)
-    scaled = np.ldexp(given, -exponents[:, None])
+    scaled = np.ldexp(values_read, -exponents[:, None])
     thin = (scaled != 0.0) & (np.abs(scaled) < _MIN_RATIO)
     complaint = "has components that differ by more than 2^500; make them 0"
     checks.refuse_rows(caller, name, scaled, thin.any(axis=1), complaint)

@@ -152,7 +152,7 @@ def _refine(cast):
     for _ in range(_MAX_ROUNDS):
         if has_radius:
             guess = guess_entry(cast, a, b, c)
-            if guess.found:
+            if guess.exists:
                 height = sample(cast, spare, guess.normal)
                 bound = _bound(cast, guess.normal, 1.0, height)
                 if bound > lower:

@@ -88,9 +88,9 @@ def together(a, b):
         return a
     state = MET if a.state == MET or b.state == MET else UNCLEAR
     # What may be no chord bounds nothing inwards.
-    sure_a, sure_b = a.state == MET or state == UNCLEAR, b.state == MET or state == UNCLEAR
-    first_upper = min(a.first_upper if sure_a else math.inf, b.first_upper if sure_b else math.inf)
-    last_lower = max(a.last_lower if sure_a else -math.inf, b.last_lower if sure_b else -math.inf)
+    counts_a, counts_b = a.state == MET or state == UNCLEAR, b.state == MET or state == UNCLEAR
+    first_upper = min(a.first_upper if counts_a else math.inf, b.first_upper if counts_b else math.inf)
+    last_lower = max(a.last_lower if counts_a else -math.inf, b.last_lower if counts_b else -math.inf)
     return Chord(
         state, min(a.first_lower, b.first_lower), min(a.first, b.first), first_upper, last_lower, max(a.last, b.last),
         max(a.last_upper, b.last_upper), a.first_side if a.first <= b.first else b.first_side,

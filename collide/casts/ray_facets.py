@@ -117,9 +117,9 @@ class _MetFacets:
         rows = self.order[self.keep[self.order]]
         ray, facet = self.ray[rows], self.facet[rows]
         X = self.X_WA[ray] if len(self.X_WA) > 1 else self.X_WA
-        sure = np.ones(len(rows), dtype=bool)
+        proven = np.ones(len(rows), dtype=bool)
         normals = facet_normals(X, self.corners[facet])
-        return RayEvents(ray, self.t[rows], normals, facet, np.zeros(len(rows), dtype=np.int64), sure, sure.copy())
+        return RayEvents(ray, self.t[rows], normals, facet, np.zeros(len(rows), dtype=np.int64), proven, proven.copy())
 
 
 def _running_ends(ray: np.ndarray, upper: np.ndarray) -> np.ndarray:

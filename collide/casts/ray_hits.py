@@ -50,7 +50,8 @@ class RayEvents(NamedTuple):
     """Places where rays meet a surface.
 
     ray : (k,) numbers of the rays.   t : (k, 3) value, from below, from above, in units of the directions given.
-    normal : (k, 3) in W.   facet, item : (k,).   sure : (k,) bool, that it is met is proven, with t within the bracket.
+    normal : (k, 3) in W.   facet, item : (k,).
+    proven : (k,) bool, that it is met is proven, with t within the bracket.
     certified : (k,) bool, the bracket is narrow, too.
     """
 
@@ -59,7 +60,7 @@ class RayEvents(NamedTuple):
     normal: np.ndarray
     facet: np.ndarray
     item: np.ndarray
-    sure: np.ndarray
+    proven: np.ndarray
     certified: np.ndarray
 
     def of(self, rows: np.ndarray) -> RayEvents:
@@ -84,12 +85,12 @@ def first_of_each(events: RayEvents) -> RayEvents:
         return first
     t = first.t.copy()
     t[:, 1] = np.minimum.reduceat(events.t[:, 1], starts)
-    upper = np.minimum.reduceat(np.where(events.sure, events.t[:, 2], np.inf), starts)
+    upper = np.minimum.reduceat(np.where(events.proven, events.t[:, 2], np.inf), starts)
     t[:, 2] = np.where(np.isinf(upper), np.maximum.reduceat(events.t[:, 2], starts), upper)
     matters = events.t[:, 1] <= np.repeat(t[:, 2], np.diff([*starts, len(ray)]))
     certified = np.logical_and.reduceat(events.certified | ~matters, starts)
     return first._replace(
-        t=t, sure=np.logical_or.reduceat(events.sure, starts), certified=certified
+        t=t, proven=np.logical_or.reduceat(events.proven, starts), certified=certified
     )  # fmt: skip
 
 

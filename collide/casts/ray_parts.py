@@ -104,18 +104,18 @@ def _events(rows, met, asked, limits, exact, directions: Directions) -> RayEvent
                                                                          LAST_SIDE)  # fmt: skip
     for value, lower, upper, normal, side in ends:
         counts = np.isfinite(rows[:, value]) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
-        sure = (rows[:, STATE] == MET) & (rows[:, lower] >= 0.0) & (rows[:, upper] <= limits)
+        proven = (rows[:, STATE] == MET) & (rows[:, lower] >= 0.0) & (rows[:, upper] <= limits)
         # What was decided exactly is as it is said, within doubles that hold it.
         counts &= ~exact | ((rows[:, value] >= 0.0) & (rows[:, value] <= limits))
-        sure |= exact
+        proven |= exact
         k = np.flatnonzero(counts)
         t = np.clip(rows[k][:, [value, lower, upper]], 0.0, None)
         t[:, :2] = np.minimum(t[:, :2], limits[k, None])
         narrow = ~_are_wide(rows[k], lower, upper)
         both.append(
             RayEvents(
-                asked[k, 0], t, rows[k][:, normal : normal + 3], rows[k, side].astype(np.int64), met[k], sure[k],
-                sure[k] & narrow,
+                asked[k, 0], t, rows[k][:, normal : normal + 3], rows[k, side].astype(np.int64), met[k], proven[k],
+                proven[k] & narrow,
             )
         )  # fmt: skip
     ray = np.concatenate([events.ray for events in both])

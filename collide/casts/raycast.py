@@ -103,7 +103,7 @@ def surfaces_met(
     items = leaves(shape)
     meshed = np.array([item.meshed for item, _ in items])
     numbers = np.arange(len(items))
-    found = [
+    events = [
         _on_parts([items[k] for k in numbers[~meshed]], numbers[~meshed], X_WA, origins, directions, limit)
     ]  # fmt: skip
     for k in numbers[meshed].tolist():
@@ -111,11 +111,11 @@ def surfaces_met(
         body = body_of(mesh)
         reach = np.full(len(X_WA), body.reach + float(np.abs(body.centre).sum()))
         X_WM, slop = moved_pose(X_WA, X_AM, reach)
-        events = facets_met(body, X_WM, origins, directions, limit, every)
+        met = facets_met(body, X_WM, origins, directions, limit, every)
         # Where the product of the poses is rounded, what is exact of it is not of the mesh.
-        sure = events.sure & ~(slop > 0.0)[events.ray if len(slop) > 1 else 0]
-        found.append(events._replace(item=np.full_like(events.item, k), sure=sure, certified=sure))
-    return in_order(joined(found))
+        proven = met.proven & ~(slop > 0.0)[met.ray if len(slop) > 1 else 0]
+        events.append(met._replace(item=np.full_like(met.item, k), proven=proven, certified=proven))
+    return in_order(joined(events))
 
 
 def _is_facets(shape: Shape) -> bool:

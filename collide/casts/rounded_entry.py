@@ -17,11 +17,11 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, norm, scale, sub, vec3_
 class Guess(NamedTuple):
     """A guessed entry.
 
-    found : whether there is one.   normal : unit normal of D there.
+    exists : whether there is one.   normal : unit normal of D there.
     w : a point of D.   touching : the point of B in W's axes from B's origin that belongs to it.
     """
 
-    found: bool
+    exists: bool
     normal: Vec3
     w: Vec3
     touching: Vec3

@@ -117,13 +117,13 @@ def shape_cast(
         raise InvalidArgument(
             f"shape_cast: lengths do not match: {lengths}; batches must be equally long, or a single one"
         )
-    refuse_endless("shape_cast: A", A)
+    refuse_unbounded("shape_cast: A", A)
     rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
     return ShapeCasts._make(values[0] for values in casts) if single and single_direction else casts
 
 
-def refuse_endless(what: str, shapes) -> None:
+def refuse_unbounded(what: str, shapes) -> None:
     """Raises UnsupportedQuery for half-spaces, and unions with one, that are to be moved."""
     for shape in [shapes] if isinstance(shapes, Shape) else {id(shape): shape for shape in shapes}.values():
         if not shape.meshed and any(packed.kind == HALFSPACE for packed, _ in parts_of(shape)):

@@ -37,7 +37,7 @@ MISSED, CROSSED, GRAZED = range(3)
 #: A polygon that holds the origin so deep, in units of its extent, is not widened any more.
 _DEEP = 2.0**-4
 #: A clearance of this many errors is proven, and enough to stop with where the polygon cannot be widened.
-_CLEAR = 16.0
+_MIN_ERRORS = 16.0
 #: The first direction is turned by an angle of this tangent, off the axes that boxes have in common.
 _SKEW = 0.17
 
@@ -159,13 +159,13 @@ def _insert(cast, n, k):
                 first = i
     if first < 0:
         return n
-    kept = n - count + 1
-    for i in range(kept):
+    n_kept = n - count + 1
+    for i in range(n_kept):
         ring[SLOTS + i] = ring[(first + count + i) % n]
-    for i in range(kept):
+    for i in range(n_kept):
         ring[i] = ring[SLOTS + i]
-    ring[kept] = k
-    return kept + 1
+    ring[n_kept] = k
+    return n_kept + 1
 
 
 @kernel(inline=True)
@@ -289,7 +289,7 @@ def line_through(cast):
     for k in range(4, _MAX_POINTS):
         edge = _where_to_look(cast, n, stuck)
         inside = edge.inside
-        if n > 2 and inside > _DEEP * extent and inside > _CLEAR * cast.error:
+        if n > 2 and inside > _DEEP * extent and inside > _MIN_ERRORS * cast.error:
             break
         if _sample_seen(cast, k, edge.x, edge.y):
             return Outline(MISSED, n, 0.0)
@@ -299,5 +299,5 @@ def line_through(cast):
         stuck = 0 if gain > 4.0 * cast.error else stuck + 1
         if stuck > (1 if n < 3 else 0):
             break
-    proven = n > 2 and inside > _CLEAR * cast.error
+    proven = n > 2 and inside > _MIN_ERRORS * cast.error
     return Outline(CROSSED if proven else GRAZED, n, inside - 4.0 * cast.error)

@@ -77,7 +77,7 @@ def support_heights(shape, X, n: np.ndarray) -> np.ndarray:
     return own + n @ X[:3, 3]
 
 
-def cast_from_below(A, B, X_WA, X_WB, d, rng, rounds: int = 80) -> float:
+def cast_from_below(A, B, X_WA, X_WB, d, rng, rounds: int = 50) -> float:
     """The largest t that a plane proves free, of many planes and of ever more around the best; inf where one proves
     that nothing is ever met.
 
