@@ -7,9 +7,9 @@ first asked for.
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 
 from collide.errors import InvalidArgument
-from collide.lazy_modules import lazy_module
 
 #: The name of the default narrowphase.
 DEFAULT = "gjk"
@@ -34,4 +34,4 @@ def named_algorithm(query: str, name: object) -> Callable | None:
         names = " or ".join(f'"{known}"' for known in (DEFAULT, *_ALGORITHMS[query]))
         raise InvalidArgument(f"algorithm must be {names}, got {name!r}")
     module, function = place
-    return getattr(lazy_module(module), function)
+    return getattr(import_module(module), function)

@@ -8,8 +8,9 @@ import numpy as np
 
 from collide.errors import InvalidPose
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.convex_bodies import Question, answer_convex
+from collide.narrowphase.convex_bodies import Question, answer_parts
 from collide.narrowphase.pair_queries import OF_ONE_PAIR, Answer, answer_of
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -34,6 +35,7 @@ def answer_batch(
     question: Question,
     threads: int = 1,
     *,
+    prepare: bool = False,
     finish: Callable[[np.ndarray], None] | None = None,
     pose_copies: Sequence[np.ndarray] = (),
 ) -> np.ndarray:
@@ -41,6 +43,7 @@ def answer_batch(
 
     A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4).
     threads : at most so many answer; the answers are the same bits.
+    prepare : make two shapes ready for single calls, too, and keep that with A.
     finish : called with the rows of each piece when they are done, by the thread that did them.
     pose_copies : two arrays like X_WA and X_WB, to become copies of them.
     """
@@ -51,8 +54,13 @@ def answer_batch(
             copy[:] = X
     if n == 0:
         return out
-    A, B = _of_one_set(A, B, n)
-    answer = None if isinstance(A, Picked) else answer_of(A, B)
+    answer = None
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        answer = answer_of(A, B)
+        if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
+            _prepare(A, B, answer)
+    else:
+        A, B = _of_one_set(A, B, n)
 
     def work(piece: slice | np.ndarray) -> None:
         """Answer the poses of these numbers."""
@@ -87,6 +95,12 @@ def answer_batch(
     return out
 
 
+def _prepare(A: Shape, B: Shape, answer: Answer) -> None:
+    pair = answer.prepare(A, B)
+    if pair is not None:
+        keep_prepared(A, B, pair)
+
+
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
     kinds = tables_of(A.shape_set).kinds
     return OF_ONE_PAIR[kinds[A.rows], kinds[B.rows]]
@@ -98,9 +112,7 @@ def _pairs_together(A, B) -> np.ndarray | None:
 
 
 def _of_one_set(A, B, n: int):
-    """The shapes as they are, or where one side is a sequence, both as picked from one set."""
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        return A, B
+    """Shapes of which one side or both are sequences, as picked from one set."""
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A, B
     numbers: dict[int, int] = {}
@@ -139,7 +151,7 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, question: Question, answer: 
         _refuse_poses(X_WA, X_WB, question.check)
         _answer_pair_by_pair(out, A, B, X_WA, X_WB, question._replace(check=False))
         return
-    batch = answer_convex if answer is None else answer.batch
+    batch = answer_parts if answer is None else answer.batch
     if not batch(out, A, B, X_WA, X_WB, question):
         _refuse_poses(X_WA, X_WB, question.check)
         out.fill(0)  # it is a pose after all, on the brink of the tolerance

@@ -18,14 +18,13 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
+from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
 
 _STARTED = time.perf_counter()
 
 FREE, YES, ERROR, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
-#: What is larger is read as a scene by no loader (`scenes/loaders/documents.py`), and need not be looked into.
-_LARGEST_SCENE = 256 * 2**20
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -60,7 +59,7 @@ def _run(argv: list[str]) -> int:
         arguments.parser().print_help()
         return FREE
     if getattr(args, "json", None) not in (None, "-"):
-        _check_place("--json", args.json, ".json")  # before the work, not after it
+        check_place("--json", args.json, ".json")  # before the work, not after it
     with _log_on_stderr(getattr(args, "quiet", False)):
         return _COMMANDS[args.command](args)
 
@@ -153,7 +152,7 @@ def _check(args) -> int:
     known = checking.read_baseline(args.baseline) if args.baseline else None
     for place, suffix in ((args.write_baseline, ".json"), (args.junit, ".xml")):
         if place:
-            _check_place("--write-baseline" if suffix == ".json" else "--junit", place, suffix)
+            check_place("--write-baseline" if suffix == ".json" else "--junit", place, suffix)
     made = _make(args, min_depth=args.min_depth)
     checks = [
         checking.check(
@@ -164,11 +163,11 @@ def _check(args) -> int:
     ]  # fmt: skip
     _write_reports(made, args.json)
     if args.write_baseline:
-        _write_text(checking.baseline_text(checks), args.write_baseline)
+        write_text(checking.baseline_text(checks), args.write_baseline)
     if args.junit:
-        _write_text(junit.text(checks), args.junit)
+        write_text(junit.text(checks), args.junit)
     if args.json != "-" and not args.quiet:
-        _print_lines(line for result in checks for line in result.lines(len(checks) > 1))
+        print_lines(line for result in checks for line in result.lines(len(checks) > 1))
     if not args.quiet:
         for result in checks:
             _say(result.verdict())
@@ -184,17 +183,6 @@ def _check(args) -> int:
     return FREE
 
 
-def _print_lines(lines) -> None:
-    from itertools import islice
-
-    from collide.reports import terminal
-
-    lines = iter(lines)
-    while some := list(islice(lines, 4096)):
-        terminal.write_text("".join(line + "\n" for line in some))
-    sys.stdout.flush()
-
-
 def _say_what_was_taken(report) -> None:
     """Free may mean less than it seems: what has no inside, and what stands in for something else."""
     surfaces = sorted({entry["body"] for entry in report.meshes if not entry["solid"]})
@@ -206,7 +194,7 @@ def _say_what_was_taken(report) -> None:
 
 
 def _make(args, **limits) -> list:
-    """Load the scene of the arguments and report on it, in each state asked for: `states.Stated`."""
+    """Load the scene of the arguments and report on it, in each state asked for: `state_reports.Stated`."""
     progress = _progress(args.quiet)
     scenes = _load(args, progress)
     trajectory = _trajectory(args, scenes)
@@ -296,7 +284,7 @@ def _compare(args) -> int:
             scenes[0][1], engines=args.engines, max_distance=args.clearance, tolerance=args.tolerance
         )
     if args.json:
-        _write_json(comparison.to_dict().items(), args.json)
+        write_json(comparison.to_dict().items(), args.json)
     if args.json != "-" and not args.quiet:
         from collide.reports import comparing, terminal
 
@@ -316,7 +304,7 @@ def _stress(args) -> int:
     with progress("asking the hard families"):
         table = run(args.family or None, n=args.cases, seed=args.seed, engine=args.engine)
     if args.json:
-        _write_json(table.to_dict().items(), args.json)
+        write_json(table.to_dict().items(), args.json)
     if args.save:
         table.save(args.save)
     if args.json != "-" and not args.quiet:
@@ -357,7 +345,7 @@ def _locality(args) -> int:
         with progress("drawing"):
             locality.plot(measured, args.plot)
     if args.json:
-        _write_json(locality.to_dict(measured, args.repeated).items(), args.json)
+        write_json(locality.to_dict(measured, args.repeated).items(), args.json)
     if args.json != "-" and not args.quiet:
         for k, table in enumerate(locality.tables(measured)):
             terminal.write_text("\n" if k else "")
@@ -367,56 +355,19 @@ def _locality(args) -> int:
 
 def _scenes(args) -> int:
     if args.copy:
-        print(_copy_scene(args.copy, args.force))
+        print(copy_scene(args.copy, args.force))
         return FREE
     from collide.reports import terminal
     from collide.reports.tables import Column, Table
     from collide.scenes import path, shipped
 
-    rows = [[name, _first_words(path(name))] for name in shipped()]
+    rows = [[name, first_words(path(name))] for name in shipped()]
     table = Table(
         "SCENES  collide report NAME", [Column("name", "label"), Column("what it is", "text")], rows,
         notes=["collide scenes --copy NAME makes a copy to change"],
     )
     terminal.show_table(table)
     return FREE
-
-
-def _copy_scene(words: list[str], force: bool) -> str:
-    """Copy a shipped scene's file; gives the path of the copy."""
-    import shutil
-    from pathlib import Path
-
-    from collide.scenes import path
-
-    if len(words) > 2:
-        raise InvalidArgument(f"--copy takes a name and at most one destination, got {' '.join(words)}")
-    source = path(words[0])
-    target = Path(words[1] if len(words) == 2 else source.name)
-    if target.is_dir():
-        target = target / source.name
-    if target.exists() and not target.is_file():
-        raise InvalidArgument(f"{target} is no file: a scene is not copied there")
-    if target.exists() and not force:
-        raise InvalidArgument(f"{target} exists already: give another destination, or --force to overwrite it")
-    shutil.copyfile(source, target)
-    return str(target)
-
-
-def _first_words(file) -> str:
-    """What a scene file says it is: its ``about``, else its first comment, else what it counts."""
-    text = file.read_text(encoding="utf-8")
-    if file.suffix == ".json":
-        import json
-
-        data = json.loads(text)
-        robots, bodies = (len(data.get(key, [])) for key in ("robots", "bodies"))
-        return data.get("about") or f"{count(robots, 'robot')}, {count(bodies, 'body', 'bodies')}"
-    for start in ("about:", "#"):
-        for line in text.splitlines():
-            if line.startswith(start) and line[len(start):].strip():
-                return line[len(start):].strip().strip("\"'")
-    return ""
 
 
 def _doctor(args) -> int:
@@ -431,55 +382,11 @@ def _doctor(args) -> int:
     return FREE if examination.sound else YES
 
 
-# --- files --------------------------------------------------------------------------------------
-
-
 def _write_reports(made: list, place: str | None) -> None:
     if place:
         from collide.reports import state_reports as states
 
-        _write_json(states.items(made), place)
-
-
-def _write_json(items, place: str) -> None:
-    """One JSON object, (key, value) after (key, value), to a .json file or to standard output."""
-    from collide.reports.json_text import pieces
-
-    if place == "-":
-        for text in pieces(items, ascii_only=True):
-            sys.stdout.write(text)
-        return
-    _write_text(pieces(items), place)
-
-
-def _write_text(pieces, place: str) -> None:
-    try:
-        with open(place, "w", encoding="utf-8") as file:
-            file.writelines(pieces)
-    except OSError as error:  # a full disk is told without the file's name
-        raise OSError(error.errno, error.strerror, place) from None
-
-
-def _check_place(option: str, place: str, suffix: str) -> None:
-    """``--json a.yaml b.yaml`` must not overwrite a scene; devices and pipes are written to as they are."""
-    if not place.lower().endswith(suffix) and (os.path.isfile(place) or not os.path.exists(place)):
-        otherwise = ", or be - for standard output" if option == "--json" else ""
-        raise InvalidArgument(f"{option}: {place!r} must end in {suffix}{otherwise}")
-    if _is_scene(place):
-        raise InvalidArgument(f"{option}: {place!r} is a scene; it is not overwritten by a report")
-
-
-def _is_scene(place: str) -> bool:
-    import json
-
-    if not os.path.isfile(place) or os.path.getsize(place) > _LARGEST_SCENE:
-        return False
-    try:
-        with open(place, encoding="utf-8") as file:
-            data = json.load(file)
-    except (ValueError, RecursionError):
-        return False
-    return isinstance(data, dict) and ("collide" in data or "robot_model_name" in data)
+        write_json(states.items(made), place)
 
 
 _COMMANDS: dict[str, Callable] = {

@@ -16,7 +16,6 @@ from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.narrowphase.convex_bodies import Question
 from collide.narrowphase.convex_queries import close
 from collide.narrowphase.dispatch import REFUSED, Method
-from collide.narrowphase.pair_queries import prepare
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
 from collide.security_margin import checked_margin, within
@@ -129,8 +128,7 @@ def collide(
 
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    prepare(A, B)
-    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses), threads)
+    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses), threads, prepare=True)
     return bool(hits[0]) if single else hits
 
 
@@ -236,7 +234,6 @@ def distance(
             pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     pose_copies = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
-    prepare(A, B)
     unbounded = []
 
     def finish(rows: np.ndarray) -> None:
@@ -244,7 +241,7 @@ def distance(
             unbounded.append(True)
 
     question = Question(False, limit, signed, check_poses)
-    rows = answer_batch(A, B, X_WA, X_WB, question, threads, finish=finish, pose_copies=pose_copies)
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True, finish=finish, pose_copies=pose_copies)
     if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"

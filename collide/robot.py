@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -33,12 +34,11 @@ from collide.kinematic_tree import (
     rigid_clusters,
     tree_of,
 )
-from collide.lazy_modules import lazy_module
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
-#: Reads robots from files, and is loaded when one is: the engine imports no loader.
-urdf = lazy_module("collide.scenes.loaders.urdf")
+#: Module and function that read robots from files: found when first needed, since the engine imports no loader.
+_LOADER = ("collide.scenes.loaders.urdf", "load_robot")
 
 
 class LinkShape(NamedTuple):
@@ -157,7 +157,7 @@ class Robot:
         SceneError
             Naming file, element and value of what cannot be read.
         """
-        return urdf.load_robot(path, srdf=srdf, **options)
+        return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {len(self.links)} links, {self.dof} degrees of freedom)"

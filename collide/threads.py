@@ -13,14 +13,14 @@ from typing import Any
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 
-#: As many threads as anybody may ask for: more than one can start are never started.
+#: The most threads that may be asked for: what fits in 32 bits. Where the system has fewer, fewer are started.
 _MAX_INT = 2**31 - 1
-#: What takes nobody knows how long is shared only if this much of it is left [s] when the caller has begun alone.
+#: Work whose length is not known is begun by the caller alone, and shared only if this much of it remains [s].
 _ALONE = 50e-3
-#: And then in pieces that last at least so long, and at most [s]: each piece costs about a millisecond besides.
+#: It is then shared in pieces that last between these two [s]: handing over a piece costs about a millisecond.
 _SHORTEST, _LONGEST = 20e-3, 100e-3
-#: Threads that wait for each other, for Python's lock say, are as fast as one, and cost more. This many times as fast
-#: as one, counted by the processor's time they get, they must be, or the helpers stop.
+#: Threads that wait for each other, for Python's lock say, are no faster than one, and cost more. Helpers stop unless
+#: all threads together get so many times the processor's time that one would get.
 _GAIN = 1.3
 
 

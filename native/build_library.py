@@ -30,8 +30,8 @@ BUILD = ROOT / "build" / "kernels"
 C_SOURCES = [
     "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c",
     "capi_mesh.c", "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c",
-    "capi_shapes.c", "capi_spread.c", "capi_status.c",
-    "capi_surface.c", "capi_tree.c", "capi_whole.c",
+    "capi_shapes.c", "capi_nested_subsets.c", "capi_status.c",
+    "capi_surface.c", "capi_tree.c", "capi_bigint.c",
 ]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
 LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
@@ -181,7 +181,8 @@ class BuildLibrary(build_ext):
             self.spawn([compiler, *kind, "-o", str(out), *objects])
         else:
             kind = ["-ldl"] if calls_python else ["-lm", "-Wl,-z,defs", f"-Wl,-soname,{LIBRARY}"]
-            self.spawn([compiler, "-shared", "-s", "-Wl,-z,relro", "-o", str(out), *objects, *kind])
+            strip = [] if os.environ.get("COLLIDE_SYMBOLS") else ["-s"]
+            self.spawn([compiler, "-shared", *strip, "-Wl,-z,relro", "-o", str(out), *objects, *kind])
 
 
 def _compiled_kernels() -> dict:

@@ -9,13 +9,13 @@ struct chunk {
 
 enum { CHUNK = 1 << 16 };
 
-void arena_begin(struct arena *arena, void *room, size_t size)
+void arena_begin(struct arena *arena, void *memory, size_t size)
 {
-    arena->place = room;
+    arena->place = memory;
     arena->used = 0;
     arena->size = size;
     arena->chunks = NULL;
-    arena->fixed = room != NULL;
+    arena->fixed = memory != NULL;
     arena->failed = 0;
 }
 

@@ -3,7 +3,7 @@
 
 #include <stddef.h>
 
-/* Memory that is freed together. One that begins with a room of its caller's takes no more. */
+/* Memory that is freed together. One that begins with memory of its caller's takes no more. */
 struct arena {
     unsigned char *place; /* of the chunk in use */
     size_t used, size;
@@ -19,7 +19,7 @@ struct mark {
     size_t used, size;
 };
 
-void arena_begin(struct arena *arena, void *room, size_t size);
+void arena_begin(struct arena *arena, void *memory, size_t size);
 void *arena_take(struct arena *arena, size_t bytes);
 struct mark arena_mark(const struct arena *arena);
 void arena_return(struct arena *arena, struct mark mark);

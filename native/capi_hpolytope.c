@@ -5,14 +5,14 @@
    and Thrall 1953; Fukuda and Prodon 1996 for the adjacency test). Its extreme rays with w > 0 are the vertices, those with w = 0
    directions in which the set never ends. */
 #include "capi_internal.h"
-#include "capi_whole.h"
+#include "capi_bigint.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 /* A half-space, or a ray; integers without a common divisor. */
 struct row {
-    struct whole at[4];
+    struct bigint at[4];
 };
 
 struct ray {
@@ -23,20 +23,20 @@ struct ray {
 /* Rays so far. Numbers and bits stand in the arena of all. */
 struct rays {
     struct ray *all;
-    size_t n, room;
+    size_t n, capacity;
 };
 
 struct work {
     struct arena arena, scratch;
     struct row *rows;
-    size_t many, words; /* rows, and limbs of their bits */
+    size_t n_rows, words; /* rows, and limbs of their bits */
 };
 
-static struct whole dot(struct arena *arena, const struct row *a, const struct row *b)
+static struct bigint dot(struct arena *arena, const struct row *a, const struct row *b)
 {
-    struct whole sum = whole_product(arena, a->at[0], b->at[0]);
+    struct bigint sum = bigint_product(arena, a->at[0], b->at[0]);
     int k;
-    for (k = 1; k < 4; k++) sum = whole_sum(arena, sum, whole_product(arena, a->at[k], b->at[k]));
+    for (k = 1; k < 4; k++) sum = bigint_sum(arena, sum, bigint_product(arena, a->at[k], b->at[k]));
     return sum;
 }
 
@@ -44,18 +44,18 @@ static struct whole dot(struct arena *arena, const struct row *a, const struct r
 static struct row kept(struct work *work, struct row row)
 {
     int k;
-    whole_make_coprime(&work->scratch, row.at, 4);
-    for (k = 0; k < 4; k++) row.at[k] = whole_copy(&work->arena, row.at[k]);
+    bigint_make_coprime(&work->scratch, row.at, 4);
+    for (k = 0; k < 4; k++) row.at[k] = bigint_copy(&work->arena, row.at[k]);
     return row;
 }
 
 static int is_known(const struct work *work, const struct row *row)
 {
     size_t i;
-    for (i = 0; i < work->many; i++) {
+    for (i = 0; i < work->n_rows; i++) {
         const struct row *other = work->rows + i;
         int k = 0;
-        while (k < 4 && whole_equal(row->at[k], other->at[k])) k++;
+        while (k < 4 && bigint_equal(row->at[k], other->at[k])) k++;
         if (k == 4) return 1;
     }
     return 0;
@@ -66,19 +66,19 @@ static int take_rows(struct work *work, const double *normals, const double *off
 {
     size_t i;
     if ((work->rows = arena_take(&work->arena, (m + 1) * sizeof *work->rows)) == NULL) return 0;
-    work->many = 0;
+    work->n_rows = 0;
     for (i = 0; i <= m; i++) {
         struct mark mark = arena_mark(&work->scratch);
         struct row row;
         int k;
-        for (k = 0; k < 3; k++) row.at[k] = whole_of(&work->scratch, i < m ? -normals[3 * i + k] : 0.0);
-        row.at[3] = whole_of(&work->scratch, i < m ? offsets[i] : 1.0);
+        for (k = 0; k < 3; k++) row.at[k] = bigint_of(&work->scratch, i < m ? -normals[3 * i + k] : 0.0);
+        row.at[3] = bigint_of(&work->scratch, i < m ? offsets[i] : 1.0);
         row = kept(work, row);
         arena_return(&work->scratch, mark);
         if (work->arena.failed || work->scratch.failed) return 0;
-        if (!is_known(work, &row)) work->rows[work->many++] = row;
+        if (!is_known(work, &row)) work->rows[work->n_rows++] = row;
     }
-    work->words = (work->many + 31) / 32;
+    work->words = (work->n_rows + 31) / 32;
     return 1;
 }
 
@@ -94,14 +94,14 @@ static size_t independent(struct work *work, size_t start[4])
 {
     struct row basis[4];
     size_t found = 0, i, j;
-    for (i = 0; i < work->many && found < 4; i++) {
+    for (i = 0; i < work->n_rows && found < 4; i++) {
         struct row rest = work->rows[i];
         for (j = 0; j < found; j++) { /* without fractions: rest * pivot - factor * basis */
             int pivot = pivot_of(basis + j), k;
-            struct whole factor = rest.at[pivot], by = basis[j].at[pivot];
+            struct bigint factor = rest.at[pivot], by = basis[j].at[pivot];
             for (k = 0; k < 4; k++)
-                rest.at[k] = whole_difference(&work->scratch, whole_product(&work->scratch, rest.at[k], by),
-                                              whole_product(&work->scratch, factor, basis[j].at[k]));
+                rest.at[k] = bigint_difference(&work->scratch, bigint_product(&work->scratch, rest.at[k], by),
+                                              bigint_product(&work->scratch, factor, basis[j].at[k]));
         }
         if (work->scratch.failed || pivot_of(&rest) == 4) continue;
         basis[found] = rest;
@@ -111,19 +111,19 @@ static size_t independent(struct work *work, size_t start[4])
 }
 
 /* a0 (b1 c2 - b2 c1) - a1 (b0 c2 - b2 c0) + a2 (b0 c1 - b1 c0) of columns i, j, k. */
-static struct whole minor(struct arena *arena, const struct row *const *r, int i, int j, int k)
+static struct bigint minor(struct arena *arena, const struct row *const *r, int i, int j, int k)
 {
     int c[3], turn;
-    struct whole sum, part;
+    struct bigint sum, part;
     c[0] = i;
     c[1] = j;
     c[2] = k;
-    sum = whole_of(arena, 0.0);
+    sum = bigint_of(arena, 0.0);
     for (turn = 0; turn < 3; turn++) {
         int x = c[turn], y = c[(turn + 1) % 3], z = c[(turn + 2) % 3];
-        part = whole_product(arena, r[1]->at[y], r[2]->at[z]);
-        part = whole_difference(arena, part, whole_product(arena, r[1]->at[z], r[2]->at[y]));
-        sum = whole_sum(arena, sum, whole_product(arena, r[0]->at[x], part));
+        part = bigint_product(arena, r[1]->at[y], r[2]->at[z]);
+        part = bigint_difference(arena, part, bigint_product(arena, r[1]->at[z], r[2]->at[y]));
+        sum = bigint_sum(arena, sum, bigint_product(arena, r[0]->at[x], part));
     }
     return sum;
 }
@@ -148,12 +148,12 @@ static void set_bit(uint32_t *bits, size_t k) { bits[k / 32] |= (uint32_t)1 << k
 
 static int append(struct work *work, struct rays *rays, struct row row, uint32_t *tight)
 {
-    if (rays->n == rays->room) {
-        size_t room = 2 * rays->room + 64;
-        struct ray *more = room > (size_t)-1 / sizeof *more ? NULL : realloc(rays->all, room * sizeof *more);
+    if (rays->n == rays->capacity) {
+        size_t capacity = 2 * rays->capacity + 64;
+        struct ray *more = capacity > (size_t)-1 / sizeof *more ? NULL : realloc(rays->all, capacity * sizeof *more);
         if (more == NULL) return 0;
         rays->all = more;
-        rays->room = room;
+        rays->capacity = capacity;
     }
     rays->all[rays->n].row = row;
     rays->all[rays->n++].tight = tight;
@@ -173,11 +173,11 @@ static int begin_rays(struct work *work, struct rays *rays, const size_t start[4
     for (apart = 0; apart < 4; apart++) {
         const struct row *on[3];
         uint32_t *tight = no_bits(work);
-        size_t many = 0;
+        size_t n_on = 0;
         if (tight == NULL) return 0;
         for (k = 0; k < 4; k++)
             if (k != apart) {
-                on[many++] = work->rows + start[k];
+                on[n_on++] = work->rows + start[k];
                 set_bit(tight, start[k]);
             }
         if (!append(work, rays, corner_ray(work, on, work->rows + start[apart]), tight)) return 0;
@@ -211,14 +211,14 @@ static int are_adjacent(const struct work *work, const struct rays *rays, const 
 }
 
 /* The ray between two on either side of a row: inside * outside ray - outside * inside ray. */
-static struct row between(struct work *work, const struct ray *out, struct whole side_out, const struct ray *in,
-                          struct whole side_in)
+static struct row between(struct work *work, const struct ray *out, struct bigint side_out, const struct ray *in,
+                          struct bigint side_in)
 {
     struct row ray;
     int k;
     for (k = 0; k < 4; k++)
-        ray.at[k] = whole_difference(&work->scratch, whole_product(&work->scratch, side_in, out->row.at[k]),
-                                     whole_product(&work->scratch, side_out, in->row.at[k]));
+        ray.at[k] = bigint_difference(&work->scratch, bigint_product(&work->scratch, side_in, out->row.at[k]),
+                                     bigint_product(&work->scratch, side_out, in->row.at[k]));
     return kept(work, ray);
 }
 
@@ -226,7 +226,7 @@ static struct row between(struct work *work, const struct ray *out, struct whole
 static int cut(struct work *work, const struct rays *rays, size_t k, struct rays *out)
 {
     struct mark begun = arena_mark(&work->scratch);
-    struct whole *sides = arena_take(&work->scratch, (rays->n + 1) * sizeof *sides);
+    struct bigint *sides = arena_take(&work->scratch, (rays->n + 1) * sizeof *sides);
     uint32_t *common = arena_take(&work->scratch, (work->words + 1) * sizeof *common);
     size_t i, j;
     int good = sides != NULL && common != NULL;
@@ -265,7 +265,7 @@ static int extreme_rays(struct work *work, struct rays *rays, struct rays *other
     if (found < 4) return -1;
     if (!begin_rays(work, rays, start)) return 0;
     arena_return(&work->scratch, mark);
-    for (k = 0; k < work->many; k++) {
+    for (k = 0; k < work->n_rows; k++) {
         struct rays before;
         if (k == start[0] || k == start[1] || k == start[2] || k == start[3]) continue;
         before = *rays;
@@ -288,9 +288,9 @@ static double write_vertices(struct work *work, const struct rays *rays, double 
         struct mark mark = arena_mark(&work->scratch);
         if (ray->at[3].sign <= 0) continue;
         for (k = 0; k < 3; k++) {
-            double v = whole_ratio(&work->scratch, ray->at[k], ray->at[3]);
-            struct whole back = whole_product(&work->scratch, whole_of(&work->scratch, v), ray->at[3]);
-            exact = exact && whole_equal(back, ray->at[k]);
+            double v = bigint_ratio(&work->scratch, ray->at[k], ray->at[3]);
+            struct bigint back = bigint_product(&work->scratch, bigint_of(&work->scratch, v), ray->at[3]);
+            exact = exact && bigint_equal(back, ray->at[k]);
             if (fabs(v) > largest) largest = fabs(v);
             vertices[3 * *n + k] = v;
         }

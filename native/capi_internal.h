@@ -14,7 +14,7 @@
 #include <math.h>
 #define INFINITE HUGE_VAL
 
-/* --- layouts, as Python's modules have them; `rooms_of` compares them with what the kernels say ---------------------- */
+/* --- layouts, as Python's modules have them; `workspace_sizes` compares them with what the kernels say --------------- */
 
 /* A row of integers a shape (collide/lowering/shape_table.py), a row of doubles, and a posed part. */
 enum { KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT, INTS };
@@ -24,7 +24,10 @@ enum { POSE = 15 };
 enum { POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE };
 enum { COORDINATES = 8, NO_BITS = 2000 };
 /* Header of queries (collide/narrowphase/pose_batches.py), poses that go through together, and what `answer_poses` says. */
-enum { CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED, HEADER };
+enum {
+    CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, SETTLE, DIGITS_AT, ANSWERED,
+    HEADER
+};
 enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };
 /* A pair that the kernels refuse to measure (collide/results.py). */
 enum { REFUSED = 255 };
@@ -51,7 +54,7 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
 struct support_tree;
-struct mesh_room;
+struct mesh_workspace;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -81,11 +84,11 @@ int64_t tree_address(const struct support_tree *tree);
 void fell_tree(struct support_tree *tree);
 
 /* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
-   room : ROOM_OF_HALFSPACES bytes. */
+   workspace : HALFSPACES_BYTES. */
 collide_status settle_halfspaces(const collide_shape *A, const double *pose_a, const collide_shape *B, const double *pose_b,
-                                 collide_pair *row, void *room);
-/* Bytes of room that it takes: numbers of up to 20,000 bits. */
-enum { ROOM_OF_HALFSPACES = 1 << 20 };
+                                 collide_pair *row, void *workspace);
+/* Bytes of workspace that it takes: numbers of up to 20,000 bits. */
+enum { HALFSPACES_BYTES = 1 << 20 };
 
 /* --- kernels and workspaces ---------------------------------------------------------------------------------------- */
 
@@ -93,7 +96,7 @@ enum { ROOM_OF_HALFSPACES = 1 << 20 };
 const struct collide_kernels *kernels_here(void);
 
 /* The measures; 0 where the library's parts do not fit each other. */
-int rooms_of(const struct collide_kernels *kernels, int64_t measures[MEASURES]);
+int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEASURES]);
 
 /* Zeroed memory that begins where a cache line does; *held is what to free. NULL where there is none. */
 void *cache_lines(size_t bytes, void **held);
@@ -110,18 +113,18 @@ struct collide_workspace {
     int64_t *shape_of; /* 2 * BLOCK */
     int64_t *pairs;    /* BLOCK pairs of parts */
     collide_pair *rows;
-    collide_pair *told;
+    collide_pair *results;
     int64_t *asked;    /* BLOCK pairs */
-    int64_t *left;     /* BLOCK */
-    void *room; /* of half-spaces */
-    struct mesh_room *mesh;
+    int64_t *undecided; /* BLOCK */
+    void *halfspaces;   /* HALFSPACES_BYTES */
+    struct mesh_workspace *mesh;
     void *held[2];
 };
 
 /* capi_mesh_pairs.c: bytes of a workspace that questions about meshes take, 0 where the library's parts do not fit; and what
    is to be set in them, which are zeros. */
-size_t mesh_room_bytes(const int64_t *measures);
-void furnish_meshes(collide_workspace *space, void *place, const int64_t *measures);
+size_t mesh_workspace_bytes(const int64_t *measures);
+void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t *measures);
 
 /* A question about poses: as `answer_poses` takes it. */
 struct question {

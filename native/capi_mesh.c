@@ -22,19 +22,20 @@ struct filled {
 };
 
 static struct filled fill(const struct collide_kernels *kernels, struct arena *arena, const int64_t *m, const double *vertices,
-                          int64_t n, const int64_t *faces, int64_t many, collide_mesh *mesh)
+                          int64_t n, const int64_t *faces, int64_t n_facets, collide_mesh *mesh)
 {
     struct filled made;
-    int64_t most = many > 2 ? many : 2, n_stack = 3 * m[M_WIDTH] * (m[M_DEEPEST_SPLIT] + 40), counts[2] = {0, 0};
+    int64_t most = n_facets > 2 ? n_facets : 2, n_stack = 3 * m[M_WIDTH] * (m[M_DEEPEST_SPLIT] + 40), counts[2] = {0, 0};
     double numbers[4];
-    void *records = arena_take(arena, (size_t)(m[M_RECORD] * many) * 4), *work = arena_take(arena, (size_t)m[M_TREE_WORK] * 8);
+    void *records = arena_take(arena, (size_t)(m[M_RECORD] * n_facets) * 4);
+    void *work = arena_take(arena, (size_t)m[M_TREE_WORK] * 8);
     void *stack = arena_take(arena, (size_t)n_stack * 8);
     made.nodes = arena_take(arena, (size_t)(m[M_NODE] * most) * 4);
-    made.triangles = arena_take(arena, (size_t)(9 * many) * 8);
-    made.ids = arena_take(arena, (size_t)many * 4);
+    made.triangles = arena_take(arena, (size_t)(9 * n_facets) * 8);
+    made.ids = arena_take(arena, (size_t)n_facets * 4);
     made.n_nodes = 0;
     if (arena->failed) return made;
-    kernels->fill_tree(address_of(vertices), n, address_of(faces), many, address_of(records), address_of(made.nodes), most,
+    kernels->fill_tree(address_of(vertices), n, address_of(faces), n_facets, address_of(records), address_of(made.nodes), most,
                        address_of(made.triangles), address_of(made.ids), address_of(numbers), address_of(work),
                        address_of(stack), n_stack, address_of(counts));
     made.n_nodes = counts[0];
@@ -45,12 +46,12 @@ static struct filled fill(const struct collide_kernels *kernels, struct arena *a
 }
 
 /* Largest coordinates, and a ball around the root's box. */
-static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t many)
+static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t n_facets)
 {
     float box[6];
     int64_t k;
     int axis;
-    for (k = 0; k < 3 * many; k++) {
+    for (k = 0; k < 3 * n_facets; k++) {
         const double *p = made->triangles + 3 * k;
         for (axis = 0; axis < 3; axis++)
             if (fabs(p[axis]) > mesh->numbers[CORNER + axis]) mesh->numbers[CORNER + axis] = fabs(p[axis]);
@@ -61,25 +62,25 @@ static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *m
                                 (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
 }
 
-static void digest(collide_mesh *mesh, const struct filled *made, int64_t many)
+static void digest(collide_mesh *mesh, const struct filled *made, int64_t n_facets)
 {
     struct blake2b hash;
     int64_t k;
     blake2b_begin(&hash);
-    for (k = 0; k < 9 * many; k++) {
+    for (k = 0; k < 9 * n_facets; k++) {
         double value = made->triangles[k] + 0.0;
         blake2b_add(&hash, &value, sizeof value);
     }
-    blake2b_add(&hash, made->ids, (size_t)many * sizeof *made->ids);
+    blake2b_add(&hash, made->ids, (size_t)n_facets * sizeof *made->ids);
     blake2b_end(&hash, mesh->content);
 }
 
 /* Everything that kernels read, in one block, and the slabs that distances need. */
 static void keep(const struct collide_kernels *kernels, struct arena *arena, const int64_t *m, collide_mesh *mesh,
-                 const struct filled *made, int64_t many)
+                 const struct filled *made, int64_t n_facets)
 {
     size_t nodes = (size_t)(m[M_NODE] * made->n_nodes) * 4, slabs = (size_t)(m[M_SLAB] * made->n_nodes) * 4;
-    size_t triangles = (size_t)(9 * many) * 8, ids = (size_t)many * 4;
+    size_t triangles = (size_t)(9 * n_facets) * 8, ids = (size_t)n_facets * 4;
     char *block = cache_lines(nodes + slabs + triangles + ids, &mesh->held);
     void *work = arena_take(arena, (size_t)(5 * made->n_nodes) * 8);
     if (block == NULL || work == NULL) {
@@ -93,25 +94,25 @@ static void keep(const struct collide_kernels *kernels, struct arena *arena, con
     mesh->tree[IDS_AT] = address_of(memcpy(block + nodes + slabs + triangles, made->ids, ids));
     mesh->tree[TREE_NUMBERS_AT] = address_of(mesh->numbers);
     mesh->tree[N_NODES] = made->n_nodes;
-    mesh->tree[N_FACETS] = many;
+    mesh->tree[N_FACETS] = n_facets;
     kernels->fill_slabs(address_of(mesh->tree), mesh->tree[SLABS_AT], address_of(work));
 }
 
 /* The tree of facets, and a ball around them; mesh->radius is set. */
-static collide_status plant(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int64_t *faces,
-                            int64_t many, collide_mesh *mesh)
+static collide_status build_mesh(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int64_t *faces,
+                            int64_t n_facets, collide_mesh *mesh)
 {
     struct arena arena;
     struct filled made;
     int64_t m[MEASURES];
-    rooms_of(kernels, m);
+    workspace_sizes(kernels, m);
     if (m[M_TREE_INTS] != TREE_INTS || m[M_TREE_NUMBERS] != TREE_NUMBERS) return COLLIDE_NO_KERNELS;
     arena_begin(&arena, NULL, 0);
-    made = fill(kernels, &arena, m, vertices, n, faces, many, mesh);
+    made = fill(kernels, &arena, m, vertices, n, faces, n_facets, mesh);
     if (!arena.failed) {
-        measure(mesh, m, &made, many);
-        digest(mesh, &made, many);
-        keep(kernels, &arena, m, mesh, &made, many);
+        measure(mesh, m, &made, n_facets);
+        digest(mesh, &made, n_facets);
+        keep(kernels, &arena, m, mesh, &made, n_facets);
     }
     arena_end(&arena);
     return arena.failed ? COLLIDE_NO_MEMORY : COLLIDE_OK;
@@ -136,27 +137,27 @@ static int by_number(const void *one, const void *other)
 /* A vertex of every shell, and those of collapsed facets that no other facet uses: numbers of vertices, at most n and shells. */
 static int64_t one_of_each_part(const struct surface *surface, int64_t n, int32_t *ids, uint8_t *used)
 {
-    int64_t f, many = 0, shells, next = 0;
+    int64_t f, n_points = 0, shells, next = 0;
     int k;
     memset(used, 0, (size_t)n);
-    for (f = 0; f < surface->many; f++) {
+    for (f = 0; f < surface->n_facets; f++) {
         if (surface->shells[f] < 0) continue;
         if (surface->shells[f] == next) { /* numbered by their first facets */
-            ids[many++] = surface->corners[3 * f];
+            ids[n_points++] = surface->corners[3 * f];
             next++;
         }
         for (k = 0; k < 3; k++) used[surface->corners[3 * f + k]] = 1;
     }
-    shells = many;
-    for (f = 0; f < surface->many; f++)
+    shells = n_points;
+    for (f = 0; f < surface->n_facets; f++)
         for (k = 0; surface->shells[f] < 0 && k < 3; k++) {
             int32_t vertex = surface->corners[3 * f + k];
             if (used[vertex]) continue;
             used[vertex] = 1;
-            ids[many++] = vertex;
+            ids[n_points++] = vertex;
         }
-    qsort(ids + shells, (size_t)(many - shells), sizeof *ids, by_number);
-    return many;
+    qsort(ids + shells, (size_t)(n_points - shells), sizeof *ids, by_number);
+    return n_points;
 }
 
 static collide_status take_parts(const struct surface *surface, const double *vertices, int64_t n, collide_mesh *mesh)
@@ -184,7 +185,7 @@ static collide_status take_inside(const struct surface *surface, int solid, coll
     return COLLIDE_OK;
 }
 
-static collide_status mesh_of_facets(const double *vertices, int64_t n, const int32_t *faces, int64_t many, int solid,
+static collide_status mesh_of_facets(const double *vertices, int64_t n, const int32_t *faces, int64_t n_facets, int solid,
                                      collide_mesh *mesh)
 {
     const struct collide_kernels *kernels = kernels_here();
@@ -192,15 +193,15 @@ static collide_status mesh_of_facets(const double *vertices, int64_t n, const in
     collide_status status;
     int64_t *wide, k;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    status = look_at_surface(kernels, vertices, n, faces, many, &surface);
+    status = look_at_surface(kernels, vertices, n, faces, n_facets, &surface);
     if (status == COLLIDE_OK) status = take_inside(&surface, solid, mesh);
     if (status == COLLIDE_OK) status = take_parts(&surface, vertices, n, mesh);
     free(surface.corners);
     free(surface.shells);
     if (status != COLLIDE_OK) return status;
-    if ((wide = malloc((size_t)(3 * many) * sizeof *wide)) == NULL) return COLLIDE_NO_MEMORY;
-    for (k = 0; k < 3 * many; k++) wide[k] = faces[k];
-    status = plant(kernels, vertices, n, wide, many, mesh);
+    if ((wide = malloc((size_t)(3 * n_facets) * sizeof *wide)) == NULL) return COLLIDE_NO_MEMORY;
+    for (k = 0; k < 3 * n_facets; k++) wide[k] = faces[k];
+    status = build_mesh(kernels, vertices, n, wide, n_facets, mesh);
     free(wide);
     return status;
 }
@@ -253,11 +254,11 @@ static int comes_before(const double *a, const double *b)
 /* Facets of a hull: one side of a flat one, a facet without area of a segment or a point. */
 static int64_t facets_of(const struct hull *hull, const double *points, int64_t *faces)
 {
-    int64_t many = hull->dimension == 3 ? hull->many : hull->many / 2, k;
+    int64_t n_facets = hull->dimension == 3 ? hull->n_facets : hull->n_facets / 2, k;
     int32_t first = hull->vertices[0], last = hull->vertices[0];
     if (hull->dimension >= 2) {
-        for (k = 0; k < 3 * many; k++) faces[k] = hull->facets[k];
-        return many;
+        for (k = 0; k < 3 * n_facets; k++) faces[k] = hull->facets[k];
+        return n_facets;
     }
     for (k = 0; k < hull->n_vertices; k++) {
         int32_t vertex = hull->vertices[k];
@@ -284,14 +285,14 @@ static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mes
     for (k = 0; points != NULL && k < 3 * n; k++) points[k] = coordinates[k % 3 * padded + k / 3];
     if (points != NULL) {
         hull = hull_of(kernels, &arena, points, n);
-        faces = arena_take(&arena, (size_t)(3 * (hull.many + 1)) * 8);
+        faces = arena_take(&arena, (size_t)(3 * (hull.n_facets + 1)) * 8);
         mesh->points = malloc(3 * sizeof *mesh->points);
         if (!arena.failed && mesh->points != NULL) {
             mesh->solid = hull.dimension == 3;
             mesh->radius = shape->numbers[RADIUS];
             mesh->n_points = 1;
             memcpy(mesh->points, points + 3 * (int64_t)hull.vertices[0], 3 * sizeof *points);
-            status = plant(kernels, points, n, faces, facets_of(&hull, points, faces), mesh);
+            status = build_mesh(kernels, points, n, faces, facets_of(&hull, points, faces), mesh);
         }
     }
     arena_end(&arena);

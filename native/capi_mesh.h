@@ -17,16 +17,16 @@ struct collide_mesh {
     void *held;       /* nodes, triangles, ids, slabs */
 };
 
-/* Which facets a surface is of and what it encloses (capi_surface.c). corners, shells : of `many` facets; equal vertices have one
+/* Which facets a surface is of and what it encloses (capi_surface.c). corners, shells : of its facets; equal vertices have one
    number. Both are freed by the caller. */
 struct surface {
     int32_t *corners, *shells;
-    int64_t many, n_shells;
+    int64_t n_facets, n_shells;
     int solid; /* whether an inside can be told */
 };
 
 collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
-                               int64_t many, struct surface *surface);
+                               int64_t n_facets, struct surface *surface);
 
 /* Whether all shells of negative volume are walls of cavities (capi_nesting.c). scaled : the vertices times a power of two,
    below 1. signs : of the shells' volumes. */

@@ -14,14 +14,14 @@ enum {
 enum { MOST_POINTS = 64 };
 
 /* Room of a workspace for meshes (collide_workspace.mesh). */
-struct mesh_room {
+struct mesh_workspace {
     int64_t header[MESH_HEADER];
 };
 
-size_t mesh_room_bytes(const int64_t *m)
+size_t mesh_workspace_bytes(const int64_t *m)
 {
     if (m[M_MESH_HEADER] != MESH_HEADER) return 0;
-    return sizeof(struct mesh_room) + 8 * (size_t)(2 * STACK_OF_MESHES + 32 + 2 * HEAP_OF_MESHES) +
+    return sizeof(struct mesh_workspace) + 8 * (size_t)(2 * STACK_OF_MESHES + 32 + 2 * HEAP_OF_MESHES) +
            8 * (size_t)(m[M_MESH_DOUBLES] + m[M_MESH_INTEGERS] + m[M_MESH_SCRATCH]);
 }
 
@@ -34,18 +34,18 @@ static int64_t code_at(const void *function)
     return code;
 }
 
-void furnish_meshes(collide_workspace *space, void *place, const int64_t *m)
+void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t *m)
 {
-    struct mesh_room *room = place;
-    int64_t *header = room->header;
-    space->mesh = room;
+    struct mesh_workspace *mesh = memory;
+    int64_t *header = mesh->header;
+    space->mesh = mesh;
     header[SURFACES_CODE] = CODE(space, walk_surfaces);
     header[POINTS_CODE] = CODE(space, points_inside);
     header[EXACT_CODE] = CODE(space, decide_exactly);
     header[DISTANCES_CODE] = CODE(space, near_surfaces);
     header[N_STACK] = STACK_OF_MESHES;
     header[N_HEAP] = HEAP_OF_MESHES;
-    header[STACK_AT] = address_of(room + 1);
+    header[STACK_AT] = address_of(mesh + 1);
     header[HEAP_AT] = header[STACK_AT] + 8 * (2 * STACK_OF_MESHES + 32);
     header[MESH_DOUBLES_AT] = header[HEAP_AT] + 8 * 2 * HEAP_OF_MESHES;
     header[MESH_INTEGERS_AT] = header[MESH_DOUBLES_AT] + 8 * m[M_MESH_DOUBLES];
@@ -62,9 +62,9 @@ static int is_exchanged(const collide_mesh *A, const collide_mesh *B)
 }
 
 /* Prepare the kernels for a pair: the bodies in the order of their contents. */
-static void take_meshes(struct mesh_room *room, const collide_mesh *A, const collide_mesh *B)
+static void take_meshes(struct mesh_workspace *mesh, const collide_mesh *A, const collide_mesh *B)
 {
-    int64_t *header = room->header;
+    int64_t *header = mesh->header;
     int exchanged = is_exchanged(A, B);
     const collide_mesh *one = exchanged ? B : A, *two = exchanged ? A : B;
     header[TREE_A] = address_of(one->tree);
@@ -85,9 +85,9 @@ static void take_meshes(struct mesh_room *room, const collide_mesh *A, const col
 /* Why a kernel left a pair to Python: matrices that are no poses, or something that C does not do. */
 static collide_status why(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags)
 {
-    int64_t check = !(flags & COLLIDE_TRUST_POSES), room = address_of(space->poses);
-    if (space->kernels->first_bad_pose(address_of(X_WA), 0, 0, 1, (uint8_t)check, room) == 0) return COLLIDE_INVALID_POSE;
-    if (space->kernels->first_bad_pose(address_of(X_WB), 0, 0, 1, (uint8_t)check, room) == 0) return COLLIDE_INVALID_POSE;
+    int64_t check = !(flags & COLLIDE_TRUST_POSES), pose_at = address_of(space->poses);
+    if (space->kernels->first_bad_pose(address_of(X_WA), 0, 0, 1, (uint8_t)check, pose_at) == 0) return COLLIDE_INVALID_POSE;
+    if (space->kernels->first_bad_pose(address_of(X_WB), 0, 0, 1, (uint8_t)check, pose_at) == 0) return COLLIDE_INVALID_POSE;
     return COLLIDE_UNSUPPORTED;
 }
 
@@ -106,16 +106,16 @@ collide_status collide_mesh_collide(collide_workspace *workspace, const collide_
 {
     collide_status status;
     rounding given;
-    int64_t said;
+    int64_t result;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
     *hit = 0;
     if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
     take_meshes(workspace->mesh, A, B);
-    said = workspace->kernels->meet_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB));
-    if (said < 0) status = why(workspace, X_WA, X_WB, flags);
+    result = workspace->kernels->meet_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB));
+    if (result < 0) status = why(workspace, X_WA, X_WB, flags);
     round_as_before(given);
-    if (status == COLLIDE_OK) *hit = (int)said;
+    if (status == COLLIDE_OK) *hit = (int)result;
     return status;
 }
 

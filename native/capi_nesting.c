@@ -4,7 +4,7 @@
    cast from one of its points in fixed directions, in doubles with an error bound, and in exact numbers for the facets that come
    too close. */
 #include "capi_mesh.h"
-#include "capi_whole.h"
+#include "capi_bigint.h"
 
 #include <string.h>
 
@@ -36,14 +36,14 @@ static int32_t direction_of(int k, int axis)
 static int find_boxes(struct nesting *nesting)
 {
     const struct surface *surface = nesting->surface;
-    int64_t f, k, many = surface->n_shells;
+    int64_t f, k, n_shells = surface->n_shells;
     int32_t *owner = arena_take(nesting->arena, (size_t)nesting->n * 4);
-    nesting->low = arena_take(nesting->arena, (size_t)(3 * many) * 8);
-    nesting->high = arena_take(nesting->arena, (size_t)(3 * many) * 8);
+    nesting->low = arena_take(nesting->arena, (size_t)(3 * n_shells) * 8);
+    nesting->high = arena_take(nesting->arena, (size_t)(3 * n_shells) * 8);
     nesting->shared = arena_take(nesting->arena, (size_t)nesting->n);
-    nesting->around = arena_take(nesting->arena, (size_t)many);
+    nesting->around = arena_take(nesting->arena, (size_t)n_shells);
     if (nesting->arena->failed) return 0;
-    for (k = 0; k < 3 * many; k++) {
+    for (k = 0; k < 3 * n_shells; k++) {
         nesting->low[k] = INFINITE;
         nesting->high[k] = -INFINITE;
     }
@@ -51,7 +51,7 @@ static int find_boxes(struct nesting *nesting)
         owner[k] = -1;
         nesting->shared[k] = 0;
     }
-    for (f = 0; f < surface->many; f++) {
+    for (f = 0; f < surface->n_facets; f++) {
         int32_t shell = surface->shells[f];
         for (k = 0; shell >= 0 && k < 3; k++) {
             int32_t vertex = surface->corners[3 * f + k];
@@ -69,7 +69,7 @@ static int find_boxes(struct nesting *nesting)
 }
 
 /* Mark the shells but one whose boxes meet that of some vertices; whether one of positive volume is among them. */
-static int find_around(struct nesting *nesting, int32_t shell, const int32_t *row, int many)
+static int find_around(struct nesting *nesting, int32_t shell, const int32_t *row, int n_vertices)
 {
     int64_t k;
     int i, axis, positive = 0;
@@ -77,7 +77,7 @@ static int find_around(struct nesting *nesting, int32_t shell, const int32_t *ro
         int meets = k != shell;
         for (axis = 0; meets && axis < 3; axis++) {
             double lowest = INFINITE, highest = -INFINITE;
-            for (i = 0; i < many; i++) {
+            for (i = 0; i < n_vertices; i++) {
                 double value = nesting->vertices[3 * (int64_t)row[i] + axis];
                 if (value < lowest) lowest = value;
                 if (value > highest) highest = value;
@@ -90,36 +90,36 @@ static int find_around(struct nesting *nesting, int32_t shell, const int32_t *ro
     return positive;
 }
 
-static struct whole determinant(struct arena *arena, const struct whole *a, const struct whole *b, const struct whole *c)
+static struct bigint determinant(struct arena *arena, const struct bigint *a, const struct bigint *b, const struct bigint *c)
 {
-    struct whole sum = whole_of(arena, 0.0);
+    struct bigint sum = bigint_of(arena, 0.0);
     int i;
     for (i = 0; i < 3; i++) {
         int j = (i + 1) % 3, k = (i + 2) % 3;
-        struct whole across = whole_difference(arena, whole_product(arena, b[j], c[k]), whole_product(arena, b[k], c[j]));
-        sum = whole_sum(arena, sum, whole_product(arena, a[i], across));
+        struct bigint across = bigint_difference(arena, bigint_product(arena, b[j], c[k]), bigint_product(arena, b[k], c[j]));
+        sum = bigint_sum(arena, sum, bigint_product(arena, a[i], across));
     }
     return sum;
 }
 
 /* Seen from the middle of vertices, exactly: on which side of each of a facet's edges the ray passes, and on which side of the
    facet the point lies. */
-static void exact_signs(struct nesting *nesting, const int32_t *facet, const int32_t *row, int many, const int32_t *direction,
-                        int sides[3], int *height)
+static void exact_signs(struct nesting *nesting, const int32_t *facet, const int32_t *row, int n_vertices,
+                        const int32_t *direction, int sides[3], int *height)
 {
     struct arena *arena = nesting->arena;
     struct mark mark = arena_mark(arena);
-    struct whole away[3][3], along[3], count = whole_of(arena, many);
+    struct bigint away[3][3], along[3], count = bigint_of(arena, n_vertices);
     int k, i, axis;
     for (axis = 0; axis < 3; axis++) {
-        struct whole middle = whole_of(arena, 0.0);
-        for (i = 0; i < many; i++)
-            middle = whole_sum(arena, middle, whole_of(arena, nesting->vertices[3 * (int64_t)row[i] + axis]));
+        struct bigint middle = bigint_of(arena, 0.0);
+        for (i = 0; i < n_vertices; i++)
+            middle = bigint_sum(arena, middle, bigint_of(arena, nesting->vertices[3 * (int64_t)row[i] + axis]));
         for (k = 0; k < 3; k++) {
-            struct whole corner = whole_of(arena, nesting->vertices[3 * (int64_t)facet[k] + axis]);
-            away[k][axis] = whole_difference(arena, whole_product(arena, corner, count), middle);
+            struct bigint corner = bigint_of(arena, nesting->vertices[3 * (int64_t)facet[k] + axis]);
+            away[k][axis] = bigint_difference(arena, bigint_product(arena, corner, count), middle);
         }
-        along[axis] = whole_of(arena, direction[axis]);
+        along[axis] = bigint_of(arena, direction[axis]);
     }
     for (k = 0; k < 3; k++) sides[k] = determinant(arena, along, away[k], away[(k + 1) % 3]).sign;
     *height = determinant(arena, away[0], away[1], away[2]).sign;
@@ -127,10 +127,10 @@ static void exact_signs(struct nesting *nesting, const int32_t *facet, const int
 }
 
 /* What a direction says of a point: how often facets wind around it. */
-enum { TOLD, ON_A_FACET, MET_AN_EDGE };
+enum { DECIDED, ON_A_FACET, MET_AN_EDGE };
 
-static int ask_direction(struct nesting *nesting, const int32_t *corners, int64_t facets, const int32_t *row, int many, int k,
-                         int32_t *unsure, int64_t *winding)
+static int ask_direction(struct nesting *nesting, const int32_t *corners, int64_t facets, const int32_t *row, int n_vertices,
+                         int k, int32_t *ambiguous, int64_t *winding)
 {
     double ray[8];
     int32_t direction[3];
@@ -139,16 +139,16 @@ static int ask_direction(struct nesting *nesting, const int32_t *corners, int64_
     for (axis = 0; axis < 3; axis++) {
         direction[axis] = direction_of(k, axis);
         ray[axis] = nesting->scaled[3 * (int64_t)row[0] + axis];
-        for (i = 1; i < many; i++) ray[axis] += nesting->scaled[3 * (int64_t)row[i] + axis];
+        for (i = 1; i < n_vertices; i++) ray[axis] += nesting->scaled[3 * (int64_t)row[i] + axis];
         ray[3 + axis] = direction[axis];
     }
-    ray[6] = many;
-    ray[7] = many == 1 ? 0.0 : ROUNDED_MIDDLE;
+    ray[6] = n_vertices;
+    ray[7] = n_vertices == 1 ? 0.0 : ROUNDED_MIDDLE;
     count = nesting->kernels->cast_ray(address_of(nesting->scaled), nesting->n, address_of(corners), facets, address_of(ray),
-                                       address_of(winding), address_of(unsure));
+                                       address_of(winding), address_of(ambiguous));
     for (u = 0; u < count; u++) {
         int sides[3], height, up, down, level;
-        exact_signs(nesting, corners + 3 * (int64_t)unsure[u], row, many, direction, sides, &height);
+        exact_signs(nesting, corners + 3 * (int64_t)ambiguous[u], row, n_vertices, direction, sides, &height);
         up = sides[0] > 0 || sides[1] > 0 || sides[2] > 0;
         down = sides[0] < 0 || sides[1] < 0 || sides[2] < 0;
         level = sides[0] == 0 || sides[1] == 0 || sides[2] == 0;
@@ -157,26 +157,27 @@ static int ask_direction(struct nesting *nesting, const int32_t *corners, int64_
         on_it = on_it || height == 0;
         if (height == sides[0]) *winding += sides[0];
     }
-    return on_it ? ON_A_FACET : TOLD;
+    return on_it ? ON_A_FACET : DECIDED;
 }
 
 /* Whether the facets around wind around the middle of vertices: 1, 0; -1 where it lies on one, or all directions met an edge. */
-static int is_wound_around(struct nesting *nesting, const int32_t *row, int many)
+static int is_wound_around(struct nesting *nesting, const int32_t *row, int n_vertices)
 {
     const struct surface *surface = nesting->surface;
     struct arena *arena = nesting->arena;
     struct mark mark = arena_mark(arena);
-    int32_t *corners = arena_take(arena, (size_t)(3 * surface->many) * 4), *unsure = arena_take(arena, (size_t)surface->many * 4);
+    int32_t *corners = arena_take(arena, (size_t)(3 * surface->n_facets) * 4);
+    int32_t *ambiguous = arena_take(arena, (size_t)surface->n_facets * 4);
     int64_t facets = 0, f, winding = 0;
-    int k, said = MET_AN_EDGE;
+    int k, outcome = MET_AN_EDGE;
     if (arena->failed) return 0;
-    for (f = 0; f < surface->many; f++)
+    for (f = 0; f < surface->n_facets; f++)
         if (surface->shells[f] >= 0 && nesting->around[surface->shells[f]])
             memcpy(corners + 3 * facets++, surface->corners + 3 * f, 3 * sizeof *corners);
-    for (k = 0; k < DIRECTIONS && said == MET_AN_EDGE; k++)
-        said = ask_direction(nesting, corners, facets, row, many, k, unsure, &winding);
+    for (k = 0; k < DIRECTIONS && outcome == MET_AN_EDGE; k++)
+        outcome = ask_direction(nesting, corners, facets, row, n_vertices, k, ambiguous, &winding);
     arena_return(arena, mark);
-    return said == TOLD ? winding >= 1 : -1;
+    return outcome == DECIDED ? winding >= 1 : -1;
 }
 
 /* The least vertex of a shell, not shared, that is larger than `above`; -1 where there is none. */
@@ -186,7 +187,7 @@ static int32_t next_alone(const struct nesting *nesting, int32_t shell, int32_t 
     int64_t f;
     int k;
     int32_t found = -1;
-    for (f = 0; f < surface->many; f++)
+    for (f = 0; f < surface->n_facets; f++)
         for (k = 0; surface->shells[f] == shell && k < 3; k++) {
             int32_t vertex = surface->corners[3 * f + k];
             if (vertex > above && !nesting->shared[vertex] && (found < 0 || vertex < found)) found = vertex;
@@ -199,16 +200,16 @@ static int is_cavity(struct nesting *nesting, int32_t shell)
     const struct surface *surface = nesting->surface;
     int32_t vertex = -1;
     int64_t f;
-    int tried, said;
+    int tried, outcome;
     for (tried = 0; tried < TRIED && (vertex = next_alone(nesting, shell, vertex)) >= 0; tried++) {
         if (!find_around(nesting, shell, &vertex, 1)) return 0;
-        if ((said = is_wound_around(nesting, &vertex, 1)) >= 0) return said;
+        if ((outcome = is_wound_around(nesting, &vertex, 1)) >= 0) return outcome;
     }
-    for (f = 0, tried = 0; f < surface->many && tried < TRIED; f++) {
+    for (f = 0, tried = 0; f < surface->n_facets && tried < TRIED; f++) {
         if (surface->shells[f] != shell) continue;
         tried++;
         if (!find_around(nesting, shell, surface->corners + 3 * f, 3)) return 0;
-        if ((said = is_wound_around(nesting, surface->corners + 3 * f, 3)) >= 0) return said;
+        if ((outcome = is_wound_around(nesting, surface->corners + 3 * f, 3)) >= 0) return outcome;
     }
     return 0;
 }

@@ -17,15 +17,14 @@ typedef char marks_stand_last[offsetof(collide_pair, exact) == 156 ? 1 : -1];
 /* Everything of a fixed size, in one piece. */
 struct buffers {
     double poses[2 * BLOCK * POSE];
-    int64_t shape_of[2 * BLOCK], pairs[2 * BLOCK], asked[2 * BLOCK], left[BLOCK];
-    collide_pair rows[BLOCK], told[BLOCK];
+    int64_t shape_of[2 * BLOCK], pairs[2 * BLOCK], asked[2 * BLOCK], undecided[BLOCK];
+    collide_pair rows[BLOCK], results[BLOCK];
 };
 
 static void begin_header(collide_workspace *space)
 {
-    int64_t code = 0;
-    memcpy(&code, &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
-    space->header[CORE] = code;
+    memcpy(&space->header[CORE], &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
+    memcpy(&space->header[SETTLE], &space->kernels->settle_hulls, sizeof space->kernels->settle_hulls);
     space->header[POSES_AT] = address_of(space->poses);
     space->header[SHAPE_OF_AT] = address_of(space->shape_of);
     space->header[PAIRS_AT] = address_of(space->pairs);
@@ -44,18 +43,18 @@ static void begin_pairs(collide_workspace *space)
     }
 }
 
-static int furnish(collide_workspace *space)
+static int allocate_workspace(collide_workspace *space)
 {
     int64_t measures[MEASURES];
     struct buffers *buffers;
     double *doubles;
     int64_t *integers, *digits;
     size_t words, meshes;
-    rooms_of(space->kernels, measures);
-    meshes = mesh_room_bytes(measures);
+    workspace_sizes(space->kernels, measures);
+    meshes = mesh_workspace_bytes(measures);
     words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * words + ROOM_OF_HALFSPACES + meshes, &space->held[1]);
+    doubles = cache_lines(8 * words + HALFSPACES_BYTES + meshes, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
@@ -63,16 +62,16 @@ static int furnish(collide_workspace *space)
     space->shape_of = buffers->shape_of;
     space->pairs = buffers->pairs;
     space->asked = buffers->asked;
-    space->left = buffers->left;
+    space->undecided = buffers->undecided;
     space->rows = buffers->rows;
-    space->told = buffers->told;
+    space->results = buffers->results;
     begin_header(space);
     space->header[DOUBLES_AT] = address_of(doubles);
     space->header[INTEGERS_AT] = address_of(integers);
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
-    space->digits_at = address_of(digits);
-    space->room = digits + measures[M_WORKSPACE];
-    furnish_meshes(space, (char *)space->room + ROOM_OF_HALFSPACES, measures);
+    space->digits_at = space->header[DIGITS_AT] = address_of(digits);
+    space->halfspaces = digits + measures[M_WORKSPACE];
+    begin_mesh_workspace(space, (char *)space->halfspaces + HALFSPACES_BYTES, measures);
     begin_pairs(space);
     return 1;
 }
@@ -86,7 +85,7 @@ collide_status collide_workspace_create(collide_workspace **workspace)
     if ((kernels = kernels_here()) == NULL) return COLLIDE_NO_KERNELS;
     if ((made = calloc(1, sizeof *made)) == NULL) return COLLIDE_NO_MEMORY;
     made->kernels = kernels;
-    if (!furnish(made)) {
+    if (!allocate_workspace(made)) {
         collide_workspace_free(made);
         return COLLIDE_NO_MEMORY;
     }
@@ -125,9 +124,9 @@ static void take_pair(collide_workspace *space, const collide_shape *A, const co
 /* Number of the first pair from `first` on at which a matrix is no pose. */
 static size_t first_bad(collide_workspace *space, const struct question *asked, size_t first)
 {
-    int64_t room = address_of(space->poses), from = (int64_t)first, n = (int64_t)asked->n;
-    int64_t a = space->kernels->first_bad_pose(address_of(asked->X_WA), asked->step_a, from, n, (uint8_t)asked->check, room);
-    int64_t b = space->kernels->first_bad_pose(address_of(asked->X_WB), asked->step_b, from, n, (uint8_t)asked->check, room);
+    int64_t pose_at = address_of(space->poses), from = (int64_t)first, n = (int64_t)asked->n;
+    int64_t a = space->kernels->first_bad_pose(address_of(asked->X_WA), asked->step_a, from, n, (uint8_t)asked->check, pose_at);
+    int64_t b = space->kernels->first_bad_pose(address_of(asked->X_WB), asked->step_b, from, n, (uint8_t)asked->check, pose_at);
     return (size_t)(a < b ? a : b);
 }
 
@@ -138,17 +137,17 @@ static collide_status answer(collide_workspace *space, const struct question *as
     void *out = asked->boolean ? (void *)hits : (void *)pairs;
     size_t done = 0;
     while (done < asked->n) {
-        int64_t said = space->kernels->answer_poses(
+        int64_t result = space->kernels->answer_poses(
             address_of(space->header), address_of(asked->which), address_of(asked->X_WA), asked->step_a,
             address_of(asked->X_WB), asked->step_b, (int64_t)done, (int64_t)asked->n, (uint8_t)asked->boolean,
             (uint8_t)(asked->depths && !asked->boolean), asked->limit, (uint8_t)asked->check, address_of(asked->axes),
             address_of(out));
         done = (size_t)space->header[ANSWERED];
-        if (said == BAD_POSE) {
+        if (result == BAD_POSE) {
             *failed = first_bad(space, asked, done);
             return COLLIDE_INVALID_POSE;
         }
-        if (said == OPEN) {
+        if (result == OPEN) {
             size_t start = done - 1 - (done - 1) % BLOCK, k, row = 0;
             collide_pair *rows = asked->boolean ? space->rows : pairs + start;
             collide_status status = settle_rows(space, asked, rows, done - start, &row);
@@ -199,23 +198,23 @@ collide_status collide_collide(collide_workspace *workspace, const collide_shape
 {
     collide_status status = COLLIDE_OK;
     rounding given;
-    int64_t said;
+    int64_t result;
     if (hit == NULL) return COLLIDE_INVALID_ARGUMENT;
     *hit = 0;
     if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags))
         return COLLIDE_INVALID_ARGUMENT;
     given = round_as_kernels_do();
     take_pair(workspace, A, B);
-    said = workspace->kernels->collide_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB));
-    if (said < 0) {
+    result = workspace->kernels->collide_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB));
+    if (result < 0) {
         struct question asked = single(workspace, X_WA, X_WB, flags, 1);
         uint8_t found = 0;
         size_t failed;
         status = answer(workspace, &asked, &found, NULL, &failed);
-        said = found;
+        result = found;
     }
     round_as_before(given);
-    if (status == COLLIDE_OK) *hit = (int)said;
+    if (status == COLLIDE_OK) *hit = (int)result;
     return status;
 }
 
@@ -225,7 +224,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
 {
     collide_status status = COLLIDE_OK;
     rounding given;
-    int64_t said = -1;
+    int64_t result = -1;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
     memset(pair, 0, sizeof *pair);
     if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags) || !(max_distance >= 0.0))
@@ -233,9 +232,9 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     given = round_as_kernels_do();
     take_pair(workspace, A, B);
     if (max_distance == INFINITE)
-        said = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
+        result = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
                                                    address_of(pair), !(flags & COLLIDE_UNSIGNED));
-    if (said < 0) {
+    if (result < 0) {
         struct question asked = single(workspace, X_WA, X_WB, flags, 0);
         size_t failed;
         asked.limit = max_distance;

@@ -5,24 +5,24 @@
 
 /* Rings of a surface as `order_rings` finds them; returns what that says. */
 static int64_t order(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
-                     const int32_t *facets, int64_t many, struct rings *rings)
+                     const int32_t *facets, int64_t n_facets, struct rings *rings)
 {
     int32_t *following, *place;
-    int64_t said, k;
+    int64_t result, k;
     rings->starts = arena_take(arena, (size_t)(n + 1) * 4);
-    rings->ring = arena_take(arena, (size_t)(3 * many) * 4);
-    rings->ring_facets = arena_take(arena, (size_t)(3 * many) * 4);
-    rings->normals = arena_take(arena, (size_t)(3 * many) * 8);
+    rings->ring = arena_take(arena, (size_t)(3 * n_facets) * 4);
+    rings->ring_facets = arena_take(arena, (size_t)(3 * n_facets) * 4);
+    rings->normals = arena_take(arena, (size_t)(3 * n_facets) * 8);
     rings->corner = arena_take(arena, (size_t)n);
-    following = arena_take(arena, (size_t)(6 * many) * 4);
+    following = arena_take(arena, (size_t)(6 * n_facets) * 4);
     place = arena_take(arena, (size_t)n * 4);
-    rings->n_normals = many;
+    rings->n_normals = n_facets;
     if (arena->failed) return -1;
-    said = kernels->order_rings(address_of(points), n, address_of(facets), many, address_of(rings->starts),
+    result = kernels->order_rings(address_of(points), n, address_of(facets), n_facets, address_of(rings->starts),
                                 address_of(rings->ring), address_of(rings->ring_facets), address_of(following),
                                 address_of(place), address_of(rings->normals));
     for (k = 0; k < n; k++) rings->corner[k] = place[k] >= 3;
-    return said;
+    return result;
 }
 
 static int turned_over(const int32_t *facets, int64_t half)
@@ -34,15 +34,15 @@ static int turned_over(const int32_t *facets, int64_t half)
 }
 
 /* Which facets of a flat hull are of its upper side. */
-static void mark_upper(const struct rings *rings, const int32_t *facets, int64_t many, uint8_t *upward)
+static void mark_upper(const struct rings *rings, const int32_t *facets, int64_t n_facets, uint8_t *upward)
 {
     int64_t k, best = 0;
     double largest = -1.0;
-    if (many % 2 == 0 && turned_over(facets, many / 2)) { /* as `hull_of` gives them; normals of slivers round */
-        for (k = 0; k < many; k++) upward[k] = k < many / 2;
+    if (n_facets % 2 == 0 && turned_over(facets, n_facets / 2)) { /* as `hull_of` gives them; normals of slivers round */
+        for (k = 0; k < n_facets; k++) upward[k] = k < n_facets / 2;
         return;
     }
-    for (k = 0; k < many; k++) {
+    for (k = 0; k < n_facets; k++) {
         const double *v = rings->normals + 3 * k;
         double size = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
         if (size > largest) {
@@ -50,7 +50,7 @@ static void mark_upper(const struct rings *rings, const int32_t *facets, int64_t
             best = k;
         }
     }
-    for (k = 0; k < many; k++) {
+    for (k = 0; k < n_facets; k++) {
         const double *v = rings->normals + 3 * k, *first = rings->normals + 3 * best;
         upward[k] = v[0] * first[0] + v[1] * first[1] + v[2] * first[2] > 0.0;
     }
@@ -59,7 +59,7 @@ static void mark_upper(const struct rings *rings, const int32_t *facets, int64_t
 /* One side of a flat hull: its facets, the edges of its border, who follows whom there. */
 struct side {
     int32_t *facets, *border;
-    int64_t many, n_border;
+    int64_t n_facets, n_border;
     int64_t *following, *previous;
 };
 
@@ -97,7 +97,7 @@ static void sort_keys(int64_t *keys, int64_t n)
 
 static void find_border(struct arena *arena, int64_t n, struct side *side)
 {
-    int64_t edges = 3 * side->many, e, k;
+    int64_t edges = 3 * side->n_facets, e, k;
     int64_t *backward = arena_take(arena, (size_t)(edges + 1) * 8);
     side->border = arena_take(arena, (size_t)(2 * edges + 1) * 4);
     side->following = arena_take(arena, (size_t)n * 8);
@@ -111,7 +111,7 @@ static void find_border(struct arena *arena, int64_t n, struct side *side)
     }
     sort_keys(backward, edges);
     for (k = 0; k < 3; k++) /* all first edges, then all second ones, then all third ones */
-        for (e = 0; e < side->many; e++) {
+        for (e = 0; e < side->n_facets; e++) {
             int32_t a = side->facets[3 * e + k], b = side->facets[3 * e + (k + 1) % 3];
             if (has_edge(backward, edges, (int64_t)a * n + b)) continue;
             side->border[2 * side->n_border] = a;
@@ -180,50 +180,50 @@ static int close_disc(const struct collide_kernels *kernels, struct arena *arena
                       const struct side *side, struct rings *rings)
 {
     uint8_t *corner = rings->corner;
-    int64_t many = side->many + side->n_border, k;
+    int64_t n_facets = side->n_facets + side->n_border, k;
     double *all = arena_take(arena, (size_t)(3 * n + 3) * 8);
-    int32_t *facets = arena_take(arena, (size_t)(3 * many) * 4);
+    int32_t *facets = arena_take(arena, (size_t)(3 * n_facets) * 4);
     if (arena->failed) return 0;
     memcpy(all, points, (size_t)(3 * n) * 8);
     memcpy(all + 3 * n, points, 3 * 8);
-    memcpy(facets, side->facets, (size_t)(3 * side->many) * 4);
+    memcpy(facets, side->facets, (size_t)(3 * side->n_facets) * 4);
     for (k = 0; k < side->n_border; k++) {
-        int32_t *f = facets + 3 * (side->many + k);
+        int32_t *f = facets + 3 * (side->n_facets + k);
         f[0] = side->border[2 * k + 1];
         f[1] = side->border[2 * k];
         f[2] = (int32_t)n;
     }
-    if (order(kernels, arena, all, n + 1, facets, many, rings) != 0) return 0;
+    if (order(kernels, arena, all, n + 1, facets, n_facets, rings) != 0) return 0;
     rings->corner = corner;
-    leave_out(rings, n, side->many);
+    leave_out(rings, n, side->n_facets);
     return 1;
 }
 
 /* A flat hull, both sides triangulated in one way. */
 static int as_polygon(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
-                      const int32_t *facets, int64_t many, struct rings *rings)
+                      const int32_t *facets, int64_t n_facets, struct rings *rings)
 {
     struct side side;
-    uint8_t *upward = arena_take(arena, (size_t)many), *used = arena_take(arena, (size_t)n);
+    uint8_t *upward = arena_take(arena, (size_t)n_facets), *used = arena_take(arena, (size_t)n);
     double normal[3] = {0.0, 0.0, 0.0}, length, *both;
     int64_t k;
     int all_corners = 1, axis;
-    side.facets = arena_take(arena, (size_t)(3 * many) * 4);
-    side.many = 0;
+    side.facets = arena_take(arena, (size_t)(3 * n_facets) * 4);
+    side.n_facets = 0;
     if (arena->failed) return 0;
     rings->flat = 1;
-    mark_upper(rings, facets, many, upward);
+    mark_upper(rings, facets, n_facets, upward);
     memset(used, 0, (size_t)n);
-    for (k = 0; k < many; k++) {
+    for (k = 0; k < n_facets; k++) {
         for (axis = 0; axis < 3; axis++) {
             double part = rings->normals[3 * k + axis] * (upward[k] ? 1.0 : -1.0);
             normal[axis] = k == 0 ? part : normal[axis] + part;
             used[facets[3 * k + axis]] = 1;
         }
-        if (upward[k]) memcpy(side.facets + 3 * side.many++, facets + 3 * k, 3 * 4);
+        if (upward[k]) memcpy(side.facets + 3 * side.n_facets++, facets + 3 * k, 3 * 4);
     }
     find_border(arena, n, &side);
-    if (arena->failed || 2 * side.many != many) return 0;
+    if (arena->failed || 2 * side.n_facets != n_facets) return 0;
     for (k = 0; k < n; k++) {
         int on_it = side.following[k] >= 0;
         if (on_it != (side.previous[k] >= 0)) return 0;
@@ -244,10 +244,10 @@ static int as_polygon(const struct collide_kernels *kernels, struct arena *arena
 }
 
 struct rings rings_of(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
-                      const int32_t *facets, int64_t many)
+                      const int32_t *facets, int64_t n_facets)
 {
     struct rings rings = {NULL, NULL, NULL, NULL, 0, NULL, 0, 0};
-    int64_t said = order(kernels, arena, points, n, facets, many, &rings);
-    rings.good = said == 0 || (said == 1 && as_polygon(kernels, arena, points, n, facets, many, &rings));
+    int64_t result = order(kernels, arena, points, n, facets, n_facets, &rings);
+    rings.good = result == 0 || (result == 1 && as_polygon(kernels, arena, points, n, facets, n_facets, &rings));
     return rings;
 }

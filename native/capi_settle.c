@@ -4,12 +4,12 @@
 #include <string.h>
 
 /* Rows that stand open. */
-static size_t open_rows(const collide_pair *rows, size_t n, int64_t *left)
+static size_t open_rows(const collide_pair *rows, size_t n, int64_t *undecided)
 {
-    size_t k, many = 0;
+    size_t k, n_open = 0;
     for (k = 0; k < n; k++)
-        if (rows[k].how == COLLIDE_HOW_UNDECIDED) left[many++] = (int64_t)k;
-    return many;
+        if (rows[k].how == COLLIDE_HOW_UNDECIDED) undecided[n_open++] = (int64_t)k;
+    return n_open;
 }
 
 /* Row of the table that a part of the block is. */
@@ -20,14 +20,14 @@ static const collide_shape *shape_at(const collide_workspace *space, const struc
 
 static collide_status settle_half_spaces(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n)
 {
-    size_t many = open_rows(rows, n, space->left), k;
-    for (k = 0; k < many; k++) {
-        const int64_t *parts = space->pairs + 2 * space->left[k];
+    size_t n_open = open_rows(rows, n, space->undecided), k;
+    for (k = 0; k < n_open; k++) {
+        const int64_t *parts = space->pairs + 2 * space->undecided[k];
         const collide_shape *A = shape_at(space, asked, parts[0]), *B = shape_at(space, asked, parts[1]);
         collide_status status;
         if (A->ints[KIND] != HALFSPACE || B->ints[KIND] != HALFSPACE) continue;
-        status = settle_halfspaces(A, space->poses + POSE * parts[0], B, space->poses + POSE * parts[1], rows + space->left[k],
-                                   space->room);
+        status = settle_halfspaces(A, space->poses + POSE * parts[0], B, space->poses + POSE * parts[1],
+                                   rows + space->undecided[k], space->halfspaces);
         if (status != COLLIDE_OK) return status;
     }
     return COLLIDE_OK;
@@ -39,16 +39,17 @@ static void settle_by_other_searches(collide_workspace *space, const struct ques
     static const int booleans[3] = {1, 0, 0}, depths[3] = {0, 1, 0};
     int search;
     for (search = 0; search < 3; search++) {
-        size_t many = open_rows(rows, n, space->left), k;
-        if (many == 0) return;
+        size_t n_open = open_rows(rows, n, space->undecided), k;
+        if (n_open == 0) return;
         if (booleans[search] == asked->boolean && depths[search] == (asked->depths && !asked->boolean)) continue;
-        for (k = 0; k < many; k++) memcpy(space->asked + 2 * k, space->pairs + 2 * space->left[k], 2 * sizeof *space->asked);
-        memset(space->told, 0, many * sizeof *space->told);
+        for (k = 0; k < n_open; k++)
+            memcpy(space->asked + 2 * k, space->pairs + 2 * space->undecided[k], 2 * sizeof *space->asked);
+        memset(space->results, 0, n_open * sizeof *space->results);
         space->kernels->answer_pairs(
             space->header[INTS_AT], space->header[NUMBERS_AT], space->header[POSES_AT], 0, space->header[SHAPE_OF_AT],
-            address_of(space->asked), (int64_t)many, (uint8_t)booleans[search], (uint8_t)depths[search], 0, asked->limit,
-            address_of(space->told), space->header[DOUBLES_AT], space->header[INTEGERS_AT]);
-        space->kernels->take_proven(address_of(rows), address_of(space->left), address_of(space->told), (int64_t)many,
+            address_of(space->asked), (int64_t)n_open, (uint8_t)booleans[search], (uint8_t)depths[search], 0, asked->limit,
+            address_of(space->results), space->header[DOUBLES_AT], space->header[INTEGERS_AT]);
+        space->kernels->take_proven(address_of(rows), address_of(space->undecided), address_of(space->results), (int64_t)n_open,
                                   (uint8_t)booleans[search], asked->limit);
     }
 }
@@ -81,7 +82,7 @@ collide_status settle_rows(collide_workspace *space, const struct question *aske
             *failed = k;
             return COLLIDE_OUT_OF_RANGE;
         }
-    if (open_rows(rows, n, space->left) == 0) return COLLIDE_OK;
+    if (open_rows(rows, n, space->undecided) == 0) return COLLIDE_OK;
     if (kernels->settle_hulls(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT],
                               (int64_t)n, (uint8_t)asked->boolean, (uint8_t)depths, asked->limit, address_of(rows), 0, 0,
                               space->requests_at, space->digits_at) > 0)

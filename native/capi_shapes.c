@@ -63,7 +63,7 @@ static collide_status lay_out(collide_shape *shape, const double *points, size_t
     double *block, squares = 0.0;
     measures[M_COARSE] = 0;
     if (coarse) {
-        if ((kernels = kernels_here()) == NULL || !rooms_of(kernels, measures)) return COLLIDE_NO_KERNELS;
+        if ((kernels = kernels_here()) == NULL || !workspace_sizes(kernels, measures)) return COLLIDE_NO_KERNELS;
     }
     block = cache_lines((3 * padded + 4 * (size_t)measures[M_COARSE]) * sizeof *block, &shape->block);
     if (block == NULL) return COLLIDE_NO_MEMORY;

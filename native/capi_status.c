@@ -27,7 +27,7 @@ static const struct collide_kernels *chosen(const char **level)
     const char *why = NULL;
     const struct collide_kernels *kernels = collide_kernels_of_level(getenv("COLLIDE_CPU"), level, &why);
     int64_t measures[MEASURES];
-    return kernels != NULL && rooms_of(kernels, measures) ? kernels : NULL;
+    return kernels != NULL && workspace_sizes(kernels, measures) ? kernels : NULL;
 }
 
 const struct collide_kernels *kernels_here(void)
@@ -43,19 +43,19 @@ collide_status collide_level(const char **level)
     return chosen(level) != NULL ? COLLIDE_OK : COLLIDE_NO_KERNELS;
 }
 
-int rooms_of(const struct collide_kernels *kernels, int64_t measures[MEASURES])
+int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEASURES])
 {
     if (kernels->write_constants(address_of(measures), MEASURES) != MEASURES) return 0;
     return measures[M_BLOCK] == BLOCK && measures[M_HEADER] == HEADER && measures[M_INTS] == INTS &&
-           measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_room_bytes(measures) > 0 &&
+           measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_workspace_bytes(measures) > 0 &&
            measures[M_ROW] == (int64_t)sizeof(collide_pair);
 }
 
 void *cache_lines(size_t bytes, void **held)
 {
-    char *room;
+    char *memory;
     *held = NULL;
-    if (bytes > (size_t)-1 - 64 || (room = calloc(bytes + 64, 1)) == NULL) return NULL;
-    *held = room;
-    return room + (64 - ((uintptr_t)room & 63)) % 64;
+    if (bytes > (size_t)-1 - 64 || (memory = calloc(bytes + 64, 1)) == NULL) return NULL;
+    *held = memory;
+    return memory + (64 - ((uintptr_t)memory & 63)) % 64;
 }

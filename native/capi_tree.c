@@ -96,13 +96,13 @@ static void add_lists(struct growing *tree, const int32_t *fine, int64_t n_fine,
     int64_t capacity = 8 * n_fine + 4 * n_coarse, found, m[MEASURES];
     struct arena own;
     int32_t *starts, *pairs;
-    double *room;
-    rooms_of(tree->kernels, m);
+    double *scratch;
+    workspace_sizes(tree->kernels, m);
     arena_begin(&own, NULL, 0);
     starts = arena_take(&own, (size_t)(n_coarse + 1) * 4);
     for (;;) {
         pairs = arena_take(&own, (size_t)(2 * capacity) * 4);
-        room = arena_take(&own, (size_t)(tree->n + capacity + 2 * m[M_STACK]) * 8);
+        scratch = arena_take(&own, (size_t)(tree->n + capacity + 2 * m[M_STACK]) * 8);
         if (own.failed) {
             tree->arena->failed = 1;
             break;
@@ -111,7 +111,7 @@ static void add_lists(struct growing *tree, const int32_t *fine, int64_t n_fine,
             address_of(tree->scaled), tree->n, address_of(fine), n_fine, address_of(rings->starts), address_of(rings->ring),
             address_of(rings->ring_facets), address_of(rings->normals), rings->n_normals, address_of(tree->nodes),
             address_of(tree->entries), address_of(tree->coordinates), tree->n_nodes, tree->depth, address_of(coarse), n_coarse,
-            first_node, address_of(pairs), capacity, address_of(starts), address_of(room));
+            first_node, address_of(pairs), capacity, address_of(starts), address_of(scratch));
         if (found <= capacity) {
             add_level(tree, starts, pairs, n_coarse, first_number, coarse);
             break;
@@ -131,9 +131,9 @@ static struct rings rings_of_subset(struct growing *tree, const int32_t *fine, i
     if (tree->arena->failed) return none;
     for (k = 0; k < n_fine; k++) memcpy(points + 3 * k, tree->scaled + 3 * (int64_t)fine[k], 3 * 8);
     hull = hull_of(tree->kernels, tree->arena, points, n_fine);
-    if (tree->arena->failed || hull.many < 2 || n_fine < 3) return none;
-    for (k = 0; k < 3 * hull.many; k++) hull.facets[k] = fine[hull.facets[k]];
-    return rings_of(tree->kernels, tree->arena, tree->scaled, tree->n, hull.facets, hull.many);
+    if (tree->arena->failed || hull.n_facets < 2 || n_fine < 3) return none;
+    for (k = 0; k < 3 * hull.n_facets; k++) hull.facets[k] = fine[hull.facets[k]];
+    return rings_of(tree->kernels, tree->arena, tree->scaled, tree->n, hull.facets, hull.n_facets);
 }
 
 /* All levels, coarsest first; subset k is the first sizes[k] of the vertices. */
@@ -225,10 +225,11 @@ static double *scaled_points(struct arena *arena, const double *points, int64_t 
 }
 
 /* A direction in which each of the vertices is extreme: the sum of its facets' unit normals. */
-static double *vertex_normals(struct arena *arena, const struct rings *rings, int64_t n, const int32_t *vertices, int64_t many)
+static double *vertex_normals(struct arena *arena, const struct rings *rings, int64_t n, const int32_t *vertices,
+                              int64_t n_vertices)
 {
     int64_t links = rings->starts[n], k;
-    double *sums = arena_take(arena, (size_t)(3 * links + 3) * 8), *normals = arena_take(arena, (size_t)(3 * many) * 8);
+    double *sums = arena_take(arena, (size_t)(3 * links + 3) * 8), *normals = arena_take(arena, (size_t)(3 * n_vertices) * 8);
     int axis;
     if (arena->failed) return NULL;
     for (axis = 0; axis < 3; axis++) {
@@ -237,7 +238,7 @@ static double *vertex_normals(struct arena *arena, const struct rings *rings, in
             double part = rings->normals[3 * (int64_t)rings->ring_facets[k] + axis];
             sums[3 * k + 3 + axis] = k == 0 ? part : sums[3 * k + axis] + part;
         }
-        for (k = 0; k < many; k++)
+        for (k = 0; k < n_vertices; k++)
             normals[3 * k + axis] = sums[3 * (int64_t)rings->starts[vertices[k] + 1] + axis] -
                                     sums[3 * (int64_t)rings->starts[vertices[k]] + axis];
     }
@@ -246,14 +247,14 @@ static double *vertex_normals(struct arena *arena, const struct rings *rings, in
 
 static int subset_sizes(int64_t n, int64_t sizes[MOST_LEVELS])
 {
-    int many = 1;
+    int n_sizes = 1;
     sizes[0] = n;
-    while (many < MOST_LEVELS && sizes[many - 1] > (many == 1 ? SMALL_HULL : LARGEST_SCAN)) {
-        int64_t ratio = many == 1 ? FINE_RATIO : RATIO;
-        sizes[many] = (sizes[many - 1] + ratio - 1) / ratio;
-        many++;
+    while (n_sizes < MOST_LEVELS && sizes[n_sizes - 1] > (n_sizes == 1 ? SMALL_HULL : LARGEST_SCAN)) {
+        int64_t ratio = n_sizes == 1 ? FINE_RATIO : RATIO;
+        sizes[n_sizes] = (sizes[n_sizes - 1] + ratio - 1) / ratio;
+        n_sizes++;
     }
-    return many;
+    return n_sizes;
 }
 
 /* Lowest and highest power of two of the coordinates bound directions that are settled exactly (`exact_range`). */
@@ -308,20 +309,20 @@ static struct support_tree *kept(const struct growing *tree, const struct rings 
 }
 
 /* Vertices that are corners, where there are enough; which of all come late. Returns how many, 0 where one has no facets. */
-static int64_t choose_vertices(const struct rings *rings, int32_t *vertices, int64_t many, uint8_t *late)
+static int64_t choose_vertices(const struct rings *rings, int32_t *vertices, int64_t n_vertices, uint8_t *late)
 {
-    int64_t k, corners = 0, left = 0;
-    for (k = 0; k < many; k++) {
+    int64_t k, corners = 0, n_chosen = 0;
+    for (k = 0; k < n_vertices; k++) {
         if (rings->starts[vertices[k] + 1] == rings->starts[vertices[k]]) return 0;
         corners += rings->corner[vertices[k]];
     }
-    for (k = 0; k < many; k++) {
+    for (k = 0; k < n_vertices; k++) {
         int32_t vertex = vertices[k];
         if (corners >= 3 && !rings->corner[vertex]) continue;
-        late[left] = rings->starts[vertex + 1] - rings->starts[vertex] > HIGHEST_DEGREE;
-        vertices[left++] = vertex;
+        late[n_chosen] = rings->starts[vertex + 1] - rings->starts[vertex] > HIGHEST_DEGREE;
+        vertices[n_chosen++] = vertex;
     }
-    return left;
+    return n_chosen;
 }
 
 static void build(struct growing *tree, const double *points, struct hull *hull, int64_t lowest, struct support_tree **out)
@@ -329,27 +330,28 @@ static void build(struct growing *tree, const double *points, struct hull *hull,
     struct arena *arena = tree->arena;
     struct rings rings;
     uint8_t *late = arena_take(arena, (size_t)hull->n_vertices);
-    int64_t sizes[MOST_LEVELS], many;
+    int64_t sizes[MOST_LEVELS], n_vertices;
     double *normals;
     int32_t *ordered;
     int attempt, n_sizes;
     tree->scaled = scaled_points(arena, points, tree->n, hull->vertices, hull->n_vertices);
     tree->place = arena_take(arena, (size_t)tree->n * 8);
     if (arena->failed) return;
-    rings = rings_of(tree->kernels, arena, tree->scaled, tree->n, hull->facets, hull->many);
-    if (arena->failed || !rings.good || (many = choose_vertices(&rings, hull->vertices, hull->n_vertices, late)) == 0) return;
-    normals = vertex_normals(arena, &rings, tree->n, hull->vertices, many);
-    n_sizes = subset_sizes(many, sizes);
-    ordered = arena_take(arena, (size_t)many * 4);
+    rings = rings_of(tree->kernels, arena, tree->scaled, tree->n, hull->facets, hull->n_facets);
+    if (arena->failed || !rings.good) return;
+    if ((n_vertices = choose_vertices(&rings, hull->vertices, hull->n_vertices, late)) == 0) return;
+    normals = vertex_normals(arena, &rings, tree->n, hull->vertices, n_vertices);
+    n_sizes = subset_sizes(n_vertices, sizes);
+    ordered = arena_take(arena, (size_t)n_vertices * 4);
     for (attempt = 0; attempt < ATTEMPTS && !arena->failed; attempt++) {
         struct mark mark = arena_mark(arena);
         int again;
-        order_nested(arena, hull->vertices, normals, late, many, sizes, n_sizes, ordered);
+        order_nested(arena, hull->vertices, normals, late, n_vertices, sizes, n_sizes, ordered);
         tree->nodes = arena_take(arena, 4);
         tree->n_nodes = tree->n_entries = tree->depth = 0;
         if (!arena->failed) add_levels(tree, ordered, sizes, n_sizes, &rings);
         if (arena->failed || tree->hopeless || !is_sound(tree, &rings)) return;
-        again = mark_long(tree, hull->vertices, many, late);
+        again = mark_long(tree, hull->vertices, n_vertices, late);
         if (arena->failed) return;
         if (!again || attempt == ATTEMPTS - 1) {
             if ((*out = kept(tree, &rings, points, lowest)) == NULL) arena->failed = 1;

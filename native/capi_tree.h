@@ -6,11 +6,11 @@
 #include "capi_arena.h"
 #include "capi_internal.h"
 
-/* The hull of points: facets (many, 3) counter-clockwise from outside, of flat ones both sides, and its vertices, in order. */
+/* The hull of points: facets (n_facets, 3) counter-clockwise from outside, of flat ones both sides, and its vertices, in order. */
 struct hull {
     int64_t dimension;
     int32_t *facets, *vertices;
-    int64_t many, n_vertices;
+    int64_t n_facets, n_vertices;
 };
 
 struct hull hull_of(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n);
@@ -29,7 +29,7 @@ struct rings {
 
 /* facets : of at least 3 vertices. */
 struct rings rings_of(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
-                      const int32_t *facets, int64_t many);
+                      const int32_t *facets, int64_t n_facets);
 
 /* The n vertices so ordered that the first sizes[k] of them are subset k; sizes fall, sizes[0] is n.
 

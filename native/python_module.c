@@ -46,9 +46,9 @@ static int double_of(PyObject *given, double *out)
 
 static int truth_of(PyObject *given, uint8_t *out)
 {
-    int said = given == Py_True ? 1 : given == Py_False ? 0 : PyObject_IsTrue(given);
-    *out = (uint8_t)said;
-    return said;
+    int truth = given == Py_True ? 1 : given == Py_False ? 0 : PyObject_IsTrue(given);
+    *out = (uint8_t)truth;
+    return truth;
 }
 
 #include "entries.inc"
@@ -64,9 +64,9 @@ static void *matrix_of(PyObject *given)
     return PyArray_DATA(array);
 }
 
-static PyObject *answer_of(int64_t said)
+static PyObject *answer_of(int64_t result)
 {
-    return said < 0 ? Py_NewRef(Py_None) : Py_NewRef(said ? Py_True : Py_False);
+    return result < 0 ? Py_NewRef(Py_None) : Py_NewRef(result ? Py_True : Py_False);
 }
 
 /* self : the array of a header. */

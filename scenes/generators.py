@@ -24,18 +24,7 @@ from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import scene_yaml
 from collide.scenes.loaders.fields import did_you_mean
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
-from collide.shapes import (
-    Box,
-    Capsule,
-    Cone,
-    ConvexHull,
-    Cylinder,
-    Ellipsoid,
-    HPolytope,
-    Mesh,
-    Shape,
-    Sphere,
-)
+from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Mesh, Shape, Sphere
 from collide.transforms import pose
 
 

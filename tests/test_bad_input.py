@@ -35,9 +35,7 @@ from collide import (
     distance,
     pose,
 )
-from collide import (
-    collide as meets,
-)
+from collide import collide as meets
 
 EYE = np.eye(4)
 NAN, INF = math.nan, math.inf

@@ -10,7 +10,7 @@ import numpy as np
 
 from collide.adapters.peers.exact_peer import INSIDE, ExactPeer, is_rounded
 from collide.adapters.peers.protocol import Question, Table
-from collide.adapters.peers.question import is_union
+from collide.adapters.peers.question import is_compound_or_mesh
 from collide.reports import classes
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class Judge:
         self.size = question.sizes()
         bodies = classes.body_sizes(question.bodies)
         self.rounding = [float(classes.roundings(bodies[i], bodies[j])) for i, j in question.pairs]
-        self.union = [is_union(body.shape) for body in question.bodies]
+        self.compound_or_mesh = [is_compound_or_mesh(body.shape) for body in question.bodies]
         self._verdicts: dict[int, Table] = {}
 
     def verdict(self, k: int) -> Table:
@@ -133,7 +133,7 @@ class Judge:
         touching = exact is not None and classes.is_touching(exact, exact, self.rounding[k])
         if touching and is_rounded(*(self.question.bodies[i] for i in pair)):
             return "touching within the rounding of the body itself"
-        if dispute.kind == "distance" and dispute.exact_hit and any(self.union[i] for i in pair):
+        if dispute.kind == "distance" and dispute.exact_hit and any(self.compound_or_mesh[i] for i in pair):
             return "the depth of a union"
         return ""
 
@@ -176,7 +176,7 @@ class Judge:
     def misses(self, k: int, answer: np.void, truth: float) -> bool:
         """Whether a proven bracket does not hold the exact distance, which was rounded once."""
         pair = self.question.pairs[k]
-        if truth <= 0 and any(self.union[i] for i in pair):
+        if truth <= 0 and any(self.compound_or_mesh[i] for i in pair):
             return False  # exact arithmetic has the depths of parts, not of the union
         slack = self.rounding[k] if is_rounded(*(self.question.bodies[i] for i in pair)) else 0.0
         below = answer["lower"] > np.nextafter(truth, np.inf) + slack
@@ -229,7 +229,8 @@ def differences(judge: Judge, ours: Table, theirs: Table, summary: Summary) -> l
         if not (ours_row["has_distance"] and theirs_row["has_distance"]) or (differing and differing.kind == "inside"):
             continue
         lower, upper = bracket_of(ours_row)
-        if lower < -judge.rounding[k] and ours_row["hit"] and any(judge.union[i] for i in judge.question.pairs[k]):
+        is_deep = lower < -judge.rounding[k] and ours_row["hit"]
+        if is_deep and any(judge.compound_or_mesh[i] for i in judge.question.pairs[k]):
             continue  # engines mean different things by the depth of a union
         difference = abs(float(ours_row["distance"]) - float(theirs_row["distance"]))
         (summary.depth if ours_row["hit"] else summary.gap).see(difference, *judge.question.names(k))

@@ -209,7 +209,7 @@ def convex_parts(shape: Shape, X_WB: np.ndarray) -> Iterator[tuple[Shape, np.nda
         yield shape, X_WB
 
 
-def is_union(shape: Shape) -> bool:
+def is_compound_or_mesh(shape: Shape) -> bool:
     """True where the body is a union of several parts, or a mesh: how deep it overlaps no engine can say."""
     parts = [part for part, _ in convex_parts(shape, np.eye(4))]
     return len(parts) > 1 or has_mesh(shape)

@@ -10,7 +10,6 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import (
     ADDRESS,
-    COUNT,
     INTS,
     KIND,
     NUMBERS,
@@ -33,10 +32,10 @@ _OUTWARD = 32 * 2.0**-53
 
 
 @kernel
-def _farthest_point(kind, coordinates, n, m, params, at, tree, g):
+def _farthest_point(kind, coordinates, m, params, at, tree, g):
     """The core point farthest in direction g (`support`); with a support tree, that of the proven vertex."""
-    vertex, point, _ = support(kind, coordinates, n, m, params, at, tree, 0, -1, g)
-    return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, n, m, tree, vertex, g))
+    vertex, point, _ = support(kind, coordinates, m, params, at, tree, 0, -1, g)
+    return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, m, tree, vertex, g))
 
 
 @kernel
@@ -46,11 +45,10 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
     row = vec3_at(poses, POSE * p + 3 * axis)  # of the rotation: the axis in the shape's frame
     t = poses[POSE * p + 9 + axis]
     kind = ints[INTS * s + KIND]
-    n = ints[INTS * s + COUNT]
     m = ints[INTS * s + PADDED]
     tree = ints[INTS * s + TREE]
-    high = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, row), row) + t
-    low = dot(_farthest_point(kind, coordinates, n, m, numbers, at + PARAMS, tree, neg(row)), row) + t
+    high = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, row), row) + t
+    low = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, neg(row)), row) + t
     radius = numbers[at + RADIUS]
     out = radius + numbers[at + SLOP] + poses[POSE * p + POSE_SLOP]
     out += _OUTWARD * (math.sqrt(dot(row, row)) * numbers[at + REACH] + abs(t) + radius)

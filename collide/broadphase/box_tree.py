@@ -170,6 +170,7 @@ def meeting_boxes(
 
     Only the first ``capacity`` are stored. Among themselves, query k is leaf k: it looks at later
     leaves only, and names its body.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     queries = view_f64(queries_at, 6 * n_queries)
     nodes = view_f64(nodes_at, 12 * leaves)

@@ -158,7 +158,7 @@ def _gaps(
     for k in order.tolist():
         if not starts[k]:
             continue
-        n = snapped(pairs, k, u[k], float(slack[k]), A, B)
+        n = snapped(pairs, k, u[k], float(slack[k]))
         seeds = np.zeros(len(pairs), dtype=bool)
         seeds[k] = True
         members, points = _grow_patch(frame, pairs, links, n, seeds, reach, 0.0)

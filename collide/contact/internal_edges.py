@@ -111,7 +111,7 @@ def _feature(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     return held
 
 
-def snapped(pairs: Pairs, k: int, u: np.ndarray, slack: float, A: Body, B: Body) -> np.ndarray:
+def snapped(pairs: Pairs, k: int, u: np.ndarray, slack: float) -> np.ndarray:
     """The normal of a facet of pair k, or the cross product of two of its edges, where u is that but for rounding."""
     normal_a, normal_b = pairs.a.normals[k], pairs.b.normals[k]
     edges = [T[[1, 2, 0]] - T for T in (pairs.a.corners[k], pairs.b.corners[k])]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Points are on a wall where they lie so many times as far above another as aside of it; so many are looked at.
+#: A point is on a wall where it lies more than _STEEP times as far above one of the _LOWEST lowest points as aside of
+#: it.
 _STEEP, _LOWEST = 2.0, 512
 
 

@@ -109,7 +109,10 @@ def _levels(corners: np.ndarray, width: float) -> int:
 def fill_graded(
     facets_at, m, low_at, width, levels, nodes_at, order_at, owner_at, outlier_at, scratch_at, stack_at, n_stack
 ):
-    """Nodes, order, owners and outliers; returns the number of inner nodes."""
+    """Nodes, order, owners and outliers; returns the number of inner nodes.
+
+    Arguments are flat: entries take integers, doubles and booleans alone.
+    """
     facets = view_f64(facets_at, _FACET * m)
     low = view_f64(low_at, 3)
     nodes = view_i64(nodes_at, NODE * max(1, m))
@@ -130,14 +133,14 @@ def fill_graded(
         at = NODE * top
         first = stack[at + FIRST]
         last = stack[at + LAST]
-        _sort_by_child(facets, low, width, levels, stack, at, first, last, order, scratch, counts)
+        _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts)
         while used > 0 and _only_child(counts, last - first) >= 0:
             # All facets go to one child and nothing branches: the node is that child. Only the root stays.
             child = _only_child(counts, last - first)
             stack[at + LEVEL] += 1
             for axis in range(3):
                 stack[at + CELL + axis] = 2 * stack[at + CELL + axis] + ((child >> axis) & 1)
-            _sort_by_child(facets, low, width, levels, stack, at, first, last, order, scratch, counts)
+            _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts)
         node = used
         used += 1
         for k in range(NODE):
@@ -172,9 +175,9 @@ def _only_child(counts, n):
 
 
 @kernel
-def _sort_by_child(facets, low, width, levels, stack, at, first, last, order, scratch, counts):
+def _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts):
     """Order a node's facets by child, 8 for outliers; counts become how many there are of each."""
-    level = stack[at + LEVEL]
+    level, first, last = stack[at + LEVEL], stack[at + FIRST], stack[at + LAST]
     cell = width / float(1 << level)
     half = len(order)
     for child in range(9):

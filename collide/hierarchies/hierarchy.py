@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hierarchies.half_edges import USED
-from collide.hierarchies.independent_sets import (
+from collide.hierarchies.independent_sets import (  # fmt: skip
     ANCHORS,
     REMOVED,
     STATE,
@@ -30,7 +30,7 @@ from collide.hierarchies.independent_sets import (
     measure_degrees,
     thin,
     write_level,
-)  # fmt: skip
+)
 from collide.hierarchies.level_rows import by_vertex
 from collide.hierarchies.symbolic_perturbation import CENTRES, exact_side
 from collide.hierarchies.true_facets import Cloud, Facets, cloud_at, named_in, true_facets

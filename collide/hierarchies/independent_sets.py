@@ -112,6 +112,7 @@ def thin(
     degree : by row, kept up to date; 0 for a vertex removed.
     bound : no degree is raised over this.
     max_degree : only vertices of at most this degree leave.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, 0)
     mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows, state_at)

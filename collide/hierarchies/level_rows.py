@@ -66,6 +66,7 @@ def write_removed(
     """For each row the vertices of the finer level that are gone and were neighbours; for a new vertex its parent.
 
     n_removed : 0 to write the number of each row behind it, else the length of ``removed``.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     birth = view_i32(birth_at, points)
     last = view_i32(last_at, points)

@@ -102,7 +102,7 @@ def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
     corners = cloud.originals[spans]
     middles = [
         0.5 * used.min(axis=0) + 0.5 * used.max(axis=0), (used / len(used)).sum(axis=0),
-        (corners.sum(axis=1) / 3.0 / len(corners)).sum(axis=0), *_mid_simplices(cloud, used),
+        (corners.sum(axis=1) / 3.0 / len(corners)).sum(axis=0), *_mid_simplices(used),
     ]  # fmt: skip
     order = np.argsort([-_clearance(corners, middle) for middle in middles], kind="stable")
     for k in order.tolist():
@@ -111,7 +111,7 @@ def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
     raise ValueError("no double was found strictly inside the hull: it is thinner than the rounding of its points")
 
 
-def _mid_simplices(cloud: Cloud, used: np.ndarray) -> list[np.ndarray]:
+def _mid_simplices(used: np.ndarray) -> list[np.ndarray]:
     """The middle of a few of the extreme points, for hulls most of whose points are crowded together."""
     extremes = np.concatenate([used[used.argmin(axis=0)], used[used.argmax(axis=0)]])
     return [extremes.mean(axis=0), used[:: max(1, len(used) // 7)].mean(axis=0)]

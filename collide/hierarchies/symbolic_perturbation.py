@@ -15,30 +15,11 @@ random order that leaves O(log k) triangles at a corner of a facet with k.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from collide.kernels import kernel
 from collide.numerics.orientation import one_of_four, orientation
 
 #: Points the perturbation moves vertices towards.
 CENTRES = 4
-
-
-class CloudView(NamedTuple):
-    """Points in kernels, as `true_facets.Cloud` has them.
-
-    scaled, originals : three doubles a row; scaled = originals · 2^−exponent.
-    work, digits : workspace of `orientation`.
-    centres : row of centre 0; the others follow it.
-    Where only exact tests are made, centres and exponent are not read.
-    """
-
-    scaled: Any
-    originals: Any
-    work: Any
-    digits: Any
-    centres: int
-    exponent: int
 
 
 @kernel
@@ -54,13 +35,13 @@ def rank_of(i):
 @kernel
 def exact_side(cloud, a, b, c, d):
     """1 where d lies above the plane of a, b, c (counter-clockwise from above), 0 on it, −1 below; exact."""
-    return orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, a, b, c, d, -1)
+    return orientation(cloud, a, b, c, d, -1)
 
 
 @kernel
 def side(cloud, a, b, c, d):
     """`exact_side` of the perturbed points; 0 only where the four are in line or two are the same."""
-    sign = orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, a, b, c, d, -1)
+    sign = orientation(cloud, a, b, c, d, -1)
     if sign != 0:
         return sign
     return tie(cloud, a, b, c, d)
@@ -82,7 +63,7 @@ def tie(cloud, a, b, c, d):
             q = centre if rank_of(b) == largest else b
             r = centre if rank_of(c) == largest else c
             s = centre if rank_of(d) == largest else d
-            sign = orientation(cloud.scaled, cloud.originals, cloud.work, cloud.digits, p, q, r, s, -1)
+            sign = orientation(cloud, p, q, r, s, -1)
             if sign != 0:
                 return sign
     return 0

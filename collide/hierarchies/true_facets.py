@@ -3,7 +3,7 @@
 `convex_hull` gives flat facets as some triangles, and may keep points that lie on a facet or an edge. Here
 triangles in one plane are put together again. A vertex where three true facets or more meet is strictly
 extreme; the others are dropped. What is left of a facet's border is a strictly convex polygon, and it is
-triangulated as `perturbed` says: vertices are cut off in the order in which they move inwards.
+triangulated as `symbolic_perturbation.py` says: vertices are cut off in the order in which they move inwards.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hierarchies.half_edges import following, preceding
-from collide.hierarchies.symbolic_perturbation import CloudView, exact_side, rank_of, side
+from collide.hierarchies.symbolic_perturbation import exact_side, rank_of, side
 from collide.hull.exact_hull import Hull
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_i64, view_u8
-from collide.numerics.orientation import DIGITS, WORK, one_of_four, survey
+from collide.numerics.orientation import DIGITS, WORK, CloudView, one_of_four, survey
 
 #: Coordinates that are smaller than the largest by this power of two must not be left to expansions (`orientation`).
 SMALL = -280

@@ -69,6 +69,7 @@ def cut(
     may_go : whether w may go even where no new vertex can take its place.
 
     Returns how many rows are used, as many as w had neighbours; −1 where w had to stay.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, exponent)
     mesh = mesh_at(corners_at, twins_at, triangles, leaving_at, rows, state_at)

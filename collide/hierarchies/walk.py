@@ -190,8 +190,8 @@ def walk_poses(
     ints, numbers : a `ShapeTable` of P and R, in this order.
     poses : for each pair P's row and R's, POSE doubles each.
     early : see `_walk_down`; the walk as published does not.   rows : WALK_DTYPE.
-    trace : 0, or TRACED_ROUNDS rounds for a
-    trace of the last pair.   doubles, integers : workspace.
+    trace : 0, or TRACED_ROUNDS rounds for a trace of the last pair.   doubles, integers : workspace.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     walk = walk_at(levels_at(p_at), levels_at(q_at), doubles_at, integers_at)
     ball = ball_at(ball_address)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hull.first_simplex import APICES
-from collide.hull.quickhull import FACET, PLANE, STATE, quickhull
+from collide.hull.growing_hull import FACET, PLANE, STATE
+from collide.hull.quickhull import quickhull
 from collide.kernels import address_of
 from collide.numerics.orientation import DIGITS, WORK
 

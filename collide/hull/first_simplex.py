@@ -11,19 +11,20 @@ import math
 
 from collide.kernels import kernel
 from collide.numerics.orientation import orientation
+from collide.numerics.vec3 import cross, dot, norm1, sub, vec3_at
 
 #: Points written behind the cloud: the origin and one on each axis. No plane holds all four.
 APICES = 4
 
 
 @kernel
-def first_simplex(points, originals, work, digits, count, exponent, corners):
+def first_simplex(cloud, count, corners):
     """The dimension of the cloud; ``corners`` receives as many of its points and one more.
 
     The fourth corner lies below the plane of the others, seen from where they run counter-clockwise. A
-    flat cloud is given one of the points behind it: its hull is the base of a pyramid. ``exponent`` is
-    what `survey` returned.
+    flat cloud is given one of the points behind it: its hull is the base of a pyramid.
     """
+    points, originals = cloud.scaled, cloud.originals
     first_two(originals, count, corners)
     if corners[0] == corners[1]:
         return 0
@@ -41,9 +42,7 @@ def first_simplex(points, originals, work, digits, count, exponent, corners):
                 corners[3] = corners[0]
             # Off a line: in one of three projections, determinants with an axis as their last row.
             for axis in range(0 if dimension == 1 else -1, 3 if dimension == 1 else 0):
-                sign = orientation(
-                    points, originals, work, digits, corners[0], corners[1], corners[2], corners[3], axis
-                )  # fmt: skip
+                sign = orientation(cloud, corners[0], corners[1], corners[2], corners[3], axis)
                 if sign != 0:
                     farthest_row = i
                     break
@@ -52,7 +51,7 @@ def first_simplex(points, originals, work, digits, count, exponent, corners):
         if farthest_row < 0 and dimension == 1:
             return 1
         if farthest_row < 0:
-            write_apices(points, originals, count, exponent)
+            write_apices(points, originals, count, cloud.exponent)
             low = count
             high = count + APICES
         else:
@@ -102,26 +101,15 @@ def before(points, a, b, axis):
 @kernel
 def farthest(points, low, high, corners, dimension):
     """The point, of those from ``low`` to ``high``, farthest in doubles off the line or plane of the corners."""
-    a, b = corners[0], corners[1]
-    ux = points[3 * b] - points[3 * a]
-    uy = points[3 * b + 1] - points[3 * a + 1]
-    uz = points[3 * b + 2] - points[3 * a + 2]
+    a = vec3_at(points, 3 * corners[0])
+    direction = sub(vec3_at(points, 3 * corners[1]), a)
     if dimension == 2:  # the normal of the plane, in place of the line's direction
-        c = corners[2]
-        vx = points[3 * c] - points[3 * a]
-        vy = points[3 * c + 1] - points[3 * a + 1]
-        vz = points[3 * c + 2] - points[3 * a + 2]
-        ux, uy, uz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        direction = cross(direction, sub(vec3_at(points, 3 * corners[2]), a))
     best = low
     size = -1.0
     for i in range(low, high):
-        wx = points[3 * i] - points[3 * a]
-        wy = points[3 * i + 1] - points[3 * a + 1]
-        wz = points[3 * i + 2] - points[3 * a + 2]
-        if dimension == 2:
-            height = abs(ux * wx + uy * wy + uz * wz)
-        else:
-            height = abs(uy * wz - uz * wy) + abs(uz * wx - ux * wz) + abs(ux * wy - uy * wx)
+        offset = sub(vec3_at(points, 3 * i), a)
+        height = abs(dot(direction, offset)) if dimension == 2 else norm1(cross(direction, offset))
         if height > size or (height == size and before(points, best, i, 0)):
             size = height
             best = i
@@ -131,7 +119,7 @@ def farthest(points, low, high, corners, dimension):
 @kernel
 def write_apices(points, originals, count, exponent):
     """The points behind the cloud. Half of the scaled unit is a double in the originals too."""
-    unit = math.ldexp(0.5, exponent)
+    unit = math.ldexp(0.5, int(exponent))
     for i in range(APICES):
         for k in range(3):
             points[3 * (count + i) + k] = 0.5 if k == i else 0.0

@@ -21,157 +21,56 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.hull.first_simplex import APICES, before, first_simplex
+from collide.hull.first_simplex import APICES, first_simplex
+from collide.hull.growing_hull import (
+    ACROSS,
+    CORNERS,
+    CURSOR,
+    FACET,
+    FIRST,
+    FREE,
+    LAST,
+    NOW,
+    PLANE,
+    POINT,
+    ROUND,
+    STATE,
+    TESTS,
+    USED,
+    GrowingHull,
+    above,
+    free_facet,
+    make_facet,
+    put,
+)
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.numerics.orientation import DIGITS, UNDERFLOW, WORK, orientation, survey
+from collide.numerics.orientation import DIGITS, WORK, CloudView, orientation, survey
 
-#: Integers of a facet: three corners, counter-clockwise from outside; the facet across each edge
-#: (corner k to k + 1); the first point of its list; its neighbours in the queue; the round
-#: in which it was last tested, negative where it was not visible.
-FACET = 10
-_ACROSS, _POINT, _BEFORE, _AFTER, _ROUND = 3, 6, 7, 8, 9
-#: Doubles of a facet: normal, a corner, how far its plane's doubles may be off, its farthest point's distance.
-PLANE = 8
-_ERROR, _FARTHEST = 6, 7
 #: Fans of more facets than this are searched by halving; at least 4, since the first four facets are no fan.
 WIDE_FAN = 48
 #: Tests per point after which corners are no longer chosen by distance. Ordinary clouds need 10 to 50.
 BUDGET = 100
-#: As `orientation`'s, for differences up to 2: 8 u times the terms' magnitudes, doubled, times 2.
-_PLANE_ERROR = 2.0**-48
-
-#: Integers of the state: free facets as a chain, facets ever used, first and last of the queue of
-#: facets with points, the round, tests of a point against a plane, facets made, how far the shuffled order
-#: was followed (−1: not begun), four corners to begin with.
-STATE = 12
-_FREE, _USED, _FIRST, _LAST, _NOW, _TESTS, _MADE, _CURSOR, _CORNERS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @kernel
-def make_facet(points, facets, planes, state, a, b, c):
-    """Number of a new facet with no neighbours and no points."""
-    f = state[_FREE]
-    if f >= 0:
-        state[_FREE] = facets[FACET * f + _AFTER]
-    else:
-        f = state[_USED]
-        state[_USED] += 1
-    state[_MADE] += 1
-    at = FACET * f
-    facets[at] = a
-    facets[at + 1] = b
-    facets[at + 2] = c
-    facets[at + _POINT] = -1
-    facets[at + _ROUND] = 0
-    x = points[3 * a]
-    y = points[3 * a + 1]
-    z = points[3 * a + 2]
-    ux = points[3 * b] - x
-    uy = points[3 * b + 1] - y
-    uz = points[3 * b + 2] - z
-    vx = points[3 * c] - x
-    vy = points[3 * c + 1] - y
-    vz = points[3 * c + 2] - z
-    yz = uy * vz
-    zy = uz * vy
-    zx = uz * vx
-    xz = ux * vz
-    xy = ux * vy
-    yx = uy * vx
-    at = PLANE * f
-    planes[at] = yz - zy
-    planes[at + 1] = zx - xz
-    planes[at + 2] = xy - yx
-    planes[at + 3] = x
-    planes[at + 4] = y
-    planes[at + 5] = z
-    size = abs(yz) + abs(zy) + abs(zx) + abs(xz) + abs(xy) + abs(yx)
-    planes[at + _ERROR] = _PLANE_ERROR * size + UNDERFLOW
-    planes[at + _FARTHEST] = -1.0
-    return f
-
-
-@kernel
-def free_facet(facets, state, f):
-    at = FACET * f
-    if facets[at + _POINT] >= 0:
-        previous = facets[at + _BEFORE]
-        following_one = facets[at + _AFTER]
-        if previous >= 0:
-            facets[FACET * previous + _AFTER] = following_one
-        else:
-            state[_FIRST] = following_one
-        if following_one >= 0:
-            facets[FACET * following_one + _BEFORE] = previous
-        else:
-            state[_LAST] = previous
-    facets[at] = -1
-    facets[at + _AFTER] = state[_FREE]
-    state[_FREE] = f
-
-
-@kernel
-def above(points, originals, work, digits, facets, planes, f, i):
-    """(whether point i lies strictly above facet f, its distance in some unit of the facet's)."""
-    at = PLANE * f
-    value = (
-        planes[at] * (points[3 * i] - planes[at + 3])
-        + planes[at + 1] * (points[3 * i + 1] - planes[at + 4])
-        + planes[at + 2] * (points[3 * i + 2] - planes[at + 5])
-    )
-    margin = planes[at + _ERROR]
-    if value > margin:
-        return True, value
-    if value < -margin or abs(value) + margin < work[1]:
-        return False, value
-    at = FACET * f
-    a, b, c = np.int64(facets[at]), np.int64(facets[at + 1]), np.int64(facets[at + 2])
-    return orientation(points, originals, work, digits, a, b, c, i, -1) > 0, value
-
-
-@kernel
-def put(points, facets, planes, following, state, f, i, distance):
-    """Put point i into the list of facet f: at its head if it is the farthest, else behind that."""
-    at = FACET * f
-    head = np.int64(facets[at + _POINT])
-    if head < 0:
-        last = state[_LAST]
-        facets[at + _BEFORE] = last
-        facets[at + _AFTER] = -1
-        if last >= 0:
-            facets[FACET * last + _AFTER] = f
-        else:
-            state[_FIRST] = f
-        state[_LAST] = f
-    # Of points equally far, one that is extreme in another direction: a corner of a flat side, not a point on it.
-    far = planes[PLANE * f + _FARTHEST]
-    if head < 0 or distance > far or (distance == far and before(points, head, i, 0)):
-        following[i] = head
-        facets[at + _POINT] = i
-        planes[PLANE * f + _FARTHEST] = distance
-    else:
-        following[i] = following[head]
-        following[head] = i
-
-
-@kernel
-def distribute(points, originals, work, digits, facets, planes, following, owner, state, orphans, n_points, fan, k):
-    """Put each orphan into the list of a facet of the fan it lies strictly above; the others are in the hull."""
+def distribute(hull, n_orphans, k):
+    """Put each orphan into the list of a facet of the fan of k it lies strictly above; the others are in the hull."""
+    owner, fan, state = hull.owner, hull.fan, hull.state
     t = 0
-    for n in range(n_points):
-        i = np.int64(orphans[n])
+    for n in range(n_orphans):
+        i = np.int64(hull.orphans[n])
         owner[i] = -1
         tries = k
         if k > WIDE_FAN:
-            t, certain = locate(points, originals, work, digits, facets, state, fan, k, i)
+            t, certain = locate(hull, k, i)
             if certain:
                 tries = 1
         for _ in range(tries):
-            state[_TESTS] += 1
+            state[TESTS] += 1
             f = np.int64(fan[t])
-            over, distance = above(points, originals, work, digits, facets, planes, f, i)
+            over, distance = above(hull, f, i)
             if over:
-                put(points, facets, planes, following, state, f, i, distance)
+                put(hull, f, i, distance)
                 owner[i] = f
                 break  # the next orphan is tried here first: it stood in the same list
             t += 1
@@ -180,7 +79,7 @@ def distribute(points, originals, work, digits, facets, planes, following, owner
 
 
 @kernel
-def locate(points, originals, work, digits, facets, state, fan, k, i):
+def locate(hull, k, i):
     """(place in the fan, whether point i is above that facet if it is above any).
 
     The half-planes from the line through the fan's apex and one corner of its rim to the other corners
@@ -189,6 +88,7 @@ def locate(points, originals, work, digits, facets, state, fan, k, i):
     facet bounds the cone of the fan there. One in the plane of the first or the last is tried from
     another corner; where three do not settle it, nothing is sure.
     """
+    facets, fan = hull.facets, hull.fan
     apex = np.int64(facets[FACET * fan[0] + 2])
     start = 0
     low = 0
@@ -198,9 +98,9 @@ def locate(points, originals, work, digits, facets, state, fan, k, i):
         high = k
         place = 1
         while high - low > 1:
-            state[_TESTS] += 1
+            hull.state[TESTS] += 1
             corner = np.int64(facets[FACET * fan[(start + place) % k]])
-            sign = orientation(points, originals, work, digits, apex, first, corner, i, -1)
+            sign = orientation(hull.cloud, apex, first, corner, i, -1)
             if sign == 0 and (low == 0 or high == k):
                 break
             if sign <= 0:
@@ -215,15 +115,16 @@ def locate(points, originals, work, digits, facets, state, fan, k, i):
 
 
 @kernel
-def visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim):
+def visible_region(hull, f, i):
     """(facets strictly below point i, edges of their rim), from facet f on, which is one of them.
 
     rim : each edge as the facet beyond it and the edge's place there.
     """
-    state[_NOW] += 1
-    now = state[_NOW]
+    facets, state, region, rim = hull.facets, hull.state, hull.region, hull.rim
+    state[NOW] += 1
+    now = state[NOW]
     region[0] = f
-    facets[FACET * f + _ROUND] = now
+    facets[FACET * f + ROUND] = now
     n_visible = 1
     edges = 0
     k = 0
@@ -231,13 +132,13 @@ def visible_region(points, originals, work, digits, facets, planes, state, f, i,
         at = FACET * region[k]
         k += 1
         for e in range(3):
-            g = np.int64(facets[at + _ACROSS + e])
-            stamp = facets[FACET * g + _ROUND]
+            g = np.int64(facets[at + ACROSS + e])
+            stamp = facets[FACET * g + ROUND]
             if stamp != now and stamp != -now:
-                state[_TESTS] += 1
-                over, _ = above(points, originals, work, digits, facets, planes, g, i)
+                state[TESTS] += 1
+                over, _ = above(hull, g, i)
                 stamp = now if over else -now
-                facets[FACET * g + _ROUND] = stamp
+                facets[FACET * g + ROUND] = stamp
                 if over:
                     region[n_visible] = g
                     n_visible += 1
@@ -252,16 +153,16 @@ def visible_region(points, originals, work, digits, facets, planes, state, f, i,
 
 
 @kernel
-def gather(facets, following, region, n_visible, corner, orphans):
-    """All points in the lists of the region's facets but ``corner``; returns how many."""
+def gather(hull, n_visible, corner):
+    """All points in the lists of the region's facets but ``corner`` become orphans; returns how many."""
     n_gathered = 0
     for k in range(n_visible):
-        i = facets[FACET * region[k] + _POINT]
+        i = hull.facets[FACET * hull.region[k] + POINT]
         while i >= 0:
             if i != corner:
-                orphans[n_gathered] = i
+                hull.orphans[n_gathered] = i
                 n_gathered += 1
-            i = following[i]
+            i = hull.following[i]
     return n_gathered
 
 
@@ -278,38 +179,40 @@ def shuffle(order, count):
 
 
 @kernel
-def next_corner(facets, order, owner, state, count):
+def next_corner(hull, count):
     """(facet, point above it) to go on with; facet −1 where no point is left.
 
     The farthest point of the facet that waits longest. Crowded clouds can make that the wrong
     choice again and again; once too many tests were spent, points are taken in a shuffled order, for
     which the expected number of facets made is below 6 per corner whatever the cloud.
     """
-    if state[_TESTS] <= BUDGET * count:
-        f = state[_FIRST]
-        return f, np.int64(facets[FACET * f + _POINT]) if f >= 0 else -1
-    if state[_CURSOR] < 0:
+    order, owner, state = hull.order, hull.owner, hull.state
+    if state[TESTS] <= BUDGET * count:
+        f = state[FIRST]
+        return f, np.int64(hull.facets[FACET * f + POINT]) if f >= 0 else -1
+    if state[CURSOR] < 0:
         shuffle(order, count)
-        state[_CURSOR] = 0
-    while state[_CURSOR] < count:
-        i = np.int64(order[state[_CURSOR]])
-        state[_CURSOR] += 1
+        state[CURSOR] = 0
+    while state[CURSOR] < count:
+        i = np.int64(order[state[CURSOR]])
+        state[CURSOR] += 1
         if owner[i] >= 0:
             return np.int64(owner[i]), i
     return -1, -1
 
 
 @kernel
-def build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
+def build_fan(hull, i, edges):
     """Facets from every edge of the rim to point i, in its order; False where it is no simple cycle."""
+    facets, rim, fan, starting = hull.facets, hull.rim, hull.fan, hull.starting
     for k in range(edges):
         g = rim[2 * k]
         place = rim[2 * k + 1]
         a = np.int64(facets[FACET * g + (place + 1) % 3])
         b = np.int64(facets[FACET * g + place])
-        f = make_facet(points, facets, planes, state, a, b, i)
-        facets[FACET * f + _ACROSS] = g
-        facets[FACET * g + _ACROSS + place] = f
+        f = make_facet(hull, a, b, i)
+        facets[FACET * f + ACROSS] = g
+        facets[FACET * g + ACROSS + place] = f
         fan[k] = f
         starting[a] = f
     for k in range(edges):
@@ -317,38 +220,41 @@ def build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
         g = starting[facets[FACET * f + 1]]
         if g < 0:
             return False
-        facets[FACET * f + _ACROSS + 1] = g
-        facets[FACET * g + _ACROSS + 2] = f
+        facets[FACET * f + ACROSS + 1] = g
+        facets[FACET * g + ACROSS + 2] = f
     for k in range(edges):
         a = facets[FACET * fan[k]]
         if starting[a] != fan[k]:
             return False
         starting[a] = -1
     for k in range(1, edges):
-        fan[k] = facets[FACET * fan[k - 1] + _ACROSS + 1]
+        fan[k] = facets[FACET * fan[k - 1] + ACROSS + 1]
     return True
 
 
 @kernel
-def first_facets(points, facets, planes, state, corners, fan):
+def first_facets(hull, corners):
+    """The four facets of the first simplex, as a fan."""
+    facets, fan = hull.facets, hull.fan
     a, b, c, d = corners[0], corners[1], corners[2], corners[3]
-    fan[0] = make_facet(points, facets, planes, state, a, b, c)
-    fan[1] = make_facet(points, facets, planes, state, a, d, b)
-    fan[2] = make_facet(points, facets, planes, state, b, d, c)
-    fan[3] = make_facet(points, facets, planes, state, c, d, a)
+    fan[0] = make_facet(hull, a, b, c)
+    fan[1] = make_facet(hull, a, d, b)
+    fan[2] = make_facet(hull, b, d, c)
+    fan[3] = make_facet(hull, c, d, a)
     for k in range(3):
-        facets[_ACROSS + k] = k + 1
-        at = FACET * (k + 1) + _ACROSS
+        facets[ACROSS + k] = k + 1
+        at = FACET * (k + 1) + ACROSS
         facets[at] = (k + 2) % 3 + 1
         facets[at + 1] = (k + 1) % 3 + 1
         facets[at + 2] = 0
 
 
 @kernel
-def write_surface(facets, state, count, marks, surface):
+def write_surface(hull, count, surface):
     """The facets of points of the cloud, and their corners marked; their number."""
+    facets, marks = hull.facets, hull.starting
     n_facets = 0
-    for f in range(state[_USED]):
+    for f in range(hull.state[USED]):
         at = FACET * f
         if facets[at] < 0 or max(facets[at], facets[at + 1], facets[at + 2]) >= count:
             continue
@@ -357,6 +263,43 @@ def write_surface(facets, state, count, marks, surface):
             marks[facets[at + k]] = 1
         n_facets += 1
     return n_facets
+
+
+@kernel
+def begin(hull, count, corners):
+    """The first simplex stands, all other points are orphans; returns how many."""
+    starting, state = hull.starting, hull.state
+    n_orphans = 0
+    for i in range(count):
+        starting[i] = -1
+        hull.owner[i] = -1
+        if i != corners[0] and i != corners[1] and i != corners[2] and i != corners[3]:
+            hull.orphans[n_orphans] = i
+            n_orphans += 1
+    for k in range(count, count + APICES):
+        starting[k] = -1
+    for k in range(CORNERS):
+        state[k] = -1 if k == FREE or k == FIRST or k == LAST or k == CURSOR else 0
+    first_facets(hull, corners)
+    return n_orphans
+
+
+@kernel
+def grow(hull, count, n_orphans):
+    """Add corners until no point is outside; False where the rim of a region is no simple cycle."""
+    edges = 4
+    while True:
+        distribute(hull, n_orphans, edges)
+        f, i = next_corner(hull, count)
+        if f < 0:
+            return True
+        n_visible, edges = visible_region(hull, f, i)
+        n_orphans = gather(hull, n_visible, i)
+        hull.owner[i] = -1
+        for k in range(n_visible):
+            free_facet(hull, np.int64(hull.region[k]))
+        if not build_fan(hull, i, edges):
+            return False
 
 
 @entry(f"int64({', '.join(['int64'] * 17)})")
@@ -368,70 +311,32 @@ def quickhull(
 
     All buffers hold APICES points more than the cloud has. ``starting`` receives the marks: 1 for points
     that are corners of the hull, else 0; of a segment or a point too. −1: the rim of a region was no
-    simple cycle, which exact tests exclude.
+    simple cycle, which exact tests exclude. Buffers come one by one, since C makes them, too.
     """
     capacity = count + APICES
-    points = view_f64(points_at, 3 * capacity)
-    originals = view_f64(originals_at, 3 * capacity)
+    originals, points = view_f64(originals_at, 3 * capacity), view_f64(points_at, 3 * capacity)
     work = view_f64(work_at, WORK)
-    digits = view_i64(digits_at, DIGITS)
-    facets = view_i32(facets_at, 2 * FACET * capacity)
-    planes = view_f64(planes_at, 2 * PLANE * capacity)
-    following = view_i32(following_at, capacity)
-    orphans = view_i32(orphans_at, capacity)
-    starting = view_i32(starting_at, capacity)
-    owner = view_i32(owner_at, capacity)
-    order = view_i32(order_at, capacity)
-    region = view_i32(region_at, 2 * capacity)
-    rim = view_i32(rim_at, 2 * capacity)
-    fan = view_i32(fan_at, capacity)
-    surface = view_i32(surface_at, 6 * capacity)
-    state = view_i64(state_at, STATE)
-    corners = view_i64(state_at + 8 * _CORNERS, 4)
-
-    exponent = survey(originals, points, count, work)
-    dimension = first_simplex(points, originals, work, digits, count, exponent, corners)
+    exponent = np.int64(survey(originals, points, count, work))
+    cloud = CloudView(points, originals, work, view_i64(digits_at, DIGITS), 0, exponent)
+    hull = GrowingHull(
+        cloud, view_i32(facets_at, 2 * FACET * capacity), view_f64(planes_at, 2 * PLANE * capacity),
+        view_i64(state_at, STATE), view_i32(following_at, capacity), view_i32(owner_at, capacity),
+        view_i32(orphans_at, capacity), view_i32(region_at, 2 * capacity), view_i32(rim_at, 2 * capacity),
+        view_i32(fan_at, capacity), view_i32(starting_at, capacity), view_i32(order_at, capacity),
+    )  # fmt: skip
+    corners = view_i64(state_at + 8 * CORNERS, 4)
+    starting = hull.starting
+    dimension = first_simplex(cloud, count, corners)
     for k in range(capacity):
         starting[k] = 0
     if dimension < 2:
         starting[corners[0]] = 1
         starting[corners[1]] = 1
-        state[0] = 0
+        hull.state[0] = 0
         return dimension
-    n_orphans = 0
-    for i in range(count):
-        starting[i] = -1
-        owner[i] = -1
-        if i != corners[0] and i != corners[1] and i != corners[2] and i != corners[3]:
-            orphans[n_orphans] = i
-            n_orphans += 1
-    for k in range(count, capacity):
-        starting[k] = -1
-    state[_FREE] = -1
-    state[_USED] = 0
-    state[_FIRST] = -1
-    state[_LAST] = -1
-    state[_NOW] = 0
-    state[_CURSOR] = -1
-    state[_TESTS] = 0
-    state[_MADE] = 0
-    first_facets(points, facets, planes, state, corners, fan)
-    edges = 4
-    while True:
-        distribute(
-            points, originals, work, digits, facets, planes, following, owner, state, orphans, n_orphans, fan, edges
-        )
-        f, i = next_corner(facets, order, owner, state, count)
-        if f < 0:
-            break
-        n_visible, edges = visible_region(points, originals, work, digits, facets, planes, state, f, i, region, rim)
-        n_orphans = gather(facets, following, region, n_visible, i, orphans)
-        owner[i] = -1
-        for k in range(n_visible):
-            free_facet(facets, state, np.int64(region[k]))
-        if not build_fan(points, facets, planes, state, i, rim, edges, fan, starting):
-            return -1
+    if not grow(hull, count, begin(hull, count, corners)):
+        return -1
     for k in range(capacity):
         starting[k] = 0
-    state[0] = write_surface(facets, state, count, starting, surface)
+    hull.state[0] = write_surface(hull, count, view_i32(surface_at, 6 * capacity))
     return dimension

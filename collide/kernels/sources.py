@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parent.parent
 #: Files of this room that make code of kernels; its others only decide how kernels run.
 COMPILER_SOURCES = tuple(
     f"kernels/{name}.py" for name in
-    ("back_end", "compiled_lanes", "front_end", "lanes", "plain_lanes", "prepared", "vectors", "views")
+    ("back_end", "box_vectors", "compiled_lanes", "front_end", "lanes", "plain_lanes", "prepared", "vectors", "views")
 )  # fmt: skip
 
 

@@ -19,8 +19,8 @@ from collide.kernels.views import data_of, is_view_of
 #: Doubles to a vector.
 LANES = 8
 
-_F64, _I64 = ir.DoubleType(), ir.IntType(64)
-_VALUES, _INDICES = ir.VectorType(_F64, LANES), ir.VectorType(_I64, LANES)
+_F64, I8, I64 = ir.DoubleType(), ir.IntType(8), ir.IntType(64)
+_VALUES, _INDICES = ir.VectorType(_F64, LANES), ir.VectorType(I64, LANES)
 _RESULT = types.Tuple((types.int64, types.float64))  # type: ignore[attr-defined]
 #: Above every index: never wins a tie.
 _NOWHERE = 1 << 62
@@ -72,18 +72,18 @@ def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
 
     def codegen(context, builder, signature, args):
         data = data_of(context, builder, signature.args[0], args[0])
-        values = _products(builder, data, ir.Constant(_I64, 0), args[1], *args[3:6])
-        limit = _splat(builder, args[6], _VALUES)
+        values = _products(builder, data, ir.Constant(I64, 0), args[1], *args[3:6])
+        limit = splat(builder, args[6], _VALUES)
         begin = builder.block
         loop, done = (builder.append_basic_block(name) for name in ("loop", "done"))
         builder.branch(loop)
         builder.position_at_end(loop)
-        at, indices = builder.phi(_I64), builder.phi(_INDICES)
+        at, indices = builder.phi(I64), builder.phi(_INDICES)
         level = builder.zext(builder.fcmp_ordered("<=", values(at), limit), _INDICES)
         more = builder.add(indices, level)
-        following = builder.add(at, ir.Constant(_I64, LANES))
+        following = builder.add(at, ir.Constant(I64, LANES))
         for phi, initial, again in (
-            (at, ir.Constant(_I64, 0), following),
+            (at, ir.Constant(I64, 0), following),
             (indices, ir.Constant(_INDICES, [0] * LANES), more),
         ):
             phi.add_incoming(initial, begin)
@@ -97,7 +97,7 @@ def level_in_blocks(_context, coordinates, stride, count, gx, gy, gz, limit):
 
 def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
     """The products with g of the eight points from an index on, as a function of the index."""
-    g = [_splat(builder, component, _VALUES) for component in (gx, gy, gz)]
+    g = [splat(builder, component, _VALUES) for component in (gx, gy, gz)]
     planes = [builder.gep(data, [at]) for at in (
         start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]  # fmt: skip
 
@@ -123,7 +123,7 @@ def _scan_list(builder: ir.IRBuilder, values, count):
 
 def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
     """A scan of up to so many blocks in each of several ways, and of more in a loop."""
-    last = builder.sub(count, ir.Constant(_I64, LANES))
+    last = builder.sub(count, ir.Constant(I64, LANES))
     done = builder.append_basic_block("done")
     results = []
     for max_blocks, scan in (*ways, (None, _scan_many)):
@@ -131,7 +131,7 @@ def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
         if max_blocks is not None:
             this, following = builder.append_basic_block("few"), builder.append_basic_block("more")
             builder.cbranch(
-                builder.icmp_signed("<=", last, ir.Constant(_I64, (max_blocks - 1) * LANES)), this, following
+                builder.icmp_signed("<=", last, ir.Constant(I64, (max_blocks - 1) * LANES)), this, following
             )
             builder.position_at_end(this)
         results.append((scan(builder, values, last), builder.block))
@@ -139,7 +139,7 @@ def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
         if following is not None:
             builder.position_at_end(following)
     builder.position_at_end(done)
-    value, index = builder.phi(_F64), builder.phi(_I64)
+    value, index = builder.phi(_F64), builder.phi(I64)
     for (one_value, one_index), block in results:
         value.add_incoming(one_value, block)
         index.add_incoming(one_index, block)
@@ -148,7 +148,7 @@ def _scan_by_count(builder: ir.IRBuilder, values, count, ways):
 
 def _scan_one(builder, values, _last):
     """`_scan` of eight."""
-    numbers = values(ir.Constant(_I64, 0))
+    numbers = values(ir.Constant(I64, 0))
     largest = _largest(builder, numbers)
     return largest, _first_holding(builder, numbers, largest)
 
@@ -167,19 +167,19 @@ def _scan_few(blocks):
         def held(numbers):  # a bit a number
             word = None
             for k, block in enumerate(numbers):
-                bits = builder.zext(_holding(builder, block, largest), _I64)
-                bits = builder.shl(bits, ir.Constant(_I64, LANES * k)) if k else bits
+                bits = builder.zext(_holding(builder, block, largest), I64)
+                bits = builder.shl(bits, ir.Constant(I64, LANES * k)) if k else bits
                 word = bits if word is None else builder.or_(word, bits)
             return word
 
-        numbers = [values(least(ir.Constant(_I64, LANES * k), last)) for k in range(blocks)]
+        numbers = [values(least(ir.Constant(I64, LANES * k), last)) for k in range(blocks)]
         largest = _largest(builder, _in_pairs(numbers, lambda a, b: _larger(builder, a, b)))
         place = builder.cttz(held(numbers[:8]), ir.Constant(ir.IntType(1), 0))
         if blocks > 8:
             behind = builder.cttz(held(numbers[8:]), ir.Constant(ir.IntType(1), 0))
-            first = builder.icmp_signed("<", place, ir.Constant(_I64, 8 * LANES))
-            place = builder.select(first, place, builder.add(behind, ir.Constant(_I64, 8 * LANES)))
-        lane = builder.and_(place, ir.Constant(_I64, LANES - 1))
+            first = builder.icmp_signed("<", place, ir.Constant(I64, 8 * LANES))
+            place = builder.select(first, place, builder.add(behind, ir.Constant(I64, 8 * LANES)))
+        lane = builder.and_(place, ir.Constant(I64, LANES - 1))
         return largest, builder.add(least(builder.sub(place, lane), last), lane)
 
     return scan
@@ -202,9 +202,9 @@ def _scan_many(builder, values, last):
     lanes = ir.Constant(_INDICES, list(range(LANES)))
 
     def block(at):
-        return values(at), builder.add(lanes, _splat(builder, at, _INDICES))
+        return values(at), builder.add(lanes, splat(builder, at, _INDICES))
 
-    zero, one_block, two = (ir.Constant(_I64, LANES * blocks) for blocks in range(3))
+    zero, one_block, two = (ir.Constant(I64, LANES * blocks) for blocks in range(3))
     none = (ir.Constant(_VALUES, [float("-inf")] * LANES), ir.Constant(_INDICES, [_NOWHERE] * LANES))
     first = block(zero)
     last_but_one = builder.sub(last, one_block)
@@ -213,7 +213,7 @@ def _scan_many(builder, values, last):
     builder.branch(pairs)
 
     builder.position_at_end(pairs)  # blocks ``at`` and ``at + 8``, before the last two
-    at, even_best, odd_best = builder.phi(_I64), _phi_pair(builder), _phi_pair(builder)
+    at, even_best, odd_best = builder.phi(I64), _phi_pair(builder), _phi_pair(builder)
     odd_next = _later(builder, odd_best, block(at))
     even_next = _later(builder, even_best, block(builder.add(at, one_block)))
     following = builder.add(at, two)
@@ -240,12 +240,12 @@ def _largest(builder, numbers):
 
 def _first_holding(builder, numbers, largest):
     """The first of eight that equals the largest."""
-    return builder.cttz(builder.zext(_holding(builder, numbers, largest), _I64), ir.Constant(ir.IntType(1), 0))
+    return builder.cttz(builder.zext(_holding(builder, numbers, largest), I64), ir.Constant(ir.IntType(1), 0))
 
 
 def _holding(builder, numbers, largest):
     """A bit of eight for each of the numbers that equals the largest."""
-    return builder.bitcast(builder.fcmp_ordered("==", numbers, _splat(builder, largest, _VALUES)), _I8)
+    return builder.bitcast(builder.fcmp_ordered("==", numbers, splat(builder, largest, _VALUES)), I8)
 
 
 def _later(builder, best, indices):
@@ -269,7 +269,7 @@ def _reduced(builder, best):
     The second half waits only for a comparison; carrying pairs down three times takes twice as long.
     """
     largest = _largest(builder, best[0])
-    holds_it = builder.fcmp_ordered("==", best[0], _splat(builder, largest, _VALUES))
+    holds_it = builder.fcmp_ordered("==", best[0], splat(builder, largest, _VALUES))
     indices = builder.select(holds_it, best[1], ir.Constant(_INDICES, [_NOWHERE] * LANES))
     return largest, _halved(builder, indices, lambda a, b: builder.select(builder.icmp_signed("<", b, a), b, a))
 
@@ -303,201 +303,8 @@ def _load(builder, plane, at):
     return builder.load(pointer, align=8)
 
 
-def _splat(builder, scalar, kind):
+def splat(builder, scalar, kind):
+    """A vector of this kind with one number in all lanes."""
     first_lane = builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
     return builder.shuffle_vector(first_lane, ir.Constant(kind, ir.Undefined), mask)
-
-
-# --- eight boxes at once ------------------------------------------------------------------------
-
-_F32, _I8 = ir.FloatType(), ir.IntType(8)
-_FLOATS = ir.VectorType(_F32, LANES)
-
-
-@intrinsic
-def boxes_meeting(_context, boxes, at, frame, probe):
-    """Bits of the boxes that nothing parts from a box; described in `mesh/box_overlap.py`."""
-    return _meeting(boxes, frame, probe, _apart)
-
-
-@intrinsic
-def boxes_meeting_prism(_context, boxes, at, frame, probe):
-    """The same of a triangle, with half-spaces along its edges."""
-
-    def parted(builder, data, frame, probe):
-        yield from _apart(builder, data, frame, probe)
-        yield from _outside(builder, data, probe)
-
-    return _meeting(boxes, frame, probe, parted)
-
-
-def _meeting(boxes, frame, probe, parted):
-    """Signature and code of the bits that none of the vectors ``parted`` yields has set."""
-    _check_floats(boxes, frame, probe)
-    signature = types.int64(boxes, types.int64, frame, probe)
-
-    def codegen(_context, builder, signature, args):
-        data, frame, probe = _float_data(_context, builder, signature, args)
-        apart = None
-        for over in parted(builder, data, frame, probe):
-            apart = over if apart is None else builder.or_(apart, over)
-        mask = builder.bitcast(builder.not_(apart), _I8)
-        return builder.zext(mask, _I64)
-
-    return signature, codegen
-
-
-def _outside(builder, data, probe):
-    """Three vectors of bits: which boxes lie outside the half-space of each edge of the probe."""
-    for edge in (17, 21, 25):
-        out = _element(builder, probe, edge + 3)
-        for j in range(3):
-            entry = _element(builder, probe, edge + j)
-            out = builder.fadd(out, builder.fmul(entry, _eight(builder, data, j)))
-            out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
-        yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
-
-
-def _apart(builder, data, frame, probe):
-    """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
-    centres = [_eight(builder, data, axis) for axis in range(3)]
-    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
-    yield _unused(builder, half_lengths)
-    for axis in range(3):
-        gap = builder.fsub(centres[axis], _element(builder, probe, axis))
-        reach = builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis))
-        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
-    for axis in range(3):
-        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
-        for j in range(3):
-            entry = _element(builder, frame, 3 * axis + j)
-            gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
-            reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
-        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
-    gap, reach = _element(builder, probe, 15), _element(builder, probe, 16)
-    for j in range(3):  # the probe's slab
-        entry = _element(builder, probe, 12 + j)
-        gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
-        reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
-    yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
-
-
-def _check_floats(*views):
-    for view in views:
-        if not is_view_of(view, types.float32):
-            raise TypingError("boxes, frame and probe must be views of floats")
-
-
-def _float_data(context, builder, signature, args):
-    """Pointers to the node's first float, to the frame and to the probe."""
-    data, frame, probe = (
-        data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 3)
-    )  # fmt: skip
-    return builder.gep(data, [args[1]]), frame, probe
-
-
-def _eight(builder, data, row):
-    place = builder.gep(data, [ir.Constant(_I64, LANES * row)])
-    return builder.load(builder.bitcast(place, _FLOATS.as_pointer()), align=4)
-
-
-def _element(builder, data, k):
-    """Float k in all lanes."""
-    return _splat(builder, builder.load(builder.gep(data, [ir.Constant(_I64, k)])), _FLOATS)
-
-
-def _abs(builder, vector):
-    """Without the sign: the bits of −0 and of all others are those of the number, but the first."""
-    words = ir.VectorType(ir.IntType(32), LANES)
-    bits = builder.bitcast(vector, words)
-    return builder.bitcast(builder.and_(bits, ir.Constant(words, [0x7FFFFFFF] * LANES)), _FLOATS)
-
-
-@intrinsic
-def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
-    """Lower bounds of the distances of eight boxes, and how far their centres are; see `mesh/box_overlap.py`."""
-    _check_floats(boxes, slabs, frame, probe, out)
-    signature = types.void(boxes, types.int64, slabs, types.int64, frame, probe, out)
-
-    def codegen(context, builder, signature, args):
-        data, slab, frame, probe, result = (
-            data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4, 5, 6)
-        )
-        best, centres = _gaps(builder, builder.gep(data, [args[1]]), builder.gep(slab, [args[3]]), frame, probe)
-        for row, vector in enumerate((best, centres)):
-            place = builder.gep(result, [ir.Constant(_I64, LANES * row)])
-            builder.store(vector, builder.bitcast(place, _FLOATS.as_pointer()), align=4)
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-def _gaps(builder, data, slab, frame, probe):
-    """Vectors: the largest gap along eight axes; the squared length of the line between centres."""
-    centres = [_eight(builder, data, axis) for axis in range(3)]
-    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
-    entries = [[_element(builder, frame, 3 * i + j) for j in range(3)] for i in range(3)]
-    best = ir.Constant(_FLOATS, [float("-inf")] * LANES)
-
-    def larger(gap):
-        return builder.select(builder.fcmp_ordered(">", gap, best), gap, best)
-
-    for axis in range(3):
-        gap = _abs(builder, builder.fsub(centres[axis], _element(builder, probe, axis)))
-        gap = builder.fsub(gap, builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis)))
-        best = larger(builder.fmul(gap, _element(builder, probe, 12 + axis)))
-    line, across, square = [], None, None
-    for axis in range(3):
-        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
-        for j in range(3):
-            gap = builder.fadd(gap, builder.fmul(entries[axis][j], centres[j]))
-            reach = builder.fadd(reach, builder.fmul(_abs(builder, entries[axis][j]), half_lengths[j]))
-        line.append(gap)
-        size = _abs(builder, gap)
-        best = larger(builder.fmul(builder.fsub(size, reach), _element(builder, probe, 15 + axis)))
-        spread = builder.fmul(size, _element(builder, probe, 9 + axis))
-        across = spread if across is None else builder.fadd(across, spread)
-        spread = builder.fmul(gap, gap)
-        square = spread if square is None else builder.fadd(square, spread)
-    for j in range(3):  # the line between the centres as an axis
-        along = builder.fmul(line[0], entries[0][j])
-        for i in (1, 2):
-            along = builder.fadd(along, builder.fmul(line[i], entries[i][j]))
-        across = builder.fadd(across, builder.fmul(_abs(builder, along), half_lengths[j]))
-    root = builder.call(_square_root(builder.module), [square])
-    gap = builder.fdiv(builder.fsub(square, across), root)
-    best = larger(builder.fmul(gap, _element(builder, probe, 18)))
-    best = larger(_along_direction(builder, centres, half_lengths, slab, probe))
-    nothing = ir.Constant(_FLOATS, [float("inf")] * LANES)
-    return builder.select(_unused(builder, half_lengths), nothing, best), square
-
-
-def _unused(builder, half_lengths):
-    return builder.fcmp_ordered("<", half_lengths[0], ir.Constant(_FLOATS, [0.0] * LANES))
-
-
-def _along_direction(builder, centres, half_lengths, slab, probe):
-    """Gaps along the direction given: what the boxes say, or their slabs and boxes together, whichever is more."""
-    direction = [_element(builder, probe, 19 + j) for j in range(3)]
-    plain = thin = _element(builder, probe, 22)
-    for j in range(3):
-        plain = builder.fadd(plain, builder.fmul(direction[j], centres[j]))
-        plain = builder.fsub(plain, builder.fmul(_abs(builder, direction[j]), half_lengths[j]))
-    normals = [_eight(builder, slab, j) for j in range(3)]
-    share = builder.fmul(direction[0], normals[0])
-    for j in (1, 2):
-        share = builder.fadd(share, builder.fmul(direction[j], normals[j]))
-    thin = builder.fadd(thin, builder.fmul(share, _eight(builder, slab, 3)))
-    thin = builder.fsub(thin, builder.fmul(_abs(builder, share), _eight(builder, slab, 4)))
-    for j in range(3):
-        rest = builder.fsub(direction[j], builder.fmul(share, normals[j]))
-        thin = builder.fadd(thin, builder.fmul(rest, centres[j]))
-        thin = builder.fsub(thin, builder.fmul(_abs(builder, rest), half_lengths[j]))
-    return builder.select(builder.fcmp_ordered(">", thin, plain), thin, plain)
-
-
-def _square_root(module):
-    """LLVM's square root of eight floats, correctly rounded."""
-    name = f"llvm.sqrt.v{LANES}f32"
-    return module.globals.get(name) or ir.Function(module, ir.FunctionType(_FLOATS, [_FLOATS]), name=name)

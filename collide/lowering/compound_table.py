@@ -73,7 +73,7 @@ def _ball_of(packed: PackedConvex) -> tuple[float, float, float, float]:
     return *centre, float(np.sqrt(np.square(packed.points - centre).sum(axis=1).max())) + packed.slop
 
 
-class UnionTable:
+class CompoundTable:
     """Bodies of convex parts in the tables that kernels read, with everything these point to kept alive."""
 
     def __init__(self, bodies: Sequence[LaidOut]):

@@ -1,7 +1,7 @@
 """Parts of posed bodies: where they stand, and balls that hold them.
 
 A body is a run of parts, each with a pose in the body's frame. Where a part stands is the product of two poses: what
-`tables.pose_table` makes of many at once, made here of one when somebody asks about it, the same bits.
+`shape_table.pose_table` makes of many at once, made here of one when somebody asks about it, the same bits.
 """
 
 from __future__ import annotations

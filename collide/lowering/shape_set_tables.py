@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import UnionTable
+from collide.lowering.compound_table import CompoundTable
 from collide.lowering.kinds import kind_of
 from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.lowering.shape_table import ShapeTable
@@ -36,9 +36,9 @@ class ShapeSetTables:
         return ShapeTable([bounding_parts_of(shape)[0][0] for shape in self._shapes])
 
     @cached_property
-    def compounds(self) -> UnionTable:
+    def compounds(self) -> CompoundTable:
         """The same with all parts of each shape, a body a shape."""
-        return UnionTable([layout_of(shape) for shape in self._shapes])
+        return CompoundTable([layout_of(shape) for shape in self._shapes])
 
 
 def tables_of(shape_set: ShapeSet) -> ShapeSetTables:

@@ -1,4 +1,4 @@
 """Triangle meshes: welding, topology, shells, and the bounding volume hierarchy (BVH) that queries traverse.
 
-`bvh.py` holds the tree as kernels read it, `build_bvh.py` makes it, `validate_bvh.py` checks it.
+`bvh.py` holds the tree as kernels read it, `build_bvh.py` makes it.
 """

@@ -112,7 +112,7 @@ if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
 else:
-    from collide.kernels.vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
+    from collide.kernels.box_vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
 #: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.

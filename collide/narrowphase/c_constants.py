@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collide.hull.first_simplex import APICES
-from collide.hull.quickhull import FACET, PLANE, STATE
+from collide.hull.growing_hull import FACET, PLANE, STATE
 from collide.kernels import entry, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.mesh.build_bvh import _DEEPEST_SPLIT as DEEPEST_SPLIT

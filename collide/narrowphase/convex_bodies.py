@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import UnionTable
+from collide.lowering.compound_table import CompoundTable
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_queries
-from collide.narrowphase.composite.composite import UnionPair, run_unions
+from collide.narrowphase.composite.composite import CompoundPair, answer_compound_batch
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -45,7 +45,7 @@ class Question(NamedTuple):
 def convex_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """(n,) bool: whether two bodies of convex parts meet at checked poses (n, 4, 4) or (1, 4, 4)."""
     out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=bool)
-    answer_convex(out, A, B, X_WA, X_WB, Question(True))
+    answer_parts(out, A, B, X_WA, X_WB, Question(True))
     return out
 
 
@@ -54,57 +54,73 @@ def convex_rows(
 ) -> np.ndarray:
     """Rows of `PAIR_DTYPE` of two bodies of convex parts at checked poses (n, 4, 4) or (1, 4, 4)."""
     out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
-    answer_convex(out, A, B, X_WA, X_WB, Question(False, limit, depths))
+    answer_parts(out, A, B, X_WA, X_WB, Question(False, limit, depths))
     return out
 
 
-def answer_convex(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    """Answer pairs of bodies of convex parts; False where a pose is none, and ``out`` is to be zeroed before it is used
-    again.
+def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    """Answer pairs of convex sets in their own frames; False where a pose is none, and ``out`` is to be zeroed before
+    it is used again.
 
     out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
     A, B : two shapes, or shapes `Picked` from one set pose by pose.
     X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
     """
-    if not len(out):
-        return True
+    if convex_queries.distrust_doubles:
+        return _answer_compounds(out, A, B, X_WA, X_WB, question)
+    if isinstance(A, Picked):
+        table, which = tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
+    else:
+        pair, which = prepared_pair(A, B), None
+        table = pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])
     boolean, limit, depths, check, axes = question
-    if _one_part(A) and _one_part(B) and not convex_queries.distrust_doubles:
-        table, which = _shape_table(A, B)
-        return convex_queries.run_poses(
-            out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
-        )
-    compounds, which = _compound_table(A, B)
-    return run_unions(out, compounds, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, depths=depths)
-
-
-def prepare_convex(A: Shape, B: Shape):
-    """The pair made ready for single calls."""
-    if is_single_convex(A) and is_single_convex(B):
-        return convex_queries.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
-    return UnionPair(layout_of(A), layout_of(B))
-
-
-def _one_part(shapes) -> bool:
-    return (
-        bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
-        if isinstance(shapes, Picked)
-        else is_single_convex(shapes)
+    return convex_queries.run_poses(
+        out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
     )
 
 
-def _shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
-    """(table, rows of it pose by pose); None for rows 0 and 1 throughout."""
-    if isinstance(A, Picked):
-        return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
-    prepared = prepared_pair(A, B)
-    return (prepared.table if prepared else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
+def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    """`answer_sets` of bodies of convex parts, one each or several."""
+    if _are_single(A) and _are_single(B):
+        return answer_sets(out, A, B, X_WA, X_WB, question)
+    return _answer_compounds(out, A, B, X_WA, X_WB, question)
 
 
-def _compound_table(A, B) -> tuple[UnionTable, np.ndarray | None]:
+def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    if not len(out):
+        return True
+    compounds, which = _compound_table(A, B)
+    boolean, limit, depths, check, _ = question
+    return answer_compound_batch(
+        out, compounds, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, depths=depths
+    )
+
+
+def prepare_sets(A: Shape, B: Shape) -> convex_queries.SinglePair:
+    """Two convex sets in their own frames made ready for single calls."""
+    return convex_queries.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+
+
+def prepare_parts(A: Shape, B: Shape) -> convex_queries.SinglePair | CompoundPair:
+    """Two bodies of convex parts made ready for single calls."""
+    if is_single_convex(A) and is_single_convex(B):
+        return prepare_sets(A, B)
+    return CompoundPair(layout_of(A), layout_of(B))
+
+
+def _are_single(shapes) -> bool:
+    """Whether a shape, or all that are picked, are one convex set in their own frame."""
+    if isinstance(shapes, Picked):
+        return bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
+    return is_single_convex(shapes)
+
+
+def _compound_table(A, B) -> tuple[CompoundTable, np.ndarray | None]:
     """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).compounds, np.stack([A.rows, B.rows], axis=1)
     prepared = prepared_pair(A, B)
-    return (prepared.unions if isinstance(prepared, UnionPair) else UnionTable([layout_of(A), layout_of(B)])), None
+    if isinstance(prepared, CompoundPair):
+        return prepared.compounds, None
+    return CompoundTable([layout_of(A), layout_of(B)]), None
 

@@ -8,23 +8,17 @@ from threading import local
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.kernels import PLAIN_PYTHON, address_of, code_of
+from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_rows
+from collide.narrowphase.exact.settle_hulls import settle_hulls
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finalize_rows import close_rows
-from collide.narrowphase.pose_batches import (
-    ANSWERED,
-    BAD_POSE,
-    BLOCK,
-    HEADER,
-    POSES_AT,
-    answer_poses,
-)
+from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
 from collide.narrowphase.single_call import collide_single, distance_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 from collide.transforms import SMALLEST
@@ -199,7 +193,8 @@ class _Workspace:
         self.shape_of[BLOCK:] = 1
         buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
         self._header = np.zeros(HEADER, dtype=np.int64)
-        self._header[POSES_AT:ANSWERED] = *map(address_of, buffers), *self.addresses
+        self._header[POSES_AT:SETTLE] = *map(address_of, buffers), *self.addresses
+        self._header[SETTLE:ANSWERED] = code_of(settle_hulls), address_of(self.digits)
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""
@@ -216,10 +211,6 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
-
-
-def single_calls_are_safe() -> bool:
-    return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
 @cache

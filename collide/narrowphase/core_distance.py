@@ -28,7 +28,7 @@ _MISS_OF_WIDTH = 2.0**-10
 _WELL_INSIDE = 2.0**-10
 #: With more vertices than this in two cores, a better seed for EPA than GJK's tetrahedron is worth its support points.
 _MAX_VERTICES_FOR_GJK_SEED = 48
-#: How often EPA begins at most, where there are so wants_cap vertices.
+#: How often EPA begins at most, where there are so many vertices.
 _MAX_STARTS = 4
 
 
@@ -39,7 +39,7 @@ class CoreDistance(NamedTuple):
     lower, upper : bounds of the signed distance.
     shallowest, deepest : proven bracket of the depth by `refine`, or (−∞, ∞).
     nhat : unit vector from A towards B.
-    n_points : of the deciding feature in the workspace.   n_vertices : how wants_cap of its vertex pairs the row names.
+    n_points : of the deciding feature in the workspace.   n_vertices : how many of its vertex pairs the row names.
     iterations : of GJK, plus 65536 times those of EPA.
     """
 
@@ -174,7 +174,7 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
     if not (inside > _WELL_INSIDE and abs(height_over(polytope, facet, foot)) <= slack):
         facet = facet_of(polytope, result.n_facets, facet, foot, slack)
         load_facet(polytope, facet, work.points, work.ids, work.weights, with_ids, foot)
-    # The surface of curved cores keeps a width. Where wants_cap facets are as near, slivers mostly, none need hold the
+    # The surface of curved cores keeps a width. Where many facets are as near, slivers mostly, none need hold the
     # foot. Some facet passes it within the width of the bracket; a thousandth of that is as good as the width allows.
     tolerated = _NEAR_MISS * size
     if curved:

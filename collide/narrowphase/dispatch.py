@@ -1,11 +1,13 @@
-"""THE table: which method answers which pair of shapes. Nothing else decides it.
+"""THE table: which method answers which pair of shapes.
 
 `Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it
 is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the
 file that it names; `pair_queries.py` says with which function each public question goes there.
 
-To add a pair or a kind: a row here, its kind in lowering, its functions in `pair_queries.py`; a test asks for all
-three.
+Kernels cannot read this table. They choose among CLOSED, PLANE, PLANES and CONVEX, the methods of two convex sets, by
+`convex_methods.method`; `tests/narrowphase/test_dispatch.py` holds both to be equal. Nothing else decides it.
+
+To add a kind or a method: CONTRIBUTING.md lists the files, "Adding things".
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from collide.lowering.kinds import Kind
 class Method(Enum):
     """How a pair is answered: (name of its file or files in this room, what happens there)."""
 
-    #: The four first are those of kernels, which find them in `convex_methods.py` by the packed sets.
+    #: The first four are of two convex sets: `convex_methods.py` is the same choice for kernels.
     CLOSED = (
         "capsule_capsule",
         "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment",
@@ -26,8 +28,9 @@ class Method(Enum):
     PLANE = "halfspace_convex", "closed form: one support query against the plane"
     PLANES = "halfspace_halfspace", "two planes: they meet unless exactly opposite"
     CONVEX = (
-        "gjk/gjk",
-        "GJK, EPA where cores overlap; MPR first for small hulls; exact integers where doubles leave a sign open",
+        "convex_convex",
+        "GJK, EPA where cores overlap; MPR first for small hulls; last digits of gaps in double-doubles "
+        + "(gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
     )
     FACETS = "facets/mesh_rows", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"

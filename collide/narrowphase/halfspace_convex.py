@@ -86,9 +86,9 @@ def halfspace_convex(ordered, query, row, work):
     plane = plane_in_world(pair, A)
     nhat = divide(plane.normal, plane.length)
     g = neg(rotate_back(poses, B.pose_at, nhat))
-    k, corner, _ = support(B.kind, B.coords, B.n, B.padded, pair.numbers, B.params_at, B.tree, 0, -1, g)
+    k, corner, _ = support(B.kind, B.coords, B.padded, pair.numbers, B.params_at, B.tree, 0, -1, g)
     if B.tree != 0:
-        k = settled_vertex(B.coords, B.n, B.padded, B.tree, k, g)
+        k = settled_vertex(B.coords, B.padded, B.tree, k, g)
         corner = column_at(B.coords, B.padded, k)
     b = rotate(poses, B.pose_at, corner)
     radius = radius_of(pair, B)

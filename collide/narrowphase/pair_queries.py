@@ -9,10 +9,8 @@ import numpy as np
 
 from collide.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
-from collide.narrowphase.convex_bodies import Question, answer_convex, prepare_convex
-from collide.narrowphase.convex_queries import single_calls_are_safe
+from collide.narrowphase.convex_bodies import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import TABLE, Method
-from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.shapes.shape import Shape
 
 #: Half of the engine, which scenes without meshes never load.
@@ -22,7 +20,7 @@ mesh_pairs = lazy_module("collide.narrowphase.facets.mesh_pairs")
 class Answer(NamedTuple):
     """How a method is asked.
 
-    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_bodies.answer_convex` describes it.
+    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_bodies.answer_sets` describes it.
     prepare : ``prepare(A, B)`` gives the pair ready for single calls, or None where they are batches of one.
     of_one_pair : whether a batch is of one pair of shapes; else shapes may be `Picked` from a set pose by pose.
     """
@@ -49,16 +47,17 @@ def _unprepared(A: Shape, B: Shape) -> None:
     return None
 
 
-_CONVEX = Answer(answer_convex, prepare_convex, False)
+_SETS = Answer(answer_sets, prepare_sets, False)
+_PARTS = Answer(answer_parts, prepare_parts, False)
 _FACETS = Answer(_answer_meshes, _prepare_facets, True)
 _MESHES = Answer(_answer_meshes, _unprepared, True)
 
 ANSWERS: dict[Method, Answer] = {
-    Method.CLOSED: _CONVEX,
-    Method.PLANE: _CONVEX,
-    Method.PLANES: _CONVEX,
-    Method.CONVEX: _CONVEX,
-    Method.PARTS: _CONVEX,
+    Method.CLOSED: _SETS,
+    Method.PLANE: _SETS,
+    Method.PLANES: _SETS,
+    Method.CONVEX: _SETS,
+    Method.PARTS: _PARTS,
     Method.FACETS: _FACETS,
     Method.CURVED: _MESHES,
     Method.HULL: _MESHES,
@@ -70,14 +69,6 @@ ANSWERS: dict[Method, Answer] = {
 _ANSWER_TABLE = tuple(tuple(ANSWERS[method] for method in row) for row in TABLE)
 #: [kind of A, kind of B]: whether a batch is of one pair of shapes.
 OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row in TABLE])
-
-
-def prepare(A, B) -> None:
-    """Make a pair of shapes ready for single calls, and keep it with A; nothing for sequences of shapes."""
-    if isinstance(A, Shape) and isinstance(B, Shape) and prepared_pair(A, B) is None and single_calls_are_safe():
-        pair = answer_of(A, B).prepare(A, B)
-        if pair is not None:
-            keep_prepared(A, B, pair)
 
 
 def answer_of(A: Shape, B: Shape) -> Answer:

@@ -25,13 +25,14 @@ BLOCK = 64
 #: How `answer_poses` ends, besides 0: rows of the block before are open, or a matrix is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
-# Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`Workspace` in
-# `convex_queries.py` and C write them); then how many poses are answered.
+# Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`_Workspace` in
+# `convex_queries.py` and C write them); the same of `settle_hulls`, for single calls; then how many poses are answered.
 (
-    CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, ANSWERED,
-) = range(10)  # fmt: skip
+    CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT,
+    SETTLE, DIGITS_AT, ANSWERED,
+) = range(12)  # fmt: skip
 #: Integers of the header.
-HEADER = 10
+HEADER = 12
 
 
 class PoseBlock(NamedTuple):

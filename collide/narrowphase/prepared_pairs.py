@@ -6,6 +6,7 @@ import itertools
 import weakref
 from typing import Any
 
+from collide.kernels import PLAIN_PYTHON
 from collide.shapes.shape import Shape
 
 #: Numbers of shapes within this process, never used again.
@@ -17,6 +18,10 @@ _MAX_PARTNERS = 512
 def prepared_pair(A: Shape, B: Shape) -> Any:
     """The pair, or None where it has not been prepared. `query.collide` reads the same two attributes by itself."""
     return getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+
+
+def single_calls_are_safe() -> bool:
+    return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Any) -> None:

@@ -4,29 +4,67 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, prepared, view_f64, view_i64
+from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
+from collide.narrowphase.exact.settle_hulls import SIGNATURE
 from collide.narrowphase.finalize_rows import forget_depth
-from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose
-from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, ROW, is_open, view_row
+from collide.narrowphase.pair_workspace import REQUESTS_AT
+from collide.narrowphase.pose_batches import (
+    BLOCK,
+    DIGITS_AT,
+    HEADER,
+    INTEGERS_AT,
+    INTS_AT,
+    NUMBERS_AT,
+    PAIRS_AT,
+    POSES_AT,
+    ROWS_AT,
+    SETTLE,
+    SHAPE_OF_AT,
+    answer_block,
+    block_of,
+    set_pose,
+)
+from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, HIT, HOW, ROW, is_open, is_undecided, view_row
+from collide.results import EXACT
+
+_settle_hulls_at = native_call(SIGNATURE)
 
 
 @kernel
 def _answer(header_at, XA_at, XB_at, boolean, depths, row_at):
-    """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than doubles, or an error has to be raised.
+    """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than this, or an error has to be raised.
 
     header : of `pose_batches.py`.
+    What doubles leave open of two hulls, boxes that touch for example, is settled here, as `exact_stage.settle_rows`
+    does first; a depth that takes more than that is left to the long way.
     """
     block = block_of(header_at)
     good_a = set_pose(block.poses, 0, view_f64(XA_at, 16), True)
     good_b = set_pose(block.poses, BLOCK * POSE, view_f64(XB_at, 16), True)
     if not (good_a and good_b):
         return -1
-    answer_block(block.header, 1, boolean, depths, 0.0 if boolean else math.inf, row_at)
+    limit = 0.0 if boolean else math.inf
+    answer_block(block.header, 1, boolean, depths, limit, row_at)
     row = view_row(row_at)
-    if is_open(row):
-        return -1
-    return int(row.flags[HIT])
+    if is_undecided(row):
+        _settle(block.header, boolean, depths, limit, row_at)
+        if depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0:
+            return -1
+    return -1 if is_open(row) else int(row.flags[HIT])
+
+
+@kernel
+def _settle(header, boolean, depths, limit, row_at):
+    """`settle_hulls` of the first pair of the block."""
+    requests_at = header[INTEGERS_AT] + 8 * REQUESTS_AT
+    _settle_hulls_at(
+        header[SETTLE],
+        (
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
+            depths, limit, row_at, 0, 0, requests_at, header[DIGITS_AT],
+        ),
+    )  # fmt: skip
 
 
 @entry(prepared.BOOLEAN, nogil=False)

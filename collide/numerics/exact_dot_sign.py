@@ -36,11 +36,12 @@ def product_and_bound(a, b, g):
 
 
 @kernel
-def _sign_of_sum(a, b, c, d, e, f):
-    """Sign of the exact sum of six doubles.
+def _sign_of_sum(x, y, z):
+    """Sign of the exact sum of three double-doubles.
 
     Each sweep adds from the left and leaves the errors behind: the sum stays, the rest shrinks by 2⁴⁸.
     """
+    a, b, c, d, e, f = x.high, y.high, z.high, x.low, y.low, z.low
     while True:
         s, a = two_sum(a, b)
         s, b = two_sum(s, c)
@@ -54,8 +55,10 @@ def _sign_of_sum(a, b, c, d, e, f):
 
 
 @kernel
-def _sign_of_long_sum(a, b, c, d, e, f, g, h, i, j, k, m):
-    """The same for twelve."""
+def _sign_of_long_sum(x, y, z, u, v, w):
+    """The same for six."""
+    a, b, c, d, e, f = x.high, y.high, z.high, x.low, y.low, z.low
+    g, h, i, j, k, m = u.high, v.high, w.high, u.low, v.low, w.low
     while True:
         s, a = two_sum(a, b)
         s, b = two_sum(s, c)
@@ -82,13 +85,11 @@ def exact_sign(a, b, g):
     y = two_product(d.y.high, g.y)
     z = two_product(d.z.high, g.z)
     if d.x.low == 0.0 and d.y.low == 0.0 and d.z.low == 0.0:
-        return _sign_of_sum(x.high, y.high, z.high, x.low, y.low, z.low)
+        return _sign_of_sum(x, y, z)
     u = two_product(d.x.low, g.x)
     v = two_product(d.y.low, g.y)
     w = two_product(d.z.low, g.z)
-    return _sign_of_long_sum(
-        x.high, y.high, z.high, x.low, y.low, z.low, u.high, v.high, w.high, u.low, v.low, w.low
-    )
+    return _sign_of_long_sum(x, y, z, u, v, w)
 
 
 @kernel

@@ -5,8 +5,8 @@ double-doubles with an error bound 2⁵¹ times smaller; expansions (Priest; She
 precision floating-point arithmetic and fast robust geometric predicates", 1997), which are exact
 while nothing underflows; integers of many digits (`numerics/digits.py`), which always are.
 
-A point cloud comes twice: ``points``, scaled by a power of two so that the largest coordinate lies in
-[1/2, 1), and ``originals``, unscaled. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
+A point cloud comes twice (`CloudView`): ``scaled`` by a power of two so that the largest coordinate lies in
+[1/2, 1), and ``originals``. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
 scaling, so the last stage reads the originals. ``work`` begins with two numbers about the cloud
 (`survey`), the rest is workspace for sums:
 
@@ -21,6 +21,7 @@ multiply-add.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from collide.kernels import kernel
 from collide.numerics import double_double as dd
@@ -53,6 +54,23 @@ _DD_ERROR = 2.0**-100
 UNDERFLOW = 2.0**-1000
 
 
+class CloudView(NamedTuple):
+    """Points in kernels.
+
+    scaled, originals : three doubles a row; scaled = originals · 2^−exponent.
+    work, digits : workspace of `orientation`.
+    centres : row of centre 0 of a perturbation (`hierarchies/symbolic_perturbation.py`); the others follow it.
+    Where only exact tests are made, centres and exponent are not read.
+    """
+
+    scaled: Any
+    originals: Any
+    work: Any
+    digits: Any
+    centres: int
+    exponent: int
+
+
 @kernel
 def survey(originals, points, count, work):
     """Scale the cloud into ``points`` and note threshold and quantum; returns the exponent divided by."""
@@ -81,7 +99,7 @@ def survey(originals, points, count, work):
 
 
 @kernel
-def orientation(points, originals, work, digits, a, b, c, d, axis):
+def orientation(cloud, a, b, c, d, axis):
     """Sign of (b − a) × (c − a) · (d − a): 1 where d sees a, b, c counter-clockwise, else 0 or −1.
 
     axis : −1; or 0, 1, 2 for that unit vector in place of d − a, with d = a: the orientation of a
@@ -90,6 +108,7 @@ def orientation(points, originals, work, digits, a, b, c, d, axis):
     The corner nearest to d is made the first: the terms of the determinant, and with them the
     margins, shrink with that distance. A cloud that crowds together in one place needs this.
     """
+    points, work = cloud.scaled, cloud.work
     if axis < 0:
         near_a = distance1(points, a, d)
         near_b = distance1(points, b, d)
@@ -105,8 +124,8 @@ def orientation(points, originals, work, digits, a, b, c, d, axis):
         return 1 if value > 0.0 else -1
     if abs(value) + margin < work[1]:
         return 0
-    if work[0] != 0.0 and too_wide(originals, work[0], a, b, c, d):
-        return by_digits(originals, digits, a, b, c, d, axis)
+    if work[0] != 0.0 and too_wide(cloud.originals, work[0], a, b, c, d):
+        return by_digits(cloud.originals, cloud.digits, a, b, c, d, axis)
     # From here on nothing underflows: a sum of terms 0 is truly 0.
     if size == 0.0:
         return 0

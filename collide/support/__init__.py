@@ -2,5 +2,5 @@
 
 `build_support_tree.py` makes a `SupportTree` (`support_tree.py`) with the kernels of `candidate_lists.py`;
 `support_tree_query.py` goes down its candidate lists, `extreme_vertex.py` proves the vertex found or climbs to the
-right one, `validate_support_tree.py` checks a tree.
+right one.
 """

@@ -161,7 +161,7 @@ def candidate_lists(
     coarse vertex i, row coarse[i].
     pairs : ``capacity`` pairs of integers, out. Where more are met nothing is made: call again with more.
     list_starts : (n_coarse + 1), out; the rows of list i end up at pairs[list_starts[i] : list_starts[i + 1]].
-    work : n + capacity + 2·STACK doubles of workspace.
+    work : n + capacity + 2·STACK doubles of workspace.   Arguments are flat: entries are called by address, from C too.
     """  # fmt: skip
     fine = view_i32(fine_at, n_fine)
     starts = view_i32(starts_at, n + 1)

@@ -18,7 +18,7 @@ import numpy as np
 from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.numerics.exact_dot_sign import exact_sign, product_and_bound, scaled_into_range
 from collide.numerics.vec3 import cross, dot, sub, vec3_at
-from collide.support.support_tree import (
+from collide.support.support_tree import (  # fmt: skip
     AT_POINTS,
     AT_RANGE,
     AT_RING,
@@ -27,7 +27,7 @@ from collide.support.support_tree import (
     HEADER,
     LINKS,
     POINTS,
-)  # fmt: skip
+)
 
 #: What is counted: entries scanned, climbing steps, neighbours looked at, exact signs.
 SCANNED, STEPS, LOOKED_AT, EXACT_SIGNS = range(4)

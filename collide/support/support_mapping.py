@@ -20,11 +20,11 @@ from collide.support.support_tree_query import SupportPoint, extreme_vertex_list
 
 
 @kernel(inline=True)
-def support_vertex(coordinates, n, m, g):
+def support_vertex(coordinates, m, g):
     """Id of a vertex with the largest product with g, by a scan over contiguous blocks.
 
     coordinates : 3·m doubles: all x, all y, all z, filled up to a multiple of BLOCK.
-    n, m : number of vertices, and of stored ones. The filling repeats vertex 0 and never wins.
+    m : number of stored ones. The filling repeats vertex 0 and never wins.
     """
     k, _ = farthest(coordinates, 0, m, m, g.x, g.y, g.z)
     return k
@@ -43,14 +43,14 @@ def coarse_vertex(coarse_at, g, list_id):
 
 
 @kernel
-def settled_vertex(coordinates, n, m, tree, vertex, g):
+def settled_vertex(coordinates, m, tree, vertex, g):
     """Id of a vertex that is farthest in direction g for certain, near one that is likely to be."""
     proven = settle_vertex(tree, vertex, g)
-    return proven if proven >= 0 else support_vertex(coordinates, n, m, g)
+    return proven if proven >= 0 else support_vertex(coordinates, m, g)
 
 
 @kernel(inline=True)
-def support(kind, coordinates, n, m, params, at, tree, coarse, list_id, g):
+def support(kind, coordinates, m, params, at, tree, coarse, list_id, g):
     """The `SupportPoint` of a core farthest in direction g; its id is −1 on curved cores.
 
     tree : address of the points' support tree, whose vertex is then not proven (`settled_vertex`), or 0.
@@ -63,7 +63,7 @@ def support(kind, coordinates, n, m, params, at, tree, coarse, list_id, g):
     if tree != 0:
         return extreme_vertex_listed(tree, list_id, g, view_i64(0, 0))
     if kind == POINTS:
-        k = support_vertex(coordinates, n, m, g)
+        k = support_vertex(coordinates, m, g)
         return SupportPoint(np.int64(k), column_at(coordinates, m, k), list_id)
     return SupportPoint(np.int64(-1), curved_support(kind, params, at, g), list_id)
 

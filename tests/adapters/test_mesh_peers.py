@@ -16,7 +16,7 @@ from collide.adapters.peers import exact, exact_meshes
 from collide.adapters.peers.compare import compare
 from collide.adapters.peers.protocol import NO_DEPTH, Question, engine
 from collide.adapters.peers.question import Body as Posed
-from collide.adapters.peers.question import bounds, is_union
+from collide.adapters.peers.question import bounds, is_compound_or_mesh
 from collide.reports import comparing
 from collide.scenes.description import Scene, SceneBody
 
@@ -235,7 +235,7 @@ def test_random_pairs_agree_or_are_judged():
 
 def test_questions_about_meshes():
     low, high = bounds(Posed("ring", RING, pose((1, 2, 3))))
-    assert low.tolist() == [-0.5, 0.5, 2.5] and high.tolist() == [2.5, 3.5, 3.5] and is_union(RING)
+    assert low.tolist() == [-0.5, 0.5, 2.5] and high.tolist() == [2.5, 3.5, 3.5] and is_compound_or_mesh(RING)
     table = ask("exact", [(RING, Halfspace((0, 0, 1), 0), np.eye(4))])
     assert table.rows["unsupported"][0] and "no exact form" in table.reasons[0]
 

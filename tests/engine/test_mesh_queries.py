@@ -13,10 +13,10 @@ import pytest
 from mesh_families import RIGHT_ANGLES, random_pose, soup
 from mesh_shapes import block_ring, box, bumpy_sphere
 from naive_triangles import as_integers, facet_pairs, surface_distance, winding, world_points
+from validate_bvh import validate_mesh_tree
 
 import collide
 from collide.lowering.parts import parts_of
-from collide.mesh.validate_bvh import validate_mesh_tree
 
 TETRAHEDRON = (
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),

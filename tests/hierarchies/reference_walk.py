@@ -1,7 +1,7 @@
 """The walk of Barba and Langerman (section 5) in rational numbers: slow, plain, and checked in every round.
 
 L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra". Nothing here is
-shared with the kernels of `collide.narrowphase.barba_langerman`: hulls, hierarchies, the polar and the small
+shared with the kernels of `collide.hierarchies`: hulls, hierarchies, the polar and the small
 linear programs are made from `Fraction`, and only for bodies of a few dozen vertices.
 
 The words of the paper become numbers so. A plane that takes part in an invariant is ρ(z) for a point z of Q_j

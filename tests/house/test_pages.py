@@ -25,6 +25,14 @@ def test_links_between_pages_lead_somewhere():
                 assert (page.parent / link).exists(), f"{page.name} links to {link}"
 
 
+def test_links_say_where_they_lead():
+    """``[`exact/`](collide/narrowphase/exact)``: what stands there as code is the end of the path."""
+    for page in _pages():
+        for name, link in re.findall(r"\[`([\w/.-]+)`\]\(([^)#\s]+)\)", page.read_text(encoding="utf-8")):
+            if "/" in name or Path(name).suffix in (".py", ".md"):
+                assert f"/{link.rstrip('/')}".endswith("/" + name.rstrip("/")), f"{page.name}: {name} leads to {link}"
+
+
 def test_files_that_pages_name_exist():
     """``examples/01_two_shapes.py``, ``bash tests/run.sh``, ``collide/narrowphase/bounds.py``: as code, so as files."""
     named = re.compile(r"(?:\.ci|adapters|benchmarks|collide|docs|examples|scenes|tests)/[\w./-]*\w")

@@ -431,6 +431,8 @@ assert min(sure) > 20, sure
 def test_plain_python_builds_the_same_hulls():
     """Also where fans are searched by halving, and corners come in a shuffled order."""
     clouds = [*all_clouds(30, 0).values(), *list(all_clouds(100, 0).values())[::2]]
+    flat = np.array([[x, y, x + 2 * y] for x in range(4) for y in range(3)], dtype=float)
+    clouds += [flat, flat[:3], flat[:1]]
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", CHILD],
         input=pickle.dumps(clouds), capture_output=True, check=False, timeout=300,

@@ -22,8 +22,8 @@ def begun(points: np.ndarray) -> tuple[int, list[int], list[float]]:
     n = len(points)
     originals = [*points.ravel().tolist(), *[0.0] * (3 * APICES)]
     scaled, work, digits, corners = [0.0] * len(originals), [0.0] * O.WORK, [0] * O.DIGITS, [0] * 4
-    exponent = O.survey(originals, scaled, n, work)
-    return first_simplex(scaled, originals, work, digits, n, exponent, corners), corners, originals
+    cloud = O.CloudView(scaled, originals, work, digits, 0, O.survey(originals, scaled, n, work))
+    return first_simplex(cloud, n, corners), corners, originals
 
 
 def rank(points) -> int:

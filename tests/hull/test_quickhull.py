@@ -9,6 +9,7 @@ import pytest
 from exact_simplex import determinant, exact
 from naive import rng_of
 
+from collide.hull import growing_hull as G
 from collide.hull import quickhull as Q
 from collide.hull.first_simplex import APICES, first_simplex
 from collide.numerics import orientation as O
@@ -21,32 +22,25 @@ class Growing:
 
     def __init__(self, points: np.ndarray):
         n = self.n = len(points)
-        room = n + APICES
-        self.originals = [*points.ravel().tolist(), *[0.0] * (3 * APICES)]
-        self.points, self.work, self.digits = [0.0] * (3 * room), [0.0] * O.WORK, [0] * O.DIGITS
-        self.facets, self.planes = np.zeros(2 * Q.FACET * room, dtype=np.int64), np.zeros(2 * Q.PLANE * room)
-        self.state = [0] * Q.STATE
-        for k in (Q._FREE, Q._FIRST, Q._LAST, Q._CURSOR):
-            self.state[k] = -1
-        self.fan, self.rim, self.region = [0] * room, [0] * (2 * room), [0] * (2 * room)
-        self.starting, self.owner, self.following = [-1] * room, [-1] * room, [-1] * room
-        self.corners = [0] * 4
-        exponent = O.survey(self.originals, self.points, n, self.work)
-        assert first_simplex(self.points, self.originals, self.work, self.digits, n, exponent, self.corners) == 3
-        Q.first_facets(self.points, self.facets, self.planes, self.state, self.corners, self.fan)
-        self.exact = exact(points)
-        self.n_fan, self.orphans = 4, [i for i in range(n) if i not in self.corners]
-        self.deal()
-
-    def deal(self) -> None:
-        """Orphans into the lists of facets of the fan."""
-        Q.distribute(
-            self.points, self.originals, self.work, self.digits, self.facets, self.planes, self.following, self.owner,
-            self.state, self.orphans, len(self.orphans), self.fan, self.n_fan,
+        capacity = n + APICES
+        originals, scaled = [*points.ravel().tolist(), *[0.0] * (3 * APICES)], [0.0] * (3 * capacity)
+        work, corners = [0.0] * O.WORK, [0] * 4
+        exponent = O.survey(originals, scaled, n, work)
+        self.facets, self.state = np.zeros(2 * G.FACET * capacity, dtype=np.int64), [0] * G.STATE
+        self.owner, self.following = [-1] * capacity, [-1] * capacity
+        self.region, self.rim, self.fan = [0] * capacity, [0] * (2 * capacity), [0] * capacity
+        self.hull = G.GrowingHull(
+            O.CloudView(scaled, originals, work, [0] * O.DIGITS, 0, exponent), self.facets,
+            np.zeros(2 * G.PLANE * capacity), self.state, self.following, self.owner, [0] * capacity, self.region,
+            self.rim, self.fan, [-1] * capacity, [0] * capacity,
         )  # fmt: skip
+        assert first_simplex(self.hull.cloud, n, corners) == 3
+        self.exact = exact(points)
+        Q.distribute(self.hull, Q.begin(self.hull, n, corners), 4)
+        self.n_fan = 4
 
     def alive(self) -> dict[int, list[int]]:
-        rows = self.facets.reshape(-1, Q.FACET)[: self.state[Q._USED]]
+        rows = self.facets.reshape(-1, G.FACET)[: self.state[G.USED]]
         return {f: row[:3].tolist() for f, row in enumerate(rows) if row[0] >= 0}
 
     def is_above(self, i: int, triangle) -> bool:
@@ -55,40 +49,24 @@ class Growing:
 
     def expand(self, i: int) -> None:
         f = self.owner[i]
-        n_region, n_edges = Q.visible_region(
-            self.points,
-            self.originals,
-            self.work,
-            self.digits,
-            self.facets,
-            self.planes,
-            self.state,
-            f,
-            i,
-            self.region,
-            self.rim,
-        )
+        n_region, n_edges = Q.visible_region(self.hull, f, i)
         seen = {g for g, triangle in self.alive().items() if self.is_above(i, triangle)}
         assert set(map(int, self.region[:n_region])) == seen and n_region == len(seen), (
             "a corner sees all facets it is above"
         )
         self.check_rim(n_edges, seen)
-        self.orphans = [0] * self.n
-        n_orphans = Q.gather(self.facets, self.following, self.region, n_region, i, self.orphans)
-        self.orphans = [int(k) for k in self.orphans[:n_orphans]]
+        n_orphans = Q.gather(self.hull, n_region, i)
         self.owner[i] = -1
         for g in self.region[:n_region]:
-            Q.free_facet(self.facets, self.state, int(g))
-        assert Q.build_fan(
-            self.points, self.facets, self.planes, self.state, i, self.rim, n_edges, self.fan, self.starting
-        )
+            G.free_facet(self.hull, int(g))
+        assert Q.build_fan(self.hull, i, n_edges)
         self.n_fan = n_edges
-        self.deal()
+        Q.distribute(self.hull, n_orphans, n_edges)
 
     def check_rim(self, n_edges: int, seen: set[int]) -> None:
         """Every edge between what is seen and what is not, once."""
         found = {(int(self.rim[2 * k]), int(self.rim[2 * k + 1])) for k in range(n_edges)}
-        across = self.facets.reshape(-1, Q.FACET)[:, 3:6]
+        across = self.facets.reshape(-1, G.FACET)[:, 3:6]
         alive = self.alive()
         true = {(g, e) for g in alive if g not in seen for e in range(3) if int(across[g, e]) in seen}
         assert found == true and len(found) == n_edges
@@ -102,14 +80,14 @@ class Growing:
                 edges[triangle[e], triangle[(e + 1) % 3]] = f
         for (i, j), f in edges.items():
             e = alive[f].index(i)
-            assert int(self.facets[Q.FACET * f + 3 + e]) == edges[j, i]
+            assert int(self.facets[G.FACET * f + 3 + e]) == edges[j, i]
         vertices = {v for triangle in alive.values() for v in triangle}
         assert len(edges) == 3 * len(alive) and len(alive) == 2 * len(vertices) - 4
         for i in range(self.n):
             above = [f for f, triangle in alive.items() if self.is_above(i, triangle)]
             assert (self.owner[i] in above) if above else self.owner[i] == -1
         for f in alive:
-            listed, i = [], int(self.facets[Q.FACET * f + Q._POINT])
+            listed, i = [], int(self.facets[G.FACET * f + G.POINT])
             while i >= 0:
                 listed.append(i)
                 i = int(self.following[i])
@@ -159,9 +137,7 @@ def test_wide_fans_are_searched_by_halving():
         fan = [int(f) for f in hull.fan[: hull.n_fan]]
         for i in range(62, len(cloud)):
             above = [k for k, f in enumerate(fan) if hull.is_above(i, hull.alive()[f])]
-            place, sure = Q.locate(
-                hull.points, hull.originals, hull.work, hull.digits, hull.facets, hull.state, hull.fan, len(fan), i
-            )
+            place, sure = Q.locate(hull.hull, len(fan), i)
             assert not sure or not above or place in above, cloud.tolist()
             seen["above" if above else "inside", bool(sure)] += 1
     assert seen["above", True] > 20, seen

@@ -343,7 +343,7 @@ def test_a_start_loads_little():
     told, names = done.stdout.splitlines()
     loaded = {name for name in names.split() if name.startswith("collide.kernels.")}
     assert json.loads(told)["mode"] == "compiled"
-    makers = {"jit", "front_end", "back_end", "views", "vectors", "compiled_lanes", "object_cache"}
+    makers = {"jit", "front_end", "back_end", "views", "vectors", "box_vectors", "compiled_lanes", "object_cache"}
     assert not {f"collide.kernels.{name}" for name in makers} & loaded
     assert not {"asyncio", "email", "multiprocessing", "setuptools", "sqlite3", "unittest"} & set(names.split())
 

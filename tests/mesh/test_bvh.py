@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mesh_families import grid, soup
 from mesh_shapes import bumpy_sphere
+from validate_bvh import validate_mesh_tree
 
 from collide.hierarchies.graded_tree import graded_tree
 from collide.hierarchies.validate_graded_tree import validate_graded_tree
@@ -24,7 +25,6 @@ from collide.mesh.box_overlap import (
 )
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import NODE, NOTHING, SLAB, MeshTree
-from collide.mesh.validate_bvh import validate_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits
 
 

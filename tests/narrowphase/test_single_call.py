@@ -11,7 +11,7 @@ from naive import Case, random_pose, rng_of
 
 import collide
 from collide import query
-from collide.narrowphase import convex_queries as run
+from collide.narrowphase.prepared_pairs import single_calls_are_safe
 
 
 def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
@@ -39,7 +39,7 @@ def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
         rows = collide.distance(box, box, np.eye(4), X[None], signed=False).rows
         assert collide.distance(box, box, np.eye(4), X, signed=False).rows.tobytes() == rows.tobytes()
     assert 0.2 < naive.share(hits) < 0.9
-    if run.single_calls_are_safe():
+    if single_calls_are_safe():
         batches = len(list(combinations_with_replacement(kinds, 2))) + 3
         assert len(long_way) - batches < 0.02 * len(hits), "single gaps go the long way"
 

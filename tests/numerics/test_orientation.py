@@ -28,7 +28,7 @@ class Cloud:
         self.exponent = O.survey(self.originals, self.points, len(self.originals) // 3, self.work)
 
     def side(self, a: int, b: int, c: int, d: int, axis: int = -1) -> int:
-        return O.orientation(self.points, self.originals, self.work, self.digits, a, b, c, d, axis)
+        return O.orientation(O.CloudView(self.points, self.originals, self.work, self.digits, 0, 0), a, b, c, d, axis)
 
 
 def sign(x) -> int:

@@ -9,19 +9,7 @@ import heapq
 from decimal import Decimal
 from typing import NamedTuple
 
-from curved_cells import (
-    Cell,
-    Vector,
-    cross,
-    dot,
-    minus,
-    norm,
-    separation,
-    shell_depth,
-    times,
-    vector,
-    weighted,
-)
+from curved_cells import Cell, Vector, cross, dot, minus, norm, separation, shell_depth, times, vector, weighted
 
 _ZERO, _INF = Decimal(0), Decimal("inf")
 _NEGATIVE = Decimal(-1)

@@ -40,7 +40,7 @@ scan_all = entry("void(int64,int64,int64,int64,int64,int64,int64,int64,int64,int
 
 
 def _support(at_coordinates, n, m, gx, gy, gz):
-    return support_vertex(view_f64(at_coordinates, 3 * m), n, m, Vec3(gx, gy, gz))
+    return support_vertex(view_f64(at_coordinates, 3 * m), m, Vec3(gx, gy, gz))
 
 
 support = entry("int64(int64,int64,int64,float64,float64,float64)")(_support)

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 from hull_families import HULLS, LARGE, bipyramid, directions_for, ellipsoid, hull_of, made, normals_of
+from validate_support_tree import validate_support_tree
 
 from collide.support import build_support_tree as build
 from collide.support.build_support_tree import LONGEST_LIST, build_support_tree, subset_sizes
@@ -16,7 +17,6 @@ from collide.support.extreme_vertex import LOOKED_AT, SCANNED, STEPS
 from collide.support.nested_subsets import nested_order
 from collide.support.support_tree import SupportTree
 from collide.support.support_tree_query import COUNTERS, extreme_vertices
-from collide.support.validate_support_tree import validate_support_tree
 
 pytest.importorskip("scipy.spatial")
 

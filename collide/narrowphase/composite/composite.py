@@ -11,22 +11,13 @@ import numpy as np
 
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
-from collide.lowering.compound_table import BALL_IN_WORLD, LaidOut, UnionTable
+from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_queries as run
-from collide.narrowphase.composite.composite_poses import (
-    BAD_POSE,
-    BLOCK,
-    HEADER,
-    LIST,
-    N_ANSWERED,
-    N_DONE,
-    N_LISTED,
-    SLOTS,
-    answer_unions,
-)
+from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
+from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
 from collide.narrowphase.composite.composite_rows import SCORE, combine_rows
-from collide.narrowphase.composite.single_composite_call import collide_single_union, distance_single_union
+from collide.narrowphase.composite.single_composite_call import collide_single_compound, distance_single_compound
 from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 
@@ -52,7 +43,7 @@ class _Workspace:
         buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, self.scores, self.slots, self.balls
         self._addresses = tuple(map(address_of, buffers))
 
-    def header_of(self, table: UnionTable, scratch: tuple[int, int]) -> np.ndarray:
+    def header_of(self, table: CompoundTable, scratch: tuple[int, int]) -> np.ndarray:
         """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
         return np.array(
             (code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START)
@@ -75,7 +66,7 @@ class _OfThread(local):
     space: _Workspace | None = None
     asked = 0
 
-    def space_for(self, table: UnionTable) -> _Workspace:
+    def space_for(self, table: CompoundTable) -> _Workspace:
         if self.space is None or self.space.capacity < table.max_parts:
             self.space = _Workspace(max(table.max_parts, _CAPACITY))
         return self.space
@@ -87,9 +78,9 @@ of_thread = _OfThread()
 # --- questions ----------------------------------------------------------------------------------
 
 
-def run_unions(
+def answer_compound_batch(
     out: np.ndarray,
-    table: UnionTable,
+    table: CompoundTable,
     which: np.ndarray | None,
     X_WA: np.ndarray,
     X_WB: np.ndarray,
@@ -107,7 +98,7 @@ def run_unions(
     space = of_thread.space_for(table)
     header = space.header_of(table, run.scratch())
     while True:
-        status = answer_unions(
+        status = answer_compounds(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), len(out), boolean, depths and not boolean, limit, check,
             run.distrust_doubles, address_of(out),
@@ -123,7 +114,7 @@ def run_unions(
         )  # fmt: skip
 
 
-class UnionPair:
+class CompoundPair:
     """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has
     them.
 
@@ -134,19 +125,19 @@ class UnionPair:
     _space: _SingleSpace | None = None
 
     def __init__(self, A: LaidOut, B: LaidOut):
-        self.unions = UnionTable([A, B])
-        self.unions.build_trees(None)
+        self.compounds = CompoundTable([A, B])
+        self.compounds.build_trees(None)
         self.collide = self._distance = _long_way
-        if self.unions.counts.prod() > _MAX_AT_ONCE:
+        if self.compounds.counts.prod() > _MAX_AT_ONCE:
             return
-        space = UnionPair._space  # read once: another thread may put a smaller one there
-        if space is None or space.capacity < self.unions.max_parts:
-            space = UnionPair._space = _SingleSpace(self.unions.max_parts)
+        space = CompoundPair._space  # read once: another thread may put a smaller one there
+        if space is None or space.capacity < self.compounds.max_parts:
+            space = CompoundPair._space = _SingleSpace(self.compounds.max_parts)
         self._held = space  # pairs made before have a smaller one
-        header = space.header_of(self.unions, space.scratch)
-        words = np.array([code_of(answer_unions), address_of(space.byte), *header.tolist()])
-        self.collide = prepared_boolean(collide_single_union, words)
-        self._distance = prepared_row(distance_single_union, words)
+        header = space.header_of(self.compounds, space.scratch)
+        words = np.array([code_of(answer_compounds), address_of(space.byte), *header.tolist()])
+        self.collide = prepared_boolean(collide_single_compound, words)
+        self._distance = prepared_row(distance_single_compound, words)
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
-from collide.narrowphase.composite.composite_parts import UnionParts, union_of
+from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
 from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
@@ -22,15 +22,15 @@ from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
 
-def union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
+def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
     """(n,) APART, HIT or OPEN.
 
     open_ones : tell them from hits among convex parts, too, which takes longer.
     """
-    return _states(union_of(A), union_of(B), X_WA, X_WB, open_ones)
+    return _states(compound_parts(A), compound_parts(B), X_WA, X_WB, open_ones)
 
 
-def _states(A: UnionParts, B: UnionParts, X_WA, X_WB, open_ones: bool = False) -> np.ndarray:
+def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = False) -> np.ndarray:
     states = np.full(len(X_WA), APART)
     if A.convex is not None and B.convex is not None:
         met = np.flatnonzero(convex_hits(A.convex, B.convex, X_WA, X_WB))
@@ -48,7 +48,7 @@ def _states(A: UnionParts, B: UnionParts, X_WA, X_WB, open_ones: bool = False) -
     return states
 
 
-def _mesh_pairs(A: UnionParts, B: UnionParts):
+def _mesh_pairs(A: CompoundParts, B: CompoundParts):
     """Numbers of parts of which one at least is a mesh."""
     for i, part_a in enumerate(A.parts):
         for j, part_b in enumerate(B.parts):
@@ -56,7 +56,7 @@ def _mesh_pairs(A: UnionParts, B: UnionParts):
                 yield i, j
 
 
-def _parts_at(A: UnionParts, B: UnionParts, i: int, j: int, X_WA, X_WB):
+def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
     """(part, part, their poses, their poses)."""
     part_a, part_b = A.parts[i], B.parts[j]
     about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
@@ -65,7 +65,7 @@ def _parts_at(A: UnionParts, B: UnionParts, i: int, j: int, X_WA, X_WB):
     return part_a, part_b, part_a.at(X_WA, about), part_b.at(X_WB, about)
 
 
-def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
+def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> np.ndarray:
     """(n, parts of A, parts of B) how far their boxes are apart along an axis, negative where they overlap."""
     a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
     return np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=3)
@@ -74,12 +74,12 @@ def _box_gaps(A: UnionParts, B: UnionParts, X_WA, X_WB) -> np.ndarray:
 # --- rows ---------------------------------------------------------------------------------------
 
 
-def union_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
+def compound_rows(A: Shape, B: Shape, X_WA, X_WB, *, limit: float, depths: bool = True) -> np.ndarray:
     """Rows (PAIR_DTYPE) for poses (n, 4, 4) of two shapes, one at least a union; limit, depths as in `distance`."""
-    return _rows_in_order(union_of(A), union_of(B), X_WA, X_WB, limit, depths)
+    return _rows_in_order(compound_parts(A), compound_parts(B), X_WA, X_WB, limit, depths)
 
 
-def _rows_in_order(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+def _rows_in_order(A: CompoundParts, B: CompoundParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
     """Rows worked out on the same numbers for swapped questions: unions in the order of their contents, equal ones by
     poses."""
     if B.key < A.key:
@@ -95,7 +95,7 @@ def _rows_in_order(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depth
     return rows
 
 
-def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
+def _rows(A: CompoundParts, B: CompoundParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
     planes = is_halfspace(A.shape) or is_halfspace(B.shape)
     asked, left_out = _part_rows(A, B, X_WA, X_WB, limit, planes)
     out = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
@@ -111,7 +111,7 @@ def _rows(A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, depths: bool) 
 
 
 def _part_rows(
-    A: UnionParts, B: UnionParts, X_WA, X_WB, limit: float, planes: bool
+    A: CompoundParts, B: CompoundParts, X_WA, X_WB, limit: float, planes: bool
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """(rows of the pairs of parts that matter, pose by pose; (n,) bool, whether some beyond the limit were left
     out)."""
@@ -174,7 +174,7 @@ def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
 
 
 def _overlap(
-    A: UnionParts, B: UnionParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool
+    A: CompoundParts, B: CompoundParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool
 ) -> None:
     """The row of two unions that meet, or may."""
     row = meeting[0].copy()
@@ -197,7 +197,9 @@ def _overlap(
     out[0] = row
 
 
-def _separating_translation(A: UnionParts, B: UnionParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
+def _separating_translation(
+    A: CompoundParts, B: CompoundParts, X_WA, X_WB, meeting: np.ndarray
+) -> SeparatingTranslation:
     """A translation of B that separates the unions, proven."""
     axes = np.concatenate([np.eye(3), X_WA[:3, :3].T, X_WB[:3, :3].T])
     axes /= np.sqrt(np.square(axes).sum(axis=1))[:, None]

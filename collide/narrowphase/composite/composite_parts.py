@@ -55,7 +55,7 @@ class Part(NamedTuple):
         return bounding_parts_of(self.shape)[0][0]
 
 
-class UnionParts:
+class CompoundParts:
     """A shape as a union: of one part, where it is none.
 
     parts : single bodies in the order of the items.   convex : those that are no meshes as one shape, None where there
@@ -125,9 +125,9 @@ class UnionParts:
 
 
 @kept_with_shape("_union")
-def union_of(shape: Shape) -> UnionParts:
+def compound_parts(shape: Shape) -> CompoundParts:
     """The parts of a shape."""
-    return UnionParts(shape)
+    return CompoundParts(shape)
 
 
 def _leaves(shape: Shape, X: list[list[Fraction]] | None):

@@ -13,12 +13,44 @@ settle them and calls again: the header holds how far things have come.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
-from collide.lowering.compound_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, COUNT, FIRST, PART, TURNED
-from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, place_part, write_terms
-from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW
+from collide.lowering.compound_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, PART
+from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, write_terms
+from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS
+from collide.narrowphase.composite.composite_block import (
+    BODY_BALLS_AT,
+    BODY_NUMBERS,
+    BODY_ROWS,
+    CORE,
+    DOUBLES_AT,
+    FIRST_PAIR,
+    INTEGERS_AT,
+    INTS_AT,
+    IS_HIT,
+    LIST,
+    N_ANSWERED,
+    N_DONE,
+    N_LISTED,
+    N_POSES,
+    NUMBERS_AT,
+    PAIR,
+    PAIRS_AT,
+    POSES_AT,
+    ROWS_AT,
+    SHAPE_OF_AT,
+    SLOT,
+    SLOT_SIZE,
+    STAGE,
+    TERMS_AT,
+    body_of,
+    count_pairs,
+    lay_out,
+    open_block,
+    part_view,
+    row_of_part,
+    terms_at,
+)
 from collide.narrowphase.composite.composite_rows import (
     SCORE,
     PosedParts,
@@ -30,172 +62,20 @@ from collide.narrowphase.composite.composite_rows import (
     separate_bodies,
 )
 from collide.narrowphase.convex_pairs import SIGNATURE
-from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
-from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
 from collide.numerics.vec3 import Vec3, norm1, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
 answer_at = native_call(SIGNATURE)
 
-#: Poses that go through together, and pairs of parts on a list.
-BLOCK = 64
-LIST = ROWS_PER_BATCH
-
-#: What `answer_unions` returns besides 0: rows of the list are undecided, or a pose is no pose.
+#: What `answer_compounds` returns besides 0: rows of the list are undecided, or a pose is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
-# Header: the kernel, tables of shapes, parts and bodies; the workspace, and how many rows of parts it has room for;
-# then how far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to
-# go on with, pairs on the list, and how many pairs of parts were answered in all.
-(
-    CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT,
-    POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, DOUBLES_AT,
-    INTEGERS_AT,
-    CAPACITY,
-    N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
-) = range(25)  # fmt: skip
-HEADER = 25
-
 _LAY_OUT, _NEAREST, _OTHERS = range(3)
-
-# Integers of a slot, which is a pose of the block: both bodies, rows of poses of theirs and where those of their parts
-# begin, whether a boolean is a hit, and the pair of parts answered first, −1 where balls say that none meets.
-_BODIES, _BODY_ROWS, _PART_ROWS, _IS_HIT, _FIRST_PAIR = 0, 2, 4, 6, 7
-_SLOT = 8
-SLOTS = _SLOT * BLOCK
 
 #: Pairs of parts whose balls are farther apart than the best so far by this much of the bodies' size are left out: far
 #: more than brackets of curved parts are wide, so that they have no say in any number of the answer.
 _BRACKET = 2.0**-20
-
-
-class Block(NamedTuple):
-    """Views of a header, and of the workspace that it names."""
-
-    header: Any
-    poses: Any
-    shape_of: Any
-    pairs: Any
-    owners: Any
-    scores: Any
-    slots: Any
-    balls: Any
-
-
-class Body(NamedTuple):
-    """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own."""
-
-    first: int
-    n_parts: int
-    part_rows: int
-    row: int
-
-
-@kernel(inline=True)
-def _open(header_at):
-    header = view_i64(header_at, HEADER)
-    rows = 2 * BLOCK + header[CAPACITY]
-    return Block(
-        header, view_f64(header[POSES_AT], POSE * rows), view_i64(header[SHAPE_OF_AT], rows),
-        view_i64(header[PAIRS_AT], 2 * LIST),
-        view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK),
-        view_i64(header[SLOTS_AT], SLOTS),
-        view_f64(header[BALLS_AT], (2 + header[CAPACITY]) * BALL_IN_WORLD),
-    )  # fmt: skip
-
-
-@kernel(inline=True)
-def _body(block, k, which):
-    """Body A (0) or B (1) of slot k."""
-    slot = _SLOT * k + which
-    number = block.slots[slot + _BODIES]
-    bodies = view_i64(block.header[BODIES_AT], 2 * (number + 1))
-    return Body(
-        bodies[2 * number + FIRST], bodies[2 * number + COUNT], block.slots[slot + _PART_ROWS],
-        block.slots[slot + _BODY_ROWS]
-    )
-
-
-@kernel(inline=True)
-def _n_pairs(block, k):
-    """How many pairs of parts the bodies of slot k make."""
-    return _body(block, k, 0).n_parts * _body(block, k, 1).n_parts
-
-
-@kernel(inline=True)
-def _part_view(block, last):
-    """Rows of all parts before part ``last``."""
-    return view_f64(block.header[PARTS_AT], PART * last)
-
-
-# --- poses --------------------------------------------------------------------------------------
-
-
-@kernel
-def _lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
-    """Fill the block with poses from N_DONE on, as many as have room; False where one is no pose."""
-    header, slots = block.header, block.slots
-    done = header[N_DONE]
-    n_rows = k = 0
-    good = True
-    while k < BLOCK and done + k < n:
-        # A pose of one body that goes with all of the other's is laid out once.
-        once_a = k > 0 and step_a == 0 and which_at == 0
-        once_b = k > 0 and step_b == 0 and which_at == 0
-        slot = _SLOT * k
-        slots[slot + _BODIES] = 0
-        slots[slot + _BODIES + 1] = 1
-        if which_at != 0:
-            which = view_i64(which_at + 16 * (done + k), 2)
-            slots[slot + _BODIES] = which[0]
-            slots[slot + _BODIES + 1] = which[1]
-        rows_a = 0 if once_a else _body(block, k, 0).n_parts
-        rows_b = 0 if once_b else _body(block, k, 1).n_parts
-        if n_rows + rows_a + rows_b > header[CAPACITY]:
-            break
-        slots[slot + _BODY_ROWS] = 0 if once_a else k
-        slots[slot + _BODY_ROWS + 1] = BLOCK + (0 if once_b else k)
-        slots[slot + _PART_ROWS] = slots[_PART_ROWS] if once_a else 2 * BLOCK + n_rows
-        slots[slot + _PART_ROWS + 1] = slots[_PART_ROWS + 1] if once_b else 2 * BLOCK + n_rows + rows_a
-        slots[slot + _IS_HIT] = 0
-        n_rows += rows_a + rows_b
-        for which in range(2):
-            body = _body(block, k, which)
-            if body.n_parts == 1 and _part_view(block, body.first + 1)[PART * body.first + TURNED] == 0.0:
-                slots[slot + _PART_ROWS + which] = body.row  # the part stands where the body does
-                block.shape_of[body.row] = body.first
-        if not once_a:
-            good = set_pose(block.poses, k * POSE, view_f64(XA_at + 8 * step_a * (done + k), 16), check) and good
-        if not once_b:
-            good = (
-                set_pose(block.poses, (BLOCK + k) * POSE, view_f64(XB_at + 8 * step_b * (done + k), 16), check) and good
-            )
-        k += 1
-    for row in range(2 * BLOCK, 2 * BLOCK + n_rows):
-        block.shape_of[row] = -1  # not placed yet
-    header[N_POSES] = k
-    return good
-
-
-@kernel
-def _row_of_part(block, k, which, part, exactly):
-    """Row of poses of a part of a body of slot k, placed when first wanted; exactly: with low parts."""
-    body = _body(block, k, which)
-    row = body.part_rows + part
-    if block.shape_of[row] < 0:
-        number = body.first + part
-        block.shape_of[row] = number
-        place_part(
-            block.poses, POSE * row, POSE * body.row, _part_view(block, number + 1), PART * number,
-            _terms_at(block, row) if exactly else 0,
-        )  # fmt: skip
-    return row
-
-
-@kernel(inline=True)
-def _terms_at(block, row):
-    return block.header[TERMS_AT] + 8 * TERM_ROW * row
 
 
 # --- balls --------------------------------------------------------------------------------------
@@ -211,10 +91,10 @@ def _shift(block, p, q):
 def _place_body_balls(block, k):
     """Balls 0 and 1 become those of all of A and of all of B, as seen from A; returns how large the pair is [m]."""
     poses = block.poses
-    p = POSE * block.slots[_SLOT * k + _BODY_ROWS]
-    q = POSE * block.slots[_SLOT * k + _BODY_ROWS + 1]
-    a = BODY * block.slots[_SLOT * k + _BODIES]
-    b = BODY * block.slots[_SLOT * k + _BODIES + 1]
+    p = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS]
+    q = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS + 1]
+    a = BODY * block.slots[SLOT_SIZE * k + BODY_NUMBERS]
+    b = BODY * block.slots[SLOT_SIZE * k + BODY_NUMBERS + 1]
     numbers = view_f64(block.header[BODY_BALLS_AT], max(a, b) + BODY)
     shift = _shift(block, p, q)
     place_ball(poses, p, numbers, a, 0.0, 0.0, 0.0, block.balls, 0)
@@ -227,15 +107,15 @@ def _place_body_balls(block, k):
 @kernel
 def _place_part_balls(block, k):
     """Balls 2, 3, … become those of the parts of A, then of B."""
-    A = _body(block, k, 0)
-    B = _body(block, k, 1)
+    A = body_of(block, k, 0)
+    B = body_of(block, k, 1)
     _place_balls_of(block, A, 2, Vec3(0.0, 0.0, 0.0))
     _place_balls_of(block, B, 2 + A.n_parts, _shift(block, POSE * A.row, POSE * B.row))
 
 
 @kernel(inline=True)
 def _place_balls_of(block, body, first, shift):
-    parts = _part_view(block, body.first + body.n_parts)
+    parts = part_view(block, body.first + body.n_parts)
     for k in range(body.n_parts):
         numbers_at = PART * (body.first + k) + CENTRE
         ball_at = (first + k) * BALL_IN_WORLD
@@ -251,7 +131,7 @@ def _gap(block, i, j):
 @kernel
 def _nearest_pair(block, k, boolean):
     """The pair of parts of slot k whose balls are nearest; −1 of booleans where no balls meet."""
-    n_pairs = _n_pairs(block, k)
+    n_pairs = count_pairs(block, k)
     if n_pairs == 1 and not boolean:
         return 0
     margin = BALL_MARGIN * _place_body_balls(block, k)
@@ -259,8 +139,8 @@ def _nearest_pair(block, k, boolean):
         return -1
     if n_pairs == 1:
         return 0
-    count_a = _body(block, k, 0).n_parts
-    count_b = _body(block, k, 1).n_parts
+    count_a = body_of(block, k, 0).n_parts
+    count_b = body_of(block, k, 1).n_parts
     _place_part_balls(block, k)
     least = math.inf
     nearest = -1
@@ -281,8 +161,8 @@ def _nearest_pair(block, k, boolean):
 @kernel(inline=True)
 def _list_pair(block, k, count_b, pair, boolean, n_listed):
     """Put a pair of parts of slot k on the list."""
-    block.pairs[2 * n_listed] = _row_of_part(block, k, 0, pair // count_b, not boolean)
-    block.pairs[2 * n_listed + 1] = _row_of_part(block, k, 1, pair % count_b, not boolean)
+    block.pairs[2 * n_listed] = row_of_part(block, k, 0, pair // count_b, not boolean)
+    block.pairs[2 * n_listed + 1] = row_of_part(block, k, 1, pair % count_b, not boolean)
     block.owners[2 * n_listed] = k
     block.owners[2 * n_listed + 1] = pair
 
@@ -293,9 +173,9 @@ def _list_nearest(block, boolean, every):
     n_listed = 0
     for k in range(block.header[N_POSES]):
         pair = 0 if every else _nearest_pair(block, k, boolean)
-        block.slots[_SLOT * k + _FIRST_PAIR] = pair
+        block.slots[SLOT_SIZE * k + FIRST_PAIR] = pair
         if pair >= 0:
-            _list_pair(block, k, _body(block, k, 1).n_parts, pair, boolean, n_listed)
+            _list_pair(block, k, body_of(block, k, 1).n_parts, pair, boolean, n_listed)
             n_listed += 1
     block.header[SLOT] = block.header[N_POSES]
     return n_listed
@@ -309,9 +189,9 @@ def _list_others(block, boolean, depths, every):
     n_listed = 0
     while header[SLOT] < header[N_POSES] and n_listed < LIST:
         k = header[SLOT]
-        n_pairs = _n_pairs(block, k)
+        n_pairs = count_pairs(block, k)
         met = not boolean and not depths and first_upper_of(block.scores, SCORE * k) <= 0.0
-        if n_pairs > 1 and not met and slots[_SLOT * k + _FIRST_PAIR] >= 0 and slots[_SLOT * k + _IS_HIT] == 0:
+        if n_pairs > 1 and not met and slots[SLOT_SIZE * k + FIRST_PAIR] >= 0 and slots[SLOT_SIZE * k + IS_HIT] == 0:
             n_listed = _list_others_of(block, k, boolean, every, n_listed)
         else:
             header[PAIR] = n_pairs
@@ -325,8 +205,8 @@ def _list_others(block, boolean, depths, every):
 def _list_others_of(block, k, boolean, every, n_listed):
     """The same of one pose, from PAIR on; PAIR becomes the one to go on with."""
     header = block.header
-    count_a = _body(block, k, 0).n_parts
-    count_b = _body(block, k, 1).n_parts
+    count_a = body_of(block, k, 0).n_parts
+    count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     _place_part_balls(block, k)
     reach = BALL_MARGIN * size
@@ -334,7 +214,7 @@ def _list_others_of(block, k, boolean, every, n_listed):
         reach = math.inf
     elif not boolean:
         reach += max(first_upper_of(block.scores, SCORE * k), 0.0) + _BRACKET * size
-    first_pair = block.slots[_SLOT * k + _FIRST_PAIR]
+    first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     start = header[PAIR]
     for i in range(start // count_b, count_a):
         if count_b > 1 and _gap(block, 2 + i, 1) > reach:
@@ -378,11 +258,11 @@ def _answer_list(header, boolean, depths, limit):
 def _write_terms_of_list(block):
     """Write the exact terms of all poses on the list, which only the exact stage reads."""
     for k in range(2 * block.header[N_LISTED]):
-        body = _body(block, block.owners[k - k % 2], k % 2)
+        body = body_of(block, block.owners[k - k % 2], k % 2)
         row = block.pairs[k]
         if block.poses[POSE * row + POSE_TERMS] >= 0.0:
             part = body.first + row - body.part_rows
-            write_terms(block.poses, POSE * body.row, _part_view(block, part + 1), PART * part, _terms_at(block, row))
+            write_terms(block.poses, POSE * body.row, part_view(block, part + 1), PART * part, terms_at(block, row))
 
 
 # --- answers ------------------------------------------------------------------------------------
@@ -397,13 +277,13 @@ def _take_rows(block, boolean, out_at):
         k = block.owners[2 * listed]
         if boolean:
             if view_u8(row_at, ROW)[HIT] != 0:
-                block.slots[_SLOT * k + _IS_HIT] = 1
+                block.slots[SLOT_SIZE * k + IS_HIT] = 1
             continue
         out = out_at + ROW * (header[N_DONE] + k)
-        if _n_pairs(block, k) == 1:
+        if count_pairs(block, k) == 1:
             copy_row(row_at, out)
             continue
-        count_b = _body(block, k, 1).n_parts
+        count_b = body_of(block, k, 1).n_parts
         pair = block.owners[2 * listed + 1]
         words = view_i32(row_at, ROW // 4)
         words[PART_A] = pair // count_b
@@ -418,8 +298,8 @@ def _close_block(block, boolean, depths, out_at):
     header = block.header
     for k in range(header[N_POSES]):
         if boolean:
-            view_u8(out_at + header[N_DONE] + k, 1)[0] = block.slots[_SLOT * k + _IS_HIT]
-        elif _n_pairs(block, k) > 1:
+            view_u8(out_at + header[N_DONE] + k, 1)[0] = block.slots[SLOT_SIZE * k + IS_HIT]
+        elif count_pairs(block, k) > 1:
             row_at = out_at + ROW * (header[N_DONE] + k)
             if close_score(block.scores, SCORE * k, row_at) and depths:
                 _separate_bodies_of(block, k, row_at)
@@ -428,12 +308,12 @@ def _close_block(block, boolean, depths, out_at):
 @kernel
 def _separate_bodies_of(block, k, row_at):
     """Have the depth of two bodies that overlap written, from all their parts."""
-    A = _body(block, k, 0)
-    B = _body(block, k, 1)
+    A = body_of(block, k, 0)
+    B = body_of(block, k, 1)
     for part in range(A.n_parts):
-        _row_of_part(block, k, 0, part, False)
+        row_of_part(block, k, 0, part, False)
     for part in range(B.n_parts):
-        _row_of_part(block, k, 1, part, False)
+        row_of_part(block, k, 1, part, False)
     last = max(A.part_rows + A.n_parts, B.part_rows + B.n_parts)
     n_shapes = max(A.first + A.n_parts, B.first + B.n_parts)
     parts = PosedParts(
@@ -443,14 +323,16 @@ def _separate_bodies_of(block, k, row_at):
     separate_bodies(block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts)
 
 
-#: How `answer_unions` is called.
-UNIONS_SIGNATURE = (
+#: How `answer_compounds` is called.
+COMPOUNDS_SIGNATURE = (
     "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, boolean, boolean, int64)"
 )
 
 
-@entry(UNIONS_SIGNATURE)
-def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean, depths, limit, check, every, out_at):
+@entry(COMPOUNDS_SIGNATURE)
+def answer_compounds(
+    header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean, depths, limit, check, every, out_at
+):
     """Answer n pairs of poses of two bodies, or of n pairs of bodies; 0, OPEN or BAD_POSE.
 
     header : HEADER integers. Where it stops OPEN, the first [N_LISTED] rows and pairs of the list are for the exact
@@ -460,8 +342,9 @@ def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean,
     limit : larger distances are not looked for [m].   check : refuse matrices that are no rotation.
     every : leave nothing to balls, and stop after every list: tests want the exact stage to have it all.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed.
+    Arguments are flat: single calls come by address.
     """
-    block = _open(header_at)
+    block = open_block(header_at)
     header = block.header
     while True:
         if header[N_LISTED] > 0:
@@ -469,7 +352,7 @@ def answer_unions(header_at, which_at, XA_at, step_a, XB_at, step_b, n, boolean,
         if header[STAGE] == _LAY_OUT:
             if header[N_DONE] >= n:
                 return 0
-            if not _lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
+            if not lay_out(block, which_at, XA_at, step_a, XB_at, step_b, n, check):
                 return BAD_POSE
             for k in range(0 if boolean else header[N_POSES]):
                 begin_score(block.scores, SCORE * k)

@@ -252,7 +252,7 @@ def _extent(parts, first, n_parts, origin, n):
             return math.inf  # bounded in one direction only, which a rounded normal never is
         g = rotate_back(parts.poses, body.pose_at, n)
         farthest_point = support(
-            body.kind, body.coords, body.n, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g
+            body.kind, body.coords, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g
         ).point
         shift = dot(sub(vec3_at(parts.poses, body.pose_at + 9), origin), n)
         farthest = max(farthest, dot(farthest_point, g) + shift + radius_of(parts, body))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, native_call, prepared, view_i64, view_u8
-from collide.narrowphase.composite.composite_poses import HEADER, N_DONE, UNIONS_SIGNATURE
+from collide.narrowphase.composite.composite_block import HEADER, N_DONE
+from collide.narrowphase.composite.composite_poses import COMPOUNDS_SIGNATURE
 from collide.narrowphase.finalize_rows import forget_depth
 from collide.narrowphase.rows import BODY_B, DISTANCE, view_row
 
-answer_unions_at = native_call(UNIONS_SIGNATURE)
+answer_compounds_at = native_call(COMPOUNDS_SIGNATURE)
 
-# Header: the kernel, where a boolean goes, then the header of `composite_poses.py`.
+# Header: the kernel, where a boolean goes, then the header of `composite_block.py`.
 _KERNEL, _BYTE_AT, _HEADER = range(3)
 SINGLE_HEADER = _HEADER + HEADER
 
@@ -22,7 +23,7 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, out_at):
     header = view_i64(header_at, SINGLE_HEADER)
     for k in range(_HEADER + N_DONE, SINGLE_HEADER):
         header[k] = 0
-    status = answer_unions_at(
+    status = answer_compounds_at(
         header[_KERNEL],
         (
             header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, 0.0 if boolean else math.inf, True,
@@ -34,7 +35,7 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, out_at):
 
 
 @entry(prepared.BOOLEAN, nogil=False)
-def collide_single_union(header_at, XA_at, XB_at):
+def collide_single_compound(header_at, XA_at, XB_at):
     """Whether the pair meets, 0 or 1; −1 where the caller has to ask as of a batch.
 
     All threads share its workspace: it keeps Python's lock.
@@ -46,7 +47,7 @@ def collide_single_union(header_at, XA_at, XB_at):
 
 
 @entry(prepared.ROW, nogil=False)
-def distance_single_union(header_at, XA_at, XB_at, row_at, depths):
+def distance_single_compound(header_at, XA_at, XB_at, row_at, depths):
     """ROW zero bytes become the pair's row, without a depth unless those are wanted; −1 as there, else 0. −1, too,
     where the depth is infinite."""
     if not _answer(header_at, XA_at, XB_at, False, depths, row_at):

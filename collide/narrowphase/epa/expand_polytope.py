@@ -147,13 +147,9 @@ def epa(pair, surface, seed, goal):
     points, ids, facets, clearances = surface.points, surface.ids, surface.facets, surface.clearances
     overlap_suffices, error = goal.overlap_suffices, goal.error
     extremes = _put_seed(pair, points, ids, seed, goal)
-    nhat = extremes.nhat
     if extremes.rank < 3:
-        up = _extent(pair, points, ids, nhat)
-        down = _extent(pair, points, ids, neg(nhat))
-        if down < up:
-            return EpaResult(FLAT, down, -1.0, neg(nhat), -1, extremes.rank + 1, 0)
-        return EpaResult(FLAT, up, -1.0, nhat, -1, extremes.rank + 1, 0)
+        return _flat_result(pair, points, ids, extremes)
+    nhat = extremes.nhat
     enough = ample(goal.size, error)
     set_tetrahedron(surface, error, enough)
     met = 0
@@ -188,7 +184,7 @@ def epa(pair, surface, seed, goal):
         if met & _vertex_fingerprint(ids, n_vertices) != 0 and _is_corner(ids, facets, f, n_vertices):
             break
         surface.starts[2 * n_vertices + 1] = -1
-        seen = find_patch(surface, f, n_vertices, 0.0625 * error)
+        seen = find_patch(surface, surface, f, point_at(points, number(n_vertices)), 0.0625 * error)
         # The nearest of what stays, while the cone's planes are worked out: neither has to wait for the other.
         nearest = least(surface.reaches, max(n_facets, 8))
         reach = surface.reaches[nearest]
@@ -206,6 +202,15 @@ def epa(pair, surface, seed, goal):
     if has_trees(pair):
         depth = _extent(pair, points, ids, nhat)
     return EpaResult(EXPANDED, depth, clearance, nhat, facet, n_vertices, n_facets)
+
+
+@kernel(inline=True)
+def _flat_result(pair, points, ids, extremes):
+    """The `EpaResult` of a flat A ⊖ B: across it, to the nearer side."""
+    up = _extent(pair, points, ids, extremes.nhat)
+    down = _extent(pair, points, ids, neg(extremes.nhat))
+    nhat = neg(extremes.nhat) if down < up else extremes.nhat
+    return EpaResult(FLAT, min(up, down), -1.0, nhat, -1, extremes.rank + 1, 0)
 
 
 @kernel

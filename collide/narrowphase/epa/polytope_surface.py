@@ -8,6 +8,7 @@ facets are in use.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
@@ -242,38 +243,54 @@ class Patch(NamedTuple):
     n_edges: int
 
 
-@kernel(inline=True)
-def find_patch(surface, f, apex, slack):
-    """The `Patch` that the apex sees, spreading from f over shared edges; marks it as seen.
+def make_find_patch(is_behind: Callable) -> Callable:
+    """A kernel ``find_patch(planes, surface, f, apex, slack)``: the `Patch` that the apex sees, spreading from facet f
+    over shared edges; marks it as seen.
+
+    is_behind(planes, h, apex, margin) : whether facet h has the apex beyond its plane by more than the margin, which
+        is the slack, or ∞ where the border is full. planes, apex : as the caller hands them in.
 
     ``border`` gets the half-edges of facets that stay, ``patch`` the facets, whose reach becomes ∞. No branch depends
     on what is seen: a mispredicted one costs more than an edge.
     """
-    facets, planes, border, patch = surface.facets, surface.planes, surface.border, surface.patch
-    p = point_at(surface.points, number(apex))
-    facets[FACET * f + MARKS] |= SEEN
-    patch[0] = f
-    n_facets = 1
-    visited = 0
-    n_edges = 0
-    while visited < n_facets:
-        g = number(patch[visited])
-        surface.reaches[g] = math.inf
-        first = FACET * g + TWIN
-        visited += 1
-        margin = slack if n_facets < WIDEST_BORDER - 4 else math.inf
-        for e in range(3):
-            t = number(facets[first + e])
-            h = t // FACET
-            marks = facets[FACET * h + MARKS]
-            fresh = 1 - (marks & SEEN)
-            seen = fresh if dot(normal_of(surface, h), p) > planes[PLANE * h + 3] + margin else 0
-            facets[FACET * h + MARKS] = marks | seen
-            patch[number(n_facets)] = h
-            n_facets += seen
-            border[number(n_edges)] = t
-            n_edges += fresh - seen
-    return Patch(n_facets, n_edges)
+
+    @kernel(inline=True)
+    def find_patch(planes, surface, f, apex, slack):
+        facets, border, patch = surface.facets, surface.border, surface.patch
+        facets[FACET * f + MARKS] |= SEEN
+        patch[0] = f
+        n_facets = 1
+        visited = 0
+        n_edges = 0
+        while visited < n_facets:
+            g = number(patch[visited])
+            surface.reaches[g] = math.inf
+            first = FACET * g + TWIN
+            visited += 1
+            margin = slack if n_facets < WIDEST_BORDER - 4 else math.inf
+            for e in range(3):
+                t = number(facets[first + e])
+                h = t // FACET
+                marks = facets[FACET * h + MARKS]
+                fresh = 1 - (marks & SEEN)
+                seen = fresh if is_behind(planes, h, apex, margin) else 0
+                facets[FACET * h + MARKS] = marks | seen
+                patch[number(n_facets)] = h
+                n_facets += seen
+                border[number(n_edges)] = t
+                n_edges += fresh - seen
+        return Patch(n_facets, n_edges)
+
+    return find_patch
+
+
+@kernel(inline=True)
+def _is_behind(surface, h, apex, margin):
+    """In doubles; apex : the point."""
+    return dot(normal_of(surface, h), apex) > surface.planes[PLANE * h + 3] + margin
+
+
+find_patch = make_find_patch(_is_behind)
 
 
 class Cone(NamedTuple):

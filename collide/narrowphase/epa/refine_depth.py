@@ -18,12 +18,11 @@ from collide.narrowphase.epa.polytope_surface import (
     PROVEN,
     SEEN,
     TWIN,
-    WIDEST_BORDER,
-    Patch,
     expand,
     fine_surface_at,
     flip,
     following,
+    make_find_patch,
     may_expand,
 )
 from collide.narrowphase.exact.depth_requests import MAX_TIED_FACETS
@@ -89,7 +88,7 @@ class _Fine(NamedTuple):
     scale: float
 
 
-@kernel(inline=True)
+@kernel
 def _load(fine, v):
     """Compute the fine point of a vertex, if it is not there."""
     if fine.known[v] == 0:
@@ -98,14 +97,13 @@ def _load(fine, v):
         fine.known[v] = 1
 
 
-@kernel(inline=True)
+@kernel
 def _load_plane(fine, f):
     """The fine normal of facet f, as long as twice its area, into ``direction``; returns its corners."""
     facets = fine.surface.facets
+    for k in range(3):
+        _load(fine, facets[FACET * f + k])
     a, b, c = facets[FACET * f], facets[FACET * f + 1], facets[FACET * f + 2]
-    _load(fine, a)
-    _load(fine, b)
-    _load(fine, c)
     set_plane(fine.points, a, b, c, fine.direction)
     return a, b, c
 
@@ -182,39 +180,16 @@ def _flip_to(surface, f, v, error):
 
 
 @kernel
-def _find_patch(fine, f, apex):
-    """`polytope_surface.find_patch` by the fine planes."""
-    facets, border, patch = fine.surface.facets, fine.surface.border, fine.surface.patch
-    _load(fine, apex)
-    facets[FACET * f + MARKS] |= SEEN
-    patch[0] = f
-    n_facets = 1
-    visited = 0
-    n_edges = 0
-    while visited < n_facets:
-        g = patch[visited]
-        visited += 1
-        for e in range(3):
-            t = facets[FACET * g + TWIN + e]
-            h = t // FACET
-            if facets[FACET * h + MARKS] & SEEN:
-                continue
-            if n_facets < WIDEST_BORDER - 2 and _is_seen(fine, h, apex):
-                facets[FACET * h + MARKS] |= SEEN
-                patch[n_facets] = h
-                n_facets += 1
-            else:
-                border[n_edges] = t
-                n_edges += 1
-    return Patch(n_facets, n_edges)
-
-
-@kernel
-def _is_seen(fine, h, apex):
-    """Whether a vertex lies beyond the fine plane of facet h."""
+def _is_behind(fine, h, apex, margin):
+    """Whether a vertex lies beyond the fine plane of facet h, which is not yet marked."""
+    if fine.surface.facets[FACET * h + MARKS] & SEEN:
+        return False
     a, _, _ = _load_plane(fine, h)
     height = dd.sub(fine_height(fine.points, apex, fine.direction), fine_height(fine.points, a, fine.direction))
-    return height.high > 4.0 * fine.error * fine_length(fine.direction).high
+    return height.high > 4.0 * fine.error * fine_length(fine.direction).high + margin
+
+
+_find_patch = make_find_patch(_is_behind)
 
 
 @kernel(inline=True)
@@ -263,7 +238,7 @@ def _fine(pair, terms_at, work, surface, size, slop):
     )
 
 
-@kernel
+@kernel(cold=True)
 def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, error):
     """Grow the surface that `epa` returned until its nearest facet is final to the last digits; returns a
     `RefinedDepth`.
@@ -333,7 +308,9 @@ def _add_vertex(fine, f, apex, n_facets, i, j, error):
     place_vertices(fine.pair, surface.points, surface.ids, apex, i, j)
     fine.known[apex] = 0
     surface.starts[2 * apex + 1] = -1
-    cone = expand(surface, f, apex, n_facets, _find_patch(fine, f, apex), math.inf, error, math.inf)
+    _load(fine, apex)
+    seen = _find_patch(fine, surface, f, apex, 0.0)
+    cone = expand(surface, f, apex, n_facets, seen, math.inf, error, math.inf)
     for g in range(cone.n_facets):
         if apex == surface.facets[FACET * g + 2]:  # the apex stands last in what was made for it
             _invalidate(fine, g, error)

@@ -16,23 +16,13 @@ from collide.results import EXACT
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)")
 def exact_depth(
-    ints_at,
-    numbers_at,
-    poses_at,
-    shape_of_at,
-    pairs_at,
-    wanted_at,
-    n_pairs,
-    limit,
-    rows_at,
-    terms_at,
-    n_terms,
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, wanted_at, n_pairs, limit, rows_at, terms_at, n_terms,
     digits_at,
-):
-    """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it plane.
+):  # fmt: skip
+    """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it found.
 
-    wanted : a byte a pair, whether its depth is wanted.   Other arguments as there. Rows are left as they are where the
-    hulls are too large (`all_planes.py`).
+    wanted : a byte a pair, whether its depth is wanted.   Other arguments as there, and flat as there. Rows are left as
+    they are where the hulls are too large (`all_planes.py`).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     wanted = view_u8(wanted_at, n_pairs)

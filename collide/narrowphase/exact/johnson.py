@@ -8,16 +8,7 @@ from collide.kernels import kernel
 from collide.narrowphase.exact.exact_directions import set_normal
 from collide.narrowphase.exact.exact_workspace import delta_at, direction_at, gram_at, point_at, scratch_at
 from collide.numerics import double_double as dd
-from collide.numerics.digits import (
-    BITS,
-    add_double,
-    add_number,
-    add_product,
-    as_double_double,
-    carry,
-    copy,
-    set_zero,
-)
+from collide.numerics.digits import BITS, add_double, add_number, add_product, as_double_double, carry, copy, set_zero
 from collide.numerics.double_double import DD, ScaledDD
 from collide.numerics.error_free import two_sum
 

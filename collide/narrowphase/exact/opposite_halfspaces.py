@@ -55,7 +55,7 @@ def settle_opposite_halfspaces(
 
 def _settle(row: np.ndarray, A: _HalfSpace, B: _HalfSpace) -> None:
     row["how"], row["certified"], row["hit"], row["exact"] = EXACT, True, True, 1
-    if any(cross(A.n, B.n)):
+    if any(cross(A.n, B.n)) or inner(A.n, B.n) > 0:
         return  # they meet, and the overlap has no end: as the kernel left it
     # B.n = −c A.n: B is {x : A.n·x ≥ −b/c}, so the gap is (−b/c − a)/|A.n|.
     square = inner(A.n, A.n)

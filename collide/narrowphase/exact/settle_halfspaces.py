@@ -12,17 +12,7 @@ from collide.narrowphase.exact.settle_hulls import keep_proven_sign
 from collide.narrowphase.exact.settle_space import bracket_of_gap, settle_space
 from collide.narrowphase.halfspace_convex import reach_of_plane
 from collide.narrowphase.posed_pair import ordered_pair
-from collide.narrowphase.rows import (
-    EXACT_ROUNDS,
-    HIT,
-    HOW,
-    LOWER,
-    ROW,
-    UPPER,
-    view_row,
-    write_verdict,
-    write_vertices,
-)
+from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, view_row, write_verdict, write_vertices
 from collide.results import EXACT, UNDECIDED
 
 
@@ -30,8 +20,10 @@ from collide.results import EXACT, UNDECIDED
 def settle_halfspaces(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Settle the undecided rows of half-spaces against hulls, in place; returns how many. Arguments as in
-    `settle_hulls`."""
+    """Settle the undecided rows of half-spaces against hulls, in place; returns how many.
+
+    Arguments as in `settle_hulls`, and flat as there.
+    """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)
     n_settled = 0

@@ -30,8 +30,13 @@ from collide.narrowphase.rows import (
 )
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
+#: How `settle_hulls` is called.
+SIGNATURE = (
+    "int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)"
+)
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)")
+
+@entry(SIGNATURE)
 def settle_hulls(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
@@ -41,6 +46,7 @@ def settle_hulls(
     Arguments as there; without depths bodies that meet get a point of both.   terms, n_terms : of the `PoseTable`.
     requests : what `answer_pairs` wrote.   digits : workspace of WORKSPACE integers.
     What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
+    Arguments are flat: entries are called by address, from C too.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)

@@ -12,8 +12,8 @@ import numpy as np
 
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
-from collide.narrowphase.composite.composite_meshes import union_rows, union_states
-from collide.narrowphase.composite.composite_parts import union_of
+from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_bodies import convex_hits, convex_rows
 from collide.narrowphase.convex_queries import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
@@ -42,8 +42,8 @@ def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check
 
 def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:
     """States of two shapes; parts_open: tell OPEN from HIT among convex parts, too."""
-    if _are_unions(A, B):
-        states = _union_states(A, B, X_WA, X_WB, check, parts_open)
+    if _has_compound(A, B):
+        states = _compound_states(A, B, X_WA, X_WB, check, parts_open)
     else:
         states = mesh_states(A, B, X_WA, X_WB, check=check)
     undecided = np.flatnonzero(states == OPEN)
@@ -54,16 +54,16 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool,
     return states
 
 
-def _union_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, parts_open: bool) -> np.ndarray:
-    """States of unions, of which only those are taken apart that balls around them leave open."""
-    union_a, union_b = union_of(A), union_of(B)
-    if union_a.ball is None or union_b.ball is None:
-        return union_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
-    near = np.flatnonzero(~balls_farther(union_a.ball, union_b.ball, X_WA, X_WB, 0.0, check=check))
+def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bool) -> np.ndarray:
+    """States of compounds, of which only those are taken apart that balls around them leave open."""
+    parts_a, parts_b = compound_parts(A), compound_parts(B)
+    if parts_a.ball is None or parts_b.ball is None:
+        return compound_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
+    near = np.flatnonzero(~balls_farther(parts_a.ball, parts_b.ball, X_WA, X_WB, 0.0, check=check))
     states = np.full(number_of_poses(X_WA, X_WB), APART)
     if len(near):
         poses = (np.broadcast_to(X, (len(states), 4, 4))[near] for X in (X_WA, X_WB))
-        states[near] = union_states(A, B, *poses, open_ones=parts_open)
+        states[near] = compound_states(A, B, *poses, open_ones=parts_open)
     return states
 
 
@@ -76,8 +76,8 @@ def pair_rows(
     part_a, part_b : of a `Compound` the number of its part, in the order of its items, nested ones in their place; of
     any other shape the facet.   out : (n,) zeroed rows, to be filled and returned.
     """
-    if _are_unions(A, B):
-        rows = union_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
+    if _has_compound(A, B):
+        rows = compound_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
     else:
         rows = mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
     undecided = np.flatnonzero(rows["how"] == UNDECIDED)
@@ -121,7 +121,7 @@ def single_pair(A: Shape, B: Shape) -> SinglePair | None:
     return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
 
 
-def _are_unions(A: Shape, B: Shape) -> bool:
+def _has_compound(A: Shape, B: Shape) -> bool:
     """Whether one is a `Compound`, to be taken apart."""
     return method_of(kind_of(A), kind_of(B)) is Method.MESH_PARTS
 

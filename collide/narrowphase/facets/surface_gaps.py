@@ -251,7 +251,10 @@ def _write_core_hit(space, pair, depths, row_at):
 
 @kernel
 def _forget_gap(row_at, proven):
-    """Make the row of bodies that their radii make meet, or may, one without a depth, at a point between the cores."""
+    """Bodies that meet because of their radii, or may meet: the row becomes an overlap of unknown depth, at distance 0.
+
+    Both points become the middle between the cores.   proven : they do meet.
+    """
     row, _, flags = view_row(row_at)
     middle = scale(0.5, add(vec3_at(row, rows.POINT_A), vec3_at(row, rows.POINT_B)))
     put_vec3(row, rows.POINT_A, middle)
@@ -320,6 +323,7 @@ def gap_poses(
     are looked for: next above the limit and the radii [m].   depths : whether it is wanted how deep overlaps are.
     hulls : 0, or rows of the bodies' hulls, for directions.   rows : of PAIR_DTYPE, zeroed.
     lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     space = open_space(header_at)
     lacks = view_u8(lacks_at, n)

@@ -310,6 +310,7 @@ def meet_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, cores, 
     XA, XB : matrices; step 16 or, for a single pose, 0.   check : refuse matrices that are no rotation.
     cores : leave radii out.   inside : 0, or three doubles a pose: a point of the world in both bodies, where a part of
     one lies inside the other; else left as they are.   states : a byte a pose.
+    Arguments are flat: entries take integers, doubles and booleans alone.
     """
     space = open_space(header_at)
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
@@ -336,7 +337,8 @@ def cull_poses(numbers_a_at, XA_at, step_a, numbers_b_at, XB_at, step_b, first, 
     """States of any two bodies by balls around them: APART where these are farther apart than a margin [m], else OPEN.
 
     numbers_a, numbers_b : as of a tree, NUMBERS doubles: centre, reach by axis, radius of a ball around the centre.
-    XA, XB, first, n, check, states : as of `meet_poses`; returns how many are done: the next is NO_POSE.
+    XA, XB, first, n, check, states : as of `meet_poses`, and flat as there; returns how many are done: the next is
+    NO_POSE.
     """
     numbers_a = view_f64(numbers_a_at, NUMBERS)
     numbers_b = view_f64(numbers_b_at, NUMBERS)

@@ -97,9 +97,9 @@ def clear_queue(integers_at):
 def enqueue(ordered, query, work, n, how, row_number, error):
     """Put a row into the queue whose gap is to be refined; returns its kind.
 
-    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`: of its n vertex pairs those
-        with a
-    weight are the feature, of four of two segments three corners.
+    ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`.
+    n : vertex pairs of the workspace. Those with a weight are the feature; of four, where two segments cross, it takes
+        three.
     how : what the row says if its digits are proven.   error : of a bound in doubles [m].
     """
     pair = ordered.pair
@@ -230,10 +230,8 @@ def refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, d
         proven = get(answer, at.PROVEN) != 0.0
         if proven and (parts == 2 or not _is_unique_minimiser(ints_at, ticket, ids, n, question, answer)):
             direction = lane_of(direction_at, dd.STRIDE, lane)
-            proven = _widen_by_ties(
-                ints_at, numbers_at, poses_at, ticket, ids, question, answer, direction, composed, doubles_at,
-                integers_at
-            )
+            pair = _pair_of(ints_at, numbers_at, poses_at, ticket)
+            proven = _widen_by_ties(pair, ids, question, answer, direction, composed, doubles_at, integers_at)
         _finish_row(rows_at + ROW * ticket[_ROW], question, answer, ticket, proven, depths, limit)
 
 
@@ -257,19 +255,19 @@ def _vertices(ints_at, shape):
     return vertices_of(posed_body(view_i64(ints_at, INTS * (shape + 1)), shape, 0))
 
 
-@kernel
-def _widen_by_ties(
-    ints_at, numbers_at, poses_at, ticket, ids, question, answer, direction_lane, composed, doubles_at, integers_at
-):
-    """Set the bracket anew by the lowest vertices there are; whether it is still proven to the last digits."""
-    sa = ticket[_SHAPE_A]
-    sb = ticket[_SHAPE_B]
-    pa = ticket[_POSE_A]
-    pb = ticket[_POSE_B]
+@kernel(inline=True)
+def _pair_of(ints_at, numbers_at, poses_at, ticket):
+    """The `PosedPair` of a ticket."""
+    sa, pa, sb, pb = ticket[_SHAPE_A], ticket[_POSE_A], ticket[_SHAPE_B], ticket[_POSE_B]
     ints = view_i64(ints_at, INTS * (max(sa, sb) + 1))
     numbers = view_f64(numbers_at, NUMBERS * (max(sa, sb) + 1))
     poses = view_f64(poses_at, POSE * (max(pa, pb) + 1))
-    pair = posed_pair(ints, numbers, poses, sa, pa, sb, pb)
+    return posed_pair(ints, numbers, poses, sa, pa, sb, pb)
+
+
+@kernel
+def _widen_by_ties(pair, ids, question, answer, direction_lane, composed, doubles_at, integers_at):
+    """Set the bracket anew by the lowest vertices there are; whether it is still proven to the last digits."""
     low = view_f64(doubles_at + 8 * _LOWS, LOW_PARTS_OF_PAIR if composed else 0)
     direction = view_f64(doubles_at + 8 * _DIRECTION, dd.STRIDE)
     for k in range(dd.STRIDE):

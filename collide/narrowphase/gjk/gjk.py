@@ -64,7 +64,10 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
     error : absolute error of a bound, from `bounds.py`.
     """
     limits = Limits(boolean, radius, limit, error, max_iterations)
-    run = _search(pair, points, ids, weights, n_start, limits)
+    start = begin(pair, points, ids, weights, limits)
+    if start.status == APART:
+        return GjkResult(APART, start.n_points, start.lower, 0.0, 0)
+    run = _search(pair, points, ids, weights, n_start, start, limits)
     if run.status == ENCLOSED or run.status == APART:
         return run
     v = vec3_at(weights, NEAREST_POINT)
@@ -88,14 +91,9 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
 
 
 @kernel(inline=True)
-def _search(pair, points, ids, weights, n_start, limits):
-    """The iterations of GJK; see `gjk` for arguments and results."""
-    boolean, radius, limit = limits.boolean, limits.radius, limits.limit
-    error, max_iterations = limits.error, limits.max_iterations
-    start = begin(pair, points, ids, weights, limits)
-    lower, list_a, list_b = start.lower, start.list_a, start.list_b
-    if start.status == APART:
-        return GjkResult(APART, start.n_points, lower, 0.0, 0)
+def _search(pair, points, ids, weights, n_start, start, limits):
+    """The iterations of GJK, from what `begin` found; see `gjk` for arguments and results."""
+    error, max_iterations, lower = limits.error, limits.max_iterations, start.lower
     n, coarse = first_simplex(pair, points, ids, weights, n_start, start)
     # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     # It is loaded so once more, below: through a kernel for both, gaps at n = 512 took 2 to 4 % longer.
@@ -106,20 +104,18 @@ def _search(pair, points, ids, weights, n_start, limits):
     square = dot(v, v)
     status = NEAREST
     clearance = 0.0
-    asked = _Asked(coarse, False, list_a, list_b, neg(start.d))
+    asked = _Asked(coarse, False, start.list_a, start.list_b, neg(start.d))
     used = 0
     while used < max_iterations:
         used += 1
         length = math.sqrt(square)
-        if length <= error:
-            status = MEETING
-            break
-        if boolean and length + error <= radius:
+        if length <= error or (limits.boolean and length + error <= limits.radius):
+            status = MEETING if length <= error else NEAREST
             break
         new = _next_point(pair, points, ids, places, v, square, asked, limits, used == max_iterations)
         asked = new.asked
         lower = max(lower, new.proven)
-        if lower - error - radius > limit:
+        if lower - error - limits.radius > limits.limit:
             status = APART
             break
         if length - new.bound <= 0.125 * error or new.repeated:
@@ -132,12 +128,10 @@ def _search(pair, points, ids, weights, n_start, limits):
             break
         if nearest.n_kept == NOT_FOUND:
             places = bring_to_front(points, ids, places)
-            faces = 15
-            if places.n == 3:
-                faces, clearance = faces_in_sight(points, error)
-                if faces == 0:
-                    status = ENCLOSED
-                    break
+            faces, clearance = faces_in_sight(points, error) if places.n == 3 else (15, 0.0)
+            if faces == 0:
+                status = ENCLOSED
+                break
             closer = nearest_of_all(points, places.n + 1, weights, faces)
             if closer < square:
                 places = Places(drop_unused(points, ids, weights, places.n + 1), 0, 1, 2, 3)
@@ -145,10 +139,8 @@ def _search(pair, points, ids, weights, n_start, limits):
                 wa, wb, wc = weights[0], weights[1], weights[2]
                 v = vec3_at(weights, NEAREST_POINT)
         elif closer < square:
-            rotation = nearest.rotation
-            A, B, C = D, select(rotation, A, B, C), select(rotation, B, C, A)
-            b, c = select(rotation, places.a, places.b, places.c), select(rotation, places.b, places.c, places.a)
-            places = Places(nearest.n_kept, places.d, b, c, 6 - places.d - b - c)
+            A, B, C = D, select(nearest.rotation, A, B, C), select(nearest.rotation, B, C, A)
+            places = _with_newest(places, nearest)
             wa, wb, wc = nearest.w0, nearest.w1, nearest.w2
             v = nearest.v
         if not closer < square:
@@ -163,16 +155,30 @@ def _search(pair, points, ids, weights, n_start, limits):
         square = closer
     if status == ENCLOSED:
         return GjkResult(ENCLOSED, 4, lower, clearance, used)
-    if not (boolean and status == APART):  # of a miss nothing else is wanted
+    if not (limits.boolean and status == APART):  # of a miss nothing else is wanted
         bring_to_front(points, ids, places)
+    _put_nearest(weights, places.n, wa, wb, wc, v)
+    return GjkResult(status, places.n, lower, 0.0, used)
+
+
+@kernel(inline=True)
+def _with_newest(places, nearest):
+    """Where the points stand once D has become point A of the face that is kept."""
+    b = select(nearest.rotation, places.a, places.b, places.c)
+    c = select(nearest.rotation, places.b, places.c, places.a)
+    return Places(nearest.n_kept, places.d, b, c, 6 - places.d - b - c)
+
+
+@kernel(inline=True)
+def _put_nearest(weights, n, wa, wb, wc, v):
+    """Weights of a simplex of n points, its nearest point and the unit axis along that."""
     weights[0] = wa
-    weights[1] = wb if places.n > 1 else 0.0
-    weights[2] = wc if places.n > 2 else 0.0
+    weights[1] = wb if n > 1 else 0.0
+    weights[2] = wc if n > 2 else 0.0
     weights[3] = 0.0
     put_vec3(weights, NEAREST_POINT, v)
     length = norm(v)
     put_vec3(weights, AXIS, scale(1.0 / length if length > 0.0 else 0.0, v))
-    return GjkResult(status, places.n, lower, 0.0, used)
 
 
 class _Asked(NamedTuple):
@@ -240,11 +246,10 @@ def _next_point(pair, points, ids, places, v, square, asked, limits, is_last):
 
 @kernel(inline=True)
 def _same_lists_cosine(pair):
-    """The squared cosine of the angle within which lists are asked again; 2, so that there is none, beside a curved
-    core.
+    """The squared cosine of the angle within which lists are asked again. 2, which no angle has, beside a curved core.
 
-    A curved core never repeats a point. Runs would converge towards what lies in one list, and again in the next: some
-    came to the last iteration.
+    A curved core never repeats a point. GJK would converge to the best point of one list, then to that of the next, and
+    some runs used up their iterations.
     """
     if pair.A.kind != POINTS or pair.B.kind != POINTS:
         return 2.0

@@ -63,7 +63,7 @@ def _support(pair, body, coarse, list_id, g):
     """`support` of one body in a direction of its own frame."""
     coarse_at = body.coarse_at if coarse else 0
     return support(
-        body.kind, body.coords, body.n, body.padded, pair.numbers, body.params_at, body.tree, coarse_at, list_id, g
+        body.kind, body.coords, body.padded, pair.numbers, body.params_at, body.tree, coarse_at, list_id, g
     )
 
 
@@ -118,7 +118,7 @@ def _settled(pair, body, vertex, d):
     if body.tree == 0:
         return vertex
     g = rotate_back(pair.poses, body.pose_at, d)
-    return settled_vertex(body.coords, body.n, body.padded, body.tree, vertex, g)
+    return settled_vertex(body.coords, body.padded, body.tree, vertex, g)
 
 
 @kernel(inline=True)

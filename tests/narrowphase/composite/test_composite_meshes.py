@@ -17,7 +17,7 @@ from surfaces import joined
 
 import collide
 from collide.lowering.shape_table import moved_pose
-from collide.narrowphase.composite.composite_parts import union_of
+from collide.narrowphase.composite.composite_parts import compound_parts
 
 EYE = np.eye(4)
 TETRAHEDRON = (
@@ -85,12 +85,12 @@ def lattice_pose(rng, spread):
     return collide.pose(rng.integers(-4, 5, 3) / 4 * spread, R=RIGHT_ANGLES[rng.integers(3)])
 
 
-def random_union(rng, poser, depth=2):
+def random_compound(rng, poser, depth=2):
     items = []
     for _ in range(int(rng.integers(1, 3))):
         deeper = depth > 0 and rng.random() < 0.4
         items.append(
-            (random_union(rng, poser, depth - 1) if deeper else BODIES[rng.integers(len(BODIES))], poser(rng, 1.5))
+            (random_compound(rng, poser, depth - 1) if deeper else BODIES[rng.integers(len(BODIES))], poser(rng, 1.5))
         )
     return items
 
@@ -109,8 +109,8 @@ def test_unions_answer_as_all_pairs_of_parts_do(poser):
     rng = rng_of("unions", poser.__name__)
     told, open_rows, gaps = [], 0, 0
     for _ in range(30):
-        A = random_union(rng, poser)
-        B = random_union(rng, poser) if rng.random() < 0.5 else BODIES[rng.integers(len(BODIES))]
+        A = random_compound(rng, poser)
+        B = random_compound(rng, poser) if rng.random() < 0.5 else BODIES[rng.integers(len(BODIES))]
         if not (has_mesh(A) or has_mesh(B)):
             continue
         X, Y = poser(rng, 1.0), poser(rng, 2.5 if poser is any_pose else 1.0)
@@ -296,7 +296,7 @@ def test_products_of_poses_are_bounded_and_said_to_be_exact_only_where_they_are(
         exact += slop[0] == 0.0
     assert 15 <= exact <= 30, exact
     nested = shape_of([([([(BODIES[0], any_pose(rng, 3.0))], any_pose(rng, 3.0))], any_pose(rng, 3.0))])
-    part, X = union_of(nested).parts[0], random_pose(rng, 100.0)
+    part, X = compound_parts(nested).parts[0], random_pose(rng, 100.0)
     (given, P), = nested.items
     (inner, Q), = given.items
     (mesh, R), = inner.items

@@ -21,6 +21,7 @@ from collide.lowering.place_parts import place_part, write_terms
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
 from collide.narrowphase import convex_queries as run
 from collide.narrowphase.composite import composite as unions
+from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.results import EXACT, SWEPT, UNDECIDED, flipped
 
 CASES = 60
@@ -285,7 +286,7 @@ def test_poses_of_parts_are_those_of_the_pose_table():
 
 def test_a_single_union_is_one_call(monkeypatch):
     """Once prepared, nothing of Python is between the call and the kernel's answer."""
-    if not run.single_calls_are_safe():
+    if not single_calls_are_safe():
         pytest.skip("single calls go the long way here")
     A, B = _row_of_boxes(4), collide.Box((1, 1, 1))
     X, Y = np.eye(4), collide.pose((0.2, 0.3, 0.4), rpy=(0.1, 0.2, 0.3))

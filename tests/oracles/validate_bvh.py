@@ -1,4 +1,4 @@
-"""Checks of every property of a box-tree that queries rely on: for tests and `collide doctor --deep`."""
+"""Checks of every property of a box-tree that queries rely on."""
 
 from __future__ import annotations
 

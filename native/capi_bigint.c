@@ -1,4 +1,4 @@
-#include "capi_whole.h"
+#include "capi_bigint.h"
 
 #include <float.h>
 #include <math.h>
@@ -6,12 +6,12 @@
 
 /* --- sums and products --------------------------------------------------------------------------------------------- */
 
-static const struct whole ZERO = {NULL, 0, 0, 0};
+static const struct bigint ZERO = {NULL, 0, 0, 0};
 
 /* Limbs become a number: without zeros at its ends. */
-static struct whole made(const uint32_t *limbs, size_t n, int64_t shift, int sign)
+static struct bigint made(const uint32_t *limbs, size_t n, int64_t shift, int sign)
 {
-    struct whole a;
+    struct bigint a;
     while (n > 0 && limbs[n - 1] == 0) n--;
     while (n > 0 && *limbs == 0) {
         limbs++;
@@ -28,7 +28,7 @@ static struct whole made(const uint32_t *limbs, size_t n, int64_t shift, int sig
 
 static uint32_t *limbs_of(struct arena *arena, size_t n) { return arena_take(arena, (n ? n : 1) * sizeof(uint32_t)); }
 
-struct whole whole_of(struct arena *arena, double value)
+struct bigint bigint_of(struct arena *arena, double value)
 {
     int exponent, low;
     uint64_t bits;
@@ -43,7 +43,7 @@ struct whole whole_of(struct arena *arena, double value)
     return made(limbs, 3, exponent / 32 - 64, value < 0.0 ? -1 : 1);
 }
 
-struct whole whole_copy(struct arena *arena, struct whole a)
+struct bigint bigint_copy(struct arena *arena, struct bigint a)
 {
     uint32_t *limbs = limbs_of(arena, a.n);
     if (limbs == NULL || a.n == 0) return ZERO;
@@ -52,13 +52,13 @@ struct whole whole_copy(struct arena *arena, struct whole a)
     return a;
 }
 
-static uint32_t limb_at(struct whole a, int64_t place)
+static uint32_t limb_at(struct bigint a, int64_t place)
 {
     return place >= a.shift && place < a.shift + (int64_t)a.n ? a.limbs[place - a.shift] : 0;
 }
 
 /* -1, 0, 1: how the sizes compare, whatever the signs. */
-static int compare_sizes(struct whole a, struct whole b)
+static int compare_sizes(struct bigint a, struct bigint b)
 {
     int64_t place, end = a.shift + (int64_t)a.n, low = a.shift < b.shift ? a.shift : b.shift;
     if (a.n == 0 || b.n == 0) return a.n > 0 ? 1 : b.n > 0 ? -1 : 0;
@@ -70,9 +70,9 @@ static int compare_sizes(struct whole a, struct whole b)
     return 0;
 }
 
-int whole_equal(struct whole a, struct whole b) { return a.sign == b.sign && compare_sizes(a, b) == 0; }
+int bigint_equal(struct bigint a, struct bigint b) { return a.sign == b.sign && compare_sizes(a, b) == 0; }
 
-struct whole whole_sum(struct arena *arena, struct whole a, struct whole b)
+struct bigint bigint_sum(struct arena *arena, struct bigint a, struct bigint b)
 {
     int64_t low, end, place;
     uint32_t *limbs;
@@ -81,7 +81,7 @@ struct whole whole_sum(struct arena *arena, struct whole a, struct whole b)
     if (a.n == 0) return b;
     if (b.n == 0) return a;
     if (subtract && compare_sizes(a, b) < 0) {
-        struct whole other = a;
+        struct bigint other = a;
         a = b;
         b = other;
     }
@@ -99,13 +99,13 @@ struct whole whole_sum(struct arena *arena, struct whole a, struct whole b)
     return made(limbs, (size_t)(end - low) + 1, low, a.sign);
 }
 
-struct whole whole_difference(struct arena *arena, struct whole a, struct whole b)
+struct bigint bigint_difference(struct arena *arena, struct bigint a, struct bigint b)
 {
     b.sign = -b.sign;
-    return whole_sum(arena, a, b);
+    return bigint_sum(arena, a, b);
 }
 
-struct whole whole_product(struct arena *arena, struct whole a, struct whole b)
+struct bigint bigint_product(struct arena *arena, struct bigint a, struct bigint b)
 {
     uint32_t *limbs;
     size_t i, j;
@@ -137,16 +137,16 @@ static int leading_zeros(uint32_t limb)
 }
 
 /* Bits of a number below its highest one, 2^0 counted as 1. */
-static int64_t length_in_bits(struct whole a) { return 32 * ((int64_t)a.n + a.shift) - leading_zeros(a.limbs[a.n - 1]); }
+static int64_t length_in_bits(struct bigint a) { return 32 * ((int64_t)a.n + a.shift) - leading_zeros(a.limbs[a.n - 1]); }
 
 /* The limbs of a, so that its highest bit is the highest of n limbs but one. */
-static void write_aligned(struct whole a, uint32_t *out, size_t n)
+static void write_aligned(struct bigint a, uint32_t *out, size_t n)
 {
-    int left = leading_zeros(a.limbs[a.n - 1]);
+    int n_zeros = leading_zeros(a.limbs[a.n - 1]);
     size_t k;
     memset(out, 0, (n + 1) * sizeof *out);
     for (k = 0; k < a.n; k++) {
-        uint64_t limb = (uint64_t)a.limbs[a.n - 1 - k] << left;
+        uint64_t limb = (uint64_t)a.limbs[a.n - 1 - k] << n_zeros;
         out[n - 1 - k] |= (uint32_t)limb;
         out[n - k] |= (uint32_t)(limb >> 32);
     }
@@ -184,7 +184,7 @@ static double to_double(uint64_t q, int64_t exponent)
     return ldexp((double)q, (int)last);
 }
 
-double whole_ratio(struct arena *arena, struct whole a, struct whole b)
+double bigint_ratio(struct arena *arena, struct bigint a, struct bigint b)
 {
     size_t n = a.n > b.n ? a.n : b.n, k;
     uint32_t *r, *d;
@@ -205,15 +205,15 @@ double whole_ratio(struct arena *arena, struct whole a, struct whole b)
     return a.sign * b.sign * to_double(q | (rest != 0), length_in_bits(a) - length_in_bits(b) - 61);
 }
 
-double whole_rounded(struct arena *arena, struct whole a)
+double bigint_rounded(struct arena *arena, struct bigint a)
 {
-    struct whole one = whole_of(arena, 1.0);
-    return arena->failed ? 0.0 : whole_ratio(arena, a, one);
+    struct bigint one = bigint_of(arena, 1.0);
+    return arena->failed ? 0.0 : bigint_ratio(arena, a, one);
 }
 
 /* --- what numbers have in common ----------------------------------------------------------------------------------- */
 
-static int64_t trailing_zeros(struct whole a)
+static int64_t trailing_zeros(struct bigint a)
 {
     int found = 0;
     while (!(a.limbs[0] >> found & 1)) found++;
@@ -256,11 +256,11 @@ static size_t common_divisor(uint32_t *x, size_t n, uint32_t *y, size_t m)
         }
         if (!larger) {
             uint32_t *other = x;
-            size_t many = n;
+            size_t size = n;
             x = y;
             y = other;
             n = m;
-            m = many;
+            m = size;
         }
         for (k = 0; k < n; k++) {
             carry = (uint64_t)x[k] - (k < m ? y[k] : 0) - carry;
@@ -295,14 +295,14 @@ static void divide_exactly(uint32_t *limbs, size_t n, const uint32_t *d, size_t 
 }
 
 /* The same number, an integer after a division by 2^zeros, in limbs of its own from 2^0 on. */
-static struct whole without_zeros(struct arena *arena, struct whole a, int64_t zeros)
+static struct bigint without_zeros(struct arena *arena, struct bigint a, int64_t zeros)
 {
     int64_t bits = 32 * a.shift - zeros; /* how far the limbs move up; below 0 by less than a limb */
     size_t up = bits > 0 ? (size_t)(bits / 32) : 0, n = a.n + up + 1;
     int part = bits > 0 ? (int)(bits % 32) : 0;
     uint32_t *limbs = limbs_of(arena, n);
     size_t k;
-    struct whole out = ZERO;
+    struct bigint out = ZERO;
     if (limbs == NULL) return ZERO;
     memset(limbs, 0, n * sizeof *limbs);
     for (k = 0; k < a.n; k++) {
@@ -316,10 +316,10 @@ static struct whole without_zeros(struct arena *arena, struct whole a, int64_t z
     return out;
 }
 
-void whole_make_coprime(struct arena *arena, struct whole *numbers, size_t n)
+void bigint_make_coprime(struct arena *arena, struct bigint *numbers, size_t n)
 {
     int64_t zeros = INT64_MAX;
-    size_t k, many = 0, longest = 0;
+    size_t k, n_divisor = 0, longest = 0;
     uint32_t *divisor, *other;
     for (k = 0; k < n; k++)
         if (numbers[k].n > 0 && trailing_zeros(numbers[k]) < zeros) zeros = trailing_zeros(numbers[k]);
@@ -335,17 +335,17 @@ void whole_make_coprime(struct arena *arena, struct whole *numbers, size_t n)
         if (length == 0) continue;
         memcpy(other, numbers[k].limbs, length * sizeof *other);
         length = make_odd(other, length);
-        if (many == 0) {
+        if (n_divisor == 0) {
             memcpy(divisor, other, length * sizeof *other);
-            many = length;
+            n_divisor = length;
         } else {
-            many = common_divisor(divisor, many, other, length);
+            n_divisor = common_divisor(divisor, n_divisor, other, length);
         }
     }
     for (k = 0; k < n; k++) {
         uint32_t *limbs = (uint32_t *)numbers[k].limbs; /* made above: nobody else's */
         if (numbers[k].n == 0) continue;
-        if (!(many == 1 && divisor[0] == 1)) divide_exactly(limbs, numbers[k].n, divisor, many);
+        if (!(n_divisor == 1 && divisor[0] == 1)) divide_exactly(limbs, numbers[k].n, divisor, n_divisor);
         numbers[k] = made(limbs, numbers[k].n, 0, numbers[k].sign);
     }
 }

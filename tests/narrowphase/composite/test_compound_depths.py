@@ -24,7 +24,7 @@ BRACKET = collide.Compound(
 )
 
 
-def random_union(rng) -> collide.Compound:
+def random_compound(rng) -> collide.Compound:
     kinds = [kind for kind in naive.KINDS if kind not in ("Halfspace", "Compound")]
     chosen = rng.choice(kinds, int(rng.integers(2, 5)))
     return collide.Compound([(naive.one_of_each(rng)[kind], random_pose(rng, 0.5)) for kind in chosen])
@@ -37,8 +37,8 @@ def parts_of(shape: collide.Shape) -> list[tuple[collide.Shape, np.ndarray]]:
 
 
 def case_of(rng, k: int) -> Case:
-    A = random_union(rng)
-    B = random_union(rng) if k % 2 else naive.one_of_each(rng)[naive.KINDS[k // 2 % 6]]
+    A = random_compound(rng)
+    B = random_compound(rng) if k % 2 else naive.one_of_each(rng)[naive.KINDS[k // 2 % 6]]
     return Case(A, B, random_pose(rng, 0.5), random_pose(rng, 1.0))
 
 
@@ -97,7 +97,7 @@ def test_upper_bound_is_what_the_parts_need():
     """The truth lies between the deepest pair of parts and the way out that is reported."""
     rng = rng_of("sampled way out")
     for _ in range(12):
-        case = Case(random_union(rng), random_union(rng), random_pose(rng, 0.2), random_pose(rng, 0.3))
+        case = Case(random_compound(rng), random_compound(rng), random_pose(rng, 0.2), random_pose(rng, 0.3))
         r = collide.distance(*case)
         if not r.hit:
             continue
@@ -204,7 +204,7 @@ def test_union_against_a_halfspace_is_as_deep_as_its_lowest_point():
     floor = collide.Halfspace((0, 0, 1), 0.0)
     hits = []
     for _ in range(30):
-        union, X = random_union(rng), random_pose(rng, 0.8)
+        union, X = random_compound(rng), random_pose(rng, 0.8)
         case = Case(floor, union, np.eye(4), X)
         with naive.reproducible(case):
             r = collide.distance(*case)

@@ -40,7 +40,7 @@ static int64_t place_on_curve(const double *direction)
 }
 
 /* Numbers 0 ... n - 1 by their keys, equal ones in order: lists of two are merged, then of four ... */
-static void sort_stably(const int64_t *keys, int64_t n, int64_t *order, int64_t *room)
+static void sort_stably(const int64_t *keys, int64_t n, int64_t *order, int64_t *scratch)
 {
     int64_t width, k;
     for (k = 0; k < n; k++) order[k] = k;
@@ -49,9 +49,9 @@ static void sort_stably(const int64_t *keys, int64_t n, int64_t *order, int64_t 
             int64_t middle = k + width < n ? k + width : n, end = k + 2 * width < n ? k + 2 * width : n;
             int64_t i = k, j = middle, at = k;
             while (i < middle || j < end)
-                room[at++] = j == end || (i < middle && keys[order[i]] <= keys[order[j]]) ? order[i++] : order[j++];
+                scratch[at++] = j == end || (i < middle && keys[order[i]] <= keys[order[j]]) ? order[i++] : order[j++];
         }
-        memcpy(order, room, (size_t)n * sizeof *order);
+        memcpy(order, scratch, (size_t)n * sizeof *order);
     }
 }
 
@@ -59,26 +59,26 @@ void order_nested(struct arena *arena, const int32_t *vertices, const double *no
                   const int64_t *sizes, int n_sizes, int32_t *ordered)
 {
     int64_t *places = arena_take(arena, (size_t)n * 8), *along = arena_take(arena, (size_t)n * 8);
-    int64_t *room = arena_take(arena, (size_t)n * 8), k, free_ones = 0, many = n, end = n, at = 0;
+    int64_t *scratch = arena_take(arena, (size_t)n * 8), k, free_ones = 0, n_remaining = n, end = n, at = 0;
     int s;
     if (arena->failed) return;
     for (k = 0; k < n; k++) places[k] = place_on_curve(normals + 3 * k);
-    sort_stably(places, n, along, room);
+    sort_stably(places, n, along, scratch);
     for (s = 0; s < 2; s++)
         for (k = 0; k < n; k++)
-            if ((late[along[k]] != 0) == s) room[at++] = along[k];
-    memcpy(along, room, (size_t)n * sizeof *along);
+            if ((late[along[k]] != 0) == s) scratch[at++] = along[k];
+    memcpy(along, scratch, (size_t)n * sizeof *along);
     for (k = 0; k < n; k++) free_ones += !late[k];
     for (s = 1; s < n_sizes; s++) {
-        int64_t size = sizes[s], chosen = 0, left = 0;
+        int64_t size = sizes[s], chosen = 0, n_late = 0;
         double step = (double)(free_ones > size ? free_ones : size) / (double)size;
-        end -= many - size;
-        for (k = 0; k < many; k++) {
-            if (chosen < size && k == (int64_t)(((double)chosen + 0.5) * step)) room[chosen++] = along[k];
-            else ordered[end + left++] = vertices[along[k]];
+        end -= n_remaining - size;
+        for (k = 0; k < n_remaining; k++) {
+            if (chosen < size && k == (int64_t)(((double)chosen + 0.5) * step)) scratch[chosen++] = along[k];
+            else ordered[end + n_late++] = vertices[along[k]];
         }
-        memcpy(along, room, (size_t)size * sizeof *along);
-        many = free_ones = size;
+        memcpy(along, scratch, (size_t)size * sizeof *along);
+        n_remaining = free_ones = size;
     }
-    for (k = 0; k < many; k++) ordered[k] = vertices[along[k]];
+    for (k = 0; k < n_remaining; k++) ordered[k] = vertices[along[k]];
 }

@@ -1,0 +1,202 @@
+"""Eight boxes at once, in LLVM's own instructions (see `vectors.py`); `mesh/box_overlap.py` has the same in Python."""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+
+from collide.kernels.vectors import I8, I64, LANES, splat
+from collide.kernels.views import data_of, is_view_of
+
+_F32 = ir.FloatType()
+_FLOATS = ir.VectorType(_F32, LANES)
+
+
+@intrinsic
+def boxes_meeting(_context, boxes, at, frame, probe):
+    """Bits of the boxes that nothing parts from a box; described in `mesh/box_overlap.py`."""
+    return _meeting(boxes, frame, probe, _apart)
+
+
+@intrinsic
+def boxes_meeting_prism(_context, boxes, at, frame, probe):
+    """The same of a triangle, with half-spaces along its edges."""
+
+    def parted(builder, data, frame, probe):
+        yield from _apart(builder, data, frame, probe)
+        yield from _outside(builder, data, probe)
+
+    return _meeting(boxes, frame, probe, parted)
+
+
+def _meeting(boxes, frame, probe, parted):
+    """Signature and code of the bits that none of the vectors ``parted`` yields has set."""
+    _check_floats(boxes, frame, probe)
+    signature = types.int64(boxes, types.int64, frame, probe)
+
+    def codegen(_context, builder, signature, args):
+        data, frame, probe = _float_data(_context, builder, signature, args)
+        apart = None
+        for over in parted(builder, data, frame, probe):
+            apart = over if apart is None else builder.or_(apart, over)
+        mask = builder.bitcast(builder.not_(apart), I8)
+        return builder.zext(mask, I64)
+
+    return signature, codegen
+
+
+def _outside(builder, data, probe):
+    """Three vectors of bits: which boxes lie outside the half-space of each edge of the probe."""
+    for edge in (17, 21, 25):
+        out = _element(builder, probe, edge + 3)
+        for j in range(3):
+            entry = _element(builder, probe, edge + j)
+            out = builder.fadd(out, builder.fmul(entry, _eight(builder, data, j)))
+            out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
+        yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
+
+
+def _apart(builder, data, frame, probe):
+    """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
+    centres = [_eight(builder, data, axis) for axis in range(3)]
+    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    yield _unused(builder, half_lengths)
+    for axis in range(3):
+        gap = builder.fsub(centres[axis], _element(builder, probe, axis))
+        reach = builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis))
+        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+    for axis in range(3):
+        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
+        for j in range(3):
+            entry = _element(builder, frame, 3 * axis + j)
+            gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
+        yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+    gap, reach = _element(builder, probe, 15), _element(builder, probe, 16)
+    for j in range(3):  # the probe's slab
+        entry = _element(builder, probe, 12 + j)
+        gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
+        reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
+    yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+
+
+def _check_floats(*views):
+    for view in views:
+        if not is_view_of(view, types.float32):
+            raise TypingError("boxes, frame and probe must be views of floats")
+
+
+def _float_data(context, builder, signature, args):
+    """Pointers to the node's first float, to the frame and to the probe."""
+    data, frame, probe = (
+        data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 3)
+    )  # fmt: skip
+    return builder.gep(data, [args[1]]), frame, probe
+
+
+def _eight(builder, data, row):
+    place = builder.gep(data, [ir.Constant(I64, LANES * row)])
+    return builder.load(builder.bitcast(place, _FLOATS.as_pointer()), align=4)
+
+
+def _element(builder, data, k):
+    """Float k in all lanes."""
+    return splat(builder, builder.load(builder.gep(data, [ir.Constant(I64, k)])), _FLOATS)
+
+
+def _abs(builder, vector):
+    """Without the sign: the bits of −0 and of all others are those of the number, but the first."""
+    words = ir.VectorType(ir.IntType(32), LANES)
+    bits = builder.bitcast(vector, words)
+    return builder.bitcast(builder.and_(bits, ir.Constant(words, [0x7FFFFFFF] * LANES)), _FLOATS)
+
+
+@intrinsic
+def boxes_nearest(_context, boxes, at, slabs, slab_at, frame, probe, out):
+    """Lower bounds of the distances of eight boxes, and how far their centres are; see `mesh/box_overlap.py`."""
+    _check_floats(boxes, slabs, frame, probe, out)
+    signature = types.void(boxes, types.int64, slabs, types.int64, frame, probe, out)
+
+    def codegen(context, builder, signature, args):
+        data, slab, frame, probe, result = (
+            data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4, 5, 6)
+        )
+        best, centres = _gaps(builder, builder.gep(data, [args[1]]), builder.gep(slab, [args[3]]), frame, probe)
+        for row, vector in enumerate((best, centres)):
+            place = builder.gep(result, [ir.Constant(I64, LANES * row)])
+            builder.store(vector, builder.bitcast(place, _FLOATS.as_pointer()), align=4)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+def _gaps(builder, data, slab, frame, probe):
+    """Vectors: the largest gap along eight axes; the squared length of the line between centres."""
+    centres = [_eight(builder, data, axis) for axis in range(3)]
+    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
+    entries = [[_element(builder, frame, 3 * i + j) for j in range(3)] for i in range(3)]
+    best = ir.Constant(_FLOATS, [float("-inf")] * LANES)
+
+    def larger(gap):
+        return builder.select(builder.fcmp_ordered(">", gap, best), gap, best)
+
+    for axis in range(3):
+        gap = _abs(builder, builder.fsub(centres[axis], _element(builder, probe, axis)))
+        gap = builder.fsub(gap, builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis)))
+        best = larger(builder.fmul(gap, _element(builder, probe, 12 + axis)))
+    line, across, square = [], None, None
+    for axis in range(3):
+        gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
+        for j in range(3):
+            gap = builder.fadd(gap, builder.fmul(entries[axis][j], centres[j]))
+            reach = builder.fadd(reach, builder.fmul(_abs(builder, entries[axis][j]), half_lengths[j]))
+        line.append(gap)
+        size = _abs(builder, gap)
+        best = larger(builder.fmul(builder.fsub(size, reach), _element(builder, probe, 15 + axis)))
+        spread = builder.fmul(size, _element(builder, probe, 9 + axis))
+        across = spread if across is None else builder.fadd(across, spread)
+        spread = builder.fmul(gap, gap)
+        square = spread if square is None else builder.fadd(square, spread)
+    for j in range(3):  # the line between the centres as an axis
+        along = builder.fmul(line[0], entries[0][j])
+        for i in (1, 2):
+            along = builder.fadd(along, builder.fmul(line[i], entries[i][j]))
+        across = builder.fadd(across, builder.fmul(_abs(builder, along), half_lengths[j]))
+    root = builder.call(_square_root(builder.module), [square])
+    gap = builder.fdiv(builder.fsub(square, across), root)
+    best = larger(builder.fmul(gap, _element(builder, probe, 18)))
+    best = larger(_along_direction(builder, centres, half_lengths, slab, probe))
+    nothing = ir.Constant(_FLOATS, [float("inf")] * LANES)
+    return builder.select(_unused(builder, half_lengths), nothing, best), square
+
+
+def _unused(builder, half_lengths):
+    return builder.fcmp_ordered("<", half_lengths[0], ir.Constant(_FLOATS, [0.0] * LANES))
+
+
+def _along_direction(builder, centres, half_lengths, slab, probe):
+    """Gaps along the direction given: what the boxes say, or their slabs and boxes together, whichever is more."""
+    direction = [_element(builder, probe, 19 + j) for j in range(3)]
+    plain = thin = _element(builder, probe, 22)
+    for j in range(3):
+        plain = builder.fadd(plain, builder.fmul(direction[j], centres[j]))
+        plain = builder.fsub(plain, builder.fmul(_abs(builder, direction[j]), half_lengths[j]))
+    normals = [_eight(builder, slab, j) for j in range(3)]
+    share = builder.fmul(direction[0], normals[0])
+    for j in (1, 2):
+        share = builder.fadd(share, builder.fmul(direction[j], normals[j]))
+    thin = builder.fadd(thin, builder.fmul(share, _eight(builder, slab, 3)))
+    thin = builder.fsub(thin, builder.fmul(_abs(builder, share), _eight(builder, slab, 4)))
+    for j in range(3):
+        rest = builder.fsub(direction[j], builder.fmul(share, normals[j]))
+        thin = builder.fadd(thin, builder.fmul(rest, centres[j]))
+        thin = builder.fsub(thin, builder.fmul(_abs(builder, rest), half_lengths[j]))
+    return builder.select(builder.fcmp_ordered(">", thin, plain), thin, plain)
+
+
+def _square_root(module):
+    """LLVM's square root of eight floats, correctly rounded."""
+    name = f"llvm.sqrt.v{LANES}f32"
+    return module.globals.get(name) or ir.Function(module, ir.FunctionType(_FLOATS, [_FLOATS]), name=name)
