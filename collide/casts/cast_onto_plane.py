@@ -20,9 +20,9 @@ def cast_onto_plane(pair, direction, size, slop, limit):
     plane = plane_in_world(pair, B)
     nhat = divide(plane.normal, plane.length)
     g = neg(rotate_back(pair.poses, A.pose_at, nhat))
-    k, corner, _ = support(A.kind, A.coords, A.n, A.padded, pair.numbers, A.params_at, A.tree, 0, -1, g)
+    k, corner, _ = support(A.kind, A.coords, A.padded, pair.numbers, A.params_at, A.tree, 0, -1, g)
     if A.tree != 0:
-        k = settled_vertex(A.coords, A.n, A.padded, A.tree, k, g)
+        k = settled_vertex(A.coords, A.padded, A.tree, k, g)
         corner = column_at(A.coords, A.padded, k)
     radius = radius_of(pair, A)
     a = sub(rotate(pair.poses, A.pose_at, corner), pair.t)

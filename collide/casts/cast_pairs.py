@@ -1,7 +1,7 @@
 """Casts of convex sets against convex sets, one row a question: doubles with proven bounds.
 
 A translation of A meets B where a ray meets their Minkowski difference. What doubles leave open is said by the row's
-status, and settled by `settle_casts.py`.
+status, and settled by `convex_casts.py`.
 """
 
 from __future__ import annotations

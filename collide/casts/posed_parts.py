@@ -116,7 +116,7 @@ def _side(shapes, X: np.ndarray, n: int, row_of) -> _Side:
         first = m * np.arange(n) if k == n else np.zeros(n, dtype=np.int64)
         return _Side(shape_of, np.repeat(X, m, axis=0), part_poses, first, np.full(n, m))
     numbers: dict[int, int] = {}
-    distinct = []
+    distinct: list[Shape] = []
     for shape in shapes:
         if id(shape) not in numbers:
             numbers[id(shape)] = len(distinct)

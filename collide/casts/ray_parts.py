@@ -144,10 +144,8 @@ def _settle(parts: PosedParts, asked, origins, vectors, limit: float, row: np.nd
     row[STATE] = MET
     row[FIRST_SIDE] = row[LAST_SIDE] = -1.0 if parts.packed(asked[1]).kind != HALFSPACE else 0.0
     for value, t in ((FIRST, first), (LAST, last)):
-        counts = t is not None and 0 <= t <= float(limit)
-        row[value] = np.nan
-        row[[value - 1, value + 1]] = np.nan
-        if counts:
+        row[value - 1 : value + 2] = np.nan
+        if t is not None and 0 <= t <= float(limit):
             row[value], row[value - 1], row[value + 1] = rounded(t)
             row[value] = min(row[value], limit)
             row[value - 1] = max(row[value - 1], 0.0)

@@ -116,6 +116,7 @@ ROOMS = {
         "threads",
         "transforms",
         "numerics",
+        "support",
         "mesh",
         "shapes",
         "lowering",

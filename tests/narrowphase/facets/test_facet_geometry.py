@@ -12,7 +12,7 @@ from naive_triangles import as_integers, minus, winding, world_points
 
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.numerics.exact_points import placed
-from collide.surface_queries.facet_geometry import (
+from collide.narrowphase.facets.facet_geometry import (
     RAY_DIRECTIONS,
     FacetCorners,
     exact_point,
