@@ -19,13 +19,17 @@ from collide.packed_world import PackedWorld, QueryRecord
 from collide.results import WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
-from collide.transforms import as_pose
+from collide.transforms import as_pose, as_poses
 from collide.world_bodies import BodiesAsTheyStood, Body, WorldBodies
+from collide.world_hits import WorldHits
 
 __all__ = ["Body", "World"]
 
 #: Contacts need what meshes need, which other questions about convex scenes do not.
 contact_query = lazy_module("collide.contact.contact_query")
+#: And so do casts.
+casts = lazy_module("collide.world_casts")
+cast_arguments = lazy_module("collide.casts.cast_arguments")
 
 
 class World:
@@ -346,6 +350,102 @@ class World:
         rows["a"], bodies[-1] = -1, Body(-1, "query", shape, X_WS, False, 0, 0)
         return WorldResult(rows, bodies, certify)
 
+    def raycast(
+        self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
+        group: int | None = None, mask: int | None = None,
+    ) -> WorldHits:  # fmt: skip
+        """What rays meet first, or everything that they meet.
+
+        Parameters
+        ----------
+        origins_W : (3,) or (N, 3) where rays begin, in W [m].
+        directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single origin or direction goes with every
+            one of the others.
+        max_distance : [lengths of the direction], ≥ 0, as of `collide.raycast`.
+        all_hits : every place where a ray meets the surface of a body, not only the first.
+        group, mask : bit sets: bodies count with ``(group & mask_B) and (group_B & mask)``; None: all of them. Whether
+            bodies are static, and which pairs are allowed, has no say.
+
+        Returns
+        -------
+        WorldHits : a row a ray, ``body`` the id of the first body it meets, −1 for none; with ``all_hits`` a row for
+            every place, by ray, distance and body, and ``starts``. What the rest means and promises:
+            `collide.raycast`. `stats` stays as it is.
+
+        Raises
+        ------
+        InvalidArgument : as of `collide.raycast`.
+
+        Notes
+        -----
+        Rays go through the box-tree, nearest box first: about O(log n) a ray for bodies that are spread out.
+        """
+        limit = checks.limit("World.raycast: max_distance", max_distance, "")
+        origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
+        which = casts.checked_filter("World.raycast", group, mask)
+        rows, starts = casts.cast_rays(self._pack(), origins, directions, limit, all_hits, which)
+        return self._hits(rows, starts)
+
+    def shape_cast(
+        self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, group: int | None = None,
+        mask: int | None = None,
+    ) -> WorldHits:  # fmt: skip
+        """The first body that an outside shape touches when it is moved along a direction.
+
+        Parameters
+        ----------
+        shape : any shape but half-spaces.
+        X_WS : (4, 4) or (N, 4, 4) its poses in the world W [m] before it moves.
+        direction_W : (3,) or (N, 3) in W, of the motion; it need not be a unit vector.
+        max_distance : [lengths of the direction], ≥ 0, as of `collide.shape_cast`.
+        group, mask : as of `raycast`.
+
+        Returns
+        -------
+        WorldHits : a row a cast, ``body`` the id of the first body touched, −1 for none. Of several touched at the same
+            place the one with the smallest id. What the rest means and promises: `collide.shape_cast`.
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose, UnsupportedQuery : as of `collide.shape_cast`.
+        """
+        limit = checks.limit("World.shape_cast: max_distance", max_distance, "")
+        if not isinstance(shape, Shape):
+            raise InvalidArgument(f"World.shape_cast: shape must be a shape, got {checks.describe(shape)}")
+        X_WS = as_poses(X_WS, "World.shape_cast: X_WS")
+        directions, _ = cast_arguments.checked_directions("World.shape_cast", "direction_W", direction_W, "a cast")
+        n = checks.matched_count("World.shape_cast", X_WS=len(X_WS), direction_W=len(directions.vectors))
+        cast_arguments.refuse_unbounded("World.shape_cast: shape", shape)
+        which = casts.checked_filter("World.shape_cast", group, mask)
+        X_WS = np.ascontiguousarray(np.broadcast_to(X_WS, (n, 4, 4)))
+        return self._hits(casts.cast_shape(self._pack(), shape, X_WS, directions.repeated(n), limit, which))
+
+    def nearest(
+        self, points_W, *, max_distance: float = math.inf, group: int | None = None, mask: int | None = None
+    ) -> WorldHits:
+        """The body nearest to a point.
+
+        Parameters
+        ----------
+        points_W : (3,) or (N, 3) in W [m], within 1e50.
+        max_distance : [m], ≥ 0: bodies farther than this do not count.
+        group, mask : as of `raycast`.
+
+        Returns
+        -------
+        WorldHits : a row a point: ``body`` the id of the body with the least signed distance, −1 for none, ``distance``
+            [m] to it, below 0 for points inside, ``point`` its nearest point, ``normal`` from the point to it.
+            What these mean and promise: `collide.distance` of a point and a body.
+
+        Raises
+        ------
+        InvalidArgument
+        """
+        limit = checks.limit("World.nearest: max_distance", max_distance)
+        points = cast_arguments.checked_points("World.nearest", "points_W", points_W)
+        which = casts.checked_filter("World.nearest", group, mask)
+        return self._hits(casts.nearest_bodies(self._pack(), points, limit, which))
+
     @property
     def allowed(self) -> dict[tuple[int, int], str]:
         """Pairs never tested: {(id, id): reason}, the smaller id first."""
@@ -388,6 +488,14 @@ class World:
 
     def _result(self, rows: np.ndarray) -> WorldResult:
         return WorldResult(rows, self._to_ids(rows), certify)
+
+    def _hits(self, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
+        """Rows whose bodies are positions, with their ids."""
+        roster = self._pack().roster
+        named = np.unique(rows["body"][rows["body"] >= 0])
+        met = rows["body"] >= 0
+        rows["body"][met] = roster.ids[rows["body"][met]]
+        return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)
 
     def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
         """The bodies at the positions that rows name; in the rows, in place, their ids."""

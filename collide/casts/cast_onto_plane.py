@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collide.casts.portal import BEHIND, HIT, MISS, OPEN, Entry
+from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN, Entry
 from collide.kernels import kernel
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.halfspace_convex import plane_in_world, reach_of_plane
@@ -36,7 +36,7 @@ def cast_onto_plane(pair, direction, size, slop, limit):
         upper = -1.0 if pace < -pace_error else max(gap + error, 0.0) / max(pace - pace_error, 2.0**-60 * length)
         return Entry(BEHIND, min(gap - error, 0.0) / length, 0.0, upper, neg(nhat), touching)
     if not abs(pace) > pace_error:
-        return Entry(OPEN, 0.0, 0.0, 0.0, neg(nhat), touching)
+        return Entry(LEVEL, gap - error, gap, gap + error, neg(nhat), touching)
     if pace < 0.0:
         return Entry(MISS, 0.0, 0.0, 0.0, neg(nhat), touching)
     value = gap / pace

@@ -10,7 +10,7 @@ import numpy as np
 
 from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE, cast_pairs
 from collide.casts.exact_cast import cast_exactly
-from collide.casts.portal import BEHIND, HIT, MISS, OPEN
+from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
 from collide.casts.posed_parts import PartPairs, PosedParts
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
 from collide.certificates.exact_parts import common_vertices
@@ -28,11 +28,12 @@ __all__ = ["CastRows", "cast_parts"]
 class CastRows(NamedTuple):
     """Answers of n questions.
 
-    hit, certified, at_start : (n,) bool.   t : (n, 3) value, from below, from above.   normal : (n, 3) from A to B.
-    point : (n, 3) in W.   item_a, item_b : (n,) parts that touch.
+    hit, proven, certified, at_start : (n,) bool.   t : (n, 3) value, from below, from above.
+    normal : (n, 3) from A to B.   point : (n, 3) in W.   item_a, item_b : (n,) parts that touch.
     """
 
     hit: np.ndarray
+    proven: np.ndarray
     certified: np.ndarray
     at_start: np.ndarray
     t: np.ndarray
@@ -50,6 +51,16 @@ class Marks(NamedTuple):
     proven: np.ndarray
     certified: np.ndarray
     at_start: np.ndarray
+
+
+class PairRows(NamedTuple):
+    """Rows of pairs of parts (k, CAST_ROW), what is known of them, the question of each, and which parts they are."""
+
+    rows: np.ndarray
+    marks: Marks
+    owner: np.ndarray
+    item_a: np.ndarray
+    item_b: np.ndarray
 
 
 class _Workspace(local):
@@ -74,10 +85,15 @@ def cast_parts(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray, n: 
 
     directions : (n, 3), the largest component below 1 and at least ½.   limits : (n,) of t.
     """
+    return first_contacts(answer_questions(pairs, directions, limits), n)
+
+
+def answer_questions(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray) -> PairRows:
+    """Rows of all pairs of parts; arguments as of `cast_parts`."""
     questions = np.empty((len(pairs.owner), QUESTION))
     questions[:, :3], questions[:, 3] = directions[pairs.owner], limits[pairs.owner]
     rows, marks = answer_part_pairs(pairs.parts, pairs.pairs, questions)
-    return _first_of_each(pairs, rows, marks, n)
+    return PairRows(rows, marks, pairs.owner, pairs.item_a, pairs.item_b)
 
 
 def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) -> tuple[np.ndarray, Marks]:
@@ -92,6 +108,8 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
         address_of(questions), len(pairs), address_of(rows), *workspace(),
     )  # fmt: skip
     _settle_starts(parts, pairs, rows, marks)
+    for i in np.flatnonzero(rows[:, STATUS] == LEVEL).tolist():
+        _settle_level(parts, pairs[i], questions[i], rows[i])
     kinds = parts.table.ints[:, KIND]
     is_curved = ((kinds != POINTS) & (kinds != HALFSPACE))[parts.shape_of[pairs]].any(axis=1)
     width = np.where(is_curved, PROMISE_CURVED, PROMISE_STORED) * rows[:, SIZE]
@@ -165,6 +183,20 @@ def settle_points(points_a, points_b, grid: int, question: np.ndarray, row: np.n
     row[TOUCHING : TOUCHING + 3] = [float(Fraction(v) * Fraction(2) ** grid) for v in point]
 
 
+def _settle_level(parts: PosedParts, pair, question, row) -> None:
+    """Decide exactly whether a body before a half-space comes nearer at all; t from the bracket of its gap."""
+    normal, _ = parts.exact(pair[1]).plane
+    pace = -inner(normal, [Fraction(v) for v in question[:3].tolist()])
+    if pace <= 0:
+        row[STATUS] = MISS
+        return
+    largest = max(abs(v) for v in normal)
+    per_length = float(pace / largest) / float(np.linalg.norm([float(v / largest) for v in normal]))
+    t = row[[LOWER, VALUE, UPPER]] / per_length * [1 - 2.0**-48, 1.0, 1 + 2.0**-48]
+    row[STATUS] = MISS if t[0] > question[3] else HIT if t[2] <= question[3] else OPEN
+    row[[LOWER, VALUE, UPPER]] = t
+
+
 def _settle_plane(parts: PosedParts, pair, question, row) -> None:
     """Write the row of a hull A and a half-space B, by the height of every vertex."""
     normal, offset = parts.exact(pair[1]).plane
@@ -191,17 +223,15 @@ def _settle_plane(parts: PosedParts, pair, question, row) -> None:
     ]  # fmt: skip
 
 
-def _first_of_each(pairs: PartPairs, rows, marks: Marks, n: int) -> CastRows:
+def first_contacts(pairs: PairRows, n: int) -> CastRows:
     """Of each question the pair of parts that is met first; of several at the same t the first in order."""
+    rows, marks = pairs.rows, pairs.marks
     hits = np.flatnonzero(rows[:, STATUS] == HIT)
-    out = CastRows(
-        np.zeros(n, dtype=bool), np.ones(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, 3), np.inf),
-        np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64),
-    )  # fmt: skip
+    out = nothing_met(n)
     if not len(hits):
         return out
     owner = pairs.owner[hits]
-    order = np.lexsort((hits, rows[hits, VALUE], owner))
+    order = np.lexsort((pairs.item_b[hits], pairs.item_a[hits], rows[hits, VALUE], owner))
     hits, owner = hits[order], owner[order]
     starts = np.flatnonzero(np.diff(owner, prepend=-1))
     first, question = hits[starts], owner[starts]
@@ -209,12 +239,21 @@ def _first_of_each(pairs: PartPairs, rows, marks: Marks, n: int) -> CastRows:
     out.t[question, 1] = np.minimum.reduceat(rows[hits, LOWER], starts)
     # What may be no hit bounds nothing from above, unless there is nothing else.
     upper = np.minimum.reduceat(np.where(marks.proven[hits], rows[hits, UPPER], np.inf), starts)
-    out.t[question, 2] = np.minimum(upper, np.where(np.isinf(upper), rows[first, UPPER], np.inf))
+    out.t[question, 2] = np.where(np.isinf(upper), np.maximum.reduceat(rows[hits, UPPER], starts), upper)
     out.t[question, 0] = np.clip(rows[first, VALUE], out.t[question, 1], out.t[question, 2])
     # An open pair that is farther than the first contact has no say in it.
     matters = rows[hits, LOWER] <= np.repeat(out.t[question, 2], np.diff([*starts, len(hits)]))
     out.certified[question] = np.logical_and.reduceat(marks.certified[hits] | ~matters, starts)
+    out.proven[question] = np.logical_or.reduceat(marks.proven[hits], starts)
     out.at_start[question] = marks.at_start[first]
     out.normal[question], out.point[question] = rows[first, NORMAL : NORMAL + 3], rows[first, TOUCHING : TOUCHING + 3]
     out.item_a[question], out.item_b[question] = pairs.item_a[first], pairs.item_b[first]
     return out
+
+
+def nothing_met(n: int) -> CastRows:
+    """Rows of n questions that are misses, proven."""
+    yes, no, none = np.ones(n, dtype=bool), np.zeros(n, dtype=bool), np.full(n, -1, dtype=np.int64)
+    return CastRows(
+        no, yes, yes.copy(), no.copy(), np.full((n, 3), np.inf), np.zeros((n, 3)), np.zeros((n, 3)), none, none.copy()
+    )

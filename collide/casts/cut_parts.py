@@ -29,7 +29,7 @@ from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH, SLOP
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.posed_pair import PosedBody, PosedPair, posed_body, stretch_of
+from collide.narrowphase.posed_pair import PosedBody, PosedPair, Tables, posed_body, stretch_of
 from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, neg, norm, put_vec3, rotate, scale, sub, vec3_at
 
 #: Doubles of a ray: origin, direction.
@@ -209,26 +209,32 @@ def cut_parts(
     doubles, integers : workspace (RAY_DOUBLES, `silhouette.CAST_INTEGERS`).
     """
     questions = view_i64(questions_at, 2 * n)
+    tables = Tables(ints_at, numbers_at, poses_at, shape_of_at)
     for k in range(n):
-        part = questions[2 * k + 1]
-        shape = view_i64(shape_of_at, part + 1)[part]
-        ints = view_i64(ints_at, INTS * (shape + 1))
-        numbers = view_f64(numbers_at, NUMBERS * (shape + 1))
-        poses = view_f64(poses_at, POSE * (part + 1))
         ray = view_f64(rays_at + 8 * RAY * questions[2 * k], RAY)
         row = view_f64(rows_at + 8 * RAY_ROW * k, RAY_ROW)
-        body = posed_body(ints, shape, part)
-        radius = numbers[NUMBERS * shape + RADIUS]
-        slop = numbers[NUMBERS * shape + SLOP] + poses[body.pose_at + POSE_SLOP]
-        if body.kind != POINTS:
-            _cut_curved(body, numbers, poses, ray, slop, row)
-            continue
-        away = norm(sub(vec3_at(ray, 0), vec3_at(poses, body.pose_at + 9)))
-        size = numbers[NUMBERS * shape + REACH] * _stretch_of_pose(poses, body.pose_at) + radius + away
-        if radius > 0.0 and body.n <= 2:
-            _cut_rounded(body, poses, ray, radius, size, slop, row)
-        else:
-            _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, integers_at)
+        cut_part(tables, questions[2 * k + 1], ray, row, doubles_at, integers_at)
+
+
+@kernel
+def cut_part(tables, part, ray, row, doubles_at, integers_at):
+    """Write the row of a ray and a part of a table.   ray, row : views of RAY and RAY_ROW doubles."""
+    shape = view_i64(tables.shape_of_at, part + 1)[part]
+    ints = view_i64(tables.ints_at, INTS * (shape + 1))
+    numbers = view_f64(tables.numbers_at, NUMBERS * (shape + 1))
+    poses = view_f64(tables.poses_at, POSE * (part + 1))
+    body = posed_body(ints, shape, part)
+    radius = numbers[NUMBERS * shape + RADIUS]
+    slop = numbers[NUMBERS * shape + SLOP] + poses[body.pose_at + POSE_SLOP]
+    if body.kind != POINTS:
+        _cut_curved(body, numbers, poses, ray, slop, row)
+        return
+    away = norm(sub(vec3_at(ray, 0), vec3_at(poses, body.pose_at + 9)))
+    size = numbers[NUMBERS * shape + REACH] * _stretch_of_pose(poses, body.pose_at) + radius + away
+    if radius > 0.0 and body.n <= 2:
+        _cut_rounded(body, poses, ray, radius, size, slop, row)
+    else:
+        _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, integers_at)
 
 
 @kernel(inline=True)

@@ -27,8 +27,8 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, scale, sub, 
 
 #: How a cast ends. MISS: nothing is met, proven. HIT: something is, λ > 0, proven. BEHIND: the line enters D at λ ≤ 0,
 #: or that cannot be told: whether the bodies meet at the start decides. OPEN: rounding leaves open whether they meet
-#: at all, or within the limit.
-MISS, HIT, BEHIND, OPEN = range(4)
+#: at all, or within the limit. LEVEL: the motion may be along the plane of a half-space; the bracket is of the gap.
+MISS, HIT, BEHIND, OPEN, LEVEL = range(5)
 
 #: A portal is near enough to a support plane at this part of the error.
 _FLAT_ENOUGH = 0.25

@@ -7,6 +7,7 @@ from threading import local
 
 import numpy as np
 
+from collide.broadphase.box_tree import BoxTree
 from collide.casts.cut_parts import (
     FIRST,
     FIRST_LOWER,
@@ -19,7 +20,6 @@ from collide.casts.cut_parts import (
     LAST_SIDE,
     LAST_UPPER,
     RAY,
-    RAY_DOUBLES,
     RAY_ROW,
     STATE,
     cut_parts,
@@ -29,7 +29,7 @@ from collide.casts.exact_cast import cast_exactly
 from collide.casts.posed_parts import PosedParts
 from collide.casts.ray_chords import MET, MISSED, UNCLEAR
 from collide.casts.ray_hits import RayEvents
-from collide.casts.silhouette import CAST_INTEGERS
+from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
 from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.numerics.exact_points import inner, integers, on_one_grid, rounded
@@ -42,8 +42,8 @@ class _Workspace(local):
     """Scratch memory of one thread."""
 
     def __init__(self) -> None:
-        self.doubles = np.zeros(RAY_DOUBLES)
-        self.integers = np.zeros(CAST_INTEGERS, dtype=np.int64)
+        self.doubles = np.zeros(TREE_RAY_DOUBLES)
+        self.integers = np.zeros(TREE_RAY_INTEGERS, dtype=np.int64)
         self.addresses = address_of(self.doubles), address_of(self.integers)
 
 
@@ -60,8 +60,7 @@ def parts_met(
     """
     rows = np.zeros((len(questions), RAY_ROW))
     if len(questions):
-        rays = np.empty((len(origins), RAY))
-        rays[:, :3], rays[:, 3:] = origins, directions.vectors
+        rays = _as_rays(origins, directions)
         cut_parts(
             *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
             address_of(rays), len(questions), address_of(rows), *_workspace.addresses,
@@ -75,6 +74,43 @@ def parts_met(
             exact[k] = True
             _settle(parts, asked[k], origins, directions.vectors, limits[k], rows[k])
     return _events(rows, met, asked, limits, exact, directions)
+
+
+def candidate_parts(
+    parts: PosedParts, tree: BoxTree, first: np.ndarray, skipped: np.ndarray, meshed: np.ndarray, origins, directions,
+    limit: float, every: bool,
+) -> np.ndarray:  # fmt: skip
+    """(k, 2) int64: rays and parts that may make a ray's first wall, or any, of the bodies of a tree that have an end.
+
+    first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of those not asked, and of
+    those whose parts are only bounds.   The rest as of `parts_met`.
+    """
+    n = len(origins)
+    rays = _as_rays(origins, directions)
+    limits = directions.limits(limit)
+    header = np.array(
+        [
+            address_of(tree.nodes), tree.leaves, address_of(tree.order), len(tree.order), address_of(first),
+            len(first) - 1, address_of(skipped), address_of(meshed),
+        ],
+        dtype=np.int64,
+    )  # fmt: skip
+    capacity = 64 + 4 * n
+    while True:
+        pairs = np.empty((capacity, 2), dtype=np.int64)
+        count = parts_on_rays(
+            *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(header),
+            address_of(rays), address_of(limits), n, every, address_of(pairs), capacity, *_workspace.addresses,
+        )  # fmt: skip
+        if count <= capacity:
+            return pairs[:count]
+        capacity = count
+
+
+def _as_rays(origins: np.ndarray, directions: Directions) -> np.ndarray:
+    rays = np.empty((len(origins), RAY))
+    rays[:, :3], rays[:, 3:] = origins, directions.vectors
+    return rays
 
 
 def _are_open(rows: np.ndarray, limits: np.ndarray) -> np.ndarray:

@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.casts.directions import Directions, checked_directions
+from collide.casts.cast_arguments import checked_rays
+from collide.casts.directions import Directions
+from collide.casts.leaves import leaves_of
 from collide.casts.posed_parts import posed_parts
 from collide.casts.ray_facets import facets_met
 from collide.casts.ray_hits import RayEvents, RayHits, as_hits, in_order, joined
@@ -19,7 +21,7 @@ from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.shapes.compound import Compound
 from collide.shapes.shape import IDENTITY, Shape
-from collide.transforms import LARGEST, poses_as_given
+from collide.transforms import poses_as_given
 
 
 def raycast(
@@ -76,19 +78,6 @@ def raycast(
     return as_hits(events, origins, directions, every=all_hits, single=single_pose and single and not all_hits)
 
 
-def checked_rays(caller: str, origins_W, directions_W, **counts: int) -> tuple[np.ndarray, Directions, bool]:
-    """((n, 3) origins, n directions, whether a single ray was handed in).
-
-    counts : lengths of other arguments that go with the rays. Raises InvalidArgument.
-    """
-    origins, single_origin = checks.vectors(caller, "origins_W", origins_W)
-    directions, single_direction = checked_directions(caller, "directions_W", directions_W, "a ray")
-    checks.refuse_rows(caller, "origins_W", origins, np.abs(origins).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
-    n = checks.matched_count(caller, **counts, origins_W=len(origins), directions_W=len(directions.vectors))
-    origins = np.ascontiguousarray(np.broadcast_to(origins, (n, 3)))
-    return origins, directions.repeated(n), single_origin and single_direction
-
-
 def surfaces_met(
     shape: Shape, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, *, every: bool
 ) -> RayEvents:
@@ -100,7 +89,7 @@ def surfaces_met(
         return facets_met(body_of(shape), X_WA, origins, directions, limit, every)
     if not isinstance(shape, Compound):
         return in_order(_on_parts([(shape, IDENTITY)], np.zeros(1, dtype=np.int64), X_WA, origins, directions, limit))
-    items = leaves(shape)
+    items = leaves_of(shape)
     meshed = np.array([item.meshed for item, _ in items])
     numbers = np.arange(len(items))
     events = [
@@ -127,15 +116,6 @@ def _is_facets(shape: Shape) -> bool:
 def body_of_points(shape: Shape) -> bool:
     """Whether a hull of doubles is swept by no ball."""
     return parts_of(shape)[0][0].radius == 0.0
-
-
-def leaves(shape: Shape, X_AS: np.ndarray = IDENTITY) -> list[tuple[Shape, np.ndarray]]:
-    """The shapes of a union that are none, in the order of its parts, and their poses (4, 4) in it."""
-    if not isinstance(shape, Compound):
-        return [(shape, X_AS)]
-    return [
-        leaf for item, X_SI in shape.items for leaf in leaves(item, X_SI if X_AS is IDENTITY else X_AS @ X_SI)
-    ]  # fmt: skip
 
 
 def _on_parts(items, numbers, X_WA, origins, directions: Directions, limit: float) -> RayEvents:

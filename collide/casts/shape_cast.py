@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.casts.convex_casts import CastRows, cast_parts
-from collide.casts.directions import Directions, checked_directions
-from collide.casts.posed_parts import part_pairs
-from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.lowering.packed_convex import HALFSPACE
-from collide.lowering.parts import parts_of
+from collide.casts.cast_arguments import checked_directions, refuse_unbounded
+from collide.casts.cast_batches import cast_batch
+from collide.casts.convex_casts import CastRows
+from collide.casts.directions import Directions
+from collide.errors import InvalidArgument
 from collide.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
 from collide.threads import check_threads, pieces_of, share
@@ -123,25 +122,15 @@ def shape_cast(
     return ShapeCasts._make(values[0] for values in casts) if single and single_direction else casts
 
 
-def refuse_unbounded(what: str, shapes) -> None:
-    """Raises UnsupportedQuery for half-spaces, and unions with one, that are to be moved."""
-    for shape in [shapes] if isinstance(shapes, Shape) else {id(shape): shape for shape in shapes}.values():
-        if not shape.meshed and any(packed.kind == HALFSPACE for packed, _ in parts_of(shape)):
-            raise UnsupportedQuery(
-                f"{what}: {type(shape).__name__} has no end and cannot be cast; exchange the shapes and turn the "
-                "direction round, or cast a large Box"
-            )
-
-
 def _in_threads(A, B, X_WA, X_WB, directions: Directions, limit: float, threads: int) -> CastRows:
     n = len(directions.vectors)
     limits = directions.limits(limit)
 
     def answer(piece: slice) -> CastRows:
-        k = piece.stop - piece.start
         A_k, B_k = (S if isinstance(S, Shape) else S[piece] for S in (A, B))
         X_WAk, X_WBk = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
-        return cast_parts(part_pairs(A_k, B_k, X_WAk, X_WBk, k), directions.vectors[piece], limits[piece], k)
+        of_piece = Directions(directions.vectors[piece], directions.exponents[piece])
+        return cast_batch(A_k, B_k, X_WAk, X_WBk, of_piece, limits[piece])
 
     threads = min(threads, n // _MIN_PER_THREAD)
     if threads < 2:

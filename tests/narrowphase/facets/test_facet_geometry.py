@@ -11,7 +11,6 @@ from naive import random_pose, rng_of
 from naive_triangles import as_integers, minus, winding, world_points
 
 from collide.mesh.build_bvh import build_mesh_tree
-from collide.numerics.exact_points import placed
 from collide.narrowphase.facets.facet_geometry import (
     RAY_DIRECTIONS,
     FacetCorners,
@@ -19,6 +18,7 @@ from collide.narrowphase.facets.facet_geometry import (
     facet_normals,
     ray_crossing,
 )
+from collide.numerics.exact_points import placed
 
 
 def test_corners_by_number():
