@@ -231,17 +231,19 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
 
 
 @kernel
-def _cast_facets(sweep, work, radius, best, row):
-    """Write the row of what the pair holds now; the largest t that is still of interest afterwards.
+def _cast_facets(sweep, work, radius, limit, best, row):
+    """Write the row of what the pair holds now; the largest t that is still of interest afterwards, at first ``best``.
 
     The bodies are known to be apart at the start.
     """
     cast = open_cast(
         sweep.pair, sweep.d, radius, 0.0, sweep.error, sweep.size, work.doubles_at, work.integers_at
     )  # fmt: skip
-    met = cast_line(cast, best, False)
+    met = cast_line(cast, limit, False)
     status = met.status
-    if status == BEHIND:
+    if met.lower > best:
+        status = MISS
+    elif status == BEHIND:
         status = MISS if met.upper <= 0.0 else OPEN
     row[STATUS] = status
     row[LOWER] = max(met.lower, 0.0)
@@ -322,8 +324,9 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
 
 
 @kernel
-def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, best, count):
+def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
     """All candidates of one question; False where there is no room for them."""
+    best = limit
     radius = 0.0 if has_tree_a else sweep.pair.numbers[RADIUS]
     top = 0
     if _entry_of(sweep, a, b, 0, 0, has_tree_a, best) < math.inf:
@@ -352,7 +355,7 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, best, count):
             for j in range(run_b & 7):
                 _put_corners(work.corners, 24, b.triangles, (run_b >> 3) + j)
                 row = view_f64(header[CANDIDATES_AT] + 8 * CANDIDATE * count[0], CANDIDATE)
-                best = _cast_facets(sweep, work, radius, best, row)
+                best = _cast_facets(sweep, work, radius, limit, best, row)
                 if row[STATUS] != MISS:
                     row[FACET_A] = a.ids[(run_a >> 3) + i] if has_tree_a else -1
                     row[FACET_B] = b.ids[(run_b >> 3) + j]

@@ -29,93 +29,91 @@ class ExactCast(NamedTuple):
     weights: dict[tuple[int, int], Fraction]
 
 
+class _Basis(NamedTuple):
+    """A basis of the program: all entries are integers over ``denominator[0]``, which is positive.
+
+    names : of the four basic variables: _ARTIFICIAL, _T, or a pair of vertices.
+    rows : four of five, the inverse of the basis and the value of the variable.
+    """
+
+    names: list
+    rows: list[list[int]]
+    denominator: list[int]
+
+
 def cast_exactly(A: Sequence[Point], B: Sequence[Point], d: Sequence[int]) -> ExactCast:
     """The first contact of the hull of A, moved along d, with the hull of B.
 
     A, B : integer points on one grid.   d : integers, in units of the same grid a unit of t; not 0.
     """
-    basis: list = [_ARTIFICIAL] * 4
-    inverse = [[Fraction(int(i == j)) for j in range(4)] for i in range(4)]
-    x = [Fraction(0), Fraction(0), Fraction(0), Fraction(1)]
+    basis = _Basis([_ARTIFICIAL] * 4, [[int(i == j) for j in range(4)] + [int(i == 3)] for i in range(4)], [1])
     while True:
-        far, near = _prices(basis, inverse)
-        column = _entering(A, B, d, far, near)
+        far, near = _prices(basis, _ARTIFICIAL), _prices(basis, _T)
+        column = _entering(A, B, d, far, near, basis.denominator[0])
         if column is None:
             break
         name, entries = column
-        pivot = [sum((row[k] * entries[k] for k in range(4)), Fraction(0)) for row in inverse]
-        leaving = _leaving(x, inverse, pivot)
-        _exchange(x, inverse, pivot, leaving)
-        basis[leaving] = name
-    if any(name == _ARTIFICIAL and value for name, value in zip(basis, x)):
-        return ExactCast(None, (Fraction(0), Fraction(0), Fraction(0)), {})
-    t = sum((value for name, value in zip(basis, x) if name == _T), Fraction(0))
-    weights = {name: value for name, value in zip(basis, x) if isinstance(name, tuple) and value}
-    # A pair w of vertices has near·(w, 1) ≤ 0 and d the price −1: w·n ≤ t times that of −d, where t is attained.
-    return ExactCast(t, (near[0], near[1], near[2]) if t else (Fraction(0), Fraction(0), Fraction(0)), weights)
+        pivots = [sum(row[k] * entries[k] for k in range(4)) for row in basis.rows]
+        _exchange(basis, pivots, _leaving(basis.rows, pivots), name)
+    values = [Fraction(row[4], basis.denominator[0]) for row in basis.rows]
+    zero = Fraction(0), Fraction(0), Fraction(0)
+    if any(name == _ARTIFICIAL and value for name, value in zip(basis.names, values)):
+        return ExactCast(None, zero, {})
+    t = sum((value for name, value in zip(basis.names, values) if name == _T), Fraction(0))
+    weights = {name: value for name, value in zip(basis.names, values) if isinstance(name, tuple) and value}
+    normal = Fraction(near[0]), Fraction(near[1]), Fraction(near[2])
+    return ExactCast(t, normal if t else zero, weights)
 
 
-def _prices(basis: list, inverse: list[list[Fraction]]) -> tuple[list[Fraction], list[Fraction]]:
-    """Prices of the four rows: for the sum of the artificial variables, and for t."""
-    zero = Fraction(0)
-    far = [sum((inverse[i][k] for i in range(4) if basis[i] == _ARTIFICIAL), zero) for k in range(4)]
-    near = [sum((inverse[i][k] for i in range(4) if basis[i] == _T), zero) for k in range(4)]
-    return far, near
+def _prices(basis: _Basis, name: int) -> list[int]:
+    """Prices of the four rows where the variables of a name cost 1, and no others."""
+    return [sum(row[k] for of, row in zip(basis.names, basis.rows) if of == name) for k in range(4)]
 
 
-def _entering(A, B, d, far, near):
+def _entering(A, B, d, far: list[int], near: list[int], one: int):
     """(name, column) of a variable that makes the sums less, the artificial one first; None at the optimum."""
-    artificial, direction = _whole(far), (far[0], far[1], far[2])
-    i, value_a = _highest(A, artificial)
-    j, value_b = _highest([(-b[0], -b[1], -b[2]) for b in B], artificial)
-    gain = value_a[0] + value_b[0] + artificial[3]
+    n = far[0], far[1], far[2]
+    heights_a, heights_b = [inner(n, a) for a in A], [-inner(n, b) for b in B]
+    highest_a, highest_b = max(heights_a), max(heights_b)
+    gain = highest_a + highest_b + far[3]
     if gain > 0:
+        i, j = heights_a.index(highest_a), heights_b.index(highest_b)
         return (i, j), (*minus(A[i], B[j]), 1)
-    price_of_t = inner(direction, d)
-    if price_of_t > 0 or (price_of_t == 0 and inner((near[0], near[1], near[2]), d) > 1):
+    time = near[0], near[1], near[2]
+    price_of_t = inner(n, d)
+    if price_of_t > 0 or (price_of_t == 0 and inner(time, d) > one):
         return _T, (*d, 0)
     if gain < 0:
         return None
-    time = _whole(near)
-    tied_a = [k for k, a in enumerate(A) if inner(artificial, a) == value_a[0]]
-    tied_b = [k for k, b in enumerate(B) if -inner(artificial, b) == value_b[0]]
-    i = max(tied_a, key=lambda k: inner(time, A[k]))
-    j = min(tied_b, key=lambda k: inner(time, B[k]))
-    if inner(time, minus(A[i], B[j])) + time[3] > 0:
+    i = max((k for k, height in enumerate(heights_a) if height == highest_a), key=lambda k: inner(time, A[k]))
+    j = min((k for k, height in enumerate(heights_b) if height == highest_b), key=lambda k: inner(time, B[k]))
+    if inner(time, minus(A[i], B[j])) + near[3] > 0:
         return (i, j), (*minus(A[i], B[j]), 1)
     return None
 
 
-def _whole(prices: list[Fraction]) -> list[int]:
-    """The same ratios in integers."""
-    scale = 1
-    for price in prices:
-        scale = scale * price.denominator // _gcd(scale, price.denominator)
-    return [int(price * scale) for price in prices]
-
-
-def _gcd(a: int, b: int) -> int:
-    while b:
-        a, b = b, a % b
-    return a
-
-
-def _highest(points, direction) -> tuple[int, tuple[int]]:
-    values = [inner(direction, p) for p in points]
-    k = max(range(len(values)), key=values.__getitem__)
-    return k, (values[k],)
-
-
-def _leaving(x: list[Fraction], inverse: list[list[Fraction]], pivot: list[Fraction]) -> int:
-    """The row that leaves: the lexicographically least of (x, inverse) over the pivot, where that is positive."""
-    rows = [k for k in range(4) if pivot[k] > 0]
-    return min(rows, key=lambda k: [x[k] / pivot[k], *(entry / pivot[k] for entry in inverse[k])])
-
-
-def _exchange(x: list[Fraction], inverse: list[list[Fraction]], pivot: list[Fraction], leaving: int) -> None:
-    x[leaving] /= pivot[leaving]
-    inverse[leaving] = [entry / pivot[leaving] for entry in inverse[leaving]]
+def _leaving(rows: list[list[int]], pivots: list[int]) -> int:
+    """The row that leaves: the least of (value, inverse) over the pivot, lexicographically, where that is positive."""
+    best = -1
     for k in range(4):
-        if k != leaving and pivot[k]:
-            x[k] -= pivot[k] * x[leaving]
-            inverse[k] = [entry - pivot[k] * of_leaving for entry, of_leaving in zip(inverse[k], inverse[leaving])]
+        if pivots[k] > 0 and (best < 0 or _is_before(rows[k], pivots[k], rows[best], pivots[best])):
+            best = k
+    return best
+
+
+def _is_before(row: list[int], pivot: int, other: list[int], pivot_of_other: int) -> bool:
+    for column in (4, 0, 1, 2, 3):
+        difference = row[column] * pivot_of_other - other[column] * pivot
+        if difference:
+            return difference < 0
+    return False
+
+
+def _exchange(basis: _Basis, pivots: list[int], leaving: int, name) -> None:
+    """A pivot in integers, without a gcd: E. H. Bareiss 1968; J. Edmonds 1967."""
+    rows, pivot, before = basis.rows, pivots[leaving], basis.denominator[0]
+    for k in range(4):
+        if k != leaving:
+            rows[k] = [(x * pivot - pivots[k] * y) // before for x, y in zip(rows[k], rows[leaving])]
+    basis.denominator[0] = pivot
+    basis.names[leaving] = name
