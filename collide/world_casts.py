@@ -76,12 +76,12 @@ def cast_rays(
     events = parts_met(parts, convex, origins, directions, limit)
     part = convex[events.item, 1]
     events = events._replace(item=part - first[body_of[part]])
-    found = [events], [body_of[part]]
+    all_events, all_bodies = [events], [body_of[part]]
     pairs = np.unique(np.stack([body_of[asked[is_meshed, 1]], asked[is_meshed, 0]], axis=1), axis=0)
     for body_events, bodies in _on_meshes(packed, pairs, origins, directions, limit, every):
-        found[0].append(body_events)
-        found[1].append(bodies)
-    return _as_rows(joined(found[0]), np.concatenate(found[1]), origins, directions, every)
+        all_events.append(body_events)
+        all_bodies.append(bodies)
+    return _as_rows(joined(all_events), np.concatenate(all_bodies), origins, directions, every)
 
 
 def _candidates(
@@ -94,8 +94,8 @@ def _candidates(
     unbounded = tree.unbounded[skipped[tree.unbounded] == 0]
     if len(unbounded):
         n = len(origins)
-        endless = np.concatenate([np.arange(first[body], first[body + 1]) for body in unbounded.tolist()])
-        pairs = np.stack([np.repeat(np.arange(n), len(endless)), np.tile(endless, n)], axis=1)
+        of_unbounded = np.concatenate([np.arange(first[body], first[body + 1]) for body in unbounded.tolist()])
+        pairs = np.stack([np.repeat(np.arange(n), len(of_unbounded)), np.tile(of_unbounded, n)], axis=1)
         asked = np.concatenate([asked, pairs])
     return asked
 

@@ -162,7 +162,7 @@ def bodies_ahead(tree: BoxTree, questions: np.ndarray, of_points: bool = False) 
     pairs, bounds = pairs[:count], bounds[:count]
     if len(tree.unbounded):
         n, m = len(questions), len(tree.unbounded)
-        endless = np.stack([np.repeat(np.arange(n), m), np.tile(tree.unbounded, n)], axis=1)
-        pairs, bounds = np.concatenate([pairs, endless]), np.concatenate([bounds, np.zeros(n * m)])
+        unbounded = np.stack([np.repeat(np.arange(n), m), np.tile(tree.unbounded, n)], axis=1)
+        pairs, bounds = np.concatenate([pairs, unbounded]), np.concatenate([bounds, np.zeros(n * m)])
     order = np.lexsort((pairs[:, 1], bounds, pairs[:, 0]))
     return pairs[order], bounds[order]

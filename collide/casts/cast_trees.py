@@ -69,7 +69,7 @@ class _Sweep(NamedTuple):
 
     pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
     In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
-    step : the direction.   turn : from A's tree to it, coordinates; shift : where the centre of A's tree is.
+    step : the direction.   rotation : from A's tree to it, coordinates; shift : where the centre of A's tree is.
     pad : by what boxes are widened.
     """
 
@@ -80,7 +80,7 @@ class _Sweep(NamedTuple):
     middle: Vec3
     half: Vec3
     step: Vec3
-    turn: _Matrix
+    rotation: _Matrix
     shift: Vec3
     pad: float
 
@@ -179,7 +179,7 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     origin = sub(_times(rows, neg(pair.t)), centre)
     d = vec3_at(view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION), 0)
     zero = Vec3(0.0, 0.0, 0.0)
-    middle, half, shift, turn = origin, zero, zero, rows
+    middle, half, shift, rotation = origin, zero, zero, rows
     if is_convex:
         points, ids = view_f64(doubles_at, 9), view_i64(integers_at, 2)
         high = Vec3(
@@ -200,13 +200,13 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
         )
         x, y, z = _times(rows, columns.x), _times(rows, columns.y), _times(rows, columns.z)
         of_a = math.ldexp(1.0, int(a.header[EXPONENT]))
-        turn = _Matrix(
+        rotation = _Matrix(
             scale(of_a, Vec3(x.x, y.x, z.x)), scale(of_a, Vec3(x.y, y.y, z.y)), scale(of_a, Vec3(x.z, y.z, z.z))
         )
         shift = add(origin, _times(rows, rotate(poses, 0, vec3_at(a.numbers, CENTRE))))
     widest = max(norm(rows.x), norm(rows.y), norm(rows.z))
     pad = 4.0 * widest * (error + 2.0**-44 * size) + 2.0**-44 * (norm(origin) + norm(centre) + 1.0)
-    return _Sweep(pair, d, error, size, middle, half, _times(rows, d), turn, shift, pad)
+    return _Sweep(pair, d, error, size, middle, half, _times(rows, d), rotation, shift, pad)
 
 
 @kernel(inline=True)
@@ -216,10 +216,10 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
     middle, half = sweep.middle, sweep.half
     if has_tree_a:
         of_a = box_at(a.boxes, ref_a)
-        turn = sweep.turn
-        middle = add(sweep.shift, _times(turn, of_a.centre))
+        rotation = sweep.rotation
+        middle = add(sweep.shift, _times(rotation, of_a.centre))
         half = Vec3(
-            dot(absolute(turn.x), of_a.half), dot(absolute(turn.y), of_a.half), dot(absolute(turn.z), of_a.half)
+            dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half), dot(absolute(rotation.z), of_a.half)
         )
     gap = sub(box.centre, middle)
     wide = add(box.half, half)
@@ -275,8 +275,8 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
     opens_a = link_a >= 0
     if opens_a and link_b >= 0:
         of_a, of_b = box_at(a.boxes, ref_a).half, box_at(b.boxes, ref_b).half
-        turn = sweep.turn
-        size_a = dot(absolute(turn.x), of_a) + dot(absolute(turn.y), of_a) + dot(absolute(turn.z), of_a)
+        rotation = sweep.rotation
+        size_a = dot(absolute(rotation.x), of_a) + dot(absolute(rotation.y), of_a) + dot(absolute(rotation.z), of_a)
         opens_a = size_a > of_b.x + of_b.y + of_b.z
     base = top
     for slot in range(WIDTH):

@@ -70,7 +70,7 @@ def _prices(basis: _Basis, name: int) -> list[int]:
     return [sum(row[k] for of, row in zip(basis.names, basis.rows) if of == name) for k in range(4)]
 
 
-def _entering(A, B, d, far: list[int], near: list[int], one: int):
+def _entering(A, B, d, far: list[int], near: list[int], unit: int):
     """(name, column) of a variable that makes the sums less, the artificial one first; None at the optimum."""
     n = far[0], far[1], far[2]
     heights_a, heights_b = [inner(n, a) for a in A], [-inner(n, b) for b in B]
@@ -81,7 +81,7 @@ def _entering(A, B, d, far: list[int], near: list[int], one: int):
         return (i, j), (*minus(A[i], B[j]), 1)
     time = near[0], near[1], near[2]
     price_of_t = inner(n, d)
-    if price_of_t > 0 or (price_of_t == 0 and inner(time, d) > one):
+    if price_of_t > 0 or (price_of_t == 0 and inner(time, d) > unit):
         return _T, (*d, 0)
     if gain < 0:
         return None
@@ -101,9 +101,9 @@ def _leaving(rows: list[list[int]], pivots: list[int]) -> int:
     return best
 
 
-def _is_before(row: list[int], pivot: int, other: list[int], pivot_of_other: int) -> bool:
+def _is_before(row: list[int], pivot: int, best: list[int], pivot_of_best: int) -> bool:
     for column in (4, 0, 1, 2, 3):
-        difference = row[column] * pivot_of_other - other[column] * pivot
+        difference = row[column] * pivot_of_best - best[column] * pivot
         if difference:
             return difference < 0
     return False

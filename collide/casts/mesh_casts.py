@@ -132,7 +132,7 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
     questions = np.ascontiguousarray(np.hstack([vectors, limits[:, None]]))
     table = ShapeTable([A.packed if A.packed is not None else pack_points(np.zeros((1, 3)))])
     table.build_trees(np.zeros(1, dtype=np.int64))
-    count, done, kept = np.zeros(1, dtype=np.int64), 0, []
+    count, done, answered = np.zeros(1, dtype=np.int64), 0, []
     capacity = 1024 + 8 * n
     while True:
         candidates = np.empty((capacity, CANDIDATE))
@@ -146,9 +146,9 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
         assert len(header) == HEADER
         before, count[0] = done, 0
         done = cast_into_tree(address_of(header), done, n, address_of(count), *_workspace.addresses)
-        kept.append(candidates[: count[0]].copy())
+        answered.append(candidates[: count[0]].copy())
         if done == n:
-            return np.concatenate(kept)
+            return np.concatenate(answered)
         if done == before:
             capacity *= 4
 

@@ -181,14 +181,16 @@ def capsule_chord(line, start, end, radius):
 def _clipped(slab, across, step, radius, line, side):
     """A cylinder of endless length, |across + t step| ≤ radius, cut off by a slab.
 
-    Where the line is within it at both ends of the slab it is so in between: nothing is asked of a line that runs along
-    the axis.
+    Where the line is within it at both ends of the slab it is so in between, and outside where the way between them is
+    too short to get in: nothing else is asked of a line that runs along the axis.
     """
     if slab.state == MET and slab.first > -math.inf:
         a, b = add(across, scale(slab.first, step)), add(across, scale(slab.last, step))
         off = (slab.first_upper - slab.first_lower + slab.last_upper - slab.last_lower) * norm(step)
         if max(norm(a), norm(b)) + off < radius * (1.0 - _ROUNDING) - 2.0 * line.error:
             return slab
+        if norm(a) - norm(sub(b, a)) - off > radius * (1.0 + _ROUNDING) + 2.0 * line.error:
+            return nothing()
     return common(ball_chord(across, step, radius, 2.0 * line.error, side), slab)
 
 

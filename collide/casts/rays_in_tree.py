@@ -32,7 +32,7 @@ _STACK = 128
 TREE_RAY_DOUBLES = RAY_DOUBLES + RAY_ROW + _STACK
 TREE_RAY_INTEGERS = CAST_INTEGERS + _STACK
 
-# Integers of a `TreeOfParts` in memory.
+# Integers of a tree of parts in memory.
 NODES_AT, LEAVES, ORDER_AT, N_ORDER, FIRST_AT, N_BODIES, SKIPPED_AT, MESHED_AT = range(8)
 TREE_OF_PARTS = 8
 

@@ -99,3 +99,52 @@ def cast_from_below(A, B, X_WA, X_WB, d, rng, rounds: int = 50) -> float:
         n = best[1] + width * rng.normal(size=(300, 3))
         width *= 0.75
     return max(best[0], 0.0)
+
+
+def holds(shape, X, point, strictly: bool = False) -> bool:
+    """Whether a convex shape at a pose (4, 4) holds a point of fractions, by its definition, exactly.
+
+    strictly : whether the point is inside, and not on the surface.
+    """
+    R = [[Fraction(v) for v in row[:3]] for row in X[:3].tolist()]
+    x = [c - Fraction(v) for c, v in zip(point, X[:3, 3].tolist())]
+    name = type(shape).__name__
+    half = Fraction(float(getattr(shape, "length", 0.0))) / 2
+    radius = Fraction(float(getattr(shape, "radius", 0.0)))
+    if name in ("Sphere", "Capsule"):  # the ball is one in W
+        axis = [row[2] for row in R]
+        square = _dot(axis, axis)
+        s = max(min(_dot(x, axis) / square, half), -half)
+        beside = [c - s * v for c, v in zip(x, axis)]
+        excess = _dot(beside, beside) - radius**2
+    else:
+        x, y, z = _solved(R, x)
+        if name == "Cylinder":
+            excess = max(x * x + y * y - radius**2, z * z - half**2)
+        elif name == "Cone":
+            width = radius * (half - z) / (2 * half)
+            excess = max(x * x + y * y - width**2 if width >= 0 else Fraction(1), -half - z)
+        elif name == "Ellipsoid":
+            a, b, c = (Fraction(v) for v in np.asarray(shape.radii).tolist())
+            excess = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2 - 1
+        elif name == "Halfspace":
+            n = [Fraction(v) for v in np.asarray(shape.normal).tolist()]
+            excess = _dot(n, (x, y, z)) - Fraction(float(shape.offset))
+        elif name == "Box":
+            sides = [Fraction(v) / 2 for v in np.asarray(shape.size).tolist()]
+            excess = max(abs(c) - side for c, side in zip((x, y, z), sides))
+        else:
+            raise TypeError(name)
+    return excess < 0 if strictly else excess <= 0
+
+
+def _solved(R, x):
+    """R⁻¹ x, by Cramer's rule."""
+    a, b, c = ([row[k] for row in R] for k in range(3))
+    determinant = _dot(a, _cross(b, c))
+    return _dot(x, _cross(b, c)) / determinant, _dot(a, _cross(x, c)) / determinant, _dot(a, _cross(b, x)) / determinant
+
+
+def on_ray(origin, direction, t) -> list[Fraction]:
+    """A point of a ray of doubles, exactly."""
+    return [Fraction(float(o)) + Fraction(float(t)) * Fraction(float(d)) for o, d in zip(origin, direction)]
