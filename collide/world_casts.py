@@ -73,7 +73,7 @@ def cast_rays(
         asked = _candidates(packed, parts, first, skipped, origins, directions, limit, every)
     is_meshed = packed.meshed[body_of[asked[:, 1]]]
     convex = np.ascontiguousarray(asked[~is_meshed])
-    events = parts_met(parts, convex, origins, directions, limit)
+    events = parts_met(parts, convex, origins, directions, limit, every)
     part = convex[events.item, 1]
     events = events._replace(item=part - first[body_of[part]])
     all_events, all_bodies = [events], [body_of[part]]

@@ -14,7 +14,7 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Doubles of a question: low and high corner of the box that moves, the direction, and the largest t that counts.
 SWEEP = 10
-#: Relative error of a t where a slab begins or ends, with a margin.
+#: Relative error of a t where a slab begins or ends, a product with an inverse, with a margin.
 _ROUNDING = 2.0**-50
 #: Coordinates are smaller than this; those of boxes that hold nothing are infinite.
 _LARGEST = 1e300
@@ -32,13 +32,16 @@ def upwards(x):
 
 
 @kernel(inline=True)
-def slab_entry(low, high, step, first, last):
-    """(first, last) of the t in [first, last] with low ≤ t step ≤ high, rounded outwards."""
-    if step == 0.0:
+def slab_entry(low, high, inverse, first, last):
+    """(first, last) of the t in [first, last] with low ≤ t step ≤ high, rounded outwards.
+
+    inverse : of the step, infinite where it is 0.
+    """
+    if abs(inverse) == math.inf:
         return (first, last) if low <= 0.0 <= high else (math.inf, -math.inf)
-    near = low / step
-    far = high / step
-    if step < 0.0:
+    near = low * inverse
+    far = high * inverse
+    if inverse < 0.0:
         near, far = far, near
     return max(first, downwards(near)), min(last, upwards(far))
 
@@ -52,7 +55,9 @@ def box_entry(nodes, node, sweep, at, limit):
         # Sums of two coordinates are rounded: outwards by an ulp of the larger.
         low = nodes[6 * node + axis] - sweep[at + 3 + axis]
         high = nodes[6 * node + 3 + axis] - sweep[at + axis]
-        first, last = slab_entry(downwards(low), upwards(high), sweep[at + 6 + axis], first, last)
+        step = sweep[at + 6 + axis]
+        inverse = 1.0 / step if step != 0.0 else math.inf
+        first, last = slab_entry(downwards(low), upwards(high), inverse, first, last)
     return first if first <= last else math.inf
 
 

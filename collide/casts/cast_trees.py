@@ -27,6 +27,7 @@ from collide.numerics.vec3 import (
     add,
     cross,
     dot,
+    max_abs,
     neg,
     norm,
     put_vec3,
@@ -69,7 +70,8 @@ class _Sweep(NamedTuple):
 
     pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
     In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
-    step : the direction.   rotation : from A's tree to it, coordinates; shift : where the centre of A's tree is.
+    inverse : of the direction there, component by component.
+    rotation : from A's tree to it, coordinates.   shift : where the centre of A's tree is.
     pad : by what boxes are widened.
     """
 
@@ -79,7 +81,7 @@ class _Sweep(NamedTuple):
     size: float
     middle: Vec3
     half: Vec3
-    step: Vec3
+    inverse: Vec3
     rotation: _Matrix
     shift: Vec3
     pad: float
@@ -206,7 +208,15 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
         shift = add(origin, _times(rows, rotate(poses, 0, vec3_at(a.numbers, CENTRE))))
     widest = max(norm(rows.x), norm(rows.y), norm(rows.z))
     pad = 4.0 * widest * (error + 2.0**-44 * size) + 2.0**-44 * (norm(origin) + norm(centre) + 1.0)
-    return _Sweep(pair, d, error, size, middle, half, _times(rows, d), rotation, shift, pad)
+    step = _times(rows, d)
+    inverse = Vec3(_inverted(step.x, step), _inverted(step.y, step), _inverted(step.z, step))
+    return _Sweep(pair, d, error, size, middle, half, inverse, rotation, shift, pad)
+
+
+@kernel(inline=True)
+def _inverted(x, step):
+    """1 / x; infinite where the component of a step is 0 but for rounding: ``pad`` holds what it moves."""
+    return 1.0 / x if abs(x) > 2.0**-48 * max_abs(step) else math.inf
 
 
 @kernel(inline=True)
@@ -219,14 +229,15 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
         rotation = sweep.rotation
         middle = add(sweep.shift, _times(rotation, of_a.centre))
         half = Vec3(
-            dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half), dot(absolute(rotation.z), of_a.half)
-        )
+            dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
+            dot(absolute(rotation.z), of_a.half),
+        )  # fmt: skip
     gap = sub(box.centre, middle)
     wide = add(box.half, half)
     pad = sweep.pad + 2.0**-40 * (abs(gap.x) + abs(gap.y) + abs(gap.z))
-    first, last = slab_entry(gap.x - wide.x - pad, gap.x + wide.x + pad, sweep.step.x, 0.0, best)
-    first, last = slab_entry(gap.y - wide.y - pad, gap.y + wide.y + pad, sweep.step.y, first, last)
-    first, last = slab_entry(gap.z - wide.z - pad, gap.z + wide.z + pad, sweep.step.z, first, last)
+    first, last = slab_entry(gap.x - wide.x - pad, gap.x + wide.x + pad, sweep.inverse.x, 0.0, best)
+    first, last = slab_entry(gap.y - wide.y - pad, gap.y + wide.y + pad, sweep.inverse.y, first, last)
+    first, last = slab_entry(gap.z - wide.z - pad, gap.z + wide.z + pad, sweep.inverse.z, first, last)
     return first if first <= last else math.inf
 
 

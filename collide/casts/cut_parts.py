@@ -1,7 +1,7 @@
 """Rays against posed convex sets, one row a question: where the ray's line enters and leaves, with proven bounds.
 
-Spheres, capsules, cylinders, cones, ellipsoids and half-spaces in closed form (`ray_chords.py`); points, and these
-swept by a ball, as casts of a point (`portal.py`), forwards and back.
+Boxes, spheres, capsules, cylinders, cones, ellipsoids and half-spaces in closed form (`ray_chords.py`); other points,
+and these swept by a ball, as casts of a point (`portal.py`), forwards and back.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from collide.casts.portal import MISS, OPEN, cast_line
+from collide.casts.portal import HIT, MISS, OPEN, cast_line
 from collide.casts.ray_chords import (
     MET,
     MISSED,
@@ -17,6 +17,7 @@ from collide.casts.ray_chords import (
     Chord,
     Line,
     ball_chord,
+    box_chord,
     capsule_chord,
     cone_chord,
     cylinder_chord,
@@ -165,9 +166,48 @@ def _away(p, start, end):
     return scale(1.0 / norm(v), v)
 
 
+@kernel(inline=True)
+def _is_box(body):
+    """Whether the points are the corners of a box about the frame's origin, along its axes, as `Box` has them."""
+    coords, m = body.coords, body.padded
+    x, y, z = coords[7], coords[m + 7], coords[2 * m + 7]
+    same = x > 0.0 and y > 0.0 and z > 0.0
+    for k in range(8):
+        same = same and coords[k] == (x if k & 4 else -x)
+        same = same and coords[m + k] == (y if k & 2 else -y)
+        same = same and coords[2 * m + k] == (z if k & 1 else -z)
+    return same
+
+
 @kernel
-def _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, integers_at):
-    """Write the row of points, swept by a ball or not, as casts of the ray's origin to and fro."""
+def _cut_box(body, numbers, poses, ray, slop, row):
+    """Write the row of a box."""
+    inverse = _inverse_of(poses, body.pose_at)
+    seen = sub(vec3_at(ray, 0), vec3_at(poses, body.pose_at + 9))
+    o, d = _to_local(inverse, seen), _to_local(inverse, vec3_at(ray, 3))
+    reach = numbers[NUMBERS * body.shape + REACH]
+    line = Line(o, d, norm(d), 2.0**-47 * inverse.skew * (norm(o) + reach) + slop)
+    chord = box_chord(line, column_at(body.coords, body.padded, 7))
+    _put_chord(row, chord)
+    row[FIRST_SIDE] = -1.0
+    row[LAST_SIDE] = -1.0
+    if chord.state != MISSED:
+        put_vec3(row, FIRST_NORMAL, _normal_to_world(inverse, _normal_of_side(chord.first_side)))
+        put_vec3(row, LAST_NORMAL, _normal_to_world(inverse, _normal_of_side(chord.last_side)))
+
+
+@kernel(inline=True)
+def _normal_of_side(side):
+    sign = 1.0 if side & 1 == 0 else -1.0
+    return Vec3(sign if side <= 2 else 0.0, sign if side == 3 or side == 4 else 0.0, sign if side > 4 else 0.0)
+
+
+@kernel
+def _cut_hull(body, numbers, poses, ray, radius, size, slop, both, row, doubles_at, integers_at):
+    """Write the row of points, swept by a ball or not, as casts of the ray's origin to and fro.
+
+    both : also where it leaves, where it is proven to enter ahead.
+    """
     local = view_f64(doubles_at + 8 * CAST_DOUBLES, 2 * POSE)
     for k in range(POSE):
         local[k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
@@ -188,6 +228,11 @@ def _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, in
     if there.status == MISS:
         _put_chord(row, nothing())
         return
+    if there.status == HIT and not both:
+        far = math.inf
+        _put_chord(row, Chord(MET, there.lower, there.value, there.upper, far, far, far, -1, -1))
+        put_vec3(row, FIRST_NORMAL, neg(there.normal))
+        return
     back = cast_line(open_cast(pair, neg(d), 0.0, radius, error, size, doubles_at, integers_at), math.inf, True)
     state = UNCLEAR if there.status == OPEN or back.status == OPEN else MET
     chord = Chord(
@@ -198,14 +243,15 @@ def _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, in
     put_vec3(row, LAST_NORMAL, neg(back.normal))
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+@entry("void(int64, int64, int64, int64, int64, int64, int64, boolean, int64, int64, int64)")
 def cut_parts(
-    ints_at, numbers_at, poses_at, shape_of_at, questions_at, rays_at, n, rows_at, doubles_at, integers_at
+    ints_at, numbers_at, poses_at, shape_of_at, questions_at, rays_at, n, both, rows_at, doubles_at, integers_at
 ):
     """Chords of n rays with posed convex parts.
 
     ints, numbers : a `ShapeTable`, its trees built.   poses : POSE doubles a part.   shape_of : a shape row a part.
     questions : two integers each, a ray and a part.   rays : RAY doubles.   rows : out, RAY_ROW doubles a question.
+    both : where they leave as well; else infinity may be said of hulls that are entered ahead.
     doubles, integers : workspace (RAY_DOUBLES, `silhouette.CAST_INTEGERS`).
     """
     questions = view_i64(questions_at, 2 * n)
@@ -213,12 +259,12 @@ def cut_parts(
     for k in range(n):
         ray = view_f64(rays_at + 8 * RAY * questions[2 * k], RAY)
         row = view_f64(rows_at + 8 * RAY_ROW * k, RAY_ROW)
-        cut_part(tables, questions[2 * k + 1], ray, row, doubles_at, integers_at)
+        cut_part(tables, questions[2 * k + 1], ray, both, row, doubles_at, integers_at)
 
 
 @kernel
-def cut_part(tables, part, ray, row, doubles_at, integers_at):
-    """Write the row of a ray and a part of a table.   ray, row : views of RAY and RAY_ROW doubles."""
+def cut_part(tables, part, ray, both, row, doubles_at, integers_at):
+    """Write the row of a ray and a part of a table.   ray, row : views of RAY and RAY_ROW doubles.   both : ends."""
     shape = view_i64(tables.shape_of_at, part + 1)[part]
     ints = view_i64(tables.ints_at, INTS * (shape + 1))
     numbers = view_f64(tables.numbers_at, NUMBERS * (shape + 1))
@@ -231,10 +277,12 @@ def cut_part(tables, part, ray, row, doubles_at, integers_at):
         return
     away = norm(sub(vec3_at(ray, 0), vec3_at(poses, body.pose_at + 9)))
     size = numbers[NUMBERS * shape + REACH] * _stretch_of_pose(poses, body.pose_at) + radius + away
-    if radius > 0.0 and body.n <= 2:
+    if body.n == 8 and radius == 0.0 and _is_box(body):
+        _cut_box(body, numbers, poses, ray, slop, row)
+    elif radius > 0.0 and body.n <= 2:
         _cut_rounded(body, poses, ray, radius, size, slop, row)
     else:
-        _cut_hull(body, numbers, poses, ray, radius, size, slop, row, doubles_at, integers_at)
+        _cut_hull(body, numbers, poses, ray, radius, size, slop, both, row, doubles_at, integers_at)
 
 
 @kernel(inline=True)

@@ -203,6 +203,15 @@ def cylinder_chord(line, radius, half):
 
 
 @kernel
+def box_chord(line, half):
+    """Of a box along the axes; sides 1 and 2 are those across x, 3 and 4 across y, 5 and 6 across z."""
+    o, d = line.origin, line.direction
+    chord = slab_chord(o.x, d.x, -half.x, half.x, line, 1, 2)
+    chord = common(chord, slab_chord(o.y, d.y, -half.y, half.y, line, 3, 4))
+    return common(chord, slab_chord(o.z, d.z, -half.z, half.z, line, 5, 6))
+
+
+@kernel
 def ellipsoid_chord(line, radii):
     """Of an ellipsoid along the axes: a unit ball in units of its radii."""
     o, d = line.origin, line.direction

@@ -51,19 +51,19 @@ _workspace = _Workspace()
 
 
 def parts_met(
-    parts: PosedParts, questions: np.ndarray, origins: np.ndarray, directions: Directions, limit: float
+    parts: PosedParts, questions: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
 ) -> RayEvents:
     """Where rays enter and leave convex parts, from their origins on to the limit.
 
     questions : (k, 2) int64, a ray and a part each.   limit : of t, in lengths of the directions given.
-    The events' items are numbers of the questions.
+    every : both ends of each; else at least the first.   The events' items are numbers of the questions.
     """
     rows = np.zeros((len(questions), RAY_ROW))
     if len(questions):
         rays = _as_rays(origins, directions)
         cut_parts(
             *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
-            address_of(rays), len(questions), address_of(rows), *_workspace.addresses,
+            address_of(rays), len(questions), every, address_of(rows), *_workspace.addresses,
         )  # fmt: skip
     limits = directions.limits(limit)[questions[:, 0]]
     met = np.flatnonzero(rows[:, STATE] != MISSED)

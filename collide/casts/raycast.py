@@ -88,12 +88,13 @@ def surfaces_met(
     if _is_facets(shape):
         return facets_met(body_of(shape), X_WA, origins, directions, limit, every)
     if not isinstance(shape, Compound):
-        return in_order(_on_parts([(shape, IDENTITY)], np.zeros(1, dtype=np.int64), X_WA, origins, directions, limit))
+        number = np.zeros(1, dtype=np.int64)
+        return in_order(_on_parts([(shape, IDENTITY)], number, X_WA, origins, directions, limit, every))
     items = leaves_of(shape)
     meshed = np.array([item.meshed for item, _ in items])
     numbers = np.arange(len(items))
     events = [
-        _on_parts([items[k] for k in numbers[~meshed]], numbers[~meshed], X_WA, origins, directions, limit)
+        _on_parts([items[k] for k in numbers[~meshed]], numbers[~meshed], X_WA, origins, directions, limit, every)
     ]  # fmt: skip
     for k in numbers[meshed].tolist():
         mesh, X_AM = items[k]
@@ -118,11 +119,11 @@ def body_of_points(shape: Shape) -> bool:
     return parts_of(shape)[0][0].radius == 0.0
 
 
-def _on_parts(items, numbers, X_WA, origins, directions: Directions, limit: float) -> RayEvents:
+def _on_parts(items, numbers, X_WA, origins, directions: Directions, limit: float, every: bool) -> RayEvents:
     """Events of n rays and convex items (shape, pose), whose numbers the events name."""
     n, m = len(origins), len(items)
     parts = posed_parts([(parts_of(item)[0][0], X_AI) for item, X_AI in items], X_WA)
     ray = np.repeat(np.arange(n), m)
     part = np.tile(np.arange(m), n) + (m * ray if len(X_WA) > 1 else 0)
-    events = parts_met(parts, np.stack([ray, part], axis=1), origins, directions, limit)
+    events = parts_met(parts, np.stack([ray, part], axis=1), origins, directions, limit, every)
     return events._replace(item=numbers[events.item % m] if m else events.item)

@@ -29,7 +29,7 @@ from collide.narrowphase.posed_pair import Tables
 #: Nodes that may wait: one a level, and some.
 _STACK = 128
 #: Doubles and integers of workspace: of a chord, its row, and of the nodes that wait.
-TREE_RAY_DOUBLES = RAY_DOUBLES + RAY_ROW + _STACK
+TREE_RAY_DOUBLES = RAY_DOUBLES + RAY_ROW + _STACK + 3
 TREE_RAY_INTEGERS = CAST_INTEGERS + _STACK
 
 # Integers of a tree of parts in memory.
@@ -51,9 +51,14 @@ class _Tree(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """One ray on its way.   stack, keys : nodes that wait, and where it comes to their boxes.   row : of a chord."""
+    """One ray on its way.
+
+    inverse : of its direction, component by component; infinite of 0.
+    stack, keys : nodes that wait, and where it comes to their boxes.   row : of a chord.
+    """
 
     ray: Any
+    inverse: Any
     stack: Any
     keys: Any
     row: Any
@@ -72,14 +77,14 @@ def _tree_at(header_at):
 
 
 @kernel(inline=True)
-def _entry_of(tree, node, ray, best):
+def _entry_of(tree, node, ray, inverse, best):
     """Where the ray comes to the box of a node, from below; infinite where it does not before ``best``."""
     first = 0.0
     last = best
     for axis in range(3):
         low = tree.nodes[6 * node + axis] - ray[axis]
         high = tree.nodes[6 * node + 3 + axis] - ray[axis]
-        first, last = slab_entry(downwards(low), upwards(high), ray[3 + axis], first, last)
+        first, last = slab_entry(downwards(low), upwards(high), inverse[axis], first, last)
     return first if first <= last else math.inf
 
 
@@ -97,7 +102,8 @@ def _nearest_wall(row, best):
 def _push_children(tree, walk, node, top, best):
     """Put the children that the ray comes to onto the stack, the nearer one on top."""
     near, far = 2 * node, 2 * node + 1
-    near_key, far_key = _entry_of(tree, near, walk.ray, best), _entry_of(tree, far, walk.ray, best)
+    near_key = _entry_of(tree, near, walk.ray, walk.inverse, best)
+    far_key = _entry_of(tree, far, walk.ray, walk.inverse, best)
     if far_key < near_key:
         near, far, near_key, far_key = far, near, far_key, near_key
     if far_key < math.inf:
@@ -129,13 +135,17 @@ def parts_on_rays(
     count = 0
     for k in range(n):
         walk = _Walk(
-            view_f64(rays_at + 8 * RAY * k, RAY), view_i64(integers_at + 8 * CAST_INTEGERS, _STACK),
+            view_f64(rays_at + 8 * RAY * k, RAY),
+            view_f64(doubles_at + 8 * (RAY_DOUBLES + RAY_ROW + _STACK), 3),
+            view_i64(integers_at + 8 * CAST_INTEGERS, _STACK),
             view_f64(doubles_at + 8 * (RAY_DOUBLES + RAY_ROW), _STACK), view_f64(doubles_at + 8 * RAY_DOUBLES, RAY_ROW),
             doubles_at, integers_at,
         )  # fmt: skip
         best = limits[k]
         top = 0
-        if _entry_of(tree, 1, walk.ray, best) < math.inf:
+        for axis in range(3):
+            walk.inverse[axis] = 1.0 / walk.ray[3 + axis] if walk.ray[3 + axis] != 0.0 else math.inf
+        if _entry_of(tree, 1, walk.ray, walk.inverse, best) < math.inf:
             walk.stack[0] = 1
             walk.keys[0] = 0.0
             top = 1
@@ -152,7 +162,7 @@ def parts_on_rays(
                 continue
             for part in range(tree.first[body], tree.first[body + 1]):
                 if tree.meshed[body] == 0:
-                    cut_part(tables, part, walk.ray, walk.row, doubles_at, integers_at)
+                    cut_part(tables, part, walk.ray, every, walk.row, doubles_at, integers_at)
                     if walk.row[STATE] == MISSED or walk.row[FIRST_LOWER] > best or walk.row[LAST_UPPER] < 0.0:
                         continue
                     if not every:
