@@ -29,7 +29,8 @@ import collide
 RESULTS = Path(__file__).parent / "results"
 SHAPES = {
     "sphere": collide.Sphere(0.5), "box": collide.Box((1.0, 0.8, 0.6)), "capsule": collide.Capsule(0.3, 0.6),
-    "cylinder": collide.Cylinder(0.4, 0.8), "cone": collide.Cone(0.4, 0.8), "ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.4)),
+    "cylinder": collide.Cylinder(0.4, 0.8), "cone": collide.Cone(0.4, 0.8),
+    "ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.4)),
 }  # fmt: skip
 Row = dict[str, object]
 
@@ -41,7 +42,8 @@ def poses(rng: np.random.Generator, n: int, spread: float) -> np.ndarray:
     X = np.tile(np.eye(4), (n, 1, 1))
     X[:, :3, :3] = np.stack(
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
-         1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+         1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x),
+         1 - 2 * (x * x + y * y)],
         axis=-1,
     ).reshape(n, 3, 3)  # fmt: skip
     X[:, :3, 3] = rng.uniform(-spread, spread, size=(n, 3))
@@ -67,7 +69,8 @@ def report(table: str, case: str, count: int, seconds: dict[str, float], differ:
             {"table": table, "case": case, "engine": engine, "us_each": f"{each:.3f}", "ratio": f"{ratio:.2f}",
              "differ": differ.get(engine, "")}
         )  # fmt: skip
-        print(f"{table:8} {case:22} {engine:9} {each:9.3f} µs, {ratio:6.2f} ×, differ {differ.get(engine, '-')}", flush=True)
+        told = differ.get(engine, "-")
+        print(f"{table:8} {case:22} {engine:9} {each:9.3f} µs, {ratio:6.2f} ×, differ {told}", flush=True)
     return rows
 
 
@@ -91,7 +94,8 @@ def bullet_world(bodies: list[tuple[collide.Shape, np.ndarray]]):
         kind, arguments = kinds[type(shape).__name__]
         made = pybullet.createCollisionShape(kind, physicsClientId=client, **arguments(shape))
         body = pybullet.createMultiBody(0, made, physicsClientId=client)
-        pybullet.resetBasePositionAndOrientation(body, X[:3, 3].tolist(), quaternion(X).tolist(), physicsClientId=client)
+        place = X[:3, 3].tolist(), quaternion(X).tolist()
+        pybullet.resetBasePositionAndOrientation(body, *place, physicsClientId=client)
     return client
 
 
@@ -253,8 +257,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few rays and turns, no CSV")
     quick = parser.parse_args().quick
-    rows = rays_at_shapes(1000 if quick else 10_000, 3 if quick else 15)
-    rows += rays_at_worlds([100, 1000] if quick else [100, 1000, 5000, 20_000], 1000 if quick else 10_000, 3 if quick else 9)
+    n, sizes = (1000, [100, 1000]) if quick else (10_000, [100, 1000, 5000, 20_000])
+    rows = rays_at_shapes(n, 3 if quick else 15)
+    rows += rays_at_worlds(sizes, n, 3 if quick else 9)
     rows += casts_of_pairs(200 if quick else 2000, 3 if quick else 9)
     if not quick:
         cpu = "amd-epyc" if "EPYC" in platform.processor() or Path("/proc/cpuinfo").read_text().count("EPYC") else "cpu"

@@ -8,8 +8,8 @@ import numpy as np
 
 from collide.errors import InvalidPose
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.convex_bodies import Question, answer_parts
-from collide.narrowphase.pair_queries import OF_ONE_PAIR, Answer, answer_of
+from collide.narrowphase.convex_batches import Question, answer_parts
+from collide.narrowphase.method_functions import OF_ONE_PAIR, Answer, answer_of
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -60,7 +60,7 @@ def answer_batch(
         if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
             _prepare(A, B, answer)
     else:
-        A, B = _of_one_set(A, B, n)
+        A, B = of_one_set(A, B, n)
 
     def work(piece: slice | np.ndarray) -> None:
         """Answer the poses of these numbers."""
@@ -111,7 +111,7 @@ def _pairs_together(A, B) -> np.ndarray | None:
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 
-def _of_one_set(A, B, n: int):
+def of_one_set(A, B, n: int):
     """Shapes of which one side or both are sequences, as picked from one set."""
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A, B

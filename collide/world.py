@@ -289,17 +289,26 @@ class World:
         margin = contact_query.check_margin("World.contacts", margin)
         max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
         packed = self._pack()
-        names, shapes, X_WBs = packed.roster.names, packed.roster.shapes, packed.X_WBs
-        of_pairs = [no_rows()]
-        for i, j in packed.candidates(margin).tolist():
+        pairs = packed.candidates(margin)
+        if not len(pairs):
+            return WorldContacts(no_rows(), self._to_ids(no_rows()))
+        try:
+            rows, ends = contact_query.contact_batch(*packed.posed_shapes(pairs), len(pairs), margin, max_contacts)
+        except UnsupportedQuery:
+            self._name_refused(packed, pairs, margin, max_contacts)
+            raise
+        which = np.repeat(pairs, np.diff(ends, prepend=0), axis=0)
+        rows["a"], rows["b"] = which[:, 0], which[:, 1]
+        return WorldContacts(rows, self._to_ids(rows))
+
+    def _name_refused(self, packed: PackedWorld, pairs: np.ndarray, margin: float, max_contacts: int) -> None:
+        """Raise for the first pair (of positions) whose contacts are refused, with the bodies' names."""
+        names = packed.roster.names
+        for i, j in pairs.tolist():
             try:
-                pair = shapes[i], shapes[j], X_WBs[i], X_WBs[j]
-                of_pairs.append(contact_query.contact_rows(*pair, margin, max_contacts))
+                contact_query.contact_batch(*packed.posed_shapes(np.array([[i, j]])), 1, margin, max_contacts)
             except UnsupportedQuery as error:
                 raise UnsupportedQuery(f'"{names[i]}" and "{names[j]}": {error}') from None
-            of_pairs[-1]["a"], of_pairs[-1]["b"] = i, j
-        rows = np.concatenate(of_pairs)
-        return WorldContacts(rows, self._to_ids(rows))
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
         """Pairs for which `distances` raises UnsupportedQuery.

@@ -20,7 +20,7 @@ from collide.casts.ray_parts import candidate_parts, parts_met
 from collide.casts.raycast import surfaces_met
 from collide.errors import InvalidArgument
 from collide.lowering.parts import bounding_parts_of
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.packed_world import PackedWorld
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.shape import Shape

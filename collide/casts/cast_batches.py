@@ -12,7 +12,7 @@ from collide.casts.directions import Directions
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import cast_leaves
 from collide.casts.posed_parts import part_pairs
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape

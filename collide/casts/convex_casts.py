@@ -18,7 +18,7 @@ from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import KIND
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.convex_queries import run_pairs
+from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.numerics.exact_points import inner, integers, rounded
 from collide.results import UNDECIDED
 

@@ -22,7 +22,7 @@ from collide.contact.shallow_overlaps import (
     separating_translations,
 )
 from collide.errors import UnsupportedQuery
-from collide.narrowphase.facets.body_pairs import core_hits
+from collide.narrowphase.facets.facet_kernel_calls import core_hits
 
 #: A pair belongs to a patch where the normal of one of its facets is this near to the patch's, as a cosine.
 _ALONG = 0.8

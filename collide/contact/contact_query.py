@@ -2,52 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.batches import answer_batch, length_of
-from collide.contact.contact_rows import Contacts, no_rows
-from collide.contact.convex_contacts import convex_contacts
-from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfspace_contacts
+from collide.batches import length_of
+from collide.contact.contact_batches import contact_batch
+from collide.contact.contact_rows import Contacts
+from collide.contact.convex_contacts import prepare_contacts
 from collide.errors import InvalidArgument
-from collide.lowering.kinds import kind_of
-from collide.lowering.parts import bounding_parts_of
-from collide.narrowphase.convex_bodies import Question
-from collide.narrowphase.dispatch import Method, method_of
-from collide.pair_arguments import asked_poses, pose_at, shape_at
-from collide.shapes.compound import Compound
+from collide.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
-from collide.transforms import as_poses
+from collide.threads import check_threads
 
 if TYPE_CHECKING:
     from collide.transforms import PoseLike
 
     Shapes = Shape | Sequence[Shape]
 
-#: What makes the contacts of a pair, by the method that answers it; compounds are taken apart before.
-_CONTACTS = {
-    Method.CLOSED: convex_contacts,
-    Method.PLANE: convex_contacts,
-    Method.PLANES: convex_contacts,
-    Method.CONVEX: convex_contacts,
-    Method.FACETS: facet_contacts,
-    Method.CURVED: curved_contacts,
-    Method.HULL: halfspace_contacts,
-}
-_U = 2.0**-53
-#: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
-_ROUNDING = 2.0**-40
 #: Margins beyond this are no margins, and would overflow squared.
 _LARGEST_MARGIN = 1e50
 
 
 def contacts(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8,
-    check_poses: bool = True,
+    check_poses: bool = True, threads: int = 1,
 ) -> Contacts:  # fmt: skip
     """Contact manifolds of A and B: where they touch, overlap, or come within a margin.
 
@@ -60,6 +41,7 @@ def contacts(
     max_contacts : of each patch, ≥ 1: the deepest is kept, then those that span the greatest area. No patch is left
         out.
     check_poses : refuse matrices that are no rotation.
+    threads : at most so many answer; the rows are the same bits.
 
     Returns
     -------
@@ -90,73 +72,27 @@ def contacts(
     "translation" is the answer of `distance`. A part of a mesh that lies within the other body, without facets that
     meet, adds nothing while other facets meet.
 
-    Two convex shapes have one patch, with the normal of `distance`. Parts of a Compound are asked one by one. A pair
-    near the surface costs about a millisecond, which grows with the facets within the margin.
+    Two convex shapes have one patch, with the normal of `distance`: in a batch, some microseconds a pair. Parts of a
+    Compound are asked one by one. A pair with a mesh near its surface costs about a millisecond, which grows with the
+    facets within the margin.
     """
-    margin, max_contacts = check_margin("contacts", margin), check_max_contacts("contacts", max_contacts)
+    if margin.__class__ is not float or not 0.0 <= margin <= _LARGEST_MARGIN:
+        margin = check_margin("contacts", margin)
+    if max_contacts.__class__ is not int or max_contacts < 1:
+        max_contacts = check_max_contacts("contacts", max_contacts)
+    if threads.__class__ is not int or threads != 1:
+        threads = check_threads(threads)
+    try:
+        rows = A._prepared[B._serial].of_contacts.contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
+        if rows is not None:
+            return Contacts(rows, np.array([0, len(rows)]))
+    except (AttributeError, KeyError, TypeError):
+        pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
-    X_WA, X_WB = (as_poses(X, name, check=check_poses) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    of_pairs = [
-        contact_rows(shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k), margin, max_contacts)
-        for k in range(length_of(A, B, X_WA, X_WB))
-    ]
-    starts = np.concatenate([[0], np.cumsum([len(rows) for rows in of_pairs])]).astype(np.int64)
-    return Contacts(np.concatenate([no_rows(), *of_pairs]), starts)
-
-
-def contact_rows(
-    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int
-) -> np.ndarray:
-    """Rows of two shapes at checked poses (4, 4): none where `distance` proves them farther apart than the margin."""
-    rows = _rows_of_parts(A, B, X_WA, X_WB, margin, max_contacts)
-    # Parts are asked a little beyond the margin, for what rounding may have moved; where it matters `distance` decides.
-    size = _reach(A) + _reach(B) + float(np.abs(X_WB[:3, 3] - X_WA[:3, 3]).sum())
-    near = not len(rows) or rows["upper"].min() <= margin - _ROUNDING * size
-    if near or answer_batch(A, B, X_WA[None], X_WB[None], Question(False, math.inf))["lower"][0] <= margin:
-        return rows
-    return no_rows()
-
-
-def _rows_of_parts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    parts_a, parts_b = _parts(A, X_WA), _parts(B, X_WB)
-    if len(parts_a) == len(parts_b) == 1 and parts_a[0][2] == parts_b[0][2] == 0.0:
-        return contacts_of_pair(parts_a[0][0], parts_b[0][0], parts_a[0][1], parts_b[0][1], margin, max_contacts)
-    rows_of_parts, patches = [], 0
-    for i, (A_i, X_WAi, off_a) in enumerate(parts_a):
-        for j, (B_j, X_WBj, off_b) in enumerate(parts_b):
-            off = off_a + off_b
-            rows = contacts_of_pair(A_i, B_j, X_WAi, X_WBj, margin + off, max_contacts)
-            rows["part_a"], rows["part_b"] = i, j
-            rows["lower"] -= off
-            rows["upper"] += off
-            rows["patch"] += patches
-            patches = int(rows["patch"].max(initial=patches - 1)) + 1
-            rows_of_parts.append(rows)
-    return np.concatenate([no_rows(), *rows_of_parts])
-
-
-def contacts_of_pair(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows of two shapes that are no compounds, by the table of pairs."""
-    return _CONTACTS[method_of(kind_of(A), kind_of(B))](A, B, X_WA, X_WB, margin, max_contacts)
-
-
-def _parts(shape: Shape, X: np.ndarray) -> list[tuple[Shape, np.ndarray, float]]:
-    """(shape, its pose, how far the pose's rounding moves a point) of every part of a compound, nested ones too."""
-    if not isinstance(shape, Compound):
-        return [(shape, X, 0.0)]
-    parts = []
-    for item, X_CS in shape.items:
-        X_WS = X.copy()
-        X_WS[:3] = (X[:3, :, None] * X_CS[None]).sum(axis=1)
-        size = _reach(item) + float(np.abs(X_CS[:3, 3]).sum() + np.abs(X[:3, 3]).sum())
-        off = 0.0 if np.array_equal(X_CS, np.eye(4)) else 32.0 * _U * size
-        parts += [(part, X_WP, off + more) for part, X_WP, more in _parts(item, np.ascontiguousarray(X_WS))]
-    return parts
-
-
-def _reach(shape: Shape) -> float:
-    parts = bounding_parts_of(shape)
-    return max(4.0 * (part.reach + part.radius) + float(np.abs(X[:3, 3]).sum()) for part, X in parts)
+    n = length_of(A, B, X_WA, X_WB)
+    rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check_poses, threads=threads)
+    prepare_contacts(A, B)
+    return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 
 
 def check_margin(name: str, value) -> float:

@@ -45,7 +45,7 @@ CONTACT_DTYPE = np.dtype(
         ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("apart", "f8"),
         ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3),
         ("a", "i4"), ("b", "i4"), ("part_a", "i4"), ("part_b", "i4"),
-        ("facet_a", "i4"), ("facet_b", "i4"), ("patch", "i4"), ("kind", "i4"),
+        ("facet_a", "i4"), ("facet_b", "i4"), ("feature_a", "i4"), ("feature_b", "i4"), ("patch", "i4"), ("kind", "i4"),
     ],
     align=True,
 )
@@ -60,7 +60,8 @@ def no_rows() -> np.ndarray:
 def flipped_contacts(rows: np.ndarray) -> np.ndarray:
     """The same contacts with A and B exchanged."""
     swapped = rows.copy()
-    for of_a, of_b in (("a", "b"), ("part_a", "part_b"), ("point_a", "point_b"), ("facet_a", "facet_b")):
+    pairs = [(f"{field}_a", f"{field}_b") for field in ("part", "point", "facet", "feature")]
+    for of_a, of_b in (("a", "b"), *pairs):
         swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
     swapped["normal"] = 0.0 - rows["normal"]
     return swapped
@@ -97,6 +98,7 @@ def rows_of(patches: list[PatchContacts]) -> np.ndarray:
         rows["distance"] = patch.distance
         rows["lower"], rows["upper"] = patch.distance - patch.error, patch.distance + patch.error
         rows["facet_a"], rows["facet_b"] = patch.facets[:, 0], patch.facets[:, 1]
+        rows["feature_a"] = rows["feature_b"] = -1
         rows["patch"], rows["kind"], rows["apart"], rows["b"] = number, patch.kind, patch.apart, 1
         begin += len(rows)
     return out

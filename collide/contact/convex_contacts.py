@@ -1,275 +1,244 @@
-"""Contacts of two convex sets: the faces that support the normal of their distance, clipped against each other.
-
-The witness points of `distance` are one contact. Where both bodies have a face across its normal, or nearly, the
-corners of the polygon in which these faces overlap, seen along the normal, are the others.
-"""
+"""Contacts of two convex sets, or of many pairs of them, from Python: rows of `distance`, and what is made of them."""
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
+from threading import local
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.batches import answer_batch
-from collide.contact.contact_facets import Pairs, Side, lengths_of, normals_of, rotated
-from collide.contact.contact_points import Points, across, points_along
-from collide.contact.contact_rows import GAP, OVERLAP, PatchContacts, flipped_contacts, no_rows, rows_of
-from collide.contact.reduce_manifold import reduce_manifold
-from collide.errors import UnsupportedQuery
-from collide.hull.exact_hull import convex_hull
-from collide.lowering.facet_bodies import body_of, hull_of
-from collide.lowering.packed_convex import CONE, CYLINDER, HALFSPACE, POINTS, PackedConvex
-from collide.lowering.parts import convex_set_of
-from collide.narrowphase.convex_bodies import Question
-from collide.narrowphase.facets.facet_queries import NearPairs
+from collide.batches import answer_batch, length_of
+from collide.contact.box_box import box_rows
+from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.contact.convex_manifolds import (
+    ARE_BOXES,
+    HEADER,
+    MARGIN,
+    MAX_CONTACTS,
+    PAIRS_DONE,
+    ROWS_DONE,
+    convex_manifolds,
+    max_corners,
+    workspace_doubles,
+    workspace_integers,
+)
+from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
+from collide.contact.support_face import ROUND
+from collide.errors import InvalidPose, UnsupportedQuery
+from collide.kernels import address_of
+from collide.kernels.prepared import prepared_row
+from collide.lowering.hull_faces import HullFaceTable, face_table_of
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
+from collide.narrowphase.convex_batches import Question, shape_table
+from collide.narrowphase.convex_kernel_calls import SinglePair
+from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
+from collide.threads import pieces_of, share
+from collide.transforms import as_poses
 
-#: A face counts as across the normal down to this cosine.
-_ACROSS = 0.7
-#: Heights that differ by less than this share of the size are equal; so are directions.
-_EQUAL = 2.0**-30
-#: Corners of the polygon within a circle of a cylinder's end or a cone's base.
-_ROUND = 8
-_U = 2.0**-53
-_ERRORS = 64.0
+#: Pairs that go through together: their rows stay in the cache.
+_BLOCK = 512
+#: Contacts that there is room for, a pair, before more is asked for.
+_USUAL = 8
 
 
-def convex_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows for two shapes that are one convex set each, at single poses (4, 4). Raises UnsupportedQuery."""
-    packed_a, packed_b = convex_set_of(A), convex_set_of(B)
-    if HALFSPACE in (packed_a.kind, packed_b.kind) and packed_a.kind != packed_b.kind:
-        if packed_a.kind == HALFSPACE:
-            return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
-        return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
-    if (packed_b.content, X_WB[:3].tolist()) < (packed_a.content, X_WA[:3].tolist()):
-        return flipped_contacts(_ordered(B, A, packed_b, packed_a, X_WB, X_WA, margin, max_contacts))
-    return _ordered(A, B, packed_a, packed_b, X_WA, X_WB, margin, max_contacts)
+def convex_contacts(
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int, *, slack: np.ndarray | None = None,
+    check: bool = False, threads: int = 1,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(rows, ends): contacts of pairs of single convex sets, pair after pair, and where those of each end.
+
+    A, B : shapes, or shapes `Picked` from one set pose by pose.   X_WA, X_WB : C-contiguous (n, 4, 4), or (1, 4, 4) for
+    a pose that goes with all of the other's.   slack : (n,) by how much rounding may have moved the bodies of a pair
+    towards each other [m]: the margin is larger by that.   check : refuse matrices that are no rotation.
+    Raises InvalidPose, UnsupportedQuery.
+    """
+    limit = margin if slack is None else margin + float(slack.max(initial=0.0))
+    asked = _Asked(A, B, X_WA, X_WB, slack, margin, max_contacts, Question(False, limit, check=check))
+    n = length_of(A, B, X_WA, X_WB)
+    threads = min(threads, n // _BLOCK)
+    try:
+        if threads < 2:
+            return _contacts_of(asked, slice(0, n))
+        pieces = pieces_of(n, threads, _BLOCK)
+        answered: list = [None] * len(pieces)
+
+        def work(number: int) -> None:
+            answered[number] = _contacts_of(asked, pieces[number])
+
+        share(range(len(pieces)), work, threads)
+    except InvalidPose:
+        for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
+            as_poses(X, name, check=check)  # named by its place in the whole batch
+        raise
+    counts = [np.diff(ends, prepend=0) for _, ends in answered]
+    return np.concatenate([rows for rows, _ in answered]), np.cumsum(np.concatenate(counts))
 
 
-def _ordered(
-    A: Shape, B: Shape, packed_a: PackedConvex, packed_b: PackedConvex, X_WA, X_WB, margin: float, max_contacts: int
-) -> np.ndarray:
-    row = _answer(A, B, X_WA, X_WB, margin)
-    if row is None:
-        return no_rows()
-    n = row["normal"].copy()
-    error = _error(packed_a, X_WA, packed_b, X_WB)
-    origin = X_WA[:3, 3]
-    radius = packed_a.radius + packed_b.radius
-    a = _support(packed_a, X_WA[:3, :3], np.zeros(3), n, error)
-    b = _support(packed_b, X_WB[:3, :3], X_WB[:3, 3] - origin, -n, error)
-    points = _nearest(row, packed_a, packed_b, n, origin)
-    facets = np.array([[-1, -1]])
-    if len(a[0]) and len(b[0]):
-        pairs = _product(a, b)
-        overlap_corners = points_along(pairs, n, True, True, error)
-        gap = overlap_corners.gap - radius
-        is_near = (gap <= margin + overlap_corners.error) & (gap >= row["lower"] - _ERRORS * error)
-        overlap_corners = overlap_corners.take(is_near)
-        points, facets = _with_nearest(points, overlap_corners, facets, pairs.near.facets[overlap_corners.pair], error)
-    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
-    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
-    selected = reduce_manifold(flat, points.gap, points.error, max_contacts, max(_ERRORS * error, _EQUAL * size))
-    points, facets = points.take(selected), facets[selected]
-    distance = points.gap - radius
-    middle = 0.5 * (points.a + points.b) + 0.5 * (packed_a.radius - packed_b.radius) * n + origin
-    half = 0.5 * distance[:, None] * n
-    bound = points.error + 8.0 * error + packed_a.slop + packed_b.slop
-    return rows_of([PatchContacts(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+class _Asked(NamedTuple):
+    """What `convex_contacts` is asked."""
+
+    A: Any
+    B: Any
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+    slack: np.ndarray | None
+    margin: float
+    max_contacts: int
+    question: Question
 
 
-def against_plane(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows for a half-space A and anything but one: corners of B within the margin of the plane, or below it."""
-    body = hull_of(body_of(B)) if B.meshed else B
-    packed = convex_set_of(body)
-    row = _answer(A, body, X_WA, X_WB, margin)
-    if row is None:
-        return no_rows()
-    n = row["normal"].copy()
-    origin = row["point_a"]
-    error = _error(convex_set_of(A), X_WA, packed, X_WB) + 8.0 * _U * float(np.abs(origin).max())
-    shift = X_WB[:3, 3] - origin
-    facets = np.array([[-1, -1]])
-    points = _nearest(row, convex_set_of(A), packed, n, origin)
-    if packed.kind == POINTS:
-        corners, numbers = _corners_of(B, packed)
-        low = rotated(X_WB[:3, :3], corners) + shift
-    else:
-        triangles, _ = _support(packed, X_WB[:3, :3], shift, -n, error)
-        low = triangles.reshape(-1, 3)
-        numbers = np.full(len(low), -1)
-    gap = (low * n).sum(axis=1)
-    near = gap - packed.radius <= margin + 32.0 * error
-    low, gap = low[near], gap[near]
-    slack = float(row["upper"] - row["lower"]) + 32.0 * error
-    corners_of_faces = Points(np.arange(len(gap)), low - gap[:, None] * n, low, gap, np.full(len(gap), slack))
-    corner_facets = np.stack([np.full(len(gap), -1), numbers[near]], axis=1)
-    points, facets = _with_nearest(points, corners_of_faces, facets, corner_facets, error)
-    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
-    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
-    selected = reduce_manifold(flat, points.gap, points.error, max_contacts, max(_ERRORS * error, _EQUAL * size))
-    points, facets = points.take(selected), facets[selected]
-    distance = points.gap - packed.radius
-    middle = 0.5 * (points.a + points.b) - 0.5 * packed.radius * n + origin
-    half = 0.5 * distance[:, None] * n
-    bound = points.error + 8.0 * error + packed.slop
-    return rows_of([PatchContacts(n, middle - half, middle + half, distance, bound, facets, _kind(row), _apart(row))])
+def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of the pairs of a piece, in this thread: a block of rows of `distance` at a time."""
+    n = piece.stop - piece.start
+    header = np.zeros(HEADER, dtype=np.int64)
+    ends = np.empty(n, dtype=np.int64)
+    out = np.empty(0, dtype=CONTACT_DTYPE)
+    for begin in range(0, n, _BLOCK):
+        pairs = slice(piece.start + begin, min(piece.start + begin + _BLOCK, piece.stop))
+        A, B = (S if isinstance(S, Shape) else S[pairs] for S in (asked.A, asked.B))
+        X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
+        slack = None if asked.slack is None else asked.slack[pairs]
+        rows = _rows(asked, A, B, X_WA, X_WB)
+        table, which = shape_table(A, B)
+        faces = face_table_of(table, ROUND)
+        header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
+        header[PAIRS_DONE] = 0
+        max_rows = min(asked.max_contacts, max_corners(faces.largest))
+        out = _with_space(out, int(header[ROWS_DONE]), min(max_rows, _USUAL) * (n - begin) + max_rows)
+        while convex_manifolds(
+            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+            address_of(X_WB), 16 * (len(X_WB) > 1), 0 if slack is None else address_of(slack), address_of(rows),
+            len(rows), asked.margin, asked.max_contacts, address_of(out), len(out), address_of(ends) + 8 * begin,
+        ):  # fmt: skip
+            out = _with_space(out, int(header[ROWS_DONE]), len(out) + max_rows)
+    n_rows = int(header[ROWS_DONE])
+    return out[:n_rows] if 2 * n_rows >= len(out) else out[:n_rows].copy(), ends
 
 
-def _with_nearest(
-    nearest: Points, corners_of_faces: Points, facets: np.ndarray, others: np.ndarray, error: float
-) -> tuple[Points, np.ndarray]:
-    """The corners of faces; and the nearest points, with their facets, where no corner is as near."""
-    known = nearest.gap[0] + nearest.error[0] + _ERRORS * error
-    if len(corners_of_faces.gap) and (corners_of_faces.gap - corners_of_faces.error).min() <= known:
-        return corners_of_faces, others
-    return Points(*(np.concatenate(both) for both in zip(nearest, corners_of_faces))), np.concatenate([facets, others])
+def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
+    """The first rows, and space for so many more behind them, in the same memory where that is large enough."""
+    if n_rows + n_more <= len(rows):
+        return rows
+    larger = np.empty(n_rows + n_more, dtype=CONTACT_DTYPE)
+    larger[:n_rows] = rows[:n_rows]
+    return larger
 
 
-def _answer(A: Shape, B: Shape, X_WA, X_WB, margin: float):
-    """The row of `distance`, None where it is proven that they are farther apart than the margin."""
-    row = answer_batch(A, B, X_WA[None], X_WB[None], Question(False, margin))[0]
-    if np.isneginf(row["distance"]):
+def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of `distance`; of pairs of boxes as good as contacts need them, where a face tells (`box_box.py`)."""
+    table, which = shape_table(A, B)
+    is_box = _boxes(table)
+    both = is_box[which].all(axis=1) if which is not None else np.array([is_box.all()])
+    if not both.any():
+        return _general_rows(asked.question, A, B, X_WA, X_WB)
+    n = length_of(A, B, X_WA, X_WB)
+    rows = np.zeros(n, dtype=PAIR_DTYPE)
+    n_open = box_rows(
+        *table.addresses, 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+        address_of(X_WB), 16 * (len(X_WB) > 1), n, asked.question.limit, address_of(rows),
+    )  # fmt: skip
+    if n_open or not both.all():
+        remaining = np.flatnonzero((rows["how"] == UNDECIDED) | ~both)
+        A, B = (S if isinstance(S, Shape) else S[remaining] for S in (A, B))
+        X_WA, X_WB = (X if len(X) == 1 else np.ascontiguousarray(X[remaining]) for X in (X_WA, X_WB))
+        rows[remaining] = _general_rows(asked.question, A, B, X_WA, X_WB)[: len(remaining)]
+    return rows
+
+
+def _boxes(table: ShapeTable) -> np.ndarray:
+    """(rows,) bool: which of the sets are boxes."""
+    return (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
+
+
+def _general_rows(question: Question, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    rows = answer_batch(A, B, X_WA, X_WB, question, prepare=True)
+    _refuse_unbounded(rows, A, B)
+    return rows
+
+
+def _refuse_unbounded(rows: np.ndarray, A, B) -> None:
+    unbounded = np.isneginf(rows["distance"])
+    if unbounded.any():
+        k = int(np.argmax(unbounded))
+        names = [type(S if isinstance(S, Shape) else S[k]).__name__ for S in (A, B)]
         raise UnsupportedQuery(
-            f"contacts of {type(A).__name__} and {type(B).__name__}: their overlap has no end, so no normal tells the "
-            "way out; collide() still answers"
+            f"contacts of {names[0]} and {names[1]}: their overlap has no end, so no normal tells the way out; "
+            "collide() still answers"
         )
-    if row["beyond"] or row["lower"] > margin:
-        return None
-    return row
 
 
-def _kind(row) -> int:
-    return OVERLAP if row["hit"] else GAP
+def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tuple[int, ...]:
+    """The header of `convex_manifolds` up to what a call has done."""
+    return (
+        *table.addresses, address_of(faces.ints), address_of(space.poses), address_of(space.shape_of),
+        address_of(space.doubles), address_of(space.integers), faces.largest,
+    )  # fmt: skip
 
 
-def _apart(row) -> float:
-    return max(0.0, -float(row["lower"])) if row["hit"] else 0.0
+def prepare_contacts(A, B) -> None:
+    """Have two shapes that are prepared for single calls prepared for contacts as well."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        pair = prepared_pair(A, B)
+        if isinstance(pair, SinglePair) and pair.of_contacts is None:
+            pair.of_contacts = SingleContacts(pair)
 
 
-def _nearest(row, packed_a: PackedConvex, packed_b: PackedConvex, n, origin) -> Points:
-    """The points of `distance`, moved back to the cores."""
-    gap = np.array([float(row["distance"]) + packed_a.radius + packed_b.radius])
-    a = (row["point_a"] - packed_a.radius * n - origin)[None]
-    bracket = max(row["upper"] - row["distance"], row["distance"] - row["lower"])
-    return Points(np.array([-1]), a, a + gap[:, None] * n, gap, np.array([float(bracket)]))
+class SingleContacts:
+    """Two convex sets prepared for `contacts` of one pair of poses at a time.
 
-
-def _error(packed_a: PackedConvex, X_WA, packed_b: PackedConvex, X_WB) -> float:
-    """Bound of the error of a coordinate seen from A's origin."""
-    both = packed_a, packed_b
-    reach = sum(4.0 * (p.reach + p.radius) + float(np.abs(X[:3, 3]).max()) for p, X in zip(both, (X_WA, X_WB)))
-    if HALFSPACE in (packed_a.kind, packed_b.kind):
-        planes = (p.params for p in both if p.kind == HALFSPACE)
-        reach += sum(abs(float(plane[3])) / max(1e-300, float(lengths_of(plane[:3]))) for plane in planes)
-    return 8.0 * _U * reach
-
-
-def _product(a, b) -> Pairs:
-    """Every facet of one with every facet of the other."""
-    (corners_a, ids_a), (corners_b, ids_b) = a, b
-    i, j = np.repeat(np.arange(len(ids_a)), len(ids_b)), np.tile(np.arange(len(ids_b)), len(ids_a))
-    sides = [
-        Side(ids[k], corners[k], normals_of(corners)[k], np.zeros((len(k), 3), dtype=np.int64))
-        for corners, ids, k in ((corners_a, ids_a, i), (corners_b, ids_b, j))
-    ]
-    zeros, points = np.zeros(len(i)), np.zeros((len(i), 3))
-    near = NearPairs(np.stack([ids_a[i], ids_b[j]], axis=1), zeros > 0.0, zeros, zeros, points, points)
-    return Pairs(near, *sides)
-
-
-def _support(packed: PackedConvex, R, shift, n, error: float) -> tuple[np.ndarray, np.ndarray]:
-    """(triangles (k, 3, 3), their numbers) of the face across n that supports n, or of an edge as one without area.
-
-    Of curved faces a polygon within them; none where the body has but a point there.
+    ask : a built-in function of two poses, rows and a flag; None where it leaves the answer to the long way.
     """
-    if packed.kind == POINTS:
-        corners, ids = _hull_support(packed, rotated(R, packed.points) + shift, n, error)
-    else:
-        local = (R * n[:, None]).sum(axis=0)
-        points = _round_support(packed, local / lengths_of(local))
-        corners = np.array([[points[0], points[k], points[k + 1]] for k in range(1, len(points) - 1)]).reshape(-1, 3, 3)
-        if len(points) == 2:
-            corners = points[[0, 1, 1]][None]
-        corners = rotated(R, corners) + shift
-        ids = np.full(len(corners), -1)
-    return corners, ids
+
+    def __init__(self, pair: SinglePair):
+        self._pair = pair  # held, since kernels use its buffers
+        table, header = pair.table, pair.header
+        self._faces = face_table_of(table, ROUND)
+        self._space = _Workspace()
+        self._space.fit(self._faces.largest)
+        self.max_rows = max_corners(self._faces.largest)
+        self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
+        self._header[: len(header)] = header
+        self._of_manifold = self._header[len(header) :]
+        self._of_manifold[:PAIRS_DONE] = _addresses(table, self._faces, self._space)
+        self._of_manifold[ARE_BOXES] = _boxes(table).all()
+        self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
+        self._ask = prepared_row(contacts_single, self._header)
+
+    def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
+        """Rows; None where more than doubles, or an error, is called for."""
+        rows = np.empty(min(max_contacts, self.max_rows), dtype=CONTACT_DTYPE)
+        self._margin[0], self._of_manifold[MAX_CONTACTS] = margin, max_contacts
+        if self._ask(X_WA, X_WB, rows, False) is None:
+            return None
+        return rows[: self._of_manifold[ROWS_DONE]]
 
 
-def _hull_support(packed: PackedConvex, points: np.ndarray, n, error: float) -> tuple[np.ndarray, np.ndarray]:
-    facets = _facets(packed.content, packed)
-    heights = (points * n).sum(axis=1)
-    size = float(np.abs(points - points[0]).max())
-    slack = _ERRORS * error + _EQUAL * size
-    top = heights >= heights.max() - slack
-    corners = points[facets]
-    normals = normals_of(corners)
-    cosines = np.where(top[facets].any(axis=1), (normals * n).sum(axis=1), -1.0)
-    if len(facets) and cosines.max() >= _ACROSS:
-        best = int(np.argmax(cosines))
-        off = np.abs(((corners - corners[best, 0]) * normals[best]).sum(axis=2)).max(axis=1)
-        ids = np.flatnonzero((off <= slack) & ((normals * normals[best]).sum(axis=1) > 0.5))
-        return corners[ids], ids
-    some = points[top]
-    far = some[int(np.argmax(lengths_of(some - some[0])))]
-    if lengths_of(far - some[0]) <= slack:
-        return np.stack([some[0]] * 3)[None], np.array([-1])
-    return np.stack([some[0], far, far])[None], np.array([-1])
+class _Workspace:
+    """Scratch memory of the kernel."""
+
+    def __init__(self) -> None:
+        self.largest = 0
+        self.doubles, self.integers = np.zeros(0), np.zeros(0, dtype=np.int64)
+        self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
+
+    def fit(self, largest: int) -> _Workspace:
+        """Itself, with space for faces of so many corners."""
+        self.shape_of[:] = 0, 1
+        if largest > self.largest:
+            self.largest = largest
+            self.doubles = np.zeros(workspace_doubles(largest))
+            self.integers = np.zeros(workspace_integers(largest), dtype=np.int64)
+        return self
 
 
-_hull_facets: dict[bytes, np.ndarray] = {}
-_MAX_HULLS = 512
+class _OfThread(local):
+    """The workspace of one thread, made when the thread first asks."""
+
+    def __init__(self) -> None:
+        self.space = _Workspace()
 
 
-def _facets(content: bytes, packed: PackedConvex) -> np.ndarray:
-    """(f, 3) facets of the hull of the points, of flat ones from both sides; kept for shapes asked about lately."""
-    if content not in _hull_facets:
-        while len(_hull_facets) >= _MAX_HULLS:
-            _hull_facets.pop(next(iter(_hull_facets)), None)
-        _hull_facets[content] = convex_hull(packed.points).facets
-    return _hull_facets[content]
-
-
-def _corners_of(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarray]:
-    """(points, a facet that each belongs to); of meshes those in use."""
-    if shape.meshed:
-        faces = shape.faces  # type: ignore[attr-defined]
-        used, first = np.unique(faces, return_index=True)
-        return shape.vertices[used], first // 3  # type: ignore[attr-defined]
-    facets = _facets(packed.content, packed)
-    if not len(facets):
-        return packed.points, np.full(len(packed.points), -1)
-    used, first = np.unique(facets, return_index=True)
-    return packed.points[used], first // 3
-
-
-def _round_support(packed: PackedConvex, n: np.ndarray) -> np.ndarray:
-    """Points of a curved body's face or line that supports the unit vector n, in its own frame; none of an
-    ellipsoid.
-    """
-    aside = math.hypot(n[0], n[1])
-    x, y = (n[0] / aside, n[1] / aside) if aside > _EQUAL else (1.0, 0.0)
-    radius, half = float(packed.params[0]), float(packed.params[1])
-    if packed.kind == CYLINDER:
-        if abs(n[2]) >= _ACROSS:
-            return _disc(x, y, radius, math.copysign(half, n[2]))
-        return np.array([[x * radius, y * radius, -half], [x * radius, y * radius, half]])
-    if packed.kind == CONE:
-        if -n[2] >= _ACROSS:
-            return _disc(x, y, radius, -half)
-        return np.array([[0.0, 0.0, half], [x * radius, y * radius, -half]])
-    return np.zeros((0, 3))
-
-
-@lru_cache(maxsize=2)
-def _circle(n: int) -> np.ndarray:
-    angles = 2.0 * np.pi * np.arange(n) / n
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def _disc(x: float, y: float, radius: float, z: float) -> np.ndarray:
-    """Corners of a regular polygon within a disc, its first towards (x, y); anticlockwise seen from outside."""
-    c, s = _circle(_ROUND).T
-    points = np.stack([radius * (x * c - y * s), radius * (y * c + x * s), np.full(_ROUND, z)], axis=1)
-    return points if z > 0.0 else points[::-1]
+_of_thread = _OfThread()

@@ -8,11 +8,13 @@ from collide.contact.contact_facets import ContactFrame, contact_frame
 from collide.contact.contact_patches import Patch, patches_of
 from collide.contact.contact_points import across
 from collide.contact.contact_rows import GAP, OVERLAP, TRANSLATION, PatchContacts, flipped_contacts, no_rows, rows_of
-from collide.contact.convex_contacts import against_plane
+from collide.contact.convex_contacts import convex_contacts
 from collide.contact.reduce_manifold import reduce_manifold
 from collide.contact.shallow_overlaps import STEP_ERRORS
-from collide.lowering.facet_bodies import Body, body_of, has_facets, is_halfspace
-from collide.narrowphase.facets.mesh_rows import mesh_rows
+from collide.contact.support_face import VERTEX
+from collide.lowering.facet_bodies import Body, body_of, has_facets, hull_of, is_halfspace
+from collide.lowering.parts import convex_set_of
+from collide.narrowphase.facets.mesh_methods import mesh_rows
 from collide.shapes.shape import Shape
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
@@ -20,10 +22,23 @@ _ERRORS, _SHARE = 64.0, 2.0**-30
 
 
 def halfspace_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows of a mesh and a half-space at single poses (4, 4)."""
-    if is_halfspace(A):
-        return against_plane(A, B, X_WA, X_WB, margin, max_contacts)
-    return flipped_contacts(against_plane(B, A, X_WB, X_WA, margin, max_contacts))
+    """Rows of a mesh and a half-space at single poses (4, 4): those of the mesh's hull, with facets of the mesh."""
+    hull_a, hull_b = (S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B))
+    rows, _ = convex_contacts(hull_a, hull_b, X_WA[None], X_WB[None], margin, max_contacts)
+    for side, shape, hull in (("a", A, hull_a), ("b", B, hull_b)):
+        if hull is not shape:
+            facet_of = _facet_of_hull_points(shape, hull)
+            vertex = rows[f"feature_{side}"]
+            rows[f"facet_{side}"] = np.where(vertex % 4 == VERTEX, facet_of[np.maximum(vertex, 0) // 4], -1)
+    return rows
+
+
+def _facet_of_hull_points(mesh: Shape, hull: Shape) -> np.ndarray:
+    """A facet of the mesh at each point of its hull."""
+    faces, vertices = mesh.faces, mesh.vertices  # type: ignore[attr-defined]
+    used, first = np.unique(faces, return_index=True)
+    facet_at = {point.tobytes(): facet for point, facet in zip(vertices[used] + 0.0, (first // 3).tolist())}
+    return np.array([facet_at[point.tobytes()] for point in convex_set_of(hull).points + 0.0])
 
 
 def facet_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:

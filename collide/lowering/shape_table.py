@@ -6,7 +6,7 @@ Rows are flat because nine arrays cost 500 ns a call in Python and four addresse
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -66,6 +66,7 @@ class ShapeTable:
         self.ints[:, RANK] = [order[p.content] for p in packed]
         self.addresses = address_of(self.ints), address_of(self.numbers)
         self._without_tree = {k for k, p in enumerate(packed) if may_have_tree(p)}
+        self.faces: Any = None  # `hull_faces.HullFaceTable`, once contacts are asked for
 
     @property
     def is_built(self) -> bool:

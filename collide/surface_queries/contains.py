@@ -19,7 +19,7 @@ from collide.lowering.facet_bodies import body_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import MeshTree
 from collide.mesh.shell_volumes import without_area
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED

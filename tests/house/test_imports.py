@@ -99,7 +99,11 @@ ROOMS = {
     "contact": {
         "errors",
         "argument_checks",
+        "kernels",
+        "threads",
         "transforms",
+        "numerics",
+        "support",
         "hull",
         "mesh",
         "shapes",

@@ -1,0 +1,209 @@
+"""Contacts of many pairs of bodies: compounds taken apart, convex pairs answered together, meshes one by one."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.batches import answer_batch, of_one_set
+from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.contact.convex_contacts import convex_contacts
+from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfspace_contacts
+from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.parts import bounding_parts_of
+from collide.lowering.shape_set_tables import tables_of
+from collide.narrowphase.composite.composite_parts import Part, compound_parts
+from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.dispatch import Method, method_of
+from collide.pair_arguments import pose_at
+from collide.shapes.shape import Shape
+from collide.shapes.shape_set import Picked, ShapeSet
+from collide.transforms import as_poses
+
+#: What makes the contacts of two bodies at one pose, by the method that answers the pair; other methods are of convex
+#: sets, which go together, or of compounds, which are taken apart.
+_OF_ONE_POSE = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
+_CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
+#: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
+_ROUNDING = 2.0**-40
+
+
+class PartPairs(NamedTuple):
+    """m pairs of single bodies at their poses.
+
+    pair : (m,) number of the pair of bodies they are parts of.   part_a, part_b : (m,).   A, B : (m,) shapes' numbers.
+    X_WA, X_WB : (m, 4, 4).   slack : (m,) by how much rounding may have moved them towards each other [m].
+    """
+
+    pair: np.ndarray
+    part_a: np.ndarray
+    part_b: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+    slack: np.ndarray
+
+    def take(self, which) -> PartPairs:
+        return PartPairs(*(column[which] for column in self))
+
+    def __len__(self) -> int:  # type: ignore[override]
+        return len(self.pair)
+
+
+def contact_batch(
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, *, check: bool = False,
+    threads: int = 1,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where those of each pair end.
+
+    A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4), finite.   check : refuse matrices
+    that are no rotation. Raises InvalidPose, UnsupportedQuery.
+    """
+    if n == 0:
+        return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
+    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+        A, B = of_one_set(A, B, n)
+    if _all_convex(A, B):
+        return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
+    X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+    shapes: tuple[Shape, ...] = (A, B)
+    which = None
+    if isinstance(A, Picked):
+        shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
+    singles: list[Shape] = []
+    part_pairs = _part_pairs(shapes, which, X_WA, X_WB, n, margin, singles)
+    rows, ends = _rows_of_parts(singles, part_pairs, margin, max_contacts, threads)
+    starts = np.concatenate([[0], ends[:-1]])
+    of_pair = np.repeat(part_pairs.pair, ends - starts)
+    rows["part_a"] = np.repeat(part_pairs.part_a, ends - starts)
+    rows["part_b"] = np.repeat(part_pairs.part_b, ends - starts)
+    _number_patches(rows, of_pair)
+    keep = _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin)
+    rows, of_pair = rows[keep], of_pair[keep]
+    return rows, np.cumsum(np.bincount(of_pair, minlength=n))
+
+
+def _all_convex(A, B) -> bool:
+    if isinstance(A, Picked):
+        single = tables_of(A.shape_set).single_convex
+        return bool(single[A.rows].all() and single[B.rows].all())
+    return method_of(kind_of(A), kind_of(B)) in _CONVEX
+
+
+def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[Shape]) -> PartPairs:
+    """Pairs of parts that come within the margin, sorted by pair and parts. singles : becomes the shapes numbered."""
+    numbers: dict[int, int] = {}
+
+    def number(shape: Shape) -> int:
+        if id(shape) not in numbers:  # held by the shapes asked about
+            numbers[id(shape)] = len(singles)
+            singles.append(shape)
+        return numbers[id(shape)]
+
+    keys = np.zeros(n, dtype=np.int64) if which is None else which[:, 0] * len(shapes) + which[:, 1]
+    of_keys: list[PartPairs] = []
+    for key in np.unique(keys).tolist():
+        poses = np.flatnonzero(keys == key)
+        shape_a, shape_b = (shapes[0], shapes[1]) if which is None else (shapes[k] for k in which[poses[0]])
+        X_WAs, X_WBs = (np.broadcast_to(X, (n, 4, 4))[poses] for X in (X_WA, X_WB))
+        apart = np.sqrt(np.square(X_WBs[:, :3, 3] - X_WAs[:, :3, 3]).sum(axis=1))
+        placed_a, placed_b = (
+            [(part, part.at(X, _reach(opposite) + apart)) for part in compound_parts(shape).parts]
+            for shape, X, opposite in ((shape_a, X_WAs, shape_b), (shape_b, X_WBs, shape_a))
+        )
+        for i, (part_a, at_a) in enumerate(placed_a):
+            for j, (part_b, at_b) in enumerate(placed_b):
+                slack = at_a.slop + at_b.slop
+                near = _may_come_within(part_a, part_b, at_a.X, at_b.X, margin + slack)
+                some = poses[near]
+                of_keys.append(
+                    PartPairs(
+                        some, np.full(len(some), i), np.full(len(some), j), np.full(len(some), number(part_a.shape)),
+                        np.full(len(some), number(part_b.shape)), at_a.X[near], at_b.X[near], slack[near],
+                    )
+                )  # fmt: skip
+    together = PartPairs(*(np.concatenate(columns) for columns in zip(*of_keys)))
+    return together.take(np.lexsort((together.part_b, together.part_a, together.pair)))
+
+
+def _reach(shape: Shape) -> float:
+    return max(packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()) for packed, X in bounding_parts_of(shape))
+
+
+def _may_come_within(part_a: Part, part_b: Part, X_WA, X_WB, limit: np.ndarray) -> np.ndarray:
+    """(m,) bool: whether balls around two parts come within a limit (m,)."""
+    a, b = part_a.bound, part_b.bound
+    if HALFSPACE in (a.kind, b.kind):
+        return np.ones(len(limit), dtype=bool)
+    apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
+    reach = (1.0 + 1e-3) * (a.reach + b.reach) + a.radius + b.radius + a.slop + b.slop  # poses stretch by 1e-4 at most
+    return apart * (1.0 - 2.0**-40) <= reach + limit
+
+
+def _rows_of_parts(
+    singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of pairs of parts: the convex ones in one batch, each other at its pose."""
+    if not len(pairs):
+        return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
+    kinds = [kind_of(shape) for shape in singles]
+    is_convex = np.array([kind < Kind.MESH for kind in kinds])
+    convex = np.flatnonzero(is_convex[pairs.A] & is_convex[pairs.B])
+    counts = np.zeros(len(pairs), dtype=np.int64)
+    blocks: list[np.ndarray] = []
+    if len(convex):
+        some = pairs.take(convex)
+        shape_set = ShapeSet(singles)
+        rows, ends = convex_contacts(
+            Picked(shape_set, some.A), Picked(shape_set, some.B), np.ascontiguousarray(some.X_WA),
+            np.ascontiguousarray(some.X_WB), margin, max_contacts, slack=np.ascontiguousarray(some.slack),
+            threads=threads,
+        )  # fmt: skip
+        counts[convex] = np.diff(ends, prepend=0)
+        blocks.append(rows)
+    owners = [np.repeat(convex, counts[convex])]
+    for k in np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B])).tolist():
+        A, B, slack = singles[pairs.A[k]], singles[pairs.B[k]], float(pairs.slack[k])
+        make = _OF_ONE_POSE[method_of(kinds[pairs.A[k]], kinds[pairs.B[k]])]
+        rows = make(A, B, pairs.X_WA[k], pairs.X_WB[k], margin + slack, max_contacts)
+        rows["lower"] -= slack
+        rows["upper"] += slack
+        counts[k] = len(rows)
+        blocks.append(rows)
+        owners.append(np.full(len(rows), k))
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return np.concatenate([*blocks, np.zeros(0, dtype=CONTACT_DTYPE)])[order], np.cumsum(counts)
+
+
+def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:
+    """Patches of each pair are counted on, from part to part."""
+    if not len(rows):
+        return
+    keys = np.stack([of_pair, rows["part_a"], rows["part_b"], rows["patch"]], axis=1)
+    begins = np.concatenate([[True], (keys[1:] != keys[:-1]).any(axis=1)])
+    number = np.cumsum(begins)
+    first = np.concatenate([[True], of_pair[1:] != of_pair[:-1]])
+    rows["patch"] = number - np.repeat(number[first], np.diff(np.flatnonzero(np.append(first, True))))
+
+
+def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
+    """(k,) bool: rows of pairs within the margin.
+
+    Facets, and parts whose poses are rounded, are asked a little beyond it; where that matters, `distance` decides.
+    """
+    keep = np.ones(len(rows), dtype=bool)
+    for k in np.unique(of_pair).tolist():
+        of_k = slice(*np.searchsorted(of_pair, [k, k + 1]))
+        shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])
+        X_A, X_B = pose_at(X_WA, k), pose_at(X_WB, k)
+        size = 4.0 * (_reach(shape_a) + _reach(shape_b)) + float(np.abs(X_B[:3, 3] - X_A[:3, 3]).sum())
+        if rows["upper"][of_k].min() <= margin - _ROUNDING * size:
+            continue
+        row = answer_batch(shape_a, shape_b, X_A[None], X_B[None], Question(False, math.inf))
+        if row["lower"][0] > margin:
+            keep[of_k] = False
+    return keep

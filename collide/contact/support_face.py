@@ -1,0 +1,284 @@
+"""What of a convex body supports the normal of a contact: a face, an edge, or a vertex.
+
+The face is the one, of those that meet at a vertex farthest along the normal, that faces it most; where none does,
+the least steep edge there counts, where none is flat enough, the vertex. Of a cylinder or a cone they are a polygon
+within an end, or a line on the side.
+
+Everything is seen along the normal: coordinates (u, v) across it, and the height h along it, from A's origin.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.kernels import kernel, view_f64, view_i64
+from collide.lowering.hull_faces import (
+    COLUMNS_AT,
+    CORNERS_AT,
+    EDGES_AT,
+    FACE_INTS,
+    FACE_OF_AT,
+    FAN_STARTS_AT,
+    FANS_AT,
+    FLATNESS_AT,
+    N_FACES,
+    N_VERTICES,
+    NORMALS_AT,
+    PADDED,
+    STARTS_AT,
+    TRIANGLES_AT,
+    VERTEX_IDS_AT,
+)
+from collide.lowering.packed_convex import CONE, CYLINDER, POINTS
+from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, norm, put_vec3, rotate, scale, sub, vec3_at
+from collide.support.support_mapping import curved_support, settled_vertex, support_vertex
+from collide.support.support_tree_query import extreme_vertex_listed
+
+#: A face, or a line, is across the normal down to this cosine, or up to this sine.
+_ACROSS = 0.7
+#: Corners of the polygon within a cylinder's end or a cone's base.
+ROUND = 8
+#: Sines below this count as 0: a cylinder stands upright.
+_UPRIGHT = 2.0**-30
+
+#: What a feature number names: number · 4 + one of these. CURVED numbers the corners of a polygon within an end.
+VERTEX, EDGE, FACE, CURVED = range(4)
+
+
+class ContactAxes(NamedTuple):
+    """Two unit vectors across the normal and the normal itself, right-handed, from A to B."""
+
+    e: Vec3
+    f: Vec3
+    nhat: Vec3
+
+
+class SupportFace(NamedTuple):
+    """Corners of a body that support a direction, in a buffer: three doubles (u, v, h) each, and a feature each.
+
+    n : of corners: 1 a vertex, 2 an edge, more a face, counter-clockwise seen from outside the body.
+    triangle : of the hull, −1 where there is none.
+    u, v, h : a point of the face's plane.   slope_u, slope_v : of the height h there; 0 but of faces.
+    flatness : how far the corners may be off that plane [m].
+    corners : view of the coordinates.   features, edges : of each corner, and of the edge from it to the next.
+    feature : of the face as a whole.
+    """
+
+    n: int
+    triangle: int
+    u: float
+    v: float
+    h: float
+    slope_u: float
+    slope_v: float
+    flatness: float
+    corners: Any
+    features: Any
+    edges: Any
+    feature: int
+
+
+@kernel(inline=True)
+def axes_across(nhat):
+    """`ContactAxes` of a unit vector."""
+    smallest = min(abs(nhat.x), abs(nhat.y), abs(nhat.z))
+    if abs(nhat.x) == smallest:
+        e = Vec3(0.0, nhat.z, -nhat.y)
+    elif abs(nhat.y) == smallest:
+        e = Vec3(-nhat.z, 0.0, nhat.x)
+    else:
+        e = Vec3(nhat.y, -nhat.x, 0.0)
+    e = scale(1.0 / norm(e), e)
+    return ContactAxes(e, cross(nhat, e), nhat)
+
+
+@kernel(inline=True)
+def seen_along(axes, p):
+    """(u, v, h) of a point."""
+    return Vec3(dot(axes.e, p), dot(axes.f, p), dot(axes.nhat, p))
+
+
+@kernel(inline=True)
+def _view_buffers(doubles_at, integers_at, capacity):
+    return view_f64(doubles_at, 3 * capacity), view_i64(integers_at, capacity), view_i64(
+        integers_at + 8 * capacity, capacity
+    )
+
+
+@kernel
+def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, integers_at):
+    """The `SupportFace` of a body for the direction sign · nhat.
+
+    faces_at : rows of `HullFaceTable`.   shift : the body's origin from A's [m].
+    capacity : corners that the buffers have room for.   doubles, integers : 3 and 2 of them a corner.
+    """
+    R = pair.poses
+    at = body.pose_at
+    corners, features, edges = _view_buffers(doubles_at, integers_at, capacity)
+    c0, c1, c2 = Vec3(R[at], R[at + 3], R[at + 6]), Vec3(R[at + 1], R[at + 4], R[at + 7]), Vec3(
+        R[at + 2], R[at + 5], R[at + 8]
+    )
+    direction = scale(sign, axes.nhat)
+    g = Vec3(dot(c0, direction), dot(c1, direction), dot(c2, direction))
+    # Normals of faces eighth with the cofactors of a matrix, which need be no rotation.
+    cofactors = cross(c1, c2), cross(c2, c0), cross(c0, c1)
+    facing = Vec3(dot(cofactors[0], direction), dot(cofactors[1], direction), dot(cofactors[2], direction))
+    normal = Vec3(0.0, 0.0, 0.0)
+    flatness = 0.0
+    triangle = np.int64(-1)
+    feature = np.int64(-1)
+    if body.kind == POINTS:
+        n, triangle, normal, flatness, feature = _hull_corners(body, faces_at, g, facing, corners, features, edges)
+    elif body.kind == CYLINDER or body.kind == CONE:
+        n, normal = _round_corners(pair, body, g, corners, features, edges)
+    else:
+        n = 1
+        put_vec3(corners, 0, curved_support(body.kind, pair.numbers, body.params_at, g))
+        features[0] = -1
+    for k in range(n):
+        p = add(rotate(R, at, vec3_at(corners, 3 * k)), shift)
+        put_vec3(corners, 3 * k, seen_along(axes, p))
+    base = vec3_at(corners, 0)
+    if n < 3:
+        return SupportFace(
+            n, triangle, base.x, base.y, base.z, 0.0, 0.0, flatness, corners, features, edges, feature
+        )
+    N = add(
+        add(scale(normal.x, cofactors[0]), scale(normal.y, cofactors[1])), scale(normal.z, cofactors[2])
+    )
+    N = seen_along(axes, N)
+    return SupportFace(
+        n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, corners, features, edges, feature
+    )
+
+
+@kernel(inline=True)
+def _hull_vertex(body, row, g):
+    """Id of a hull's vertex farthest in direction g of the body's own frame."""
+    if body.tree != 0:
+        listed = extreme_vertex_listed(body.tree, -1, g, view_i64(0, 0))
+        return settled_vertex(body.coords, body.padded, body.tree, listed.id, g)
+    padded = row[PADDED]
+    k = support_vertex(view_f64(row[COLUMNS_AT], 3 * padded), padded, g)
+    return view_i64(row[VERTEX_IDS_AT], row[N_VERTICES])[k]
+
+
+@kernel(inline=True)
+def _hull_corners(body, faces_at, g, facing, corners, features, edges):
+    """Put the corners of a hull's support into the buffers; (their number, triangle, normal, flatness, feature)."""
+    row = view_i64(faces_at + 8 * FACE_INTS * body.shape, FACE_INTS)
+    n_faces = row[N_FACES]
+    starts = view_i64(row[STARTS_AT], n_faces + 1)
+    n_corners = starts[n_faces]
+    loop = view_i64(row[CORNERS_AT], n_corners)
+    loop_edges = view_i64(row[EDGES_AT], n_corners)
+    face_of = view_i64(row[FACE_OF_AT], n_corners)
+    fan_starts = view_i64(row[FAN_STARTS_AT], body.n + 1)
+    fans = view_i64(row[FANS_AT], n_corners)
+    normals = view_f64(row[NORMALS_AT], 3 * n_faces)
+    triangles = view_i64(row[TRIANGLES_AT], n_faces)
+    vertex = _hull_vertex(body, row, g)
+    p = column_at(body.coords, body.padded, vertex)
+    best = np.int64(-1)
+    best_edge = np.int64(-1)
+    best_cosine = _ACROSS
+    least_steep = -_ACROSS * norm(g)
+    for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
+        at = fans[k]
+        face = face_of[at]
+        cosine = dot(vec3_at(normals, 3 * face), facing)
+        if cosine > best_cosine:
+            best_cosine = cosine
+            best = face
+        following = at + 1 if at + 1 < starts[face + 1] else starts[face]
+        e = sub(column_at(body.coords, body.padded, loop[following]), p)
+        slope = dot(e, g) / norm(e)
+        if slope > least_steep:
+            least_steep = slope
+            best_edge = at
+    if best >= 0:
+        begin = starts[best]
+        n = starts[best + 1] - begin
+        for k in range(n):
+            put_vec3(corners, 3 * k, column_at(body.coords, body.padded, loop[begin + k]))
+            features[k] = 4 * loop[begin + k] + VERTEX
+            edges[k] = 4 * loop_edges[begin + k] + EDGE
+        flatness = view_f64(row[FLATNESS_AT], n_faces)[best]
+        return n, triangles[best], vec3_at(normals, 3 * best), flatness, 4 * best + FACE
+    put_vec3(corners, 0, p)
+    features[0] = 4 * vertex + VERTEX
+    first = fan_starts[vertex]
+    triangle = np.int64(-1)
+    if first < fan_starts[vertex + 1]:
+        triangle = triangles[face_of[fans[first]]]
+    zero = Vec3(0.0, 0.0, 0.0)
+    if best_edge < 0:
+        return np.int64(1), triangle, zero, 0.0, features[0]
+    face = face_of[best_edge]
+    following = best_edge + 1 if best_edge + 1 < starts[face + 1] else starts[face]
+    put_vec3(corners, 3, column_at(body.coords, body.padded, loop[following]))
+    features[1] = 4 * loop[following] + VERTEX
+    edges[0] = 4 * loop_edges[best_edge] + EDGE
+    edges[1] = edges[0]
+    return np.int64(2), triangles[face], zero, 0.0, edges[0]
+
+
+@kernel(inline=True)
+def _round_corners(pair, body, g, corners, features, edges):
+    """The same of a cylinder or a cone; (their number, the normal of an end)."""
+    radius = pair.numbers[body.params_at]
+    half = pair.numbers[body.params_at + 1]
+    aside = math.sqrt(g.x * g.x + g.y * g.y)
+    length = norm(g)
+    x, y = 1.0, 0.0
+    if aside > _UPRIGHT * length:
+        x = g.x / aside
+        y = g.y / aside
+    up = g.z / length
+    normal = Vec3(0.0, 0.0, 0.0)
+    is_cone = body.kind == CONE
+    if -up >= _ACROSS or (up >= _ACROSS and not is_cone):
+        z = half if up > 0.0 else -half
+        _put_disc(x, y, radius, z, corners, features, edges)
+        return np.int64(ROUND), Vec3(0.0, 0.0, 1.0 if up > 0.0 else -1.0)
+    # A line on the side, from the lower end to the upper one; a cone's apex where that is what is in front.
+    put_vec3(corners, 0, Vec3(x * radius, y * radius, -half))
+    if is_cone:
+        put_vec3(corners, 3, Vec3(0.0, 0.0, half))
+    else:
+        put_vec3(corners, 3, Vec3(x * radius, y * radius, half))
+    for k in range(2):
+        features[k] = 4 * k + CURVED
+        edges[k] = 4 * (ROUND + k) + CURVED
+    line = sub(vec3_at(corners, 3), vec3_at(corners, 0))
+    slope = dot(line, g) / (norm(line) * length)
+    if abs(slope) <= _ACROSS:
+        return np.int64(2), normal
+    if slope > 0.0:
+        put_vec3(corners, 0, vec3_at(corners, 3))
+        features[0] = features[1]
+    return np.int64(1), normal
+
+
+@kernel(inline=True)
+def _put_disc(x, y, radius, z, corners, features, edges):
+    """Corners of a regular octagon within a disc, the first towards (x, y); counter-clockwise seen from outside."""
+    for k in range(ROUND):
+        eighth = k if z > 0.0 else ROUND - 1 - k
+        c, s = _cosine_of_eighths(eighth), _cosine_of_eighths(eighth + ROUND - 2)
+        put_vec3(corners, 3 * k, Vec3(radius * (x * c - y * s), radius * (y * c + x * s), z))
+        features[k] = 4 * eighth + CURVED
+        edges[k] = 4 * (ROUND + eighth) + CURVED
+
+
+@kernel(inline=True)
+def _cosine_of_eighths(k):
+    """Of k eighths of a full rotation."""
+    k = k % ROUND
+    if k % 4 == 2:
+        return 0.0
+    value = 1.0 if k % 4 == 0 else math.sqrt(0.5)
+    return value if k < 2 or k == 7 else -value

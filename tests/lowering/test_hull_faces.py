@@ -1,0 +1,82 @@
+"""Faces of hulls: closed, flat, complete, and linked at their vertices."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from collide.hull.exact_hull import convex_hull
+from collide.lowering.hull_faces import hull_faces
+
+
+def cloud(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    kind = seed % 4
+    if kind == 0:
+        return rng.normal(size=(int(rng.integers(4, 40)), 3))
+    if kind == 1:  # many coplanar points, on faces and edges, too
+        return rng.integers(-2, 3, size=(60, 3)).astype(float)
+    if kind == 2:
+        angles = np.arange(int(rng.integers(3, 30)))
+        ring = np.round(np.stack([np.cos(angles), np.sin(angles)], axis=1), 3)
+        return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in (0.0, 1.0)])
+    return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+
+def area_vector(loop: np.ndarray) -> np.ndarray:
+    return 0.5 * np.cross(loop - loop[0], np.roll(loop, -1, axis=0) - loop[0]).sum(axis=0)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_faces_close_the_hull(seed):
+    points = cloud(seed)
+    hull, faces = convex_hull(points), hull_faces(points)
+    assert hull.dimension == 3
+    loops = [faces.corners[i:j] for i, j in itertools.pairwise(faces.starts)]
+    edges = {}
+    for face, loop in enumerate(loops):
+        for tail, head in zip(loop.tolist(), np.roll(loop, -1).tolist()):
+            assert (tail, head) not in edges
+            edges[tail, head] = face
+    assert all((head, tail) in edges for tail, head in edges)
+    assert len(faces.vertex_ids) - len(edges) // 2 + len(loops) == 2  # Euler
+    size = np.abs(points).max()
+    T = points[hull.facets]
+    whole = 0.5 * np.linalg.norm(np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]), axis=1).sum()
+    assert abs(sum(np.linalg.norm(area_vector(points[loop])) for loop in loops) - whole) < 1e-9 * whole
+    for loop, normal, flatness in zip(loops, faces.normals, faces.flatness):
+        along = (points - points[loop[0]]) @ normal
+        assert along.max() <= flatness + 1e-13 * size and np.abs(along[loop]).max() <= flatness + 1e-15 * size
+        assert area_vector(points[loop]) @ normal > 0.0 and flatness < 1e-13 * size
+    assert max(len(loop) for loop in loops) > 3 or seed % 4 == 0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_fans_and_numbers_of_edges(seed):
+    points = cloud(seed)
+    faces = hull_faces(points)
+    for vertex in range(len(points)):
+        fan = faces.fans[faces.fan_starts[vertex] : faces.fan_starts[vertex + 1]]
+        assert (faces.corners[fan] == vertex).all()
+        assert len(fan) == (faces.corners == vertex).sum()
+    for face, (i, j) in enumerate(itertools.pairwise(faces.starts)):
+        assert (faces.face_of[i:j] == face).all()
+    ends = {}
+    for i, j in itertools.pairwise(faces.starts):
+        loop = faces.corners[i:j]
+        for edge, *pair in zip(faces.edges[i:j].tolist(), loop.tolist(), np.roll(loop, -1).tolist()):
+            assert ends.setdefault(edge, frozenset(pair)) == frozenset(pair)
+    assert len(set(ends.values())) == len(ends) == len(faces.corners) // 2
+    assert np.array_equal(faces.columns[:, : len(faces.vertex_ids)].T, points[faces.vertex_ids])
+
+
+def test_flat_hulls_have_two_sides_and_segments_one_edge():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
+    faces = hull_faces(square)
+    assert faces.starts.tolist() == [0, 4, 8] and np.array_equal(faces.normals[0], -faces.normals[1])
+    assert faces.corners[:4].tolist() == faces.corners[4:].tolist()[::-1]
+    segment = hull_faces(np.array([[0, 0, 0], [2, 2, 2], [1, 1, 1]], dtype=float))
+    assert segment.corners.tolist() == [0, 1] and segment.vertex_ids.tolist() == [0, 1]
+    assert hull_faces(np.ones((3, 3))).vertex_ids.tolist() in ([0], [1], [2])
