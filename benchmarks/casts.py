@@ -69,8 +69,8 @@ def report(table: str, case: str, count: int, seconds: dict[str, float], differ:
             {"table": table, "case": case, "engine": engine, "us_each": f"{each:.3f}", "ratio": f"{ratio:.2f}",
              "differ": differ.get(engine, "")}
         )  # fmt: skip
-        told = differ.get(engine, "-")
-        print(f"{table:8} {case:22} {engine:9} {each:9.3f} µs, {ratio:6.2f} ×, differ {told}", flush=True)
+        count_of = differ.get(engine, "-")
+        print(f"{table:8} {case:22} {engine:9} {each:9.3f} µs, {ratio:6.2f} ×, differ {count_of}", flush=True)
     return rows
 
 
@@ -115,13 +115,13 @@ def bullet_rays(client, origins: np.ndarray, motions: np.ndarray) -> Callable[[]
     import pybullet
 
     starts, ends = origins.tolist(), (origins + motions).tolist()
-    most = pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
+    max_rays = pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
 
     def ask() -> np.ndarray:
         fractions: list[float] = []
-        for k in range(0, len(starts), most):
+        for k in range(0, len(starts), max_rays):
             replies = pybullet.rayTestBatch(
-                starts[k : k + most], ends[k : k + most], numThreads=1, physicsClientId=client
+                starts[k : k + max_rays], ends[k : k + max_rays], numThreads=1, physicsClientId=client
             )
             fractions += [np.inf if reply[0] < 0 else reply[2] for reply in replies]
         return np.array(fractions)

@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from collide.surface_queries.overlay import Overlay, overlay
     from collide.transforms import pose
     from collide.world import World
+    from collide.world_hits import WorldHits
 
 __version__ = "0.1.0"
 
@@ -92,6 +93,7 @@ _HOMES = {
     "collide.shapes.tessellation": ("tessellate",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
+    "collide.world_hits": ("WorldHits",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -104,10 +106,11 @@ _RENAMED = {
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
     "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument",
-    "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot",
-    "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery",
-    "World", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
-    "get_library", "overlay", "pose", "raycast", "self_collisions", "shape_cast", "tessellate", "verify", "walk",
+    "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError",
+    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World",
+    "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs",
+    "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "shape_cast", "tessellate",
+    "verify", "walk",
 ]
 
 

@@ -66,9 +66,9 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
     for i, leaf_a in enumerate(leaves_of(A)):
         for j, leaf_b in enumerate(leaves_of(B)):
             pair = leaf_a, leaf_b, X_WA[ahead], X_WB[ahead], vectors[ahead], limits[ahead]
-            rows = cast_leaves(*pair) if leaf_a.shape.meshed or leaf_b.shape.meshed else _cast_convex(*pair)
-            k = len(rows.owner)
-            parts.append(rows._replace(owner=ahead[rows.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
+            part = cast_leaves(*pair) if leaf_a.shape.meshed or leaf_b.shape.meshed else _cast_convex(*pair)
+            k = len(part.owner)
+            parts.append(part._replace(owner=ahead[part.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
     rows = np.concatenate([part.rows for part in parts])
     marks = Marks._make(np.concatenate(columns) for columns in zip(*(part.marks for part in parts)))
     columns = [np.concatenate([getattr(part, name) for part in parts]) for name in ("owner", "item_a", "item_b")]
