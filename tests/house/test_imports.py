@@ -176,6 +176,7 @@ ROOMS = {
         "world_hits",
     },
     "packed_world": {"casts", "errors", "shapes", "lowering", "broadphase", "narrowphase", "results", "world_bodies"},
+    "world_scene": {"errors", "argument_checks", "log", "shapes", "world_bodies", "packed_world"},
     "world": {
         "errors",
         "argument_checks",
@@ -192,6 +193,7 @@ ROOMS = {
         "security_margin",
         "packed_world",
         "world_bodies",
+        "world_scene",
     },
     "kinematic_tree": {"errors", "transforms"},
     "joint_motions": set(),
