@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from collide.hierarchies.hierarchy_queries import walk
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
+    from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
+    from collide.motion.impact_rows import TimeOfImpact
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
     from collide.robot import Robot
@@ -83,6 +85,8 @@ _HOMES = {
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.hierarchies.hierarchy_queries": ("walk",),
+    "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
+    "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robot": ("Robot",),
@@ -107,10 +111,10 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
     "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument",
     "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError",
-    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "UnknownBody", "UnsupportedQuery", "World",
-    "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs",
-    "get_include", "get_library", "overlay", "pose", "raycast", "self_collisions", "shape_cast", "tessellate",
-    "verify", "walk",
+    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact", "UnknownBody", "UnsupportedQuery",
+    "World", "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs",
+    "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion", "raycast", "self_collisions",
+    "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 
