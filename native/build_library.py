@@ -217,7 +217,8 @@ def _exported() -> list[str]:
     """Names of what leaves the library, for linkers that want a list."""
     import re
 
-    text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h", "host_mujoco.h"))
+    headers = ("collide.h", "kernels_of_level.h", "host_mujoco.h")
+    text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in headers)
     return re.findall(r"^COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", text, re.MULTILINE)
 
 

@@ -175,7 +175,7 @@ def _hook() -> None:
 
 
 def _uninstall_all() -> None:
-    for installed in list(_installed):
+    for installed in _installed:
         installed.uninstall()
 
 
