@@ -63,7 +63,7 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
 
 /* What the single call leaves: the row by all means there are, then the same manifold. */
 static collide_status contacts_by_rows(collide_workspace *space, struct manifold_space *manifold, const double *X_WA,
-                                       const double *X_WB, double margin, int64_t most, struct contact_row *rows, int64_t *n)
+                                       const double *X_WB, double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n)
 {
     int64_t *header = manifold->header + HEADER, end = 0;
     int64_t corners = 2 * header[F_LARGEST] + 8;
@@ -74,22 +74,22 @@ static collide_status contacts_by_rows(collide_workspace *space, struct manifold
     manifold->shape_of[0] = 0;
     manifold->shape_of[1] = 1;
     space->kernels->convex_manifolds(address_of(header), 0, address_of(X_WA), 0, address_of(X_WB), 0, 0, address_of(&row), 1,
-                                     margin, most, address_of(rows), most < corners ? most : corners, address_of(&end));
+                                     margin, max_contacts, address_of(rows), max_contacts < corners ? max_contacts : corners, address_of(&end));
     *n = end;
     return COLLIDE_OK;
 }
 
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
-                                double margin, int64_t most, struct contact_row *rows, int64_t *n)
+                                double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n)
 {
     int64_t *header = manifold->header + HEADER;
     collide_status status = COLLIDE_OK;
     rounding given = round_as_kernels_do();
     *n = 0;
     memcpy(&header[F_MARGIN], &margin, sizeof margin);
-    header[F_MAX_CONTACTS] = most;
+    header[F_MAX_CONTACTS] = max_contacts;
     if (space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows), 0) < 0)
-        status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, most, rows, n);
+        status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, max_contacts, rows, n);
     else
         *n = header[F_ROWS_DONE];
     round_as_before(given);

@@ -39,9 +39,9 @@ int fit_manifolds(struct manifold_space *manifold, int64_t largest);
 void take_table_pair(collide_workspace *space, struct manifold_space *manifold, const int64_t *ints, const double *numbers,
                      const int64_t *faces, int64_t a, int64_t b, int are_boxes);
 
-/* Contacts of the pair taken, at most `most`, into `rows`, which has room for as many; *n : how many. */
+/* Contacts of the pair taken, at most `max_contacts`, into `rows`, which has room for as many; *n : how many. */
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
-                                double margin, int64_t most, struct contact_row *rows, int64_t *n);
+                                double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n);
 
 /* Whether the pair taken is proven to be farther apart than `gap`. */
 int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap);

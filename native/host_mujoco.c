@@ -23,7 +23,7 @@ typedef volatile int lock;
 #define PUBLISH() __sync_synchronize()
 #endif
 
-enum { KINDS = COLLIDE_MUJOCO_KINDS, PAIRS = KINDS * KINDS, MOST_MODELS = 256, SLOTS = 128, MOST_CONTACTS = 50, MESH = 7 };
+enum { KINDS = COLLIDE_MUJOCO_KINDS, PAIRS = KINDS * KINDS, MAX_MODELS = 256, SLOTS = 128, MAX_CONTACTS = 50, MESH = 7 };
 
 typedef int collision_function(const void *, void *, void *, int, int, double);
 
@@ -38,7 +38,7 @@ static struct {
 static struct {
     const void *volatile model; /* NULL of a free place */
     struct collide_mujoco_model made;
-} models[MOST_MODELS];
+} models[MAX_MODELS];
 static volatile int n_models; /* places used so far */
 
 /* Workspaces: a thread takes one that is free for the length of a call. */
@@ -46,7 +46,7 @@ static struct slot {
     lock taken;
     collide_workspace *space;
     struct manifold_space manifold;
-    struct contact_row rows[MOST_CONTACTS];
+    struct contact_row rows[MAX_CONTACTS];
 } slots[SLOTS];
 
 /* --- memory of MuJoCo's -------------------------------------------------------------------------------------------- */
@@ -168,7 +168,7 @@ static int left_to_mujoco(const void *model, void *data, void *contacts, int g1,
 static int answer(const struct collide_mujoco_model *made, const void *data, char *out, int g1, int g2, double margin,
                   collide_status *status)
 {
-    int64_t a = made->rows[g1], b = made->rows[g2], most = made->most[KINDS * made->types[g1] + made->types[g2]], n = 0, k;
+    int64_t a = made->rows[g1], b = made->rows[g2], max_contacts = made->max_contacts[KINDS * made->types[g1] + made->types[g2]], n = 0, k;
     struct slot *slot;
     double X_WA[16], X_WB[16], asked = margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0;
     int count = 0;
@@ -184,7 +184,7 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
         double slack = 1e-3 * (made->reaches[g1] + made->reaches[g2]) + 1e-5;
         count = is_farther_apart(slot->space, X_WA, X_WB, asked + slack) ? 0 : -1;
     } else {
-        *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, most, slot->rows, &n);
+        *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, max_contacts, slot->rows, &n);
         if (*status == COLLIDE_INVALID_POSE) { /* a state that diverged: MuJoCo notices, and resets it */
             *status = COLLIDE_OK;
             count = -1;
@@ -264,8 +264,8 @@ int collide_mujoco_add(const struct collide_mujoco_model *model)
     if (model->face_ints != FACE_INTS || model->manifold_header != MANIFOLD_HEADER ||
         model->contact_bytes != (int64_t)sizeof(struct contact_row))
         return -2;
-    for (k = 0; k < MOST_MODELS && models[k].model != NULL; k++) {}
-    if (k == MOST_MODELS) return -1;
+    for (k = 0; k < MAX_MODELS && models[k].model != NULL; k++) {}
+    if (k == MAX_MODELS) return -1;
     models[k].made = *model;
     PUBLISH();
     models[k].model = model->model;
@@ -275,7 +275,7 @@ int collide_mujoco_add(const struct collide_mujoco_model *model)
 
 void collide_mujoco_remove(int number)
 {
-    if (number < 0 || number >= MOST_MODELS) return;
+    if (number < 0 || number >= MAX_MODELS) return;
     models[number].model = NULL;
     while (n_models > 0 && models[n_models - 1].model == NULL) n_models--;
 }

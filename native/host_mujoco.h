@@ -34,7 +34,7 @@ struct collide_mujoco_model {
     const uint8_t *boxes;     /* rows that are boxes */
     int64_t largest;          /* most corners of a face */
     int64_t face_ints, manifold_header, contact_bytes; /* as Python has them */
-    int64_t most[COLLIDE_MUJOCO_KINDS * COLLIDE_MUJOCO_KINDS]; /* contacts of a pair of kinds */
+    int64_t max_contacts[COLLIDE_MUJOCO_KINDS * COLLIDE_MUJOCO_KINDS]; /* contacts of a pair of kinds */
 };
 
 /* Take the place of the functions of `table` where `replaced` is 1; 0, or -1 where it is taken already.

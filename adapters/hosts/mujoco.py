@@ -4,9 +4,9 @@
     with install(model):
         mujoco.mj_step(model, data)
 
-MuJoCo finds the contacts of each pair of kinds of geoms by a function of a table. While installed, compiled functions of
-libcollide stand in that table: no Python runs in a step, in however many threads MuJoCo steps. Geoms of other models, and
-height fields and signed distance fields, go to the functions that stood there before.
+MuJoCo finds the contacts of each pair of kinds of geoms by a function of a table. While installed, compiled functions
+of libcollide stand in that table: no Python runs in a step, in however many threads MuJoCo steps. Geoms of other
+models, and height fields and signed distance fields, go to the functions that stood there before.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 
 from collide import World
 from collide.adapters.hosts.mujoco_geoms import Model, ModelTables, geom_shapes
-from collide.adapters.hosts.mujoco_layout import OURS, Layout, N, host
+from collide.adapters.hosts.mujoco_layout import OURS, Layout, N, host, max_contacts
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
@@ -56,7 +56,8 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
 
     Notes
     -----
-    O(n) for n geoms, and what their meshes' hulls cost; the first time some 50 ms to look at MuJoCo.
+    O(n) for n geoms, and what their meshes' hulls cost; the first time some 0.1 s to look at MuJoCo, while no other
+    thread may step.
 
     A pair has at most as many contacts as MuJoCo has room for, and 8: the deepest, and those that span the greatest
     area. `mj_geomDistance` asks the same functions. Changing sizes or kinds of geoms while installed makes the next
@@ -66,23 +67,23 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     if mode not in MODES:
         raise InvalidArgument(f"install: mode must be one of {', '.join(map(repr, MODES))}, got {mode!r}")
     mujoco = host().mujoco
-    given = [models] if isinstance(models, mujoco.MjModel) else list(models) if isinstance(models, Iterable) else []
-    if not given or not all(isinstance(model, mujoco.MjModel) for model in given):
+    listed = [models] if isinstance(models, mujoco.MjModel) else list(models) if isinstance(models, Iterable) else []
+    if not listed or not all(isinstance(model, mujoco.MjModel) for model in listed):
         raise InvalidArgument(f"install: models must be a mujoco.MjModel, or several, got {type(models).__name__}")
-    return Installed(given, mode)
+    return Installed(listed, mode)
 
 
 class Installed:
     """Models that are answered by collide while this is in force.
 
-    left : (model's place, geom) of geoms that are left to MuJoCo, and why.
+    remaining : (model's place, geom) of geoms that are left to MuJoCo, and why.
     """
 
     def __init__(self, models: list, mode: str):
         self._models, self._mode = models, mode
         self._tables: list[ModelTables] = []
         self._numbers: list[int] = []
-        self.left: dict[tuple[int, int], str] = {}
+        self.remaining: dict[tuple[int, int], str] = {}
         with _lock:
             self._add()
             _installed.append(self)
@@ -107,7 +108,7 @@ class Installed:
                 if not _installed:
                     _library().collide_mujoco_unhook()
 
-    def __enter__(self) -> Installed:
+    def __enter__(self) -> Installed:  # noqa: PYI034 - Self is of Python 3.11
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -133,7 +134,7 @@ class Installed:
                 library.collide_mujoco_unhook()
             raise
         self._tables = tables
-        self.left = {(k, geom): why for k, made in enumerate(tables) for geom, why in made.left.items()}
+        self.remaining = {(k, geom): why for k, made in enumerate(tables) for geom, why in made.remaining.items()}
 
     def _remove(self) -> None:
         for number in self._numbers:
@@ -163,20 +164,23 @@ def _library() -> ctypes.CDLL:
 
 
 def _hook() -> None:
-    found = host()
+    loaded = host()
+    for disabled in (0, -1):  # asked now, since asking puts other functions in the table for a moment
+        for enabled in (0, -1):
+            max_contacts((disabled, enabled))
     replaced = np.zeros((N, N), dtype=np.uint8)
     for i in OURS:
         replaced[i, [j for j in OURS if i <= j]] = 1
-    error = ctypes.cast(found.library.mju_error, ctypes.c_void_p)
-    if _library().collide_mujoco_hook(ctypes.byref(found.layout), found.table, replaced.ctypes.data, error):
+    error = ctypes.cast(loaded.library.mju_error, ctypes.c_void_p)
+    if _library().collide_mujoco_hook(ctypes.byref(loaded.layout), loaded.table, replaced.ctypes.data, error):
         # All our functions were overwritten by somebody since: begin again on what stands there now.
         _library().collide_mujoco_unhook()
-        _library().collide_mujoco_hook(ctypes.byref(found.layout), found.table, replaced.ctypes.data, error)
+        _library().collide_mujoco_hook(ctypes.byref(loaded.layout), loaded.table, replaced.ctypes.data, error)
 
 
 def _uninstall_all() -> None:
-    for installed in _installed:
-        installed.uninstall()
+    while _installed:
+        _installed[-1].uninstall()
 
 
 def world(model: Any, data: Any = None) -> World:
@@ -186,7 +190,7 @@ def world(model: Any, data: Any = None) -> World:
     ----------
     model : ``mujoco.MjModel``.
     data : ``mujoco.MjData`` whose ``geom_xpos`` and ``geom_xmat`` are up to date (``mj_kinematics``); without, those
-        of the model's first configuration ``qpos0``.
+        of the model's first configuration.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Geoms of a MuJoCo model as shapes, and the tables that the hook reads.
 
-Planes are half-spaces, meshes their convex hulls, as in MuJoCo. MuJoCo keeps vertices of meshes in single precision: those
-numbers are taken as they are.
+Planes are half-spaces, meshes their convex hulls, as in MuJoCo. MuJoCo keeps vertices of meshes in single precision:
+those numbers are taken as they are.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
-from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, N, check_model, most_contacts
+from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, N, check_model, max_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import HEADER
 from collide.contact.support_face import ROUND
@@ -27,12 +27,12 @@ class GeomShapes(NamedTuple):
     """Shapes of a model's geoms.
 
     shapes : each once.   rows : (n_geoms,) int64, which one; −1 of geoms that are left to MuJoCo.
-    left : why these are, geom by geom.
+    remaining : why these are, geom by geom.
     """
 
     shapes: list[Shape]
     rows: np.ndarray
-    left: dict[int, str]
+    remaining: dict[int, str]
 
 
 def geom_shapes(model) -> GeomShapes:
@@ -40,11 +40,11 @@ def geom_shapes(model) -> GeomShapes:
     shapes: list[Shape] = []
     known: dict = {}
     rows = np.full(model.ngeom, -1, dtype=np.int64)
-    left = {}
+    remaining = {}
     for geom in range(model.ngeom):
         kind = int(model.geom_type[geom])
         if kind not in OURS:
-            left[geom] = f"{KINDS[kind] if kind < N else f'geoms of kind {kind}'}: left to MuJoCo"
+            remaining[geom] = f"{KINDS[kind] if kind < N else f'geoms of kind {kind}'}: left to MuJoCo"
             continue
         name = KINDS[kind]
         key = (kind, int(model.geom_dataid[geom])) if name == "mesh" else (kind, model.geom_size[geom].tobytes())
@@ -57,7 +57,7 @@ def geom_shapes(model) -> GeomShapes:
             except CollideError as error:
                 raise InvalidShape(f"geom {geom} ({model.geom(geom).name or 'no name'}), a {name}: {error}") from None
         rows[geom] = known[key]
-    return GeomShapes(shapes, rows, left)
+    return GeomShapes(shapes, rows, remaining)
 
 
 def _shape(model, geom: int, name: str) -> Shape:
@@ -99,19 +99,19 @@ class Model(ctypes.Structure):
             "numbers", "faces", "boxes",
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
-        ("most", ctypes.c_int64 * (N * N)),
+        ("max_contacts", ctypes.c_int64 * (N * N)),
     ]  # fmt: skip
 
 
 class ModelTables:
     """What the hook reads of one model, held as long as this lives.
 
-    made : the `Model` of C.   left : geoms that are left to MuJoCo, and why.
+    made : the `Model` of C.   remaining : geoms that are left to MuJoCo, and why.
     """
 
     def __init__(self, model, is_cull: bool):
         check_model(model)
-        shapes, rows, self.left = geom_shapes(model)
+        shapes, rows, self.remaining = geom_shapes(model)
         table = ShapeTable([convex_set_of(shape) for shape in shapes] or [convex_set_of(Sphere(1.0))])
         table.build_trees(np.arange(len(table.ints)))
         faces = face_table_of(table, ROUND)
@@ -131,10 +131,10 @@ class ModelTables:
             "boxes": ((table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)).astype(np.uint8),
         }
         self._held: tuple[Any, ...] = (model, table, faces, arrays)
-        most = most_contacts((int(model.opt.disableflags), int(model.opt.enableflags)))
+        counts = max_contacts((int(model.opt.disableflags), int(model.opt.enableflags)))
         self.made = Model(
             model=model._address, signature=model.signature, n_geoms=model.ngeom, is_cull=is_cull,
             largest=faces.largest, face_ints=FACE_INTS, manifold_header=HEADER, contact_bytes=CONTACT_DTYPE.itemsize,
             **{name: array.ctypes.data for name, array in arrays.items()},
         )  # fmt: skip
-        self.made.most[:] = most.ravel().tolist()
+        self.made.max_contacts[:] = counts.ravel().tolist()

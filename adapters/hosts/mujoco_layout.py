@@ -1,7 +1,8 @@
 """Where MuJoCo keeps what the functions of its collision table read and write, found out by looking.
 
-MuJoCo's structures change from version to version. Arrays' addresses are known to Python: where a structure holds one is
-where a field stands. What a function of the table writes is found in the contacts of a model whose contacts are known.
+MuJoCo's structures change from version to version. Arrays' addresses are known to Python: where a structure holds one
+is where a field stands. What a function of the table writes is found in the contacts of a model whose contacts are
+known.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ N = len(KINDS)
 #: Kinds that are ours.
 OURS = tuple(KINDS.index(name) for name in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"))
 #: Contacts of a pair where MuJoCo sets no limit of its own below that.
-_MOST = 8
+_MAX_CONTACTS = 8
 #: Bytes that a structure is looked through for at most.
 _MODEL_BYTES, _DATA_BYTES = 1 << 16, 1 << 20
 
@@ -93,15 +94,15 @@ def _library(mujoco) -> ctypes.CDLL:
     """MuJoCo's library that the Python module has loaded."""
     folder = Path(mujoco.__file__).parent
     names = {"win32": "mujoco.dll", "darwin": "libmujoco*.dylib"}
-    found = sorted(folder.glob(names.get(sys.platform, "libmujoco.so*")))
-    if not found:
+    files = sorted(folder.glob(names.get(sys.platform, "libmujoco.so*")))
+    if not files:
         raise _refuse(mujoco, f"no library in {folder}")
-    library = ctypes.CDLL(str(found[0]))
+    library = ctypes.CDLL(str(files[0]))
     for name in ("mjCOLLISIONFUNC", "mju_error", "mj_version"):
         if not hasattr(library, name):
-            raise _refuse(mujoco, f"{found[0].name} has no {name}")
+            raise _refuse(mujoco, f"{files[0].name} has no {name}")
     if library.mj_version() != mujoco.mj_version():
-        raise _refuse(mujoco, f"{found[0].name} is of another version")
+        raise _refuse(mujoco, f"{files[0].name} is of another version")
     return library
 
 
@@ -146,7 +147,7 @@ def _where(mujoco, address: int, limit: int, wanted: dict[str, int]) -> dict[str
 
 def _offsets(mujoco) -> Layout:
     """All but `contact_size`, the same from two models."""
-    found = []
+    layouts = []
     for text in (_TRIAL, _TRIAL.replace("</worldbody>", '<geom type="sphere" size=".1" pos="9 9 9"/></worldbody>')):
         model = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(model)
@@ -157,13 +158,13 @@ def _offsets(mujoco) -> Layout:
         arrays = ("geom_type", "geom_dataid", "geom_size", "mesh_vert")
         wanted = {name: getattr(model, name).ctypes.data for name in arrays} | {"signature": model.signature}
         of_data = {name: getattr(data, name).ctypes.data for name in ("geom_xpos", "geom_xmat")}
-        found.append(
+        layouts.append(
             _where(mujoco, model._address, _MODEL_BYTES, wanted)
             | _where(mujoco, data._address, _DATA_BYTES, of_data)
         )
-    if found[0] != found[1]:
+    if layouts[0] != layouts[1]:
         raise _refuse(mujoco, "two models are laid out differently")
-    return Layout(**found[0])
+    return Layout(**layouts[0])
 
 
 def check_model(model) -> None:
@@ -188,7 +189,10 @@ def _instead(table, index: int, function):
 
 
 def _contact_size(mujoco, table) -> int:
-    """How far apart contacts stand that a function writes: a box on a plane has four, and MuJoCo tells them afterwards."""
+    """How far apart contacts stand that a function writes.
+
+    A box on a plane has four, and MuJoCo tells them afterwards.
+    """
     model = mujoco.MjModel.from_xml_string(_TRIAL)
     data = mujoco.MjData(model)
     index, written = N * PLANE + BOX, []
@@ -211,28 +215,29 @@ def _contact_size(mujoco, table) -> int:
     return sizes[0]
 
 
-def most_contacts(flags: tuple[int, int]) -> np.ndarray:
+def max_contacts(flags: tuple[int, int]) -> np.ndarray:
     """(N, N) int64: contacts of a pair that MuJoCo takes under these `disableflags` and `enableflags`; 0 where not
     ours."""
     mujoco = host().mujoco
     off, on = (getattr(bits, name, 0) for bits, name in (
         (mujoco.mjtDisableBit, "mjDSBL_MULTICCD"), (mujoco.mjtEnableBit, "mjENBL_MULTICCD"),
     ))  # fmt: skip
-    return _most_contacts(flags[0] & int(off), flags[1] & int(on))
+    return _max_contacts(flags[0] & int(off), flags[1] & int(on))
 
 
 @cache
-def _most_contacts(disabled: int, enabled: int) -> np.ndarray:
-    most = np.zeros((N, N), dtype=np.int64)
+def _max_contacts(disabled: int, enabled: int) -> np.ndarray:
+    counts = np.zeros((N, N), dtype=np.int64)
     for i in OURS:
         for j in OURS:
             if i <= j and j != PLANE and host().table[N * i + j]:
-                most[i, j] = min(_limit(i, j, disabled, enabled), _MOST) if host().has_limits else _MOST
-    return most
+                limit = _limit(i, j, disabled, enabled) if host().has_limits else _MAX_CONTACTS
+                counts[i, j] = min(limit, _MAX_CONTACTS)
+    return counts
 
 
 def _limit(i: int, j: int, disabled: int, enabled: int) -> int:
-    """What MuJoCo says it expects at most, when it is told of one contact more than it ever takes."""
+    """What MuJoCo says it expects at most, when it is reported of one contact more than it ever takes."""
     mujoco, table = host().mujoco, host().table
     bodies = [_geom_text(i) if i == PLANE else f"<body><freejoint/>{_geom_text(i)}</body>"]
     bodies.append(f"<body><freejoint/>{_geom_text(j)}</body>")
@@ -244,9 +249,9 @@ def _limit(i: int, j: int, disabled: int, enabled: int) -> int:
         with _instead(table, N * i + j, lambda *_: int(mujoco.mjMAXCONPAIR) + 1):
             mujoco.mj_forward(model, mujoco.MjData(model))
     except mujoco.FatalError as error:
-        if told := re.search(r"expected at most (\d+)", str(error)):
-            return int(told[1])
-    raise _refuse(mujoco, f"how many contacts {KINDS[i]} and {KINDS[j]} may have is not told")
+        if reported := re.search(r"expected at most (\d+)", str(error)):
+            return int(reported[1])
+    raise _refuse(mujoco, f"how many contacts {KINDS[i]} and {KINDS[j]} may have is not reported")
 
 
 def _geom_text(kind: int) -> str:

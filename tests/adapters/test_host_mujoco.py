@@ -1,7 +1,7 @@
 """MuJoCo on collide: what stands in its table, whose answers a step has, and that everything is put back.
 
-Contacts are judged against `collide.contacts`, whose own tests judge it exactly; places of geoms are turned into matrices
-here, not by the adapter. Skipped where MuJoCo is not installed.
+Contacts are judged against `collide.contacts`, whose own tests judge it exactly; places of geoms are turned into
+matrices here, not by the adapter. Skipped where MuJoCo is not installed.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def test_contacts_are_those_of_collide(a):
         model = pair_of(a, b, more='margin="0.01"')
         shapes, rows, _ = geom_shapes(model)
         A, B = (shapes[row] for row in rows)
-        most = int(mujoco_layout.most_contacts((0, 0))[tuple(sorted(model.geom_type.tolist()))])
+        most = int(mujoco_layout.max_contacts((0, 0))[tuple(sorted(model.geom_type.tolist()))])
         data = mujoco.MjData(model)
         with install(model):
             for _ in range(40):
@@ -134,16 +134,16 @@ def test_contacts_are_those_of_collide(a):
 
 
 def margin_of(model) -> float:
-    """The margin of a pair: versions add those of the geoms, or take the larger; a contact is told of where a ball has
-    one at that gap."""
-    two = model_of(body(geom("sphere", more='margin="0.01"')), body(geom("sphere", more='margin="0.01"'), (0.175, 0, 0)))
+    """The margin of a pair: versions add those of the geoms, or take the larger. Two balls, 15 mm apart, tell."""
+    ball = geom("sphere", more='margin="0.01"')
+    two = model_of(body(ball), body(ball, (0.175, 0, 0)))
     data = mujoco.MjData(two)
     mujoco.mj_forward(two, data)
     return 0.02 if data.ncon else 0.01
 
 
 def test_directions_and_signs():
-    """A box 3 mm deep in a plane: normals from the first geom to the second, distances negative, places in the middle."""
+    """A box 3 mm deep in a plane: normals from the first geom to the second, distances negative, places halfway."""
     model = model_of(geom("plane"), body(geom("box", (0.1, 0.2, 0.05)), (0.3, 0.0, 0.047)))
     with install(model):
         data = mujoco.MjData(model)
@@ -351,7 +351,7 @@ def test_height_fields_are_left_to_mujoco():
     model = mujoco.MjModel.from_xml_string(text)
     alone = stepped(model, 50).qpos
     with install(model) as installed:
-        assert list(installed.left) == [(0, 0)] and "hfield" in installed.left[0, 0]
+        assert list(installed.remaining) == [(0, 0)] and "hfield" in installed.remaining[0, 0]
         np.testing.assert_array_equal(stepped(model, 50).qpos, alone)
 
 
