@@ -1,4 +1,4 @@
-"""Contacts of many pairs of bodies: compounds taken apart, convex pairs answered together, meshes one by one."""
+"""Contacts of many pairs of bodies: compounds taken apart, convex pairs answered together, meshes pair by pair."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from collide.pair_arguments import pose_at
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 
-#: What makes the contacts of two bodies at one pose, by the method that answers the pair; other methods are of convex
-#: sets, which go together, or of compounds, which are taken apart.
-_OF_ONE_POSE = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
+#: What makes the contacts of two bodies, by the method that answers the pair; other methods are of convex sets, which
+#: go together, or of compounds, which are taken apart.
+_OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
@@ -66,6 +66,10 @@ def contact_batch(
         A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, threads=threads)
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        make = _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))
+        if make is not None:
+            return make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
     shapes, which = (A, B), None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
@@ -142,7 +146,7 @@ def _may_come_within(part_a: Part, part_b: Part, X_WA, X_WB, limit: np.ndarray) 
 def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of pairs of parts: the convex ones in one batch, each other at its pose."""
+    """(rows, ends) of pairs of parts: the convex ones in one batch, of meshes those of two shapes."""
     if not len(pairs):
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
     kinds = [kind_of(shape) for shape in singles]
@@ -161,15 +165,22 @@ def _rows_of_parts(
         counts[convex] = np.diff(ends, prepend=0)
         blocks.append(rows)
     owners = [np.repeat(convex, counts[convex])]
-    for k in np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B])).tolist():
-        A, B, slack = singles[pairs.A[k]], singles[pairs.B[k]], float(pairs.slack[k])
-        make = _OF_ONE_POSE[method_of(kinds[pairs.A[k]], kinds[pairs.B[k]])]
-        rows = make(A, B, pairs.X_WA[k], pairs.X_WB[k], margin + slack, max_contacts)
-        rows["lower"] -= slack
-        rows["upper"] += slack
-        counts[k] = len(rows)
+    meshed = np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B]))
+    keys = pairs.A[meshed] * len(singles) + pairs.B[meshed]
+    for key in np.unique(keys).tolist():
+        which = meshed[keys == key]
+        a, b = divmod(key, len(singles))
+        some = pairs.take(which)
+        make = _OF_MESHES[method_of(kinds[a], kinds[b])]
+        X_WA, X_WB = np.ascontiguousarray(some.X_WA), np.ascontiguousarray(some.X_WB)
+        slack = some.slack if some.slack.any() else None
+        rows, ends = make(singles[a], singles[b], X_WA, X_WB, margin, max_contacts, slack, threads)
+        counts[which] = np.diff(ends, prepend=0)
+        if slack is not None:
+            rows["lower"] -= np.repeat(slack, counts[which])
+            rows["upper"] += np.repeat(slack, counts[which])
         blocks.append(rows)
-        owners.append(np.full(len(rows), k))
+        owners.append(np.repeat(which, counts[which]))
     order = np.argsort(np.concatenate(owners), kind="stable")
     return np.concatenate([*blocks, np.zeros(0, dtype=CONTACT_DTYPE)])[order], np.cumsum(counts)
 

@@ -234,7 +234,7 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
         collide.contacts(sheet, sheet, EYE, collide.pose((0, 0, 1e-3)), margin=5.0)
     flat = collide.contacts(sheet, sheet, EYE, EYE)
     near(flat.point_a, [(x, y, 0) for x in (-1, 1) for y in (-1, 1)])
-    monkeypatch.setattr("collide.contact.contact_facets.MAX_PAIRS", 100)
+    monkeypatch.setattr("collide.contact.mesh_contacts.MAX_PAIRS", 100)
     c = collide.contacts(sheet, sheet, EYE, EYE)
     assert (
         len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance

@@ -109,7 +109,7 @@ def _widen_probe(query, which, probe):
 
 
 @kernel
-def _world_error(A, XA, B, XB):
+def world_error(A, XA, B, XB):
     """Bound of the error of a coordinate in the world's axes."""
     size = 0.0
     for i in range(3):
@@ -173,7 +173,11 @@ def _measure(query, a, b):
 _traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open_larger(_widen_probe))
 
 
-@entry("int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)")
+#: Of `list_near_pairs`.
+SIGNATURE = "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
     integers_at, exact_at,
@@ -192,7 +196,7 @@ def list_near_pairs(
     if not invertible:
         return -SINGULAR
     numbers_at = doubles_at + 8 * (PLACING + CORNERS)
-    error = _world_error(A, trees.XA, B, trees.XB)
+    error = world_error(A, trees.XA, B, trees.XB)
     query = _Query(
         trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(numbers_at + 8 * _REACHES, 6),
         view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),

@@ -1,0 +1,146 @@
+"""Rows of a patch: its points, thinned out and reduced, in the world."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from collide.contact.contact_points import PatchPoints, copy_of_points
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
+from collide.contact.manifold_points import GAP as POINT_GAP
+from collide.contact.manifold_points import HEIGHT, POINT, V
+from collide.contact.reduce_patch import HullSpace, reduce_patch
+from collide.contact.reduce_points import select_points
+from collide.kernels import kernel, view_f64, view_i32
+from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
+from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
+
+#: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
+_ERRORS, _SHARE = 64.0, 2.0**-30
+
+
+def _at(field: str, unit: int) -> int:
+    assert CONTACT_DTYPE.fields is not None
+    return CONTACT_DTYPE.fields[field][1] // unit
+
+
+CONTACT = CONTACT_DTYPE.itemsize
+_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+
+
+class PatchSpace(NamedTuple):
+    """Where rows go, and what they are made of.
+
+    target : points as they are chosen.   hull : numbers of points.   origin : of A in the world.
+    out : address of rows, ``capacity`` of them.   max_contacts : of a patch.   margin : [m].
+    """
+
+    target: PatchPoints
+    hull: HullSpace
+    origin: Vec3
+    out: int
+    capacity: int
+    max_contacts: int
+    margin: float
+
+
+@kernel
+def _keep_near(points, n, limit):
+    """Keep the points whose gap is at most so much, but for its error, and the nearest; how many."""
+    p = points.manifold.points
+    least = math.inf
+    for i in range(n):
+        least = min(least, p[POINT * i + POINT_GAP])
+    n_kept = 0
+    for i in range(n):
+        gap = p[POINT * i + POINT_GAP]
+        if gap <= limit + points.errors[i] or gap == least:
+            copy_of_points(points, i, points, n_kept)
+            n_kept += 1
+    return n_kept
+
+
+@kernel
+def _extent(points, n):
+    """The larger side of the box around n points."""
+    p = points.manifold.points
+    low_u = low_v = math.inf
+    high_u = high_v = -math.inf
+    for i in range(n):
+        u, v = p[POINT * i], p[POINT * i + V]
+        low_u, high_u = min(low_u, u), max(high_u, u)
+        low_v, high_v = min(low_v, v), max(high_v, v)
+    return max(high_u - low_u, high_v - low_v)
+
+
+@kernel
+def put_patch(frame, patch, apart, number, space, n_rows):
+    """Append the rows of a patch; how many there are then, −1 where there is no place for them.
+
+    apart : as in the rows [m].   number : of the patch.
+    """
+    points, target = frame.points, space.target
+    radius = frame.A.radius + frame.B.radius
+    n = _keep_near(points, patch.n, space.margin + radius)
+    tolerance = max(_ERRORS * frame.error, _SHARE * _extent(points, n))
+    n = reduce_patch(points, n, tolerance, target, space.hull)
+    n = select_points(target.manifold, n, 0, space.max_contacts, space.hull.order)
+    if n_rows + n > space.capacity:
+        return -1
+    for i in range(n):
+        contact_at = space.out + CONTACT * (n_rows + i)
+        k = space.hull.order[i]
+        _put_row(contact_at, frame, patch, k, space)
+        doubles, words = view_f64(contact_at, CONTACT // 8), view_i32(contact_at, CONTACT // 4)
+        doubles[_APART] = apart
+        words[_PATCH] = number
+    return n_rows + n
+
+
+@kernel
+def _put_row(contact_at, frame, patch, k, space):
+    """One contact: point k of the target."""
+    doubles, words = view_f64(contact_at, CONTACT // 8), view_i32(contact_at, CONTACT // 4)
+    points, axes = space.target, patch.axes
+    p, at = points.manifold.points, POINT * k
+    radius_a, radius_b = frame.A.radius, frame.B.radius
+    radius = radius_a + radius_b
+    distance = p[at + POINT_GAP] - radius
+    error = points.errors[k] + (8.0 * frame.error if radius > 0.0 else 0.0)
+    if patch.meets and 0.0 < distance <= error:  # what touches is no gap, though it may come out as one
+        distance = 0.0
+    height = p[at + HEIGHT] + 0.5 * (radius_a - radius_b)
+    middle = add(add(scale(p[at], axes.e), scale(p[at + V], axes.f)), scale(height, axes.nhat))
+    middle = add(middle, space.origin)
+    half = scale(0.5 * distance, axes.nhat)
+    doubles[_DISTANCE] = distance + 0.0
+    doubles[_LOWER] = distance - error
+    doubles[_UPPER] = distance + error
+    put_vec3(doubles, _NORMAL, add(axes.nhat, Vec3(0.0, 0.0, 0.0)))
+    put_vec3(doubles, _POINT_A, sub(middle, half))
+    put_vec3(doubles, _POINT_B, add(middle, half))
+    pair = INTS_OF_PAIR * points.pairs[k]
+    words[_B] = 1
+    words[_FACET_A] = frame.pairs.facets[pair + FACET_A]
+    words[_FACET_B] = frame.pairs.facets[pair + FACET_B]
+    words[_FEATURE_A] = points.manifold.features[2 * k]
+    words[_FEATURE_B] = points.manifold.features[2 * k + 1]
+    words[_KIND] = OVERLAP if patch.meets else GAP
+
+
+@kernel
+def flip_row(contact_at):
+    """Exchange A and B in a row, in place."""
+    doubles, words = view_f64(contact_at, CONTACT // 8), view_i32(contact_at, CONTACT // 4)
+    point = vec3_at(doubles, _POINT_A)
+    put_vec3(doubles, _POINT_A, vec3_at(doubles, _POINT_B))
+    put_vec3(doubles, _POINT_B, point)
+    put_vec3(doubles, _NORMAL, sub(Vec3(0.0, 0.0, 0.0), vec3_at(doubles, _NORMAL)))
+    facet, feature = words[_FACET_A], words[_FEATURE_A]
+    words[_FACET_A] = words[_FACET_B]
+    words[_FACET_B] = facet
+    words[_FEATURE_A] = words[_FEATURE_B]
+    words[_FEATURE_B] = feature
