@@ -116,8 +116,8 @@ def _of_poses(
     header = np.zeros(CONTACT_HEADER, dtype=np.int64)
     header[:HEADER] = pair_header(*ordered, exchanged, work)
     header[HEADER:POSES_DONE] = (
-        *(address_of(topology.header) for topology in topologies), 0, code_of(list_near_pairs), space.address,
-        space.capacity, space.capacity >= MAX_PAIRS, min(max_contacts, 1 << 40),
+        *(address_of(topology.header) for topology in topologies), 0, code_of(list_near_pairs), *space.described,
+        min(max_contacts, 1 << 40),
     )  # fmt: skip
     header.view(np.float64)[LIMIT] = _longest_translation(*ordered)
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.uint8)
@@ -134,7 +134,7 @@ def _of_poses(
             out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])
         elif status == PAIRS_FULL:
             space.grow()
-            header[WORDS : WORDS + 3] = space.address, space.capacity, space.capacity >= MAX_PAIRS
+            header[WORDS : WORDS + 3] = space.described
         elif status == TOO_MANY:
             raise _too_many(margin, body_a, body_b)
         else:
@@ -171,12 +171,16 @@ class _OfThread(local):
         self._keep(_FEWEST_PAIRS)
 
     def _keep(self, capacity: int) -> None:
-        self.capacity = capacity
+        self._capacity = capacity
         self._words = np.empty(workspace_words(capacity))
-        self.address = address_of(self._words)
+
+    @property
+    def described(self) -> tuple[int, int, bool]:
+        """Its address, for how many pairs it is, and whether that is the most."""
+        return address_of(self._words), min(self._capacity, MAX_PAIRS), self._capacity >= MAX_PAIRS
 
     def grow(self) -> None:
-        self._keep(min(4 * self.capacity, MAX_PAIRS))
+        self._keep(min(4 * self._capacity, MAX_PAIRS))
 
 
 _of_thread = _OfThread()
