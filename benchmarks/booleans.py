@@ -29,7 +29,7 @@ POSES = 4000
 #: What turns the engine into its uncertified twin: (file, text, replacement).
 UNCERTIFIED = [
     ("narrowphase/bounds.py", "ERROR = 64 * 2.0**-53", "ERROR = 0.0"),
-    ("narrowphase/convex_queries.py", 'if (rows["how"] == UNDECIDED).any():', "if False:"),
+    ("narrowphase/convex_kernel_calls.py", 'if (rows["how"] == UNDECIDED).any():', "if False:"),
 ]
 
 

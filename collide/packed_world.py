@@ -18,14 +18,14 @@ from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
-from collide.narrowphase.convex_queries import run_pairs
+from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.world_bodies import Roster
 
 #: Half of the engine, which scenes without meshes never load.
-mesh_pairs = lazy_module("collide.narrowphase.facets.mesh_pairs")
+mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 
 #: Booleans about meshes that stop at the first hit ask so many pairs of the same two shapes at first, then twice as
 #: many.
@@ -170,10 +170,11 @@ class PackedWorld:
         A, B = self._shapes[self._shape_of[a[0]]], self._shapes[self._shape_of[b[0]]]
         if boolean:
             rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-            states = mesh_pairs.pair_states(A, B, self.X_WBs[a], self.X_WBs[b])
-            rows["hit"], rows["how"] = states != mesh_pairs.APART, np.where(states == mesh_pairs.OPEN, UNDECIDED, EXACT)
+            states = mesh_batches.pair_states(A, B, self.X_WBs[a], self.X_WBs[b])
+            rows["hit"] = states != mesh_batches.APART
+            rows["how"] = np.where(states == mesh_batches.OPEN, UNDECIDED, EXACT)
         else:
-            rows = mesh_pairs.rows_within(A, B, self.X_WBs[a], self.X_WBs[b], limit)
+            rows = mesh_batches.rows_within(A, B, self.X_WBs[a], self.X_WBs[b], limit)
         rows["a"], rows["b"] = a, b
         return rows
 
@@ -259,7 +260,7 @@ class PackedWorld:
         for batch in _batches(pairs, self._shape_of, len(self._shapes)):
             b = batch[:, 0]
             B = self._shapes[self._shape_of[b[0]]]
-            rows.append(mesh_pairs.rows_within(shape, B, X_WS[None], self.X_WBs[b], limit))
+            rows.append(mesh_batches.rows_within(shape, B, X_WS[None], self.X_WBs[b], limit))
             rows[-1]["a"], rows[-1]["b"] = 0, b
         answered = np.concatenate(rows)
         return answered[np.argsort(answered["b"], kind="stable")]

@@ -13,8 +13,8 @@ from collide.algorithms import named_algorithm
 from collide.batches import answer_batch, length_of
 from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.narrowphase.convex_bodies import Question
-from collide.narrowphase.convex_queries import close
+from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
@@ -237,7 +237,7 @@ def distance(
     unbounded = []
 
     def finish(rows: np.ndarray) -> None:
-        if close(rows, depths=signed):
+        if finish_distances(rows, depths=signed):
             unbounded.append(True)
 
     question = Question(False, limit, signed, check_poses)

@@ -18,7 +18,7 @@ from collide.batches import answer_batch
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.parts import convex_set_of, is_single_convex
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.results import UNDECIDED
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.shape import Shape

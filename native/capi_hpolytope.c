@@ -225,7 +225,7 @@ static struct row between(struct work *work, const struct ray *out, struct bigin
 /* Rays that span what row number k leaves of the cone of the rays given. */
 static int cut(struct work *work, const struct rays *rays, size_t k, struct rays *out)
 {
-    struct mark begun = arena_mark(&work->scratch);
+    struct mark outer = arena_mark(&work->scratch);
     struct bigint *sides = arena_take(&work->scratch, (rays->n + 1) * sizeof *sides);
     uint32_t *common = arena_take(&work->scratch, (work->words + 1) * sizeof *common);
     size_t i, j;
@@ -251,7 +251,7 @@ static int cut(struct work *work, const struct rays *rays, size_t k, struct rays
             arena_return(&work->scratch, mark);
         }
     }
-    arena_return(&work->scratch, begun);
+    arena_return(&work->scratch, outer);
     return good && !work->arena.failed && !work->scratch.failed;
 }
 

@@ -78,10 +78,10 @@ collide_status shape_of_points(const double *points, size_t n, double radius, do
 
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. lowest : exponent of the lowest bit of the coordinates. */
-collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
+collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
                           struct support_tree **tree);
 int64_t tree_address(const struct support_tree *tree);
-void fell_tree(struct support_tree *tree);
+void free_tree(struct support_tree *tree);
 
 /* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
    workspace : HALFSPACES_BYTES. */

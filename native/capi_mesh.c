@@ -10,7 +10,7 @@
 /* The header of a box-tree (collide/mesh/bvh.py), its numbers, and the most facets that it holds. */
 enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, TREE_INTS };
 enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
-static const size_t MOST_FACETS = (size_t)1 << 28;
+static const size_t MAX_FACETS = (size_t)1 << 28;
 
 typedef char headers_fit[TREE_INTS == 9 && TREE_NUMBERS == 7 ? 1 : -1];
 
@@ -210,7 +210,7 @@ static int are_facets(const double *vertices, size_t n, const int32_t *faces, si
 {
     double largest = 0.0;
     size_t k;
-    if (n == 0 || n > (size_t)INT32_MAX || m == 0 || m > MOST_FACETS) return 0;
+    if (n == 0 || n > (size_t)INT32_MAX || m == 0 || m > MAX_FACETS) return 0;
     for (k = 0; k < 3 * n; k++) {
         if (!(fabs(vertices[k]) <= LARGEST)) return 0;
         if (fabs(vertices[k]) > largest) largest = fabs(vertices[k]);

@@ -1,17 +1,17 @@
-/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/body_pairs.py. What kernels leave to Python is
+/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/facet_kernel_calls.py. What kernels leave to Python is
    said to be unsupported. */
 #include "capi_mesh.h"
 
 #include <string.h>
 
-/* Header of the kernels (collide/narrowphase/facets/surface_pairs.py). */
+/* Header of the kernels (collide/narrowphase/facets/collide_kernel.py). */
 enum {
     TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B, SAME_TREE, SAME_BODY, EXCHANGED,
     SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, HEAP_AT, N_HEAP,
     SCRATCH_AT, MESH_HEADER
 };
 /* More points than this are left to a batch. */
-enum { MOST_POINTS = 64 };
+enum { MAX_POINTS = 64 };
 
 /* Room of a workspace for meshes (collide_workspace.mesh). */
 struct mesh_workspace {
@@ -97,7 +97,7 @@ static collide_status check_pair(const collide_workspace *space, const collide_m
     if (space == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || !(A->given || B->given) ||
         (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0)
         return COLLIDE_INVALID_ARGUMENT;
-    if ((A->solid && B->n_points > MOST_POINTS) || (B->solid && A->n_points > MOST_POINTS)) return COLLIDE_UNSUPPORTED;
+    if ((A->solid && B->n_points > MAX_POINTS) || (B->solid && A->n_points > MAX_POINTS)) return COLLIDE_UNSUPPORTED;
     return COLLIDE_OK;
 }
 

@@ -70,11 +70,11 @@ void order_nested(struct arena *arena, const int32_t *vertices, const double *no
     memcpy(along, scratch, (size_t)n * sizeof *along);
     for (k = 0; k < n; k++) free_ones += !late[k];
     for (s = 1; s < n_sizes; s++) {
-        int64_t size = sizes[s], chosen = 0, n_late = 0;
+        int64_t size = sizes[s], n_taken = 0, n_late = 0;
         double step = (double)(free_ones > size ? free_ones : size) / (double)size;
         end -= n_remaining - size;
         for (k = 0; k < n_remaining; k++) {
-            if (chosen < size && k == (int64_t)(((double)chosen + 0.5) * step)) scratch[chosen++] = along[k];
+            if (n_taken < size && k == (int64_t)(((double)n_taken + 0.5) * step)) scratch[n_taken++] = along[k];
             else ordered[end + n_late++] = vertices[along[k]];
         }
         memcpy(along, scratch, (size_t)size * sizeof *along);

@@ -1,4 +1,4 @@
-/* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_queries.py and `distance` of collide/query.py. */
+/* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/query.py. */
 #include "capi_internal.h"
 
 #include <math.h>
@@ -165,7 +165,7 @@ static collide_status answer(collide_workspace *space, const struct question *as
 static collide_status close_pairs(collide_workspace *space, const struct question *asked, collide_pair *pairs, size_t *failed)
 {
     size_t k;
-    if (!space->kernels->close_rows(address_of(pairs), (int64_t)asked->n, (uint8_t)asked->depths)) return COLLIDE_OK;
+    if (!space->kernels->finish_rows(address_of(pairs), (int64_t)asked->n, (uint8_t)asked->depths)) return COLLIDE_OK;
     for (k = 0; k < asked->n && pairs[k].distance != -INFINITE; k++) {}
     *failed = k;
     return COLLIDE_ENDLESS_DEPTH;

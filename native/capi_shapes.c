@@ -85,12 +85,12 @@ static collide_status lay_out(collide_shape *shape, const double *points, size_t
     return COLLIDE_OK;
 }
 
-static collide_status plant(collide_shape *shape, size_t n)
+static collide_status build_support_tree(collide_shape *shape, size_t n)
 {
     const struct collide_kernels *kernels = kernels_here();
     collide_status status;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    status = plant_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
+    status = build_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
     if (shape->tree != NULL) shape->ints[TREE] = tree_address(shape->tree);
     return status;
 }
@@ -104,7 +104,7 @@ static collide_status made_of_points(collide_shape *shape, const double *points,
     if (!may_have_tree || n < FEWEST_FOR_TREE) return COLLIDE_OK;
     if ((shape->points = malloc(3 * n * sizeof *points)) == NULL) return COLLIDE_NO_MEMORY;
     memcpy(shape->points, points, 3 * n * sizeof *points);
-    return plant(shape, n);
+    return build_support_tree(shape, n);
 }
 
 collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
@@ -141,7 +141,7 @@ static collide_status shape_of_numbers(int kind, const double *params, size_t n,
 void collide_shape_free(collide_shape *shape)
 {
     if (shape == NULL) return;
-    fell_tree(shape->tree);
+    free_tree(shape->tree);
     free(shape->points);
     free(shape->block);
     free(shape);

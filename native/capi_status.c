@@ -22,7 +22,7 @@ const char *collide_status_text(collide_status status)
     return "unknown status";
 }
 
-static const struct collide_kernels *chosen(const char **level)
+static const struct collide_kernels *kernels_of(const char **level)
 {
     const char *why = NULL;
     const struct collide_kernels *kernels = collide_kernels_of_level(getenv("COLLIDE_CPU"), level, &why);
@@ -33,14 +33,14 @@ static const struct collide_kernels *chosen(const char **level)
 const struct collide_kernels *kernels_here(void)
 {
     const char *level = NULL;
-    return chosen(&level);
+    return kernels_of(&level);
 }
 
 collide_status collide_level(const char **level)
 {
     if (level == NULL) return COLLIDE_INVALID_ARGUMENT;
     *level = NULL;
-    return chosen(level) != NULL ? COLLIDE_OK : COLLIDE_NO_KERNELS;
+    return kernels_of(level) != NULL ? COLLIDE_OK : COLLIDE_NO_KERNELS;
 }
 
 int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEASURES])

@@ -10,7 +10,7 @@ enum { FINE_RATIO = 24, RATIO = 16, SMALL_HULL = 160, LARGEST_SCAN = 100, HIGHES
 /* A hull of fewer vertices is scanned; fewest entries of a list. */
 enum { FEWEST_VERTICES = 32, FEWEST = 8 };
 /* Subsets fall by RATIO at least. */
-enum { MOST_LEVELS = 16 };
+enum { MAX_LEVELS = 16 };
 
 /* Header of a tree, as kernels read it (collide/support/support_tree.py). */
 enum {
@@ -33,7 +33,7 @@ struct growing {
     int32_t *nodes, *owners, *entries, *rows;
     double *coordinates;
     int64_t n_nodes, n_entries, depth;
-    int hopeless; /* so degenerate that no order of neighbours is certain: it is scanned */
+    int too_flat; /* so degenerate that no order of neighbours is certain: it is scanned */
 };
 
 /* --- levels -------------------------------------------------------------------------------------------------------- */
@@ -152,8 +152,8 @@ static void add_levels(struct growing *tree, const int32_t *ordered, const int64
         struct rings own;
         if (level > 0) {
             own = rings_of_subset(tree, ordered, sizes[level]);
-            tree->hopeless = tree->hopeless || !own.good;
-            if (tree->arena->failed || tree->hopeless) return;
+            tree->too_flat = tree->too_flat || !own.good;
+            if (tree->arena->failed || tree->too_flat) return;
         }
         add_lists(tree, ordered, sizes[level], level > 0 ? &own : rings, ordered, n_coarse, first_node,
                   level > 0 ? first_node + n_coarse : -1);
@@ -245,11 +245,11 @@ static double *vertex_normals(struct arena *arena, const struct rings *rings, in
     return normals;
 }
 
-static int subset_sizes(int64_t n, int64_t sizes[MOST_LEVELS])
+static int subset_sizes(int64_t n, int64_t sizes[MAX_LEVELS])
 {
     int n_sizes = 1;
     sizes[0] = n;
-    while (n_sizes < MOST_LEVELS && sizes[n_sizes - 1] > (n_sizes == 1 ? SMALL_HULL : LARGEST_SCAN)) {
+    while (n_sizes < MAX_LEVELS && sizes[n_sizes - 1] > (n_sizes == 1 ? SMALL_HULL : LARGEST_SCAN)) {
         int64_t ratio = n_sizes == 1 ? FINE_RATIO : RATIO;
         sizes[n_sizes] = (sizes[n_sizes - 1] + ratio - 1) / ratio;
         n_sizes++;
@@ -311,7 +311,7 @@ static struct support_tree *kept(const struct growing *tree, const struct rings 
 /* Vertices that are corners, where there are enough; which of all come late. Returns how many, 0 where one has no facets. */
 static int64_t choose_vertices(const struct rings *rings, int32_t *vertices, int64_t n_vertices, uint8_t *late)
 {
-    int64_t k, corners = 0, n_chosen = 0;
+    int64_t k, corners = 0, n_used = 0;
     for (k = 0; k < n_vertices; k++) {
         if (rings->starts[vertices[k] + 1] == rings->starts[vertices[k]]) return 0;
         corners += rings->corner[vertices[k]];
@@ -319,10 +319,10 @@ static int64_t choose_vertices(const struct rings *rings, int32_t *vertices, int
     for (k = 0; k < n_vertices; k++) {
         int32_t vertex = vertices[k];
         if (corners >= 3 && !rings->corner[vertex]) continue;
-        late[n_chosen] = rings->starts[vertex + 1] - rings->starts[vertex] > HIGHEST_DEGREE;
-        vertices[n_chosen++] = vertex;
+        late[n_used] = rings->starts[vertex + 1] - rings->starts[vertex] > HIGHEST_DEGREE;
+        vertices[n_used++] = vertex;
     }
-    return n_chosen;
+    return n_used;
 }
 
 static void build(struct growing *tree, const double *points, struct hull *hull, int64_t lowest, struct support_tree **out)
@@ -330,7 +330,7 @@ static void build(struct growing *tree, const double *points, struct hull *hull,
     struct arena *arena = tree->arena;
     struct rings rings;
     uint8_t *late = arena_take(arena, (size_t)hull->n_vertices);
-    int64_t sizes[MOST_LEVELS], n_vertices;
+    int64_t sizes[MAX_LEVELS], n_vertices;
     double *normals;
     int32_t *ordered;
     int attempt, n_sizes;
@@ -350,7 +350,7 @@ static void build(struct growing *tree, const double *points, struct hull *hull,
         tree->nodes = arena_take(arena, 4);
         tree->n_nodes = tree->n_entries = tree->depth = 0;
         if (!arena->failed) add_levels(tree, ordered, sizes, n_sizes, &rings);
-        if (arena->failed || tree->hopeless || !is_sound(tree, &rings)) return;
+        if (arena->failed || tree->too_flat || !is_sound(tree, &rings)) return;
         again = mark_long(tree, hull->vertices, n_vertices, late);
         if (arena->failed) return;
         if (!again || attempt == ATTEMPTS - 1) {
@@ -361,7 +361,7 @@ static void build(struct growing *tree, const double *points, struct hull *hull,
     }
 }
 
-collide_status plant_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
+collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
                           struct support_tree **tree)
 {
     struct arena arena;
@@ -383,4 +383,4 @@ collide_status plant_tree(const struct collide_kernels *kernels, const double *p
 
 int64_t tree_address(const struct support_tree *tree) { return address_of(tree->header); }
 
-void fell_tree(struct support_tree *tree) { free(tree); }
+void free_tree(struct support_tree *tree) { free(tree); }

@@ -8,9 +8,10 @@ import naive
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
+from validate_box_tree import validate_box_tree
 
 import collide
-from collide.broadphase.box_tree import BoxTree, validate_box_tree
+from collide.broadphase.box_tree import BoxTree
 
 #: All but the effort: a World leaves out parts of compounds that are too far apart to matter.
 FIELDS = [field for field in naive.ANSWER_FIELDS if field != "iterations"]

@@ -16,11 +16,12 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.composite_parts import Part, compound_parts
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
+from collide.transforms import as_poses
 
 #: What makes the contacts of two bodies, by the method that answers the pair; other methods are of convex sets, which
 #: go together, or of compounds, which are taken apart.
@@ -54,22 +55,25 @@ class PartPairs(NamedTuple):
 
 
 def contact_batch(
-    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, threads: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, *, check: bool = False,
+    threads: int = 1,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where those of each pair end.
 
-    A, B : shapes, or sequences of n shapes.   X_WA, X_WB : checked, (n, 4, 4) or (1, 4, 4). Raises UnsupportedQuery.
+    A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4), finite.   check : refuse matrices
+    that are no rotation. Raises InvalidPose, UnsupportedQuery.
     """
     if n == 0:
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
-        return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, threads=threads)
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        make = _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))
-        if make is not None:
-            return make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
+        return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
+    X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+    if isinstance(A, Shape) and isinstance(B, Shape) and (make := _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))):
+        rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
+        of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
+        return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
     shapes, which = (A, B), None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
@@ -81,8 +85,16 @@ def contact_batch(
     rows["part_a"] = np.repeat(part_pairs.part_a, ends - starts)
     rows["part_b"] = np.repeat(part_pairs.part_b, ends - starts)
     _number_patches(rows, of_pair)
-    keep = _within_margin(rows, of_pair, part_pairs, A, B, X_WA, X_WB, margin)
-    rows, of_pair = rows[keep], of_pair[keep]
+    return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
+
+
+def _only_within_margin(
+    rows, of_pair, n: int, A, B, X_WA, X_WB, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of the pairs within the margin."""
+    keep = _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin)
+    if not keep.all():
+        rows, of_pair = rows[keep], of_pair[keep]
     return rows, np.cumsum(np.bincount(of_pair, minlength=n))
 
 
@@ -196,23 +208,36 @@ def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:
     rows["patch"] = number - np.repeat(number[first], np.diff(np.flatnonzero(np.append(first, True))))
 
 
-def _within_margin(rows, of_pair, part_pairs: PartPairs, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
+def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
     """(k,) bool: rows of pairs within the margin.
 
-    Parts whose poses are rounded are asked a little beyond it; where that matters, `distance` of the pair decides.
+    Facets, and parts whose poses are rounded, are asked a little beyond it; where that matters, `distance` decides.
     """
     keep = np.ones(len(rows), dtype=bool)
-    moved = np.unique(part_pairs.pair[part_pairs.slack > 0.0])
-    for k in moved.tolist():
-        of_k = of_pair == k
-        if not of_k.any():
-            continue
+    if not len(rows):
+        return keep
+    starts = np.flatnonzero(np.diff(of_pair, prepend=-1))
+    pairs, ends = of_pair[starts], np.append(starts[1:], len(rows))
+    across = np.abs(_some(X_WB, pairs)[:, :3, 3] - _some(X_WA, pairs)[:, :3, 3]).sum(axis=1)
+    size = 4.0 * (_reaches(A, pairs) + _reaches(B, pairs)) + across
+    near = np.minimum.reduceat(rows["upper"], starts) > margin - _ROUNDING * size
+    for i in np.flatnonzero(near).tolist():
+        k = int(pairs[i])
         shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])
         X_A, X_B = pose_at(X_WA, k), pose_at(X_WB, k)
-        size = 4.0 * (_reach(shape_a) + _reach(shape_b)) + float(np.abs(X_B[:3, 3] - X_A[:3, 3]).sum())
-        if rows["upper"][of_k].min() <= margin - _ROUNDING * size:
-            continue
         row = answer_batch(shape_a, shape_b, X_A[None], X_B[None], Question(False, math.inf))
         if row["lower"][0] > margin:
-            keep[of_k] = False
+            keep[starts[i] : ends[i]] = False
     return keep
+
+
+def _some(X: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Poses of some pairs."""
+    return X if len(X) == 1 else X[pairs]
+
+
+def _reaches(shapes, pairs: np.ndarray):
+    """How far the shapes of some pairs reach from their origins [m]: a number, or one a pair."""
+    if isinstance(shapes, Shape):
+        return _reach(shapes)
+    return np.array([_reach(shapes[k]) for k in pairs.tolist()])

@@ -278,6 +278,8 @@ def _write_contact(contact_at, manifold, k, is_first, axes, pair, row, flip, bou
     put_vec3(doubles, _NORMAL, add(scale(sign, axes.nhat), Vec3(0.0, 0.0, 0.0)))
     put_vec3(doubles, _POINT_B if flip else _POINT_A, sub(middle, half))
     put_vec3(doubles, _POINT_A if flip else _POINT_B, add(middle, half))
+    for at in range(_A, _CONTACT // 4):  # what is not set below
+        words[at] = 0
     words[_B] = 1
     words[_FEATURE_B if flip else _FEATURE_A] = manifold.features[2 * k]
     words[_FEATURE_A if flip else _FEATURE_B] = manifold.features[2 * k + 1]

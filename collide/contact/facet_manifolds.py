@@ -48,7 +48,7 @@ from collide.narrowphase.facets import facets_within
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, NUMBERS_OF_PAIR, world_error
 from collide.narrowphase.facets.posed_surfaces import is_swapped_order, shift_between
 from collide.narrowphase.facets.surface_collision import FULL
-from collide.narrowphase.facets.surface_pairs import (
+from collide.narrowphase.facets.collide_kernel import (
     APART,
     EXCHANGED,
     HEADER,
@@ -61,12 +61,12 @@ from collide.narrowphase.facets.surface_pairs import (
     open_pair,
     open_space,
 )
-from collide.narrowphase.facets.surface_pairs import SINGULAR as PLACES_NOTHING
+from collide.narrowphase.facets.collide_kernel import SINGULAR as PLACES_NOTHING
 from collide.numerics.vec3 import Vec3, vec3_at
 
 _list_pairs = native_call(facets_within.SIGNATURE)
 
-# Header: that of `surface_pairs.py`, then addresses of both topologies, the longest separating translation (a double),
+# Header: that of `collide_kernel.py`, then addresses of both topologies, the longest separating translation (a double),
 # the address of `list_near_pairs`, the workspace and how many pairs it is for, whether that is the most there may be,
 # max_contacts; then what a call has done: poses, rows.
 (

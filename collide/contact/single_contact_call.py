@@ -7,7 +7,7 @@ from collide.contact.convex_manifolds import MARGIN, MAX_CONTACTS, POSES_AT, ROW
 from collide.kernels import entry, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE, POSE_SLOP
 from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose
-from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_open, view_row
+from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused, view_row
 
 #: Integers of the header: that of `pose_batches.py`, then that of `convex_manifolds.py`.
 SINGLE_HEADER = HEADER + MANIFOLD_HEADER
@@ -36,7 +36,7 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     answer_block(block.header, 1, False, True, margin, rows_at)
     row = view_row(rows_at)
     # A half-space within another has no depth that ends.
-    if is_open(row) or not row.doubles[LOWER] > -1e300:
+    if is_undecided_or_refused(row) or not row.doubles[LOWER] > -1e300:
         return -1
     header = view_i64(manifold_at, MANIFOLD_HEADER)
     header[ROWS_DONE] = 0

@@ -21,8 +21,8 @@ from collide.hierarchies.walk_bodies import WalkBody
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_table import ShapeTable, pose_table
-from collide.narrowphase.convex_bodies import Question
-from collide.narrowphase.convex_queries import close, number_of_poses, settle_proposals
+from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses, settle_proposals
 from collide.pair_arguments import asked_poses, pose_batch
 from collide.results import PAIR_DTYPE, PairResult
 from collide.shapes.shape import Shape
@@ -133,7 +133,7 @@ def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> Pa
         walk_body(shape, "dobkin-kirkpatrick")
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda ids: ask_default(ids, False, math.inf, signed))
-    close(rows, depths=signed)
+    finish_distances(rows, depths=signed)
     return PairResult(rows, single, (A, B, X_WA, X_WB), certify)
 
 

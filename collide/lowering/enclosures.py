@@ -3,7 +3,7 @@
 Cylinders, cones and ellipsoids are curved; the corners of an `HPolytope` may be rounded. A polytope around the shape
 and one inside it, both made of doubles, decide most questions without rounding: what does not meet the outer one does
 not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet
-(`facet_convex.py`).
+(`facets_against_curved.py`).
 
 Both polytopes are right by more than rounding: rings and corners are drawn in or pushed out by 1e-12 of the size
 beyond what the geometry asks; that of a shape with planes is looked at in fractions.

@@ -13,13 +13,13 @@ from collide.mesh.bvh import INTS as TREE_INTS
 from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
-from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.exact.settle_space import WORKSPACE
+from collide.narrowphase.facets import collide_kernel as pairs
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
-from collide.narrowphase.facets import surface_pairs as pairs
 from collide.narrowphase.facets import winding_numbers as inside
 from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
+from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.pose_batches import BLOCK, HEADER
 from collide.narrowphase.rows import ROW
 from collide.numerics.orientation import DIGITS as HULL_DIGITS

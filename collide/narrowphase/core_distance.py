@@ -91,13 +91,13 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
     n = run.n_points
     tolerance = TOLERANCE_CURVED * size if curved else 0.25 * error
     polytope = surface_at(work.epa_at, work.epa_integers_at)
-    wants_cap = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
+    use_capped_tetrahedron = query.depths and not curved and pair.A.n + pair.B.n > _MAX_VERTICES_FOR_GJK_SEED
     well_conditioned = enclosed and run.clearance > WELL_CONDITIONED * size
     iterations = run.iterations
     shallowest, deepest = -math.inf, math.inf
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
-        seed = Seed(points, ids, enclosed and start == 0, well_conditioned, wants_cap, start)
+        seed = Seed(points, ids, enclosed and start == 0, well_conditioned, use_capped_tetrahedron, start)
         result = epa(pair, polytope, seed, Goal(not query.depths, size, error, tolerance))
         iterations += 65536 * max(result.n_vertices - 4, 0)
         if result.status == FLAT:
@@ -119,7 +119,7 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         result = _refined_result(result, refined, error)
         start += 1
         # few vertices: `exact_depth.py` tries all planes instead
-        if refined.sound or not wants_cap or start == _MAX_STARTS:
+        if refined.sound or not use_capped_tetrahedron or start == _MAX_STARTS:
             break
     _weigh_foot(work, polytope, result, query.depths, not enclosed, curved, tolerance, size, error)
     if result.clearance > error:

@@ -2,7 +2,7 @@
 
 `Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it
 is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the
-file that it names; `pair_queries.py` says with which function each public question goes there.
+file that it names; `method_functions.py` says with which function each public question goes there.
 
 Kernels cannot read this table. They choose among CLOSED, PLANE, PLANES and CONVEX, the methods of two convex sets, by
 `convex_methods.method`; `tests/narrowphase/test_dispatch.py` holds both to be equal. Nothing else decides it.
@@ -32,9 +32,9 @@ class Method(Enum):
         "GJK, EPA where cores overlap; MPR first for small hulls; last digits of gaps in double-doubles "
         + "(gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
     )
-    FACETS = "facets/mesh_rows", "two BVHs of facets traversed together, exact triangle tests"
+    FACETS = "facets/mesh_methods", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
-    HULL = "facets/mesh_rows", "the hull of the mesh answers against the plane"
+    HULL = "facets/mesh_methods", "the hull of the mesh answers against the plane"
     PARTS = "composite/composite", "pairs of convex parts, culled by balls, combined to one row"
     MESH_PARTS = (
         "composite/composite_meshes",

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_i64
-from collide.narrowphase.convex_pairs import answer_pairs
+from collide.narrowphase.pair_kernel import answer_pairs
 from collide.narrowphase.rows import (
     BEYOND,
     CERTIFIED,

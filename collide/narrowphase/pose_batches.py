@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
-from collide.narrowphase.convex_pairs import SIGNATURE
+from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.posed_pair import stretch_of
-from collide.narrowphase.rows import HIT, NORMAL, ROW, is_open, view_row
+from collide.narrowphase.rows import HIT, NORMAL, ROW, is_undecided_or_refused, view_row
 from collide.numerics.vec3 import Vec3, cross, dot, norm1, put_vec3, vec3_at
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
@@ -26,7 +26,8 @@ BLOCK = 64
 OPEN, BAD_POSE = range(1, 3)
 
 # Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`_Workspace` in
-# `convex_queries.py` and C write them); the same of `settle_hulls`, for single calls; then how many poses are answered.
+# `convex_kernel_calls.py` and C write them); the same of `settle_hulls`, for single calls; then how many poses are
+# answered.
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT,
     SETTLE, DIGITS_AT, ANSWERED,
@@ -153,7 +154,7 @@ def answer_poses(
         some_open = False
         for k in range(count):
             row = view_row(rows_at + ROW * k)
-            some_open = some_open or is_open(row)
+            some_open = some_open or is_undecided_or_refused(row)
             if boolean:
                 view_u8(out_at + done + k, 1)[0] = row.flags[HIT]
                 if axes_at != 0 and row.flags[HIT] == 0:

@@ -49,7 +49,7 @@ def is_undecided(row):
 
 
 @kernel(inline=True)
-def is_open(row):
+def is_undecided_or_refused(row):
     """Whether the row is left to the exact stage, or refused."""
     return row.flags[HOW] == UNDECIDED or row.flags[HOW] == REFUSED
 
@@ -64,7 +64,7 @@ def clear_vertices(row):
 
 
 @kernel(inline=True)
-def open_row(row_at):
+def blank_row(row_at):
     """`view_row`, and the row names no vertices."""
     row = view_row(row_at)
     clear_vertices(row)
@@ -94,13 +94,20 @@ def write_vertices(row, ids, n, flip):
 
 
 @kernel(inline=True)
+def touching_is_a_hit(lower):
+    """1 unless bodies are proven to be apart, by a lower bound of their distance: closed sets that touch share a point,
+    and an open sign counts as a hit."""
+    return 0 if lower > 0.0 else 1
+
+
+@kernel(inline=True)
 def write_decision(row, distance, lower, upper, how, limit):
     """`write_verdict` where the sign is known and nothing more is promised."""
     row.doubles[LOWER] = lower
     row.doubles[UPPER] = upper if lower <= limit else math.inf
     row.doubles[DISTANCE] = (min(max(distance, lower), upper) if lower <= limit else lower) + 0.0
     row.flags[HOW] = how
-    row.flags[HIT] = 0 if lower > 0.0 else 1
+    row.flags[HIT] = touching_is_a_hit(lower)
     row.flags[CERTIFIED] = 1
     row.flags[BEYOND] = 1 if lower > limit else 0
 
@@ -120,7 +127,7 @@ def write_verdict(row, distance, lower, upper, how, width, limit):
         width = max(width, PROMISE_SUBNORMAL)
     decided = lower > 0.0 or upper <= 0.0
     row.flags[HOW] = how if decided else UNDECIDED
-    row.flags[HIT] = 0 if lower > 0.0 else 1
+    row.flags[HIT] = touching_is_a_hit(lower)
     row.flags[CERTIFIED] = 1 if decided and upper - lower <= width else 0
     row.flags[BEYOND] = 1 if lower > limit else 0
     if lower > limit:

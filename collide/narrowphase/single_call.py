@@ -7,7 +7,7 @@ import math
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.exact.settle_hulls import SIGNATURE
-from collide.narrowphase.finalize_rows import forget_depth
+from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_workspace import REQUESTS_AT
 from collide.narrowphase.pose_batches import (
     BLOCK,
@@ -25,7 +25,17 @@ from collide.narrowphase.pose_batches import (
     block_of,
     set_pose,
 )
-from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, HIT, HOW, ROW, is_open, is_undecided, view_row
+from collide.narrowphase.rows import (
+    BODY_B,
+    CERTIFIED,
+    DISTANCE,
+    HIT,
+    HOW,
+    ROW,
+    is_undecided,
+    is_undecided_or_refused,
+    view_row,
+)
 from collide.results import EXACT
 
 _settle_hulls_at = native_call(SIGNATURE)
@@ -51,7 +61,7 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, row_at):
         _settle(block.header, boolean, depths, limit, row_at)
         if depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0:
             return -1
-    return -1 if is_open(row) else int(row.flags[HIT])
+    return -1 if is_undecided_or_refused(row) else int(row.flags[HIT])
 
 
 @kernel

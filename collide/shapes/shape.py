@@ -48,7 +48,7 @@ class Shape:
 
     #: False where the set is not convex: its overlapping distance is a proven bound, not a minimum.
     convex = True
-    #: True where the set is given by triangles: `meshes` answers, and there are no convex parts.
+    #: True where triangles are in it (`Mesh`, a `Compound` with one): `parts_of` has no convex parts for those.
     meshed = False
 
     def _store(self, **values: Any) -> None:

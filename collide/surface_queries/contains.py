@@ -18,7 +18,7 @@ from collide.lowering.facet_bodies import body_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import MeshTree
 from collide.mesh.shell_volumes import without_area
-from collide.narrowphase.convex_bodies import Question
+from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
 from collide.numerics.exact_points import minus, on_one_grid, placed

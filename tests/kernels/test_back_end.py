@@ -79,10 +79,10 @@ _CODE = """
 import hashlib, sys
 from collide.kernels.back_end import Target, machine_code
 from collide.kernels.front_end import Lowered
-from collide.narrowphase.finalize_rows import close_rows
+from collide.narrowphase.finish_rows import finish_rows
 from collide.hull.quickhull import quickhull
 code = Lowered()
-for entry in (close_rows, quickhull):
+for entry in (finish_rows, quickhull):
     code.add(entry.__name__, entry.function, entry.signature)
 for cpu in ("x86-64-v2", "x86-64-v3") if "x86" in __import__("platform").machine() else ("generic",):
     print(hashlib.sha256(machine_code(code.names, code.modules, Target(cpu), prefix="p_")).hexdigest())
@@ -143,12 +143,12 @@ def test_entries_of_one_name_are_refused(monkeypatch):
     monkeypatch.setattr(jit, "entries", [*jit.entries])
     compile_kernels._entries()
 
-    def close_rows(a, b):
+    def finish_rows(a, b):
         return a
 
-    close_rows.__module__ = "collide.somewhere_else"
-    jit.entry("int64(int64, int64)")(close_rows)
-    with pytest.raises(SystemExit, match="two entries have one name: close_rows"):
+    finish_rows.__module__ = "collide.somewhere_else"
+    jit.entry("int64(int64, int64)")(finish_rows)
+    with pytest.raises(SystemExit, match="two entries have one name: finish_rows"):
         compile_kernels._entries()
 
 

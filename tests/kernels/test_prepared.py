@@ -7,7 +7,7 @@ import pytest
 
 import collide
 from collide.lowering.facet_bodies import body_of
-from collide.narrowphase.facets.body_pairs import SinglePair
+from collide.narrowphase.facets.facet_kernel_calls import SinglePair
 from collide.results import PAIR_DTYPE
 
 EYE = np.eye(4)

@@ -88,7 +88,7 @@ import json, os, sys
 from pathlib import Path
 from collide.broadphase.bounding_boxes import bounding_boxes
 from collide.kernels import PLAIN_PYTHON, sources
-from collide.narrowphase.convex_pairs import answer_pairs
+from collide.narrowphase.pair_kernel import answer_pairs
 
 assert PLAIN_PYTHON, "entries are functions"
 
@@ -136,8 +136,8 @@ def test_an_edit_of_what_a_kernel_imports_makes_it_stale_and_no_other_does(tmp_p
         "support/block_scan.py",
         "kernels/vectors.py",
     } <= boxes
-    assert {"narrowphase/convex_pairs.py", "narrowphase/epa/prove_facets.py", "numerics/double_double.py"} <= pairs
-    assert not {"narrowphase/convex_pairs.py", "mesh/build_bvh.py"} & boxes
+    assert {"narrowphase/pair_kernel.py", "narrowphase/epa/prove_facets.py", "numerics/double_double.py"} <= pairs
+    assert not {"narrowphase/pair_kernel.py", "mesh/build_bvh.py"} & boxes
     elsewhere = {
         name
         for name in names
@@ -151,7 +151,7 @@ def test_an_edit_of_what_a_kernel_imports_makes_it_stale_and_no_other_does(tmp_p
         "log.py",
         "cache_folder.py",
     }
-    for module, stale in (("collide.broadphase.bounding_boxes", boxes), ("collide.narrowphase.convex_pairs", pairs)):
+    for module, stale in (("collide.broadphase.bounding_boxes", boxes), ("collide.narrowphase.pair_kernel", pairs)):
         missing = {name for name in imported_by(module) - stale - deciding if not name.endswith("__init__.py")}
         assert not missing, f"{module} imports what its kernels' hash does not see: {sorted(missing)}"
 

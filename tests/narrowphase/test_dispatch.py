@@ -14,7 +14,7 @@ from collide.lowering.kinds import WITH_FACETS, Kind, kind_of
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.narrowphase import convex_methods
 from collide.narrowphase.dispatch import TABLE, Method, method_of
-from collide.narrowphase.pair_queries import ANSWERS, OF_ONE_PAIR, answer_of
+from collide.narrowphase.method_functions import ANSWERS, OF_ONE_PAIR, answer_of
 
 PACKED = {
     Kind.SPHERE: (POINTS, 1), Kind.CAPSULE: (POINTS, 2), Kind.POLYTOPE: (POINTS, 8), Kind.CYLINDER: (CYLINDER, 0),

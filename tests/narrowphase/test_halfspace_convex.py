@@ -17,7 +17,7 @@ import collide
 from collide.kernels import address_of
 from collide.narrowphase.halfspace_convex import halfspace_convex, plane_in_world, reach_of_plane, refine_height
 from collide.narrowphase.halfspace_halfspace import halfspace_halfspace
-from collide.narrowphase.rows import ROW, open_row
+from collide.narrowphase.rows import ROW, blank_row
 from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED
 
 pytestmark = pytest.mark.plain_kernels
@@ -68,7 +68,7 @@ def test_rows(kind):
         rows = np.zeros(1, dtype=PAIR_DTYPE)
         with reproducible(case):
             true = signed_gap(case)
-            halfspace_convex(bodies.ordered, bodies.query(), open_row(address_of(rows)), bodies.work)
+            halfspace_convex(bodies.ordered, bodies.query(), blank_row(address_of(rows)), bodies.work)
             row = rows[0]
             assert row["lower"] <= true + 4e-16 * abs(true) and true - 4e-16 * abs(true) <= row["upper"]
             if row["how"] == UNDECIDED:
@@ -140,7 +140,7 @@ def test_two_halfspaces():
         bodies = PosedBodies(*case)
         rows = np.zeros(1, dtype=PAIR_DTYPE)
         with reproducible(case):
-            halfspace_halfspace(bodies.pair, bodies.ordered.flip, open_row(address_of(rows)))
+            halfspace_halfspace(bodies.pair, bodies.ordered.flip, blank_row(address_of(rows)))
             row = rows[0]
             (n, _), (m, _) = image(A, case.X_WA), image(B, case.X_WB)
             across = math.sqrt(sum((n[k - 2] * m[k - 1] - n[k - 1] * m[k - 2]) ** 2 for k in range(3)))

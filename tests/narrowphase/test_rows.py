@@ -47,7 +47,7 @@ def test_places_of_fields():
 def test_vectors_and_vertices(flip):
     """Of the bodies as asked: exchanged ones get their own, and a normal from A to B that is never −0."""
     rows, row = empty()
-    row = R.open_row(address_of(rows))
+    row = R.blank_row(address_of(rows))
     assert (rows["vertices_a"] == -1).all() and (rows["vertices_b"] == -1).all() and row.flags[R.COUNT] == 0
     R.write_vectors(row, Vec3(0.0, -0.6, 0.8), Vec3(1.0, 2.0, 3.0), Vec3(4.0, 5.0, 6.0), flip)
     R.write_vertices(row, [10, 20, 11, 21, 12, 22, 13, 23], 3, flip)
@@ -78,7 +78,7 @@ def test_verdicts():
             beyond, decided = lower > limit, lower > 0.0 or upper <= 0.0
             assert r["beyond"] == beyond and r["hit"] == (not lower > 0.0)
             assert r["how"] == (3 if decided else UNDECIDED) and R.is_undecided(row) == (not decided)
-            assert R.is_open(row) == (not decided)
+            assert R.is_undecided_or_refused(row) == (not decided)
             assert r["lower"] == lower and r["upper"] == (math.inf if beyond else upper)
             assert r["lower"] <= r["distance"] <= r["upper"] and (not beyond or r["distance"] == lower)
             assert not (r["distance"] == 0.0 and np.signbit(r["distance"]))
@@ -92,4 +92,4 @@ def test_verdicts():
         seen[beyond, decided] += 1
     assert min(seen[True, True], seen[False, True], seen[False, False]) >= 40, seen
     row.flags[R.HOW] = REFUSED
-    assert R.is_open(row) and not R.is_undecided(row) and len(HOW) < REFUSED
+    assert R.is_undecided_or_refused(row) and not R.is_undecided(row) and len(HOW) < REFUSED

@@ -268,15 +268,15 @@ def test_deep_touching_and_near_meshes_are_told_apart():
 
 def test_pairs_that_cannot_be_answered_are_listed_and_the_rest_is_answered(tmp_path, monkeypatch):
     from collide.errors import UnsupportedQuery
-    from collide.narrowphase.facets import mesh_pairs
+    from collide.narrowphase.facets import mesh_batches
 
     def refuse(A, B, *rest, **options):
         if isinstance(B, Cylinder) or isinstance(A, Cylinder):
             raise UnsupportedQuery("Cylinder against Mesh: not today")
         return honest(A, B, *rest, **options)
 
-    honest = mesh_pairs.pair_rows
-    monkeypatch.setattr(mesh_pairs, "pair_rows", refuse)
+    honest = mesh_batches.pair_rows
+    monkeypatch.setattr(mesh_batches, "pair_rows", refuse)
     L = Mesh(*l_solid())
     # The cylinder stands in the notch: hulls meet. The far one is answered by the hulls.
     scene = scene_of(

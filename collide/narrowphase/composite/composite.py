@@ -13,12 +13,12 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
-from collide.narrowphase import convex_queries as run
+from collide.narrowphase import convex_kernel_calls as run
 from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
 from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
 from collide.narrowphase.composite.composite_rows import SCORE, combine_rows
 from collide.narrowphase.composite.single_composite_call import collide_single_compound, distance_single_compound
-from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, answer_pairs
+from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 
 # --- workspaces ---------------------------------------------------------------------------------

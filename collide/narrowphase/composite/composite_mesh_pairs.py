@@ -15,14 +15,14 @@ from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, is_halfspace
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.parts import bounding_parts_of
-from collide.narrowphase.convex_bodies import convex_rows
+from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.body_pairs import body_rows, core_hits
+from collide.narrowphase.facets.collide_kernel import APART, FARTHER, HIT, OPEN
+from collide.narrowphase.facets.distance_kernel import PROMISE
+from collide.narrowphase.facets.facet_kernel_calls import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
 from collide.narrowphase.facets.mesh_curved import curved_rows, settle_curved
-from collide.narrowphase.facets.mesh_rows import hull_shape, mesh_rows, mesh_states
-from collide.narrowphase.facets.surface_gaps import PROMISE
-from collide.narrowphase.facets.surface_pairs import APART, FARTHER, HIT, OPEN
+from collide.narrowphase.facets.mesh_methods import hull_shape, mesh_rows, mesh_states
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 

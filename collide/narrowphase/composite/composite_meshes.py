@@ -15,9 +15,9 @@ import numpy as np
 from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
-from collide.narrowphase.convex_bodies import convex_hits, convex_rows
+from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
-from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 

@@ -61,7 +61,7 @@ from collide.narrowphase.composite.composite_rows import (
     first_upper_of,
     separate_bodies,
 )
-from collide.narrowphase.convex_pairs import SIGNATURE
+from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
 from collide.numerics.vec3 import Vec3, norm1, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED

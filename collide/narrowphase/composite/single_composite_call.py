@@ -7,7 +7,7 @@ import math
 from collide.kernels import entry, kernel, native_call, prepared, view_i64, view_u8
 from collide.narrowphase.composite.composite_block import HEADER, N_DONE
 from collide.narrowphase.composite.composite_poses import COMPOUNDS_SIGNATURE
-from collide.narrowphase.finalize_rows import forget_depth
+from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.rows import BODY_B, DISTANCE, view_row
 
 answer_compounds_at = native_call(COMPOUNDS_SIGNATURE)

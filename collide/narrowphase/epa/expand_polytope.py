@@ -69,7 +69,7 @@ class Seed(NamedTuple):
 
     points, ids : POINT doubles and two vertices a point.   enclosed : the origin is proven to lie among them.
     well_conditioned : it does so clear of rounding by far.
-    wants_cap : there are so many vertices that iterations cost
+    use_capped_tetrahedron : there are so many vertices that iterations cost
     more than the supports of a better seed.   start : how often EPA has begun elsewhere.
     """
 
@@ -77,7 +77,7 @@ class Seed(NamedTuple):
     ids: Any
     enclosed: bool
     well_conditioned: bool
-    wants_cap: bool
+    use_capped_tetrahedron: bool
     start: int
 
 
@@ -135,7 +135,7 @@ def _put_seed(pair, points, ids, seed, goal):
         ids[2 * k + 1] = seed.ids[2 * k + 1]
     # GJK's own tetrahedron saves a dozen supports, if it is nothing like as thin as those of touching bodies.
     if seed.enclosed and (
-        (seed.wants_cap and capped_tetrahedron(pair, points, ids, goal.size)) or seed.well_conditioned
+        (seed.use_capped_tetrahedron and capped_tetrahedron(pair, points, ids, goal.size)) or seed.well_conditioned
     ):
         return Extremes(3, Vec3(0.0, 0.0, 0.0))
     return extremal_tetrahedron(pair, points, ids, goal.error, seed.start)

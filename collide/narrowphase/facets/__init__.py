@@ -1,9 +1,10 @@
 """Bodies of facets: triangles against triangles, exactly, and the traversals of two BVHs that lead to them.
 
-The way in is `mesh_pairs.py` (any two shapes with a mesh), then by kind `mesh_rows.py`; two bodies of facets go to
-`body_pairs.py`, whose kernels `surface_pairs.py` (booleans) and `surface_gaps.py` (rows) take whole batches; curved
-shapes to `mesh_curved.py`. `facet_queries.py` asks single traversals from Python: `surface_collision.py`,
-`surface_distance.py`, `winding_numbers.py`, `facets_within.py`, `ray_surface.py`, `self_collision.py`.
+The way in is `mesh_batches.py` (any two shapes with a mesh), then by method `mesh_methods.py`; two bodies of facets (a
+mesh and a hull, too) go to `facet_kernel_calls.py`, whose kernels `collide_kernel.py` (booleans) and
+`distance_kernel.py` (rows) take whole batches; curved shapes to `mesh_curved.py`. `facet_queries.py` asks
+single traversals from Python: `surface_collision.py`, `surface_distance.py`, `winding_numbers.py`, `facets_within.py`,
+`ray_surface.py`, `self_collision.py`.
 `posed_surfaces.py` sets two posed trees in relation, `filtered_triangles.py` decides in doubles what doubles can
 decide, `exact_corners.py` and `exact_triangles.py` the rest.
 """

@@ -26,7 +26,8 @@ MARKS = 6
 # A's boxes (3), with B's (3) and with the shift (1), less rounding; the least lengths in the world of a gap of 1 along
 # the axes of A's frame (3), of B's (3), along lines in A's frame and in B's; the best distance so far, also in units of
 # A's boxes; the least slab; the bound of the error of a world coordinate; the nearest points so far (6).
-DIRECTION, ALONG_A, ALONG_B, OFFSET, WORTH_A, WORTH_B, LINE_A, LINE_B = 0, 3, 6, 9, 10, 13, 16, 17
+DIRECTION, ALONG_A, ALONG_B, OFFSET = 0, 3, 6, 9
+AXIS_SCALES_A, AXIS_SCALES_B, LINE_SCALE_A, LINE_SCALE_B = 10, 13, 16, 17
 BEST, BOUND, LEAST, WORLD_ERROR, POINTS = 18, 19, 20, 21, 22
 # Then a pair of triangles in world axes (18), points of it (6), and up to seven triangles of A (63).
 TRIANGLES_AT, NEW, OF_A_AT = 28, 46, 52
@@ -78,8 +79,8 @@ def prepare(query, limit):
     """Start a pair of poses.   limit : nothing farther than this is looked for."""
     trees, near, marks = query.trees, query.near, query.marks
     A, B, XA, XB = trees.A, trees.B, trees.XA, trees.XB
-    _set_worths(trees.placing, INVERSE_A, near, WORTH_A, LINE_A, 1.0)
-    _set_worths(trees.placing, INVERSE_B, near, WORTH_B, LINE_B, 1.0 / trees.placing[UNITS])
+    _set_scales(trees.placing, INVERSE_A, near, AXIS_SCALES_A, LINE_SCALE_A, 1.0)
+    _set_scales(trees.placing, INVERSE_B, near, AXIS_SCALES_B, LINE_SCALE_B, 1.0 / trees.placing[UNITS])
     size = 0.0
     for i in range(3):
         terms = abs(XB[4 * i + 3] - XA[4 * i + 3])
@@ -103,7 +104,7 @@ def _centre_in_world(X, tree):
 
 
 @kernel
-def _set_worths(placing, inverse, near, at, line, unit):
+def _set_scales(placing, inverse, near, at, line, unit):
     """A gap of 1 along an axis of a frame is at least this long in the world: 1 over the row of the inverse.
 
     The inverse is off by at most 2⁻¹⁰ of its size where it is accepted, and by 2⁻⁵⁰ for rotations: the residual,
@@ -201,10 +202,10 @@ def set_near_probe(query, which, tree, ref, gap):
     """`set_probe`, and what distances need besides.   gap : `gap_of_box` of the box."""
     near, probe = query.near, query.trees.probe
     set_probe(query.trees.placing, which, tree.boxes, ref, probe)
-    probe_worth = WORTH_A if which == 0 else WORTH_B
-    node_worth = WORTH_B if which == 0 else WORTH_A
-    put_floats(probe, 12, vec3_at(near, node_worth))
-    put_floats(probe, 15, vec3_at(near, probe_worth))
-    probe[18] = np.float32(near[LINE_A if which == 0 else LINE_B])
+    probe_scales = AXIS_SCALES_A if which == 0 else AXIS_SCALES_B
+    node_scales = AXIS_SCALES_B if which == 0 else AXIS_SCALES_A
+    put_floats(probe, 12, vec3_at(near, node_scales))
+    put_floats(probe, 15, vec3_at(near, probe_scales))
+    probe[18] = np.float32(near[LINE_SCALE_A if which == 0 else LINE_SCALE_B])
     put_floats(probe, 19, vec3_at(near, ALONG_B) if which == 0 else neg(vec3_at(near, ALONG_A)))
     probe[22] = np.float32(near[OFFSET] + gap)

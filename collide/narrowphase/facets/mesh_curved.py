@@ -16,13 +16,13 @@ from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, reach_of
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.convex_queries import number_of_poses
-from collide.narrowphase.facets.body_pairs import balls_farther, core_hits, farthest_gap, hull_rows
-from collide.narrowphase.facets.facet_convex import facet_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
+from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
+from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
+from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.near_facets import Facets, near_facets
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.narrowphase.facets.surface_pairs import APART, HIT, OPEN
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED

@@ -31,7 +31,7 @@ from collide.narrowphase.rows import (
     ROW,
     VERTICES_A,
     VERTICES_B,
-    open_row,
+    blank_row,
     write_decision,
 )
 from collide.numerics.vec3 import Vec3, add, divide, norm, norm1, put_vec3, scale, sub, vec3_at
@@ -166,7 +166,7 @@ def _are_far(numbers, poses, sa, pa, sb, pb, boolean, error, limit, row_at):
 @kernel(inline=True)
 def _write_miss(row_at, lower, nhat, limit, iterations):
     """A boolean: apart by ``lower`` at least along nhat, for the pair as asked."""
-    row = open_row(row_at)
+    row = blank_row(row_at)
     row.words[ITERATIONS] = iterations
     write_decision(row, lower, lower, math.inf, PLANE, limit)
     put_vec3(row.doubles, NORMAL, nhat)
@@ -198,7 +198,7 @@ def _answer_eight(lanes, count, n_padded, boolean, limit, rows_at):
         if lower > limit:
             _write_miss(row_at, lower, _vec3(lanes, mpr.ACROSS, k, 1), limit, iterations)
         elif boolean and clearance > error:
-            row = open_row(row_at)
+            row = blank_row(row_at)
             row.words[ITERATIONS] = iterations
             write_decision(row, -clearance, -math.inf, error - clearance, SIMPLEX, limit)
         elif not boolean:
@@ -222,7 +222,7 @@ def _write_portal(lanes, lane, n_padded, clearance, row_at, limit):
 
     clearance : of the origin in the tetrahedron of o and the portal, −1 where it is not proven to lie in it.
     """
-    row = open_row(row_at)
+    row = blank_row(row_at)
     words = row.words
     for n in range(3):
         name = int(_number(lanes, mpr.PORTAL + mpr.CORNER * n + mpr.NAME, lane))

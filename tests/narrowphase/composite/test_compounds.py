@@ -19,7 +19,7 @@ from collide.lowering.compound_table import PART, lay_out
 from collide.lowering.parts import convex_set_of, parts_of
 from collide.lowering.place_parts import place_part, write_terms
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
-from collide.narrowphase import convex_queries as run
+from collide.narrowphase import convex_kernel_calls as run
 from collide.narrowphase.composite import composite as unions
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.results import EXACT, SWEPT, UNDECIDED, flipped

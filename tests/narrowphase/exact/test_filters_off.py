@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import collide
-from collide.narrowphase import convex_queries as run
+from collide.narrowphase import convex_kernel_calls as run
 from collide.results import HOW
 from collide.scenes.families import generate, names
 

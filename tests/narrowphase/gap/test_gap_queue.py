@@ -19,7 +19,7 @@ from collide.narrowphase.convex_methods import CAPSULES, method
 from collide.narrowphase.gap import gap_queue as Q
 from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, Query, workspace_at
 from collide.narrowphase.posed_pair import ordered_pair
-from collide.narrowphase.rows import ROW, open_row
+from collide.narrowphase.rows import ROW, blank_row
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 pytestmark = pytest.mark.plain_kernels
@@ -70,12 +70,13 @@ class Pairs:
         ordered = ordered_pair(*self.tables, address_of(self.shape_of), 2 * k, 2 * k + 1)
         A, B = ordered.pair.A, ordered.pair.B
         query = Query(False, True, np.inf, address_of(self.poses.terms))
-        row = open_row(address_of(rows) + ROW * k)
+        row = blank_row(address_of(rows) + ROW * k)
         return convex_convex(ordered, method(A.kind, A.n, B.kind, B.n) == CAPSULES, query, row, k, 0, self.work)
 
     def refine(self, rows: np.ndarray, kind: int) -> None:
-        Q.refine_queued(*self.tables, kind, True, np.inf, address_of(rows), self.work.queue_at,
-                        self.work.queue_integers_at)  # fmt: skip
+        queue = self.work.queue_at, self.work.queue_integers_at
+        with np.errstate(all="ignore"):  # lanes that hold no question are zeros
+            Q.refine_queued(*self.tables, kind, True, np.inf, address_of(rows), *queue)
 
     def answer(self, order, together: int) -> tuple[np.ndarray, list[int]]:
         """Rows of the pairs in some order, so many of a kind finished at once; their kinds."""

@@ -80,7 +80,7 @@ def test_no_other_is_tied(with_tree):
     points = BALL if with_tree else SOLID
     vertices, held = body(points, with_tree)
     seen: Counter = Counter()
-    for _ in range(400):
+    for _ in range(200):
         g = np.array(STRAIGHT[int(rng.integers(len(STRAIGHT)))]) @ LATTICE_ROTATIONS[int(rng.integers(24))]
         g = g + rng.choice([0.0, 0.125]) * rng.integers(-2, 3, 3)
         heights = points @ g
@@ -99,7 +99,7 @@ def test_no_other_is_tied(with_tree):
             found = T.no_other_is_tied(vertices, ids, n, which, len(set(named)), Vec3(*g.tolist()), limit)
             assert found == (true == set(named))
         seen[bool(found)] += 1
-    assert min(seen[True], seen[False]) >= 40, (seen, held[1])
+    assert min(seen[True], seen[False]) > 20, (seen, held[1])
 
 
 def test_distinct_vertices():

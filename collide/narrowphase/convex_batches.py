@@ -16,7 +16,7 @@ from collide.lowering.compound_table import CompoundTable
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
-from collide.narrowphase import convex_queries
+from collide.narrowphase import convex_kernel_calls
 from collide.narrowphase.composite.composite import CompoundPair, answer_compound_batch
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.results import PAIR_DTYPE
@@ -44,7 +44,7 @@ class Question(NamedTuple):
 
 def convex_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """(n,) bool: whether two bodies of convex parts meet at checked poses (n, 4, 4) or (1, 4, 4)."""
-    out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=bool)
+    out = np.zeros(convex_kernel_calls.number_of_poses(X_WA, X_WB), dtype=bool)
     answer_parts(out, A, B, X_WA, X_WB, Question(True))
     return out
 
@@ -53,7 +53,7 @@ def convex_rows(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float = math.inf, depths: bool = True
 ) -> np.ndarray:
     """Rows of `PAIR_DTYPE` of two bodies of convex parts at checked poses (n, 4, 4) or (1, 4, 4)."""
-    out = np.zeros(convex_queries.number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
+    out = np.zeros(convex_kernel_calls.number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
     answer_parts(out, A, B, X_WA, X_WB, Question(False, limit, depths))
     return out
 
@@ -66,11 +66,11 @@ def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, quest
     A, B : two shapes, or shapes `Picked` from one set pose by pose.
     X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
     """
-    if convex_queries.distrust_doubles:
+    if convex_kernel_calls.distrust_doubles:
         return _answer_compounds(out, A, B, X_WA, X_WB, question)
     table, which = shape_table(A, B)
     boolean, limit, depths, check, axes = question
-    return convex_queries.run_poses(
+    return convex_kernel_calls.run_poses(
         out, table, which, X_WA, X_WB, boolean=boolean, limit=limit, check=check, axes=axes, depths=depths
     )
 
@@ -100,12 +100,12 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
     )
 
 
-def prepare_sets(A: Shape, B: Shape) -> convex_queries.SinglePair:
+def prepare_sets(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair:
     """Two convex sets in their own frames made ready for single calls."""
-    return convex_queries.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    return convex_kernel_calls.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
 
 
-def prepare_parts(A: Shape, B: Shape) -> convex_queries.SinglePair | CompoundPair:
+def prepare_parts(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair | CompoundPair:
     """Two bodies of convex parts made ready for single calls."""
     if is_single_convex(A) and is_single_convex(B):
         return prepare_sets(A, B)

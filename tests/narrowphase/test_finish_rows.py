@@ -9,7 +9,7 @@ import pytest
 from naive import rng_of
 
 from collide.kernels import address_of
-from collide.narrowphase.finalize_rows import close_rows
+from collide.narrowphase.finish_rows import finish_rows
 from collide.results import HOW, PAIR_DTYPE, UNDECIDED
 
 
@@ -47,10 +47,10 @@ def test_rows_are_closed(depths, unbounded):
         rows = random_rows(rng, n, unbounded)
         wanted, without_end = closed(rows, depths)
         found = rows.copy()
-        assert bool(close_rows(address_of(found), n, depths)) == without_end
+        assert bool(finish_rows(address_of(found), n, depths)) == without_end
         assert found.tobytes() == wanted.tobytes(), rows
 
 
 def test_no_rows_are_fine():
     rows = np.zeros(1, dtype=PAIR_DTYPE)
-    assert not close_rows(address_of(rows), 0, False) and rows["b"][0] == 0
+    assert not finish_rows(address_of(rows), 0, False) and rows["b"][0] == 0

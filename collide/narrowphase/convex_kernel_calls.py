@@ -12,13 +12,13 @@ from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
-from collide.narrowphase.convex_pairs import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_rows
 from collide.narrowphase.exact.settle_hulls import settle_hulls
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
-from collide.narrowphase.finalize_rows import close_rows
+from collide.narrowphase.finish_rows import finish_rows
+from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
 from collide.narrowphase.single_call import collide_single, distance_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
@@ -173,9 +173,9 @@ def settle_open(
     _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
 
 
-def close(rows: np.ndarray, *, depths: bool) -> bool:
-    """Finish rows of `distance` in place: `closing.close_rows`."""
-    return bool(close_rows(address_of(rows), len(rows), depths))
+def finish_distances(rows: np.ndarray, *, depths: bool) -> bool:
+    """`finish_rows` of `distance`; whether a depth has no end."""
+    return bool(finish_rows(address_of(rows), len(rows), depths))
 
 
 class _Workspace:

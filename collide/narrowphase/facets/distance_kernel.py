@@ -1,7 +1,7 @@
 """Rows of two bodies of facets at one pair of poses or at many, from matrices to the row inside one kernel.
 
 What kernels leave to Python (depths, directions of bodies that all but touch, gaps that boxes of floats cannot measure)
-is reported as bits of what a row lacks, for `body_pairs.py` to complete.
+is reported as bits of what a row lacks, for `facet_kernel_calls.py` to complete.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ from collide.kernels import entry, kernel, prepared, view_f64, view_i32, view_i6
 from collide.mesh.bvh import CENTRE, EXPONENT, INTS, REACH
 from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_distance
-from collide.narrowphase.facets.posed_surfaces import is_swapped_order
-from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, MARKS, RESULT
-from collide.narrowphase.facets.surface_pairs import (
+from collide.narrowphase.facets.collide_kernel import (
     APART,
     EXCHANGED,
     FARTHER,
@@ -36,7 +34,9 @@ from collide.narrowphase.facets.surface_pairs import (
     placed,
     result_of,
 )
-from collide.narrowphase.rows import ROW, open_row, view_row
+from collide.narrowphase.facets.posed_surfaces import is_swapped_order
+from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, MARKS, RESULT
+from collide.narrowphase.rows import ROW, blank_row, view_row
 from collide.numerics.vec3 import Vec3, add, dot, put_vec3, scale, sub, vec3_at
 from collide.results import EXACT, FORMULA, UNDECIDED
 
@@ -115,7 +115,7 @@ def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
     corner of two faces that lie on each other: hulls as far apart, as far as is proven, know the bodies' direction.
     """
     result, marks = result_of(space)
-    row, words, flags = open_row(row_at)
+    row, words, flags = blank_row(row_at)
     radius = pair.A.radius + pair.B.radius
     unseen = marks[FACET_A] < 0
     middle_a = placed(view_f64(pair.XA_at, 16), vec3_at(numbers_of(pair.A), CENTRE))
@@ -193,7 +193,7 @@ def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
     if balls_farther_than(pair, reach):
         _set_unseen(space, reach)
     else:
-        row, _, _ = open_row(row_at)
+        row, _, _ = blank_row(row_at)
         row[rows.POINT_A] = math.nan
         state = cores_state(space, pair, row_at + 8 * rows.POINT_A)
         if state == SINGULAR or (state == APART and not measure(space, pair, reach)):

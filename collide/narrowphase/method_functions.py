@@ -9,18 +9,18 @@ import numpy as np
 
 from collide.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
-from collide.narrowphase.convex_bodies import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
+from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import TABLE, Method
 from collide.shapes.shape import Shape
 
 #: Half of the engine, which scenes without meshes never load.
-mesh_pairs = lazy_module("collide.narrowphase.facets.mesh_pairs")
+mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 
 
 class Answer(NamedTuple):
     """How a method is asked.
 
-    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_bodies.answer_sets` describes it.
+    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_batches.answer_sets` describes it.
     prepare : ``prepare(A, B)`` gives the pair ready for single calls, or None where they are batches of one.
     of_one_pair : whether a batch is of one pair of shapes; else shapes may be `Picked` from a set pose by pose.
     """
@@ -32,15 +32,15 @@ class Answer(NamedTuple):
 
 def _answer_meshes(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
     if question.boolean:
-        out[:] = mesh_pairs.pair_hits(A, B, X_WA, X_WB, check=question.check)
+        out[:] = mesh_batches.pair_hits(A, B, X_WA, X_WB, check=question.check)
     else:
         limit, depths, check = question.limit, question.depths, question.check
-        mesh_pairs.pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+        mesh_batches.pair_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
     return True
 
 
 def _prepare_facets(A: Shape, B: Shape) -> Any:
-    return mesh_pairs.single_pair(A, B)
+    return mesh_batches.single_pair(A, B)
 
 
 def _unprepared(A: Shape, B: Shape) -> None:

@@ -3,7 +3,7 @@
 Bodies whose balls are apart are apart. Else their surfaces are tested (`surface_collision.py`), then a point of every
 part of either body against the inside of the other (`winding_numbers.py`): without radii, that decides exactly. Bodies
 swept by balls take the distance of the surfaces (`surface_distance.py`). The traversals are called where they were
-compiled (`kernels.native_call`). Rows are written by `surface_gaps.py`.
+compiled (`kernels.native_call`). Rows are written by `distance_kernel.py`.
 """
 
 from __future__ import annotations
@@ -256,7 +256,7 @@ def measure(space, pair, limit):
 
 @kernel
 def gap_state(space, radius):
-    """APART, HIT or OPEN: swept bodies whose cores, measured just now, do not meet."""
+    """APART, HIT or OPEN: swept bodies whose cores, measured just now, do not meet. Touching is a hit."""
     result, marks = result_of(space)
     meets = marks[MEETS] != 0
     if result[surface_distance.LOWER] > radius if radius > 0.0 else not meets:

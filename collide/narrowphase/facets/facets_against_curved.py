@@ -1,4 +1,4 @@
-"""Facets of a mesh one by one against a convex set that has none: rows of the certified convex engine.
+"""Facets of a mesh one by one against a curved convex set (a cylinder, cone, ellipsoid): rows of the convex engine.
 
 Every facet is a hull of three points, and stands before the convex set, whichever way the pair is asked
 (`lowering/facet_table.py`). Poses may be rounded products: how far they may be off is counted in (`PoseTable`, column
@@ -14,7 +14,7 @@ from collide.lowering.facet_table import FacetTable
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import NO_TERMS, POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PoseTable
 from collide.mesh.bvh import MeshTree
-from collide.narrowphase.convex_queries import run_pairs
+from collide.narrowphase.convex_kernel_calls import run_pairs
 
 
 def facet_rows(

@@ -1,7 +1,8 @@
 """Two shapes with a mesh in one or both, at n pairs of poses: what pair queries and worlds ask.
 
-Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_rows.py`). Hulls settle
-what facets leave open: the convex engine gives them the last digit, and takes the poses of parts without rounding them.
+Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_methods.py`). Hulls
+settle what facets leave open: the convex engine gives them the last digit, and takes the poses of parts without
+rounding them.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
 from collide.narrowphase.composite.composite_parts import compound_parts
-from collide.narrowphase.convex_bodies import convex_hits, convex_rows
-from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.body_pairs import SinglePair, balls_farther
-from collide.narrowphase.facets.mesh_rows import checked_poses, hull_shape, mesh_rows, mesh_states
-from collide.narrowphase.facets.surface_pairs import APART, OPEN
+from collide.narrowphase.facets.collide_kernel import APART, OPEN
+from collide.narrowphase.facets.facet_kernel_calls import SinglePair, balls_farther
+from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape

@@ -1,7 +1,7 @@
 """A mesh and another single body, whatever its kind: states and rows. Unions are taken apart in `composite/`.
 
-Bodies of facets go to `body_pairs.py`, curved shapes to `mesh_curved.py`; a half-space meets a mesh where it meets the
-mesh's hull.
+Bodies of facets go to `facet_kernel_calls.py`, curved shapes to `mesh_curved.py`; a half-space meets a mesh where it
+meets the mesh's hull.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import numpy as np
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of
 from collide.lowering.kinds import Kind, kind_of
-from collide.narrowphase.convex_bodies import convex_hits, convex_rows
-from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.body_pairs import body_rows, states
+from collide.narrowphase.facets.collide_kernel import APART, HIT
+from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
 from collide.narrowphase.facets.mesh_curved import curved_rows, curved_states
-from collide.narrowphase.facets.surface_pairs import APART, HIT
 from collide.results import flipped
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape

@@ -1,7 +1,7 @@
 """Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
 
-Kernels answer whole batches (`surface_pairs.py`, `surface_gaps.py`). Completed here, pose by pose, is what a row may
-still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
+Kernels answer whole batches (`collide_kernel.py`, `distance_kernel.py`). Completed here, pose by pose, is what a row
+may still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
 surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
 that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so
 the bracket reaches up to 0.
@@ -19,9 +19,28 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.facet_bodies import Body, hull_of, reach_of
 from collide.mesh.bvh_slabs import make_slabs
-from collide.narrowphase.convex_bodies import convex_rows
-from collide.narrowphase.convex_queries import number_of_poses
+from collide.narrowphase.convex_batches import convex_rows
+from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
+from collide.narrowphase.facets.collide_kernel import (
+    APART,
+    NO_POSE,
+    RADIUS_A,
+    RADIUS_B,
+    cull_poses,
+    meet_poses,
+    meet_single,
+)
+from collide.narrowphase.facets.distance_kernel import (
+    FARTHEST,
+    NEARLY_TOUCH,
+    PROMISE,
+    RADII_MEET,
+    ROW_NO_POSE,
+    TOO_FAR,
+    gap_poses,
+    gap_single,
+)
 from collide.narrowphase.facets.exact_triangles import decide_exactly
 from collide.narrowphase.facets.facet_queries import (
     HEAP,
@@ -32,25 +51,6 @@ from collide.narrowphase.facets.facet_queries import (
     workspace,
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.narrowphase.facets.surface_gaps import (
-    FARTHEST,
-    NEARLY_TOUCH,
-    PROMISE,
-    RADII_MEET,
-    ROW_NO_POSE,
-    TOO_FAR,
-    gap_poses,
-    gap_single,
-)
-from collide.narrowphase.facets.surface_pairs import (
-    APART,
-    NO_POSE,
-    RADIUS_A,
-    RADIUS_B,
-    cull_poses,
-    meet_poses,
-    meet_single,
-)
 from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.transforms import as_poses
 
@@ -166,7 +166,7 @@ def _make_slabs(A: Body, B: Body) -> None:
 
 
 def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
-    """What the kernels of `surface_pairs.py` read first; the caller keeps bodies and workspace alive."""
+    """What the kernels of `collide_kernel.py` read first; the caller keeps bodies and workspace alive."""
     same_tree = A.tree.content == B.tree.content
     header = np.array(
         [

@@ -12,7 +12,7 @@ import collide
 from collide.lowering.facet_bodies import as_given
 from collide.lowering.parts import convex_set_of
 from collide.mesh.build_bvh import build_mesh_tree
-from collide.narrowphase.facets.facet_convex import facet_rows
+from collide.narrowphase.facets.facets_against_curved import facet_rows
 
 
 @pytest.mark.parametrize("kind", ["Cylinder", "Cone", "Ellipsoid", "Sphere", "Box"])

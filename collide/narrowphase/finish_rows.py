@@ -23,7 +23,7 @@ from collide.numerics.vec3 import Vec3, add, put_vec3, scale, vec3_at
 
 
 @entry("boolean(int64, int64, boolean)")
-def close_rows(rows_at, n, depths):
+def finish_rows(rows_at, n, depths):
     """Name body B in n rows and, unless depths are wanted, make overlaps distance 0; whether a depth has no end.
 
     numpy took 100 ns a row for it, as long as some gaps take.
