@@ -14,9 +14,10 @@ from collide.narrowphase.facets.posed_surfaces import rotate_by_pose
 from collide.numerics.vec3 import Vec3, add, vec3_at
 from collide.shapes.mesh import Mesh
 
-# Header of a body's topology, 64-bit words: addresses of its arrays, how many corners there are.
-CORNERS_AT, PLACES_AT, FANS_AT, FAN_STARTS_AT, EDGES_AT, N_CORNERS = range(6)
-TOPOLOGY = 6
+# Header of a body's topology, 64-bit words: addresses of its arrays, how many corners there are, whether the facets are
+# those of a convex hull.
+CORNERS_AT, PLACES_AT, FANS_AT, FAN_STARTS_AT, EDGES_AT, N_CORNERS, IS_CONVEX = range(7)
+TOPOLOGY = 7
 
 
 class Topology(NamedTuple):
@@ -52,7 +53,8 @@ def _topology(body: Body) -> Topology:
     tree = body.tree
     places = np.empty(len(tree.ids), dtype=np.int32)
     places[tree.ids] = np.arange(len(places))
-    if isinstance(body.shape, Mesh):
+    is_mesh = isinstance(body.shape, Mesh)
+    if is_mesh:
         corners = np.ascontiguousarray(body.shape.survey.corners, dtype=np.int32)
     else:
         corners = _rows_of_points(convex_set_of(body.shape).points, tree.triangles[places].reshape(-1, 3))
@@ -64,7 +66,7 @@ def _topology(body: Body) -> Topology:
     keys = np.minimum(corners, ends) * n_corners + np.maximum(corners, ends)
     edges = np.unique(keys, return_inverse=True)[1].reshape(-1, 3).astype(np.int32)
     arrays = corners, places, fans, fan_starts, edges
-    header = np.array([*(address_of(array) for array in arrays), n_corners], dtype=np.int64)
+    header = np.array([*(address_of(array) for array in arrays), n_corners, not is_mesh], dtype=np.int64)
     return Topology(*arrays, header)
 
 
@@ -79,11 +81,12 @@ def _rows_of_points(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 class PosedFacets(NamedTuple):
     """A body's facets at a pose X (view of 16 doubles), seen from the origin of A.
 
-    solid : facets have an outer side.   radius : of the ball swept over them [m].   shift : of its origin from A's [m].
+    solid : facets have an outer side.   is_convex : what leaves all facets at a point leads outside.   radius : of the ball swept over them [m].   shift : of its origin from A's [m].
     triangles : nine doubles a facet, in the order of the tree.   Other views are those of `Topology`.
     """
 
     solid: bool
+    is_convex: bool
     radius: float
     X: Any
     shift: Vec3
@@ -103,7 +106,7 @@ def open_facets(body, topology_at, X_at, shift):
     tree = view_i64(body.tree_at, INTS)
     m, n_corners = tree[N_FACETS], words[N_CORNERS]
     return PosedFacets(
-        body.solid != 0, body.radius, view_f64(X_at, 16), shift, view_f64(tree[TRIANGLES_AT], 9 * m),
+        body.solid != 0, words[IS_CONVEX] != 0, body.radius, view_f64(X_at, 16), shift, view_f64(tree[TRIANGLES_AT], 9 * m),
         view_i32(words[CORNERS_AT], 3 * m), view_i32(words[PLACES_AT], m), view_i32(words[FANS_AT], 3 * m),
         view_i32(words[FAN_STARTS_AT], n_corners + 1), view_i32(words[EDGES_AT], 3 * m), n_corners,
     )  # fmt: skip

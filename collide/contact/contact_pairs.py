@@ -14,8 +14,8 @@ from collide.numerics.vec3 import Vec3, cross, dot, norm, put_vec3, scale, sub, 
 
 # What a pair is, bits: its facets meet or nearly; it was told apart by a translation, or is in a patch; its nearest
 # points are local minima; then what searches mark: where they start, what they may pass, what they reached, what
-# was looked at; and pairs of the translation in hand.
-TOUCHING, COVERED, LEAST, SEED, PASSABLE, REACHED, TRIED, WANTED = 1, 2, 4, 8, 16, 32, 64, 128
+# was looked at; pairs of the translation in hand; and whether it is known that nearest points are local minima.
+TOUCHING, COVERED, LEAST, SEED, PASSABLE, REACHED, TRIED, WANTED, JUDGED = (1 << bit for bit in range(9))
 
 #: Most corners of an overlap of two facets, with what rounding may add: 3 and 3 corners, 9 crossings.
 MAX_POINTS = 15
@@ -23,7 +23,7 @@ MAX_POINTS = 15
 _FLAT_FACET = 2.0**-44
 
 # Workspace, words a pair: of `ContactPairs`, in the order of its fields from `near` on.
-_WORDS = (NUMBERS_OF_PAIR, INTS_OF_PAIR, 18, 6, 6, 9, 9, 10, 9, 1, 1, 1, 3, 1, 1, 80)
+_WORDS = (NUMBERS_OF_PAIR, INTS_OF_PAIR, 18, 6, 6, 9, 9, 10, 9, 1, 1, 1, 3, 1, 1, 1, 80)
 WORDS_OF_PAIRS = sum(_WORDS)
 
 
@@ -36,7 +36,7 @@ class ContactPairs(NamedTuple):
     by_key, key_starts : pairs at key after key, and where those of each begin.   seen_keys : marks of a search.
     states : bits.   groups : of the translation that separates the pair, −1 for none.   queue : of a search.
     directions, slacks, gaps : of pairs that are apart, from A's nearest point to B's, what in it may be rounding, and
-    how long it is in errors of a coordinate.   table : of hashes.   counts : [0] of keys.
+    how long it is in errors of a coordinate; infinite of others.   order : numbers of pairs.   table : of hashes.   counts : [0] of keys.
     """
 
     n: int
@@ -55,6 +55,7 @@ class ContactPairs(NamedTuple):
     directions: Any
     slacks: Any
     gaps: Any
+    order: Any
     table: Any
 
 
@@ -77,10 +78,10 @@ def open_pairs(words_at, capacity, n):
     at += 2 * step
     directions, slacks = view_f64(at, 3 * capacity), view_f64(at + 3 * step, capacity)
     at += 4 * step
-    gaps, table = view_f64(at, capacity), view_i64(at + step, 80 * capacity)
+    gaps, order, table = view_f64(at, capacity), view_i64(at + step, capacity), view_i64(at + 2 * step, 80 * capacity)
     return ContactPairs(
         n, near, facets, corners, normals, ids, keys, by_key, key_starts, seen_keys, states, groups, queue, directions,
-        slacks, gaps, table,
+        slacks, gaps, order, table,
     )  # fmt: skip
 
 

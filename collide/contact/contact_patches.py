@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from collide.contact.contact_facets import PosedFacets
 from collide.contact.contact_pairs import (
     COVERED,
+    JUDGED,
     LEAST,
     PASSABLE,
     REACHED,
@@ -205,15 +206,19 @@ def grow_overlap(frame, first, axes, length):
 def cover_patch(frame, nhat):
     """The pairs of the patch, and local minima that are linked with them in the same direction, start no patches."""
     pairs = frame.pairs
+    n_passable = 0
     for k in range(pairs.n):
         state = pairs.states[k] & ~(SEED | PASSABLE)
         if state & REACHED:
             state |= SEED | COVERED
-        elif state & LEAST and not state & COVERED:
-            off = norm(sub(vec3_at(pairs.directions, 3 * k), nhat))
-            if off <= pairs.slacks[k] + _SAME:
-                state |= PASSABLE
         pairs.states[k] = state
+        if not state & COVERED and pairs.gaps[k] < math.inf:
+            off = norm(sub(vec3_at(pairs.directions, 3 * k), nhat))
+            if off <= pairs.slacks[k] + _SAME and _is_minimum(frame, k):
+                pairs.states[k] |= PASSABLE
+                n_passable += 1
+    if n_passable == 0:
+        return
     spread(pairs)
     for k in range(pairs.n):
         if pairs.states[k] & REACHED:
@@ -225,52 +230,105 @@ def cover_patch(frame, nhat):
 
 
 @kernel
-def find_minima(frame):
-    """Mark local minima among the pairs within the reach that are not covered."""
+def set_directions(frame):
+    """Set gaps and directions of the pairs within the reach that are not covered: local minima are among them."""
     pairs, error = frame.pairs, frame.error
+    n = 0
     for k in range(pairs.n):
         near = NUMBERS_OF_PAIR * k
         length = pairs.near[near + LENGTH]
         pairs.gaps[k] = math.inf
+        if pairs.states[k] & COVERED or pairs.near[near + LOWER] > frame.reach:
+            continue
         across = sub(vec3_at(pairs.near, near + POINT_B), vec3_at(pairs.near, near + POINT_A))
         size = norm(across)
-        if pairs.states[k] & COVERED or pairs.near[near + LOWER] > frame.reach or not size > 0.0:
+        if not size > 0.0:
             continue
         put_vec3(pairs.directions, 3 * k, divide(across, size))
         pairs.slacks[k] = FLAT + 32.0 * error / length if length > 0.0 else math.inf
         pairs.gaps[k] = float(math.floor(length / error + 0.5)) if length < 2.0**52 * error else length / error
-        if is_local_minimum(pairs, k, frame.A, frame.B):
-            pairs.states[k] |= LEAST
+        pairs.order[n] = k
+        n += 1
+    return n
 
 
 @kernel
-def need_nearest(frame):
-    """The nearest pair is a minimum where none as near is marked: nothing is nearer, whatever rounding makes of its
+def _is_minimum(frame, k):
+    """Whether a pair's nearest points are local minima; looked at when first asked."""
+    pairs = frame.pairs
+    if not pairs.states[k] & JUDGED:
+        pairs.states[k] |= JUDGED
+        if is_local_minimum(pairs, k, frame.A, frame.B):
+            pairs.states[k] |= LEAST
+    return pairs.states[k] & LEAST != 0
+
+
+@kernel
+def sort_by_gap(frame, n):
+    """Sort the first n of ``order`` that are not covered by gap; how many (heapsort: J. W. J. Williams, 1964)."""
+    pairs = frame.pairs
+    n_left = 0
+    for i in range(n):
+        if not pairs.states[pairs.order[i]] & COVERED:
+            pairs.order[n_left] = pairs.order[i]
+            n_left += 1
+    for root in range(n_left // 2 - 1, -1, -1):
+        _sift(pairs, root, n_left)
+    for end in range(n_left - 1, 0, -1):
+        first = pairs.order[0]
+        pairs.order[0] = pairs.order[end]
+        pairs.order[end] = first
+        _sift(pairs, 0, end)
+    return n_left
+
+
+@kernel
+def _sift(pairs, root, end):
+    order = pairs.order
+    k = order[root]
+    while 2 * root + 1 < end:
+        child = 2 * root + 1
+        if child + 1 < end and _is_nearer(pairs, order[child], order[child + 1]):
+            child += 1
+        if not _is_nearer(pairs, k, order[child]):
+            break
+        order[root] = order[child]
+        root = child
+    order[root] = k
+
+
+@kernel(inline=True)
+def _is_nearer(pairs, i, j):
+    return pairs.gaps[i] < pairs.gaps[j] or (pairs.gaps[i] == pairs.gaps[j] and i < j)
+
+
+@kernel
+def need_nearest(frame, n):
+    """The first pair in order is a minimum where none as near is: nothing is nearer, whatever rounding makes of its
     neighbours.
     """
     pairs = frame.pairs
-    nearest, least = -1, math.inf
-    for k in range(pairs.n):
-        if pairs.gaps[k] < math.inf and pairs.near[NUMBERS_OF_PAIR * k + LENGTH] < least:
-            nearest, least = k, pairs.near[NUMBERS_OF_PAIR * k + LENGTH]
-    if nearest < 0:
+    if n == 0:
         return
-    for k in range(pairs.n):
-        lower = pairs.near[NUMBERS_OF_PAIR * k + LOWER]
-        if pairs.states[k] & LEAST and not lower > least + STEP_ERRORS * frame.error:
+    nearest = pairs.order[0]
+    limit = pairs.near[NUMBERS_OF_PAIR * nearest + LENGTH] + STEP_ERRORS * frame.error
+    for i in range(n):
+        k = pairs.order[i]
+        if pairs.gaps[k] > pairs.gaps[nearest] + 2.0 * STEP_ERRORS:
+            break
+        if pairs.near[NUMBERS_OF_PAIR * k + LOWER] <= limit and _is_minimum(frame, k):
             return
     pairs.states[nearest] |= LEAST
 
 
 @kernel
-def nearest_minimum(frame):
-    """The nearest local minimum that is in no patch; −1 where none is left."""
-    pairs = frame.pairs
-    nearest, least = -1, math.inf
-    for k in range(pairs.n):
-        if pairs.states[k] & LEAST and not pairs.states[k] & COVERED and pairs.gaps[k] < least:
-            nearest, least = k, pairs.gaps[k]
-    return nearest
+def next_minimum(frame, first, n):
+    """Where in the order, from ``first`` on, the next local minimum is that is in no patch; n where none is left."""
+    for i in range(first, n):
+        k = frame.pairs.order[i]
+        if not frame.pairs.states[k] & COVERED and _is_minimum(frame, k):
+            return i
+    return n
 
 
 @kernel

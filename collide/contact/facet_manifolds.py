@@ -26,15 +26,16 @@ from collide.contact.contact_patches import (
     Patch,
     cover_close,
     cover_patch,
-    find_minima,
     grow_gap,
     grow_overlap,
     least_gap_of,
     mark_touching,
-    nearest_minimum,
     need_nearest,
+    next_minimum,
     next_seed,
     seed_group,
+    set_directions,
+    sort_by_gap,
 )
 from collide.contact.contact_points import PatchPoints
 from collide.contact.manifold_points import POINT, ManifoldPoints
@@ -45,9 +46,6 @@ from collide.contact.support_face import axes_across
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.mesh.bvh import INTS, N_FACETS, open_tree
 from collide.narrowphase.facets import facets_within
-from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, NUMBERS_OF_PAIR, world_error
-from collide.narrowphase.facets.posed_surfaces import is_swapped_order, shift_between
-from collide.narrowphase.facets.surface_collision import FULL
 from collide.narrowphase.facets.collide_kernel import (
     APART,
     EXCHANGED,
@@ -62,6 +60,9 @@ from collide.narrowphase.facets.collide_kernel import (
     open_space,
 )
 from collide.narrowphase.facets.collide_kernel import SINGULAR as PLACES_NOTHING
+from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, NUMBERS_OF_PAIR, world_error
+from collide.narrowphase.facets.posed_surfaces import is_swapped_order, shift_between
+from collide.narrowphase.facets.surface_collision import FULL
 from collide.numerics.vec3 import Vec3, vec3_at
 
 _list_pairs = native_call(facets_within.SIGNATURE)
@@ -333,7 +334,7 @@ def _list_wider(task, frame, reach):
 def _put_patches(frame, ways, rows, clearing, first, is_deep):
     """The rows of pairs that are listed, posed, linked and grouped."""
     cover_close(frame)
-    find_minima(frame)
+    n_apart = set_directions(frame)
     n_rows, number = first, 0
     for i in range(ways.counts[N_WAYS]):
         axes = axes_across(vec3_at(ways.ways, 3 * i))
@@ -349,17 +350,18 @@ def _put_patches(frame, ways, rows, clearing, first, is_deep):
             else:
                 is_deep = is_deep or patch.meets
             seed = next_seed(frame)
+    n_apart = sort_by_gap(frame, n_apart)
     if number == 0:
-        need_nearest(frame)
-    start = nearest_minimum(frame)
-    while start >= 0:
-        patch = grow_gap(frame, start)
+        need_nearest(frame, n_apart)
+    start = next_minimum(frame, 0, n_apart)
+    while start < n_apart:
+        patch = grow_gap(frame, frame.pairs.order[start])
         depth = clearing.radius - least_gap_of(frame.points, patch.n)
         n_rows = _put_patch(frame, Patch(patch.axes, patch.n, depth >= 0.0), rows, clearing, number, n_rows)
         if n_rows < 0:
             return ROWS_FULL, first, False
         number += 1
-        start = nearest_minimum(frame)
+        start = next_minimum(frame, start, n_apart)
     return DONE, n_rows, is_deep or number == 0
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from collide.contact.contact_facets import posed_corner
-from collide.contact.contact_pairs import TOUCHING
 from collide.kernels import kernel
 from collide.narrowphase.facets.facets_within import FACET_A, INTS_OF_PAIR, NUMBERS_OF_PAIR, POINT_A, POINT_B
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, scale, sub, vec3_at
@@ -65,7 +64,7 @@ def _has_corner(body, facet, corner):
 
 @kernel(inline=True)
 def _is_outside(body, outward, u, slack):
-    return not body.solid or dot(outward, u) >= -slack * max(norm(outward), FLAT)
+    return not body.solid or body.is_convex or dot(outward, u) >= -slack * max(norm(outward), FLAT)
 
 
 @kernel
@@ -79,15 +78,10 @@ def _facet_at(body, facet, point, u, slack, at_corner):
     p, q, r = posed_corner(body, place, 0), posed_corner(body, place, 1), posed_corner(body, place, 2)
     least = _ON * norm(sub(q, p))
     a, b, c = sub(p, point), sub(q, point), sub(r, point)
-    length_a, length_b, length_c = norm(a), norm(b), norm(c)
     zero = Vec3(0.0, 0.0, 0.0)
-    if (
-        dot(a, u) > slack * length_a + least
-        or dot(b, u) > slack * length_b + least
-        or dot(c, u) > slack * length_c + least
-    ):
+    if _rises(a, u, slack, least) or _rises(b, u, slack, least) or _rises(c, u, slack, least):
         return True, zero
-    if not body.solid:
+    if not body.solid or body.is_convex:
         return False, zero
     n = cross(sub(q, p), sub(r, p))
     length = norm(n)
@@ -95,14 +89,22 @@ def _facet_at(body, facet, point, u, slack, at_corner):
         return False, zero
     weight = 1.0 / length
     if at_corner:
-        if length_a <= length_b and length_a <= length_c:
+        square_a, square_b, square_c = dot(a, a), dot(b, b), dot(c, c)
+        if square_a <= square_b and square_a <= square_c:
             e, f = sub(q, p), sub(r, p)
-        elif length_b <= length_c:
+        elif square_b <= square_c:
             e, f = sub(r, q), sub(p, q)
         else:
             e, f = sub(p, r), sub(q, r)
         weight *= _angle(e, f)
     return False, scale(weight, n)
+
+
+@kernel(inline=True)
+def _rises(away, u, slack, least):
+    """Whether a corner is farther along u than what may be rounding."""
+    rise = dot(away, u)
+    return rise > least and rise > slack * norm(away) + least
 
 
 @kernel
@@ -184,8 +186,3 @@ def cross_of_edges(corners, at, i, j):
     if not length > FLAT * (norm(e) * norm(f)):
         return Vec3(0.0, 0.0, 0.0)
     return scale(1.0 / length, n)
-
-
-@kernel(inline=True)
-def is_touching(pairs, k):
-    return pairs.states[k] & TOUCHING != 0

@@ -58,7 +58,8 @@ def _keep_near(points, n, limit):
     for i in range(n):
         gap = p[POINT * i + POINT_GAP]
         if gap <= limit + points.errors[i] or gap == least:
-            copy_of_points(points, i, points, n_kept)
+            if n_kept != i:
+                copy_of_points(points, i, points, n_kept)
             n_kept += 1
     return n_kept
 

@@ -68,19 +68,35 @@ def _drop_walls(p, n, n_corners, tolerance, space):
     return dropped
 
 
+@kernel
+def _extreme_points(p, n, extreme):
+    """Put the numbers of points farthest in eight directions, counter-clockwise, none twice in a row; how many."""
+    for d in range(_EXTREME):
+        extreme[d] = 0
+    for i in range(1, n):
+        u, v = p[POINT * i], p[POINT * i + V]
+        _farther(p, extreme, 0, 4, i, u, p[POINT * extreme[0]], p[POINT * extreme[4]])
+        a, b = POINT * extreme[2], POINT * extreme[6]
+        _farther(p, extreme, 2, 6, i, v, p[a + V], p[b + V])
+        a, b = POINT * extreme[1], POINT * extreme[5]
+        _farther(p, extreme, 1, 5, i, u + v, p[a] + p[a + V], p[b] + p[b + V])
+        a, b = POINT * extreme[3], POINT * extreme[7]
+        _farther(p, extreme, 3, 7, i, v - u, p[a + V] - p[a], p[b + V] - p[b])
+    n_extreme = 1
+    for d in range(1, _EXTREME):
+        if extreme[d] != extreme[n_extreme - 1]:
+            extreme[n_extreme] = extreme[d]
+            n_extreme += 1
+    return n_extreme - 1 if n_extreme > 1 and extreme[n_extreme - 1] == extreme[0] else n_extreme
+
+
 @kernel(inline=True)
-def _along(p, i, direction):
-    """Place of a point along one of eight directions, counter-clockwise; not of unit length."""
-    u, v = p[POINT * i], p[POINT * i + V]
-    if direction % 4 == 0:
-        value = u
-    elif direction % 4 == 1:
-        value = u + v
-    elif direction % 4 == 2:
-        value = v
-    else:
-        value = v - u
-    return value if direction < 4 else -value
+def _farther(p, extreme, d, opposite, i, value, largest, least):
+    """Make point i extreme in a direction, or the opposite one, where it is; of equal ones the deeper counts."""
+    if value > largest or (value == largest and p[POINT * i + GAP] < p[POINT * extreme[d] + GAP]):
+        extreme[d] = i
+    if value < least or (value == least and p[POINT * i + GAP] < p[POINT * extreme[opposite] + GAP]):
+        extreme[opposite] = i
 
 
 @kernel
@@ -91,32 +107,27 @@ def _outer_points(p, n, tolerance, space):
     convex hull algorithm", 1978); in the place of an extreme point the one of least gap counts.
     """
     extreme = space.corners
-    for d in range(_EXTREME):
-        best = 0
-        for i in range(1, n):
-            value, largest = _along(p, i, d), _along(p, best, d)
-            if value > largest or (value == largest and p[POINT * i + GAP] < p[POINT * best + GAP]):
-                best = i
-        extreme[d] = best
+    n_extreme = _extreme_points(p, n, extreme)
     n_order = 0
     for i in range(n):
-        if _is_outer(p, i, extreme, tolerance):
+        if _is_outer(p, i, extreme, n_extreme, tolerance):
             space.order[n_order] = i
             n_order += 1
     return n_order
 
 
 @kernel(inline=True)
-def _is_outer(p, i, extreme, tolerance):
+def _is_outer(p, i, extreme, n_extreme, tolerance):
     u, v = p[POINT * i], p[POINT * i + V]
     beyond = False
-    for d in range(_EXTREME):
+    for d in range(n_extreme):
         at = POINT * extreme[d]
-        if abs(u - p[at]) <= tolerance and abs(v - p[at + V]) <= tolerance:
-            return True
-        to = POINT * extreme[d + 1 if d + 1 < _EXTREME else 0]
+        du, dv = u - p[at], v - p[at + V]
+        if abs(du) <= tolerance and abs(dv) <= tolerance:
+            return extreme[d] == i or p[POINT * i + GAP] < p[at + GAP]
+        to = POINT * extreme[d + 1 if d + 1 < n_extreme else 0]
         eu, ev = p[to] - p[at], p[to + V] - p[at + V]
-        wide = eu * (v - p[at + V]) - ev * (u - p[at])
+        wide = eu * dv - ev * du
         if wide < 0.0 and wide * wide > tolerance * tolerance * (eu * eu + ev * ev):
             beyond = True
     return beyond
