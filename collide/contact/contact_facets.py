@@ -81,7 +81,8 @@ def _rows_of_points(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 class PosedFacets(NamedTuple):
     """A body's facets at a pose X (view of 16 doubles), seen from the origin of A.
 
-    solid : facets have an outer side.   is_convex : what leaves all facets at a point leads outside.   radius : of the ball swept over them [m].   shift : of its origin from A's [m].
+    solid : facets have an outer side.   is_convex : what leaves all facets at a point leads outside.
+    radius : of the ball swept over them [m].   shift : of its origin from A's [m].
     triangles : nine doubles a facet, in the order of the tree.   Other views are those of `Topology`.
     """
 
@@ -106,7 +107,8 @@ def open_facets(body, topology_at, X_at, shift):
     tree = view_i64(body.tree_at, INTS)
     m, n_corners = tree[N_FACETS], words[N_CORNERS]
     return PosedFacets(
-        body.solid != 0, words[IS_CONVEX] != 0, body.radius, view_f64(X_at, 16), shift, view_f64(tree[TRIANGLES_AT], 9 * m),
+        body.solid != 0, words[IS_CONVEX] != 0, body.radius, view_f64(X_at, 16), shift,
+        view_f64(tree[TRIANGLES_AT], 9 * m),
         view_i32(words[CORNERS_AT], 3 * m), view_i32(words[PLACES_AT], m), view_i32(words[FANS_AT], 3 * m),
         view_i32(words[FAN_STARTS_AT], n_corners + 1), view_i32(words[EDGES_AT], 3 * m), n_corners,
     )  # fmt: skip

@@ -36,7 +36,8 @@ class ContactPairs(NamedTuple):
     by_key, key_starts : pairs at key after key, and where those of each begin.   seen_keys : marks of a search.
     states : bits.   groups : of the translation that separates the pair, −1 for none.   queue : of a search.
     directions, slacks, gaps : of pairs that are apart, from A's nearest point to B's, what in it may be rounding, and
-    how long it is in errors of a coordinate; infinite of others.   order : numbers of pairs.   table : of hashes.   counts : [0] of keys.
+    how long it is in errors of a coordinate; infinite of others.   order : numbers of pairs.
+    table : of hashes.
     """
 
     n: int

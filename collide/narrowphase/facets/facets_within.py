@@ -61,7 +61,9 @@ _U = 2.0**-53
 class _Query(NamedTuple):
     """reach : distance that pairs are listed within [m].   error : bound of the error of a coordinate in the world.
 
-    shift : t_B − t_A.   leaf : triangles of a leaf of A, and one of B, with boxes.   out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
+    shift : t_B − t_A.
+    leaf : triangles of a leaf of A, and one of B, with boxes.
+    out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
     """
 
     trees: PosedTrees
