@@ -74,7 +74,8 @@ def contact_batch(
         rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
         of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
         return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
-    shapes, which = (A, B), None
+    shapes: tuple[Shape, ...] = (A, B)
+    which = None
     if isinstance(A, Picked):
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
     singles: list[Shape] = []

@@ -11,7 +11,7 @@ from collide import argument_checks as checks
 from collide.batches import length_of
 from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
-from collide.contact.convex_contacts import single_contacts
+from collide.contact.convex_contacts import prepare_contacts
 from collide.errors import InvalidArgument
 from collide.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
@@ -76,15 +76,22 @@ def contacts(
     Compound are asked one by one. A pair with a mesh near its surface costs about a millisecond, which grows with the
     facets within the margin.
     """
-    margin, max_contacts = check_margin("contacts", margin), check_max_contacts("contacts", max_contacts)
-    threads = check_threads(threads)
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        rows = single_contacts(A, B, X_WA, X_WB, margin, max_contacts)
+    if margin.__class__ is not float or not 0.0 <= margin <= _LARGEST_MARGIN:
+        margin = check_margin("contacts", margin)
+    if max_contacts.__class__ is not int or max_contacts < 1:
+        max_contacts = check_max_contacts("contacts", max_contacts)
+    if threads.__class__ is not int or threads != 1:
+        threads = check_threads(threads)
+    try:
+        rows = A._prepared[B._serial].of_contacts.contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
         if rows is not None:
             return Contacts(rows, np.array([0, len(rows)]))
+    except (AttributeError, KeyError, TypeError):
+        pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
     rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check_poses, threads=threads)
+    prepare_contacts(A, B)
     return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 
 

@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.batches import answer_batch, length_of
+from collide.contact.box_box import box_rows
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
+    ARE_BOXES,
     HEADER,
     MARGIN,
     MAX_CONTACTS,
@@ -26,10 +28,12 @@ from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
-from collide.lowering.shape_table import POSE, ShapeTable
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
 from collide.narrowphase.convex_batches import Question, shape_table
 from collide.narrowphase.convex_kernel_calls import SinglePair
 from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
@@ -97,8 +101,7 @@ def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
         A, B = (S if isinstance(S, Shape) else S[pairs] for S in (asked.A, asked.B))
         X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
         slack = None if asked.slack is None else asked.slack[pairs]
-        rows = answer_batch(A, B, X_WA, X_WB, asked.question, prepare=True)
-        _refuse_unbounded(rows, A, B)
+        rows = _rows(asked, A, B, X_WA, X_WB)
         table, which = shape_table(A, B)
         faces = face_table_of(table, ROUND)
         header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
@@ -124,6 +127,38 @@ def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
     return larger
 
 
+def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of `distance`; of pairs of boxes as good as contacts need them, where a face tells (`box_box.py`)."""
+    table, which = shape_table(A, B)
+    is_box = _boxes(table)
+    both = is_box[which].all(axis=1) if which is not None else np.array([is_box.all()])
+    if not both.any():
+        return _general_rows(asked.question, A, B, X_WA, X_WB)
+    n = length_of(A, B, X_WA, X_WB)
+    rows = np.zeros(n, dtype=PAIR_DTYPE)
+    n_open = box_rows(
+        *table.addresses, 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
+        address_of(X_WB), 16 * (len(X_WB) > 1), n, asked.question.limit, address_of(rows),
+    )  # fmt: skip
+    if n_open or not both.all():
+        remaining = np.flatnonzero((rows["how"] == UNDECIDED) | ~both)
+        A, B = (S if isinstance(S, Shape) else S[remaining] for S in (A, B))
+        X_WA, X_WB = (X if len(X) == 1 else np.ascontiguousarray(X[remaining]) for X in (X_WA, X_WB))
+        rows[remaining] = _general_rows(asked.question, A, B, X_WA, X_WB)[: len(remaining)]
+    return rows
+
+
+def _boxes(table: ShapeTable) -> np.ndarray:
+    """(rows,) bool: which of the sets are boxes."""
+    return (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
+
+
+def _general_rows(question: Question, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    rows = answer_batch(A, B, X_WA, X_WB, question, prepare=True)
+    _refuse_unbounded(rows, A, B)
+    return rows
+
+
 def _refuse_unbounded(rows: np.ndarray, A, B) -> None:
     unbounded = np.isneginf(rows["distance"])
     if unbounded.any():
@@ -143,16 +178,12 @@ def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tu
     )  # fmt: skip
 
 
-def single_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
-    """Rows of two shapes prepared for single calls, at one pair of poses; None where that is not what was asked, or
-    takes the long way.
-    """
-    pair = prepared_pair(A, B)
-    if not isinstance(pair, SinglePair):
-        return None
-    if pair.of_contacts is None:
-        pair.of_contacts = SingleContacts(pair)
-    return pair.of_contacts.contacts(X_WA, X_WB, margin, max_contacts)
+def prepare_contacts(A, B) -> None:
+    """Have two shapes that are prepared for single calls prepared for contacts as well."""
+    if isinstance(A, Shape) and isinstance(B, Shape):
+        pair = prepared_pair(A, B)
+        if isinstance(pair, SinglePair) and pair.of_contacts is None:
+            pair.of_contacts = SingleContacts(pair)
 
 
 class SingleContacts:
@@ -172,6 +203,7 @@ class SingleContacts:
         self._header[: len(header)] = header
         self._of_manifold = self._header[len(header) :]
         self._of_manifold[:PAIRS_DONE] = _addresses(table, self._faces, self._space)
+        self._of_manifold[ARE_BOXES] = _boxes(table).all()
         self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
         self._ask = prepared_row(contacts_single, self._header)
 

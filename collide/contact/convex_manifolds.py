@@ -44,12 +44,13 @@ _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
 # two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs,
-# and rows; of single calls the bits of the margin, and max_contacts.
+# and rows; of single calls the bits of the margin, max_contacts, and
+# whether both shapes are boxes.
 (
     INTS_AT, NUMBERS_AT, FACES_AT, POSES_AT, SHAPE_OF_AT, DOUBLES_AT, INTEGERS_AT, LARGEST, PAIRS_DONE, ROWS_DONE,
-    MARGIN, MAX_CONTACTS,
-) = range(12)  # fmt: skip
-HEADER = 12
+    MARGIN, MAX_CONTACTS, ARE_BOXES,
+) = range(13)  # fmt: skip
+HEADER = 13
 
 
 def _at(field: str, unit: int) -> int:

@@ -50,9 +50,9 @@ def halfspace_contacts(
     A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
 ) -> Rows:
     """Rows of a mesh and a half-space: those of the mesh's hull, with facets of the mesh. As `facet_contacts`."""
-    bodies = [S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B)]
-    rows, ends = convex_contacts(*bodies, X_WA, X_WB, margin, max_contacts, slack=slack, threads=threads)
-    for side, shape, hull in (("a", A, bodies[0]), ("b", B, bodies[1])):
+    hull_a, hull_b = (S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B))
+    rows, ends = convex_contacts(hull_a, hull_b, X_WA, X_WB, margin, max_contacts, slack=slack, threads=threads)
+    for side, shape, hull in (("a", A, hull_a), ("b", B, hull_b)):
         if hull is not shape:
             row_of, facet_of = _rows_of_hull_points(shape, hull)
             feature = rows[f"feature_{side}"]

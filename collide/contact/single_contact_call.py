@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collide.contact.box_box import put_box_row
+from collide.contact.convex_manifolds import (
+    ARE_BOXES,
+    INTS_AT,
+    MARGIN,
+    MAX_CONTACTS,
+    NUMBERS_AT,
+    POSES_AT,
+    ROWS_DONE,
+    put_manifold,
+)
 from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
-from collide.contact.convex_manifolds import MARGIN, MAX_CONTACTS, POSES_AT, ROWS_DONE, put_manifold
-from collide.kernels import entry, prepared, view_f64, view_i64
-from collide.lowering.shape_table import POSE, POSE_SLOP
+from collide.kernels import entry, kernel, prepared, view_f64, view_i64
+from collide.lowering.shape_table import POSE
 from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose
 from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused, view_row
 
@@ -21,30 +31,36 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     out : `CONTACT_DTYPE`, zeroed, room for as many rows as a manifold may have. All threads share the workspace: the
     kernel keeps Python's lock.
     """
-    block = block_of(header_at)
-    poses = block.poses
-    good_a = set_pose(poses, 0, view_f64(XA_at, 16), True)
-    good_b = set_pose(poses, BLOCK * POSE, view_f64(XB_at, 16), True)
-    if not (good_a and good_b):
-        return -1
-    rows_at = block.header[ROWS_AT]
-    words = view_i64(rows_at, ROW // 8)
-    for k in range(ROW // 8):
-        words[k] = 0
     manifold_at = header_at + 8 * HEADER
-    margin = view_f64(manifold_at + 8 * MARGIN, 1)[0]
-    answer_block(block.header, 1, False, True, margin, rows_at)
-    row = view_row(rows_at)
-    # A half-space within another has no depth that ends.
-    if is_undecided_or_refused(row) or not row.doubles[LOWER] > -1e300:
-        return -1
     header = view_i64(manifold_at, MANIFOLD_HEADER)
+    margin = view_f64(manifold_at + 8 * MARGIN, 1)[0]
+    X_WA, X_WB = view_f64(XA_at, 16), view_f64(XB_at, 16)
+    block = block_of(header_at)
+    rows_at = block.header[ROWS_AT]
+    row = view_row(rows_at)
+    _zero_row(rows_at)
+    is_known = header[ARE_BOXES] != 0 and put_box_row(
+        header[INTS_AT], header[NUMBERS_AT], 0, 1, X_WA, X_WB, margin, row
+    )
+    if not is_known:
+        _zero_row(rows_at)
+        if not (set_pose(block.poses, 0, X_WA, True) and set_pose(block.poses, BLOCK * POSE, X_WB, True)):
+            return -1
+        answer_block(block.header, 1, False, True, margin, rows_at)
+        # A half-space within another has no depth that ends.
+        if is_undecided_or_refused(row) or not row.doubles[LOWER] > -1e300:
+            return -1
     header[ROWS_DONE] = 0
     if row.flags[BEYOND] == 0 and row.doubles[LOWER] <= margin:
-        pair_poses = view_f64(header[POSES_AT], 2 * POSE)
-        for k in range(POSE):
-            pair_poses[k] = poses[k]
-            pair_poses[POSE + k] = poses[BLOCK * POSE + k]
-        pair_poses[POSE_SLOP] = 0.0
+        poses = view_f64(header[POSES_AT], 2 * POSE)
+        set_pose(poses, 0, X_WA, False)
+        set_pose(poses, POSE, X_WB, False)
         header[ROWS_DONE] = put_manifold(header, row, margin, header[MAX_CONTACTS], out_at)
     return 0
+
+
+@kernel(inline=True)
+def _zero_row(row_at):
+    words = view_i64(row_at, ROW // 8)
+    for k in range(ROW // 8):
+        words[k] = 0

@@ -45,8 +45,8 @@ class PackedConvex(NamedTuple):
     reach : proven upper bound of the distance of a core point from the frame's origin [m].
     slop : proven upper bound of the distance between the set described and the set stored [m];
         0 where the numbers given are stored as they are.
-    params : (4,) cylinder, cone: radius and half length; ellipsoid: three radii; half-space:
-        normal and offset; unused entries are 0.
+    params : (4,) cylinder, cone: radius and half length; ellipsoid: three radii; half-space: normal and offset; boxes,
+        which are POINTS: half sizes; unused entries are 0.
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
         filled up with copies of the first point.

@@ -78,7 +78,9 @@ def _sphere(shape: Sphere) -> tuple[Part, ...]:
 
 def _box(shape: Box) -> tuple[Part, ...]:
     signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    return _alone(pack_points(signs * shape.size))
+    half = np.append(0.5 * shape.size, 0.0)
+    half.flags.writeable = False
+    return _alone(pack_points(signs * shape.size)._replace(params=half))
 
 
 def _capsule(shape: Capsule) -> tuple[Part, ...]:

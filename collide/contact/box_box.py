@@ -1,0 +1,330 @@
+"""Two boxes by the separating axis test: rows of `distance` good enough for contacts, where a face tells.
+
+Of the 15 axes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996, theorem 1) the one of least overlap, or of widest
+gap, is the normal. Where it is that of a face, the answer is proven here; edges against edges, and pairs whose matrices
+are no rotations but for rounding, are left to the general narrowphase.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.lowering.shape_table import INTS, NUMBERS, PARAMS, RANK
+from collide.narrowphase.rows import (
+    BEYOND,
+    CERTIFIED,
+    DISTANCE,
+    HIT,
+    HOW,
+    LOWER,
+    NORMAL,
+    POINT_A,
+    POINT_B,
+    ROW,
+    UPPER,
+    view_row,
+)
+from collide.numerics.vec3 import Vec3, absolute, add, component, cross, dot, neg, norm1, put_vec3, scale, sub, vec3_at
+from collide.results import PLANE, SIMPLEX, UNDECIDED
+from collide.transforms import LARGEST
+
+_U = 2.0**-53
+#: Matrices farther from a rotation than this are none.
+_ORTHONORMAL = 2.0**-44
+#: Edges are parallel where the sine of their angle is below this: what their axis could tell is bounded instead.
+_PARALLEL = 2.0**-46
+#: A bracket wider than this part of the size is left to the general narrowphase.
+_WIDEST = 2.0**-40
+
+
+class PosedBox(NamedTuple):
+    """Half sizes, axes in the world, and centre.   off : how far the axes are from a rotation, at most."""
+
+    half: Vec3
+    x: Vec3
+    y: Vec3
+    z: Vec3
+    p: Vec3
+    off: float
+
+
+class EdgeAxes(NamedTuple):
+    """The widest gap along axes across two edges.
+
+    gap, sine : along that axis, and of the edges' angle.   a, b : the boxes' axes along these edges.
+    upper : what no such gap exceeds.   missed : by how much one may that was left out, its edges too nearly parallel.
+    """
+
+    gap: float
+    sine: float
+    a: int
+    b: int
+    upper: float
+    missed: float
+
+
+class FaceAxis(NamedTuple):
+    """The face axis of widest gap: 0, 1, 2 of A, 3, 4, 5 of B; the gap along it, negative where boxes overlap."""
+
+    axis: int
+    gap: float
+
+
+@kernel(inline=True)
+def _box_at(numbers, shape, X):
+    """The `PosedBox` of a matrix; far off a rotation where the matrix is no pose."""
+    at = NUMBERS * shape + PARAMS
+    x, y, z = Vec3(X[0], X[4], X[8]), Vec3(X[1], X[5], X[9]), Vec3(X[2], X[6], X[10])
+    off = max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0), abs(dot(z, z) - 1.0))
+    off = max(off, abs(dot(x, y)), abs(dot(y, z)), abs(dot(z, x)))
+    p = Vec3(X[3], X[7], X[11])
+    is_pose = X[12] == 0.0 and X[13] == 0.0 and X[14] == 0.0 and X[15] == 1.0 and dot(x, cross(y, z)) > 0.0
+    if not (is_pose and norm1(p) <= LARGEST):
+        off = 1.0
+    return PosedBox(Vec3(numbers[at], numbers[at + 1], numbers[at + 2]), x, y, z, p, off + 4.0 * _U)
+
+
+@kernel(inline=True)
+def _in_frame(box, v):
+    return Vec3(dot(box.x, v), dot(box.y, v), dot(box.z, v))
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, float64, int64)")
+def box_rows(ints_at, numbers_at, which_at, XA_at, step_a, XB_at, step_b, n, limit, rows_at):
+    """Rows of n pairs of boxes, `UNDECIDED` where a face does not tell; how many are left so.
+
+    ints, numbers : a `ShapeTable`.   which : 0, or two shape rows a pair.   XA, XB : matrices; step 16 or 0.
+    limit : of gaps beyond it no more is said than that [m].   rows : PAIR_DTYPE, zeroed. Of a decided row the numbers,
+    the normal and two points are set that a manifold needs, no vertices.
+    """
+    n_open = 0
+    for k in range(n):
+        sa, sb = 0, 1
+        if which_at != 0:
+            which = view_i64(which_at + 16 * k, 2)
+            sa, sb = which[0], which[1]
+        row = view_row(rows_at + ROW * k)
+        X_WA, X_WB = view_f64(XA_at + 8 * step_a * k, 16), view_f64(XB_at + 8 * step_b * k, 16)
+        if not put_box_row(ints_at, numbers_at, sa, sb, X_WA, X_WB, limit, row):
+            row.flags[HOW] = UNDECIDED
+            n_open += 1
+    return n_open
+
+
+@kernel(inline=True)
+def put_box_row(ints_at, numbers_at, sa, sb, X_WA, X_WB, limit, row):
+    """The row of one pair of boxes, by their rows of the `ShapeTable`; False where a face does not tell."""
+    n = max(sa, sb) + 1
+    ints, numbers = view_i64(ints_at, INTS * n), view_f64(numbers_at, NUMBERS * n)
+    A, B = _box_at(numbers, sa, X_WA), _box_at(numbers, sb, X_WB)
+    # The same numbers are worked on whichever way round the pair is asked.
+    flip = ints[INTS * sb + RANK] < ints[INTS * sa + RANK]
+    if ints[INTS * sb + RANK] == ints[INTS * sa + RANK]:
+        for k in range(12):
+            if X_WA[k] != X_WB[k]:
+                flip = X_WB[k] < X_WA[k]
+                break
+    if not flip:
+        return _put_row(A, B, limit, row)
+    is_decided = _put_row(B, A, limit, row)
+    doubles = row.doubles
+    on_a, on_b, nhat = vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B), vec3_at(doubles, NORMAL)
+    put_vec3(doubles, POINT_A, on_b)
+    put_vec3(doubles, POINT_B, on_a)
+    put_vec3(doubles, NORMAL, add(neg(nhat), Vec3(0.0, 0.0, 0.0)))
+    return is_decided
+
+
+@kernel
+def _put_row(A, B, limit, row):
+    """Write the row of two boxes; False where it takes more than faces."""
+    off = max(A.off, B.off)
+    if not off <= _ORTHONORMAL:
+        return False
+    t = sub(B.p, A.p)
+    size = norm1(A.half) + norm1(B.half) + norm1(t)
+    # Each gap is a sum of products of columns: 16u of the size, and what the matrices are off.
+    error = (16.0 * _U + 2.0 * off) * size
+    c0, c1, c2 = _in_frame(A, B.x), _in_frame(A, B.y), _in_frame(A, B.z)  # columns: B's axes in A
+    r0, r1, r2 = Vec3(c0.x, c1.x, c2.x), Vec3(c0.y, c1.y, c2.y), Vec3(c0.z, c1.z, c2.z)
+    t_A, t_B = _in_frame(A, t), _in_frame(B, t)
+    best = _best_face(A, B, r0, r1, r2, c0, c1, c2, t_A, t_B, error)
+    if best.gap - error > limit:
+        row.doubles[LOWER] = best.gap - error
+        row.doubles[DISTANCE] = best.gap - error
+        row.doubles[UPPER] = math.inf
+        row.flags[BEYOND] = 1
+        row.flags[HOW] = PLANE
+        return True
+    row.doubles[LOWER] = best.gap - error
+    row.doubles[UPPER] = best.gap + error
+    row.doubles[DISTANCE] = best.gap
+    is_proven = best.gap > error
+    if best.axis < 3:
+        is_proven = _put_face(A, B, best, t, error, False, row) and is_proven
+    else:
+        of_b = FaceAxis(best.axis - 3, best.gap)
+        is_proven = _put_face(B, A, of_b, neg(t), error, True, row) and is_proven
+    if not is_proven:  # a corner over a face, at its distance, needs no look at edges
+        edges = _edges(A, B, c0, c1, c2, t_A, error)
+        if edges.gap - error / edges.sine > row.doubles[UPPER]:
+            row.doubles[LOWER] = edges.gap - error / edges.sine
+            row.doubles[DISTANCE] = edges.gap
+            is_proven = _put_edges(A, B, edges, t, error, row)
+        else:
+            is_proven = best.gap < 0.0
+        row.doubles[UPPER] = max(row.doubles[UPPER], edges.upper) + edges.missed
+    lower, upper = row.doubles[LOWER], row.doubles[UPPER]
+    row.flags[HIT] = 1 if upper < 0.0 else 0
+    row.flags[CERTIFIED] = 1
+    row.flags[HOW] = SIMPLEX if upper < 0.0 else PLANE
+    # What touches, or nearly, is left to exact arithmetic.
+    return is_proven and (lower > 0.0 or upper < 0.0) and upper - lower <= _WIDEST * size
+
+
+@kernel(inline=True)
+def _best_face(A, B, r0, r1, r2, c0, c1, c2, t_A, t_B, error):
+    """The `FaceAxis` of widest gap; of equal ones but for rounding, one of A."""
+    hA, hB = A.half, B.half
+    a0 = abs(t_A.x) - hA.x - dot(hB, absolute(r0))
+    a1 = abs(t_A.y) - hA.y - dot(hB, absolute(r1))
+    a2 = abs(t_A.z) - hA.z - dot(hB, absolute(r2))
+    b0 = abs(t_B.x) - hB.x - dot(hA, absolute(c0))
+    b1 = abs(t_B.y) - hB.y - dot(hA, absolute(c1))
+    b2 = abs(t_B.z) - hB.z - dot(hA, absolute(c2))
+    of_a, of_b = FaceAxis(0, a0), FaceAxis(3, b0)
+    if a1 > of_a.gap:
+        of_a = FaceAxis(1, a1)
+    if a2 > of_a.gap:
+        of_a = FaceAxis(2, a2)
+    if b1 > of_b.gap:
+        of_b = FaceAxis(4, b1)
+    if b2 > of_b.gap:
+        of_b = FaceAxis(5, b2)
+    return of_b if of_b.gap > of_a.gap + 2.0 * error else of_a
+
+
+@kernel(inline=True)
+def _edges(A, B, c0, c1, c2, t, error):
+    """`EdgeAxes` of all nine.   c0, c1, c2, t : B's axes and centre in A."""
+    h = B.half
+    first = _edges_along(A, c0, 0, h.x, h.y, c2, h.z, c1, t, error)
+    second = _edges_along(A, c1, 1, h.y, h.z, c0, h.x, c2, t, error)
+    third = _edges_along(A, c2, 2, h.z, h.x, c1, h.y, c0, t, error)
+    return _wider(_wider(first, second), third)
+
+
+@kernel(inline=True)
+def _wider(a, b):
+    widest = a if a.gap >= b.gap else b
+    upper, missed = max(a.upper, b.upper), a.missed + b.missed
+    return EdgeAxes(widest.gap, widest.sine, widest.a, widest.b, upper, missed)
+
+
+@kernel(inline=True)
+def _edges_along(A, c, b, length, h, c_of_h, k, c_of_k, t, error):
+    """`EdgeAxes` of B's edges along its axis b, with A's three.
+
+    c, length : that axis in A, and B's half size along it.
+    h, k : half sizes of B along its other axes, each with the column that its product with the axis is found in:
+    of a × c with the second axis it is that of a with the third.
+    """
+    x = _edge_pair(0, b, c.y, c.z, A.half.y, A.half.z, t.y, t.z, h * abs(c_of_h.x) + k * abs(c_of_k.x), length, error)
+    y = _edge_pair(1, b, c.z, c.x, A.half.z, A.half.x, t.z, t.x, h * abs(c_of_h.y) + k * abs(c_of_k.y), length, error)
+    z = _edge_pair(2, b, c.x, c.y, A.half.x, A.half.y, t.x, t.y, h * abs(c_of_h.z) + k * abs(c_of_k.z), length, error)
+    return _wider(_wider(x, y), z)
+
+
+@kernel(inline=True)
+def _edge_pair(a, b, u, v, h_u, h_v, t_u, t_v, radius, length, error):
+    """`EdgeAxes` of an edge of A and one of B whose direction has the components (u, v) across A's.
+
+    Nearly parallel edges span a facet of the Minkowski difference, narrow by what one of them is off the other. Were it
+    parallel, the difference would be moved by so much at most, and all its facets would be among the other axes.
+    """
+    sine = math.sqrt(u * u + v * v)
+    if sine < _PARALLEL:
+        return EdgeAxes(-math.inf, 1.0, a, b, -math.inf, 2.0 * length * (sine + 8.0 * _U))
+    gap = (abs(t_u * v - t_v * u) - h_u * abs(v) - h_v * abs(u) - radius) / sine
+    return EdgeAxes(gap, sine, a, b, gap + error / sine, 0.0)
+
+
+@kernel(inline=True)
+def _put_face(F, G, face, t, error, exchanged, row):
+    """Normal and points of the row, from the corner of G nearest to a face of F; whether it is over that face.
+
+    t : from F's centre to G's.   exchanged : F is B.
+    """
+    i, j, k = face.axis, (face.axis + 1) % 3, (face.axis + 2) % 3
+    a, e, f = _axis_of(F, i), _axis_of(F, j), _axis_of(F, k)
+    h_e, h_f = component(F.half, j), component(F.half, k)
+    n = scale((1.0 if dot(a, t) >= 0.0 else -1.0) / math.sqrt(dot(a, a)), a)
+    is_over = False
+    corner = t
+    for ends in range(8):  # of axes of G that lie in the face's plane both ends are as near
+        corner = add(_corner(G.x, G.half.x, n, error, ends & 1), _corner(G.y, G.half.y, n, error, (ends >> 1) & 1))
+        corner = add(add(corner, _corner(G.z, G.half.z, n, error, ends >> 2)), t)
+        is_over = abs(dot(corner, e)) <= h_e - error and abs(dot(corner, f)) <= h_f - error
+        if is_over or face.gap < 0.0:
+            break
+    on_g = add(corner, F.p)
+    on_f = sub(on_g, scale(face.gap, n))
+    put_vec3(row.doubles, NORMAL, add(scale(-1.0 if exchanged else 1.0, n), Vec3(0.0, 0.0, 0.0)))
+    put_vec3(row.doubles, POINT_B if exchanged else POINT_A, on_f)
+    put_vec3(row.doubles, POINT_A if exchanged else POINT_B, on_g)
+    return is_over
+
+
+@kernel(inline=True)
+def _corner(axis, half, n, error, other_end):
+    """What an axis of a box adds to the corner least along n."""
+    along = dot(axis, n)
+    end = -half if along > 0.0 else half
+    if abs(half * along) <= error and other_end == 1:
+        end = -end
+    return scale(end, axis)
+
+
+@kernel
+def _put_edges(A, B, edges, t, error, row):
+    """Normal and points of the row, from two edges; False where bodies are apart and other points are nearer.
+
+    t : from A's centre to B's.
+    """
+    a, b = _axis_of(A, edges.a), _axis_of(B, edges.b)
+    c = cross(a, b)
+    n = scale((1.0 if dot(c, t) >= 0.0 else -1.0) / math.sqrt(dot(c, c)), c)
+    h_a, h_b = component(A.half, edges.a), component(B.half, edges.b)
+    # The middles of the edges farthest towards each other: corners less what lies along the edge itself.
+    p = sub(_farthest_corner(A, n), scale(h_a * _sign(dot(a, n)), a))
+    q = add(sub(t, _farthest_corner(B, n)), scale(h_b * _sign(dot(b, n)), b))
+    w = sub(q, p)
+    along = dot(a, b)
+    square = 1.0 - along * along
+    at_a = (dot(a, w) - along * dot(b, w)) / square
+    at_b = (along * dot(a, w) - dot(b, w)) / square
+    is_within = abs(at_a) <= h_a - error / edges.sine and abs(at_b) <= h_b - error / edges.sine
+    on_a = add(add(p, scale(min(max(at_a, -h_a), h_a), a)), A.p)
+    put_vec3(row.doubles, NORMAL, add(n, Vec3(0.0, 0.0, 0.0)))
+    put_vec3(row.doubles, POINT_A, on_a)
+    put_vec3(row.doubles, POINT_B, add(on_a, scale(edges.gap, n)))
+    return is_within or edges.gap < 0.0
+
+
+@kernel(inline=True)
+def _axis_of(box, k):
+    return box.x if k == 0 else box.y if k == 1 else box.z
+
+
+@kernel(inline=True)
+def _sign(value):
+    return 1.0 if value >= 0.0 else -1.0
+
+
+@kernel(inline=True)
+def _farthest_corner(box, n):
+    """The corner farthest along n, from the centre."""
+    x, y, z = scale(_sign(dot(box.x, n)), box.x), scale(_sign(dot(box.y, n)), box.y), scale(_sign(dot(box.z, n)), box.z)
+    return add(add(scale(box.half.x, x), scale(box.half.y, y)), scale(box.half.z, z))

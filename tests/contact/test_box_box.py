@@ -1,0 +1,122 @@
+"""Boxes by fifteen axes: brackets against the same axes in fractions, gaps against `distance`, decided often enough."""
+
+from __future__ import annotations
+
+from decimal import Decimal, getcontext
+from fractions import Fraction
+
+import numpy as np
+from naive_triangles import cross, inner
+
+import collide
+from collide.contact.box_box import box_rows
+from collide.kernels import address_of
+from collide.lowering.parts import convex_set_of
+from collide.lowering.shape_table import ShapeTable
+from collide.results import PAIR_DTYPE, UNDECIDED
+
+MODES = ("any", "flush", "tilted by 1e-9", "tilted by 1e-3", "edge on edge")
+
+
+def boxes(rng, mode: str):
+    """Two boxes near each other: (A, B, X_WA, X_WB)."""
+    A, B = collide.Box(rng.uniform(0.1, 1, 3)), collide.Box(rng.uniform(0.1, 1, 3))
+    X_WA = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3))
+    if mode == "any":
+        return A, B, X_WA, collide.pose(X_WA[:3, 3] + rng.normal(size=3) * 0.6, rpy=rng.uniform(-3, 3, 3))
+    if mode == "edge on edge":
+        X_AB = collide.pose((0, 0, 0), rpy=(np.pi / 4, 0, 0)) @ collide.pose((0, 0, 0), rpy=(0, 0, np.pi / 2))
+        X_WA = X_WA @ collide.pose((0, 0, 0), rpy=(np.pi / 4, 0, 0))
+        X_WB = X_WA @ X_AB @ collide.pose((0, 0, 0), rpy=rng.normal(size=3) * 0.1)
+        X_WB[:3, 3] = X_WA[:3, 3] + rng.normal(size=3)
+        r = collide.distance(A, B, X_WA, X_WB)
+        X_WB[:3, 3] -= (r.distance + rng.choice([1e-3, -1e-3, -1e-2])) * r.normal
+        return A, B, X_WA, X_WB
+    tilt = {"flush": 0.0, "tilted by 1e-9": 1e-9, "tilted by 1e-3": 1e-3}[mode]
+    k = int(rng.integers(3))
+    shift = rng.uniform(-0.3, 0.3, 3)
+    shift[k] = (A.size[k] + B.size[k]) / 2 + rng.choice([-1e-3, -1e-6, 1e-6, 1e-3])
+    about = np.zeros(3)
+    about[k] = rng.uniform(-3, 3)
+    X_AB = collide.pose(shift, rpy=about) @ collide.pose((0, 0, 0), rpy=rng.normal(size=3) * tilt)
+    return A, B, X_WA, X_WA @ X_AB
+
+
+def row_of(A, B, X_WA, X_WB, limit=np.inf):
+    table = ShapeTable([convex_set_of(A), convex_set_of(B)])
+    rows, a, b = np.zeros(1, dtype=PAIR_DTYPE), np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
+    n_open = box_rows(*table.addresses, 0, address_of(a), 16, address_of(b), 16, 1, limit, address_of(rows))
+    assert n_open == (rows["how"][0] == UNDECIDED)
+    return rows[0], not n_open
+
+
+def widest_gap(A, B, X_WA, X_WB) -> Decimal:
+    """The largest gap along the 15 axes, to forty digits: minus the depth, where it is negative."""
+    sides = []
+    for S, X in ((A, X_WA), (B, X_WB)):
+        half = [Fraction(v) / 2 for v in S.size.tolist()]
+        columns = [[Fraction(X[i, k]) for i in range(3)] for k in range(3)]
+        sides.append([[h * v for v in column] for h, column in zip(half, columns)])
+    t = [Fraction(b) - Fraction(a) for a, b in zip(X_WA[:3, 3].tolist(), X_WB[:3, 3].tolist())]
+    a, b = sides
+    pairs = [(p[i], p[j]) for p in (a, b) for i, j in ((0, 1), (1, 2), (2, 0))] + [(p, q) for p in a for q in b]
+    getcontext().prec = 60
+    best = None
+    for p, q in pairs:
+        c = cross(p, q)
+        square = inner(c, c)
+        if square == 0:
+            continue
+        gap = abs(inner(t, c)) - sum(abs(inner(g, c)) for g in a + b)
+        root = (Decimal(square.numerator) / Decimal(square.denominator)).sqrt()
+        value = Decimal(gap.numerator) / Decimal(gap.denominator) / root
+        best = value if best is None else max(best, value)
+    return best
+
+
+def test_brackets_hold_the_widest_gap():
+    decided = dict.fromkeys(MODES, 0)
+    for seed in range(500):
+        rng = np.random.default_rng(seed)
+        mode = MODES[seed % len(MODES)]
+        A, B, X_WA, X_WB = boxes(rng, mode)
+        where = f'boxes(np.random.default_rng({seed}), "{mode}")'
+        row, known = row_of(A, B, X_WA, X_WB)
+        if not known:
+            continue
+        decided[mode] += 1
+        r = collide.distance(A, B, X_WA, X_WB)
+        assert row["hit"] == r.hit and row["lower"] <= r.upper and r.lower <= row["upper"], where
+        assert row["upper"] - row["lower"] < 1e-11
+        n = row["normal"]
+        if r.hit:
+            gap = widest_gap(A, B, X_WA, X_WB)
+            assert Decimal(float(row["lower"])) <= gap <= Decimal(float(row["upper"])), where
+            moved = X_WB.copy()  # it is a way out, and none is shorter
+            moved[:3, 3] -= (row["lower"] - 1e-12) * n
+            assert not collide.collide(A, B, X_WA, moved), where
+        else:
+            assert np.abs(n - r.normal).max() < 1e-6 and abs(row["distance"] - r.distance) < 1e-13, where
+        assert abs(np.linalg.norm(n) - 1.0) < 1e-15
+        assert np.abs(row["point_b"] - row["point_a"] - row["distance"] * n).max() < 1e-13, where
+    assert min(decided.values()) > 50 and sum(decided.values()) > 380, decided
+
+
+def test_exchanged_rows_are_the_mirror():
+    for seed in range(100):
+        A, B, X_WA, X_WB = boxes(np.random.default_rng(seed), MODES[seed % len(MODES)])
+        (row, known), (back, back_known) = row_of(A, B, X_WA, X_WB), row_of(B, A, X_WB, X_WA)
+        assert known == back_known
+        if known:
+            assert np.array_equal(row["normal"], 0.0 - back["normal"])
+            assert np.array_equal(row["point_a"], back["point_b"])
+            assert all(row[name] == back[name] for name in ("distance", "lower", "upper", "hit"))
+
+
+def test_what_is_far_or_no_rotation_is_left_alone():
+    A, E = collide.Box(1, 1, 1), np.eye(4)
+    row, known = row_of(A, A, E, collide.pose((3, 0, 0)), limit=0.5)
+    assert known and row["beyond"] and 0.5 < row["lower"] <= 2.0
+    for bad in (np.diag([1.0, 1, 1 + 1e-6, 1]), np.diag([1.0, 1, -1, 1]), np.eye(4) * np.nan, np.diag([1.0, 1, 1, 2])):
+        assert not row_of(A, A, E, bad)[1]
+    assert not row_of(A, A, E, collide.pose((1, 0, 0)))[1]  # touching: exact arithmetic decides
