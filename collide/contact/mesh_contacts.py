@@ -151,9 +151,9 @@ assert IS_LARGEST == CAPACITY + 1
 
 
 def _longest_translation(A: Body, B: Body) -> float:
-    """How far bodies may overlap for patches to describe it [m]: half the smaller body's radius."""
+    """How far bodies may overlap for patches to describe it [m]: the smaller body's diameter."""
     smaller = min(A.reach, B.reach)
-    return 0.5 * smaller if smaller > 0.0 else max(A.reach, B.reach)
+    return 2.0 * (smaller if smaller > 0.0 else max(A.reach, B.reach))
 
 
 def _too_many(margin: float, A: Body, B: Body) -> UnsupportedQuery:

@@ -151,18 +151,20 @@ def _longest_needed(pairs, A, B, translations):
 
 @kernel
 def _gain(pairs, A, B, i, limit, translations):
-    """(pairs without a group that candidate i separates within a length, those of them that face along it, the length
-    needed for these).
+    """What candidate i does for the pairs that have no group, within a length: how many it separates, by which length
+    all of them, how many of them face along it, and by which length these.
     """
     n = vec3_at(translations.normals, 3 * i)
-    gained, forward, length = 0, 0, 0.0
+    gained, needed, forward, needed_forward = 0, 0.0, 0, 0.0
     for k in range(pairs.n):
-        if pairs.states[k] & TOUCHING and pairs.groups[k] < 0 and translations.depths[MAX_NORMALS * k + i] <= limit:
+        length = translations.depths[MAX_NORMALS * k + i]
+        if pairs.states[k] & TOUCHING and pairs.groups[k] < 0 and length <= limit:
             gained += 1
+            needed = max(needed, length)
             if _is_before(pairs, k, n, A, B):
                 forward += 1
-                length = max(length, translations.depths[MAX_NORMALS * k + i])
-    return gained, forward, length
+                needed_forward = max(needed_forward, length)
+    return gained, needed, forward, needed_forward
 
 
 @kernel
@@ -171,14 +173,13 @@ def _group_pairs(pairs, A, B, error, translations):
     limit = _LONGER * _longest_needed(pairs, A, B, translations)
     while translations.counts[N_WAYS] < MAX_TRANSLATIONS:
         best, best_gain, best_length = -1, 0, math.inf
-        for strict in range(2):
+        for attempt in range(2):
             # Pairs connected with a group come apart with it; but at least half must face along the normal.
             for i in range(translations.counts[N_CANDIDATES]):
-                gained, forward, length = _gain(pairs, A, B, i, limit, translations)
-                if strict == 0 and 2 * forward < gained:
-                    continue
-                gain = gained if strict == 0 else forward
-                if forward == 0 or gain < best_gain:
+                gain, length, forward, needed_forward = _gain(pairs, A, B, i, limit, translations)
+                if attempt == 1:
+                    gain, length = forward, needed_forward
+                if forward == 0 or 2 * forward < gain or gain < best_gain:
                     continue
                 shorter = length < best_length * (1.0 - 2.0**-20) - STEP_ERRORS * error
                 as_long = not shorter and length <= best_length * (1.0 + 2.0**-20) + STEP_ERRORS * error
