@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from collide.contact.contact_points import PatchPoints, copy_of_points
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import GAP as POINT_GAP
 from collide.contact.manifold_points import HEIGHT, POINT, V
 from collide.contact.reduce_patch import HullSpace, reduce_patch
@@ -19,16 +19,11 @@ from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
 _ERRORS, _SHARE = 64.0, 2.0**-30
 
 
-def _at(field: str, unit: int) -> int:
-    assert CONTACT_DTYPE.fields is not None
-    return CONTACT_DTYPE.fields[field][1] // unit
-
-
 CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 class PatchSpace(NamedTuple):
