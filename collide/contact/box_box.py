@@ -180,8 +180,9 @@ def _put_row(A, B, limit, row):
     row.flags[HIT] = 1 if upper < 0.0 else 0
     row.flags[CERTIFIED] = 1
     row.flags[HOW] = SIMPLEX if upper < 0.0 else PLANE
-    # What touches, or nearly, is left to exact arithmetic.
-    return is_proven and (lower > 0.0 or upper < 0.0) and upper - lower <= _WIDEST * size
+    # What touches, or nearly, is left to exact arithmetic, and so is what may be beyond the limit.
+    is_decided = (lower > 0.0 or upper < 0.0) and upper <= limit
+    return is_proven and is_decided and upper - lower <= _WIDEST * size
 
 
 @kernel(inline=True)

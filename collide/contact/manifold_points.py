@@ -11,8 +11,11 @@ from collide.kernels import kernel
 #: Doubles of a point: place across the normal, gap along it, height of the middle between both bodies.
 U, V, GAP, HEIGHT = range(4)
 POINT = 4
-#: Sines up to this are those of parallel lines: where these overlap they touch along a line.
-_PARALLEL = 2.0**-30
+#: Sines up to this are those of parallel lines: where these overlap they touch along a line, and each end lies off the
+#: other line by so much of its length at most.
+_PARALLEL = 2.0**-36
+#: Lines farther beside each other than this part of the shorter do not touch along it.
+_BESIDE = 2.0**-20
 
 
 class ManifoldPoints(NamedTuple):
@@ -125,6 +128,10 @@ def _overlap_of_edges(edge_a, edge_b, tolerance, manifold):
     if length_a == 0.0 or length_b == 0.0:
         return 0
     if abs(du * ev - dv * eu) > _PARALLEL * length_a * length_b + tolerance * (length_a + length_b):
+        return 0
+    # The normal of curved bodies is good to 2⁻²⁶: seen along it, lines that touch may lie beside each other by as much.
+    beside = abs(du * (edge_b.corners[1] - v0) - dv * (edge_b.corners[0] - u0)) / length_a
+    if beside > _BESIDE * min(length_a, length_b) + tolerance:
         return 0
     square = length_a * length_a
     at_0 = ((edge_b.corners[0] - u0) * du + (edge_b.corners[1] - v0) * dv) / square
