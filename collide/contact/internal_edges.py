@@ -41,6 +41,14 @@ def _leaves(pairs, k, side, body, point, u, slack):
         return not rises and _is_outside(body, outward, u, slack)
     corner = pairs.ids[ids_at + first]
     end = pairs.ids[ids_at + second] if second >= 0 else -1
+    return fan_allows(body, corner, end, point, u, slack)
+
+
+@kernel
+def fan_allows(body, corner, end, point, u, slack):
+    """Whether u leaves a body at right angles from a point at a corner, or of the edge from there to the corner ``end``
+    (−1: none).
+    """
     outward = Vec3(0.0, 0.0, 0.0)
     for at in range(int(body.fan_starts[corner]), int(body.fan_starts[corner + 1])):
         facet = int(body.fans[at])

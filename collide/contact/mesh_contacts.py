@@ -10,7 +10,6 @@ from collide.contact.contact_facets import topology_of
 from collide.contact.contact_rows import CONTACT_DTYPE, GAP, TRANSLATION
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.facet_manifolds import (
-    CAPACITY,
     CONTACT_HEADER,
     DONE,
     IS_LARGEST,
@@ -20,6 +19,7 @@ from collide.contact.facet_manifolds import (
     ROWS_DONE,
     ROWS_FULL,
     TOO_MANY,
+    WORDS_AT,
     facet_manifolds,
     workspace_words,
 )
@@ -87,9 +87,7 @@ def facet_contacts(
     topology_of(body_of(A)), topology_of(body_of(B))  # made once, before threads ask for them
 
     def answer(piece: slice) -> None:
-        XA, XB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
-        some = None if slack is None else slack[piece]
-        of_piece[piece.start] = _of_poses(A, B, XA, XB, piece.stop - piece.start, margin, max_contacts, some)
+        of_piece[piece.start] = _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
 
     if len(pieces) == 1:
         answer(pieces[0])
@@ -105,9 +103,12 @@ def facet_contacts(
 
 
 def _of_poses(
-    A: Shape, B: Shape, X_WA, X_WB, n: int, margin: float, max_contacts: int, slack: np.ndarray | None
+    A: Shape, B: Shape, X_WA, X_WB, piece: slice, margin: float, max_contacts: int, slack: np.ndarray | None
 ) -> Rows:
-    """The same in one thread."""
+    """The same of a piece of the poses, in one thread."""
+    n = piece.stop - piece.start
+    X_WA, X_WB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
+    slack = None if slack is None else slack[piece]
     body_a, body_b = body_of(A), body_of(B)
     exchanged = body_b.key < body_a.key
     ordered = (body_b, body_a) if exchanged else (body_a, body_b)
@@ -134,20 +135,15 @@ def _of_poses(
             out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])
         elif status == PAIRS_FULL:
             space.grow()
-            header[WORDS : WORDS + 3] = space.described
+            header[WORDS_AT : IS_LARGEST + 1] = space.described
         elif status == TOO_MANY:
             raise _too_many(margin, body_a, body_b)
         else:
-            raise not_invertible(int(header[POSES_DONE]))
+            raise not_invertible(piece.start + int(header[POSES_DONE]))
     rows = out[: header[ROWS_DONE]]
     if lacks.any():
         return _with_distances(A, B, X_WA, X_WB, margin, slack, rows, ends, lacks)
     return rows, ends
-
-
-#: Where the header names the workspace: its address, for how many pairs it is, whether it is the largest.
-WORDS = CAPACITY - 1
-assert IS_LARGEST == CAPACITY + 1
 
 
 def _longest_translation(A: Body, B: Body) -> float:

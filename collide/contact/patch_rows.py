@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from collide.contact.contact_points import PatchPoints, copy_of_points
 from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
@@ -17,7 +17,6 @@ from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
 _ERRORS, _SHARE = 64.0, 2.0**-30
-
 
 CONTACT = CONTACT_DTYPE.itemsize
 _DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
@@ -72,59 +71,99 @@ def _extent(points, n):
     return max(high_u - low_u, high_v - low_v)
 
 
+class RowsOf(NamedTuple):
+    """What all rows of a patch share.
+
+    axes : `ContactAxes`.   origin : of A in the world.   radius_a, radius_b : of the balls swept over both [m].
+    error : beyond those of the gaps [m].   meets : whether something of the patch meets.   apart : as in the rows [m].
+    number : of the patch.
+    """
+
+    axes: Any
+    origin: Vec3
+    radius_a: float
+    radius_b: float
+    error: float
+    meets: bool
+    apart: float
+    number: int
+
+
 @kernel
 def put_patch(frame, patch, apart, number, space, n_rows):
     """Append the rows of a patch; how many there are then, −1 where there is no place for them.
 
     apart : as in the rows [m].   number : of the patch.
     """
-    points, target = frame.points, space.target
-    radius = frame.A.radius + frame.B.radius
-    n = _keep_near(points, patch.n, space.margin + radius)
-    tolerance = max(_ERRORS * frame.error, _SHARE * _extent(points, n))
-    n = reduce_patch(points, n, tolerance, target, space.hull)
-    n = select_points(target.manifold, n, 0, space.max_contacts, space.hull.order)
+    target = space.target
+    radius_a, radius_b = frame.A.radius, frame.B.radius
+    n = choose_points(frame.points, patch.n, frame.error, space.margin + radius_a + radius_b, space)
     if n_rows + n > space.capacity:
         return -1
+    error = 8.0 * frame.error if radius_a + radius_b > 0.0 else 0.0
+    rows = RowsOf(patch.axes, space.origin, radius_a, radius_b, error, patch.meets, apart, number)
     for i in range(n):
-        contact_at = space.out + CONTACT * (n_rows + i)
         k = space.hull.order[i]
-        _put_row(contact_at, frame, patch, k, space)
-        doubles, words = view_f64(contact_at, CONTACT // 8), view_i32(contact_at, CONTACT // 4)
-        doubles[_APART] = apart
-        words[_PATCH] = number
+        pair = INTS_OF_PAIR * target.pairs[k]
+        facet_a, facet_b = frame.pairs.facets[pair + FACET_A], frame.pairs.facets[pair + FACET_B]
+        put_row(space.out + CONTACT * (n_rows + i), target, k, facet_a, facet_b, rows)
     return n_rows + n
 
 
 @kernel
-def _put_row(contact_at, frame, patch, k, space):
-    """One contact: point k of the target."""
+def choose_points(points, n, error, limit, space):
+    """Put the contacts of a patch of n points into ``space.target``, in the order of ``space.hull.order``; how many.
+
+    error : of a coordinate [m].   limit : gaps are no larger, but for their errors [m].
+    """
+    n = _keep_near(points, n, limit)
+    tolerance = max(_ERRORS * error, _SHARE * _extent(points, n))
+    n = reduce_patch(points, n, tolerance, space.target, space.hull)
+    return select_points(space.target.manifold, n, 0, space.max_contacts, space.hull.order)
+
+
+@kernel
+def put_row(contact_at, points, k, facet_a, facet_b, rows):
+    """Write one contact: point k."""
     doubles, words = view_f64(contact_at, CONTACT // 8), view_i32(contact_at, CONTACT // 4)
-    points, axes = space.target, patch.axes
+    axes = rows.axes
     p, at = points.manifold.points, POINT * k
-    radius_a, radius_b = frame.A.radius, frame.B.radius
-    radius = radius_a + radius_b
-    distance = p[at + POINT_GAP] - radius
-    error = points.errors[k] + (8.0 * frame.error if radius > 0.0 else 0.0)
-    if patch.meets and 0.0 < distance <= error:  # what touches is no gap, though it may come out as one
+    distance = p[at + POINT_GAP] - (rows.radius_a + rows.radius_b)
+    error = points.errors[k] + rows.error
+    if rows.meets and 0.0 < distance <= error:  # what touches is no gap, though it may come out as one
         distance = 0.0
-    height = p[at + HEIGHT] + 0.5 * (radius_a - radius_b)
+    height = p[at + HEIGHT] + 0.5 * (rows.radius_a - rows.radius_b)
     middle = add(add(scale(p[at], axes.e), scale(p[at + V], axes.f)), scale(height, axes.nhat))
-    middle = add(middle, space.origin)
+    middle = add(middle, rows.origin)
     half = scale(0.5 * distance, axes.nhat)
     doubles[_DISTANCE] = distance + 0.0
     doubles[_LOWER] = distance - error
     doubles[_UPPER] = distance + error
+    doubles[_APART] = rows.apart
     put_vec3(doubles, _NORMAL, add(axes.nhat, Vec3(0.0, 0.0, 0.0)))
     put_vec3(doubles, _POINT_A, sub(middle, half))
     put_vec3(doubles, _POINT_B, add(middle, half))
-    pair = INTS_OF_PAIR * points.pairs[k]
     words[_B] = 1
-    words[_FACET_A] = frame.pairs.facets[pair + FACET_A]
-    words[_FACET_B] = frame.pairs.facets[pair + FACET_B]
+    words[_FACET_A] = facet_a
+    words[_FACET_B] = facet_b
     words[_FEATURE_A] = points.manifold.features[2 * k]
     words[_FEATURE_B] = points.manifold.features[2 * k + 1]
-    words[_KIND] = OVERLAP if patch.meets else GAP
+    words[_KIND] = OVERLAP if rows.meets else GAP
+    words[_PATCH] = rows.number
+
+
+@kernel
+def widen_row(contact_at, distance, lower, upper):
+    """Make the distance of a row that of its pair of facets, where the brackets of both overlap: both hold the truth."""
+    doubles = view_f64(contact_at, CONTACT // 8)
+    if doubles[_LOWER] <= upper and lower <= doubles[_UPPER]:
+        doubles[_DISTANCE] = distance + 0.0
+        doubles[_LOWER] = min(doubles[_LOWER], lower)
+        doubles[_UPPER] = max(doubles[_UPPER], upper)
+        middle = scale(0.5, add(vec3_at(doubles, _POINT_A), vec3_at(doubles, _POINT_B)))
+        half = scale(0.5 * distance, vec3_at(doubles, _NORMAL))
+        put_vec3(doubles, _POINT_A, sub(middle, half))
+        put_vec3(doubles, _POINT_B, add(middle, half))
 
 
 @kernel
