@@ -10,7 +10,8 @@ import numpy as np
 from collide.batches import answer_batch, of_one_set
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
-from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfspace_contacts
+from collide.contact.curved_contacts import curved_contacts
+from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of

@@ -7,8 +7,9 @@ from threading import local
 import numpy as np
 
 from collide.contact.contact_facets import topology_of
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, TRANSLATION
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
+from collide.contact.distance_contacts import with_distances
 from collide.contact.facet_manifolds import (
     CONTACT_HEADER,
     DONE,
@@ -26,13 +27,12 @@ from collide.contact.facet_manifolds import (
 from collide.contact.support_face import VERTEX
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
-from collide.lowering.facet_bodies import Body, body_of, has_facets, hull_of, is_halfspace
+from collide.lowering.facet_bodies import Body, body_of, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
 from collide.narrowphase.facets.collide_kernel import HEADER
 from collide.narrowphase.facets.facet_kernel_calls import pair_header, step_of
 from collide.narrowphase.facets.facet_queries import not_invertible, stack_of, workspace
 from collide.narrowphase.facets.facets_within import list_near_pairs
-from collide.narrowphase.facets.mesh_methods import mesh_rows
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 
@@ -142,7 +142,8 @@ def _of_poses(
             raise not_invertible(piece.start + int(header[POSES_DONE]))
     rows = out[: header[ROWS_DONE]]
     if lacks.any():
-        return _with_distances(A, B, X_WA, X_WB, margin, slack, rows, ends, lacks)
+        limit = np.full(n, margin) if slack is None else margin + slack
+        return with_distances(A, B, X_WA, X_WB, limit, rows, ends, lacks)
     return rows, ends
 
 
@@ -180,54 +181,3 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
-
-
-# --- rows of distance ---------------------------------------------------------------------------
-
-
-def curved_contacts(
-    A: Shape, B: Shape, X_WA, X_WB, margin: float, _max_contacts: int, slack: np.ndarray | None, threads: int
-) -> Rows:
-    """One row a pose for a mesh and a shape without exact facets: the answer of `distance`; none beyond the margin."""
-    limit = margin if slack is None else margin + float(slack.max(initial=0.0))
-    n = max(len(X_WA), len(X_WB))
-    rows = np.zeros(n, dtype=CONTACT_DTYPE)
-    answers = mesh_rows(A, B, X_WA, X_WB, limit=limit)
-    keep = ~answers["beyond"] & (answers["lower"] <= (margin if slack is None else margin + slack))
-    _write_distances(A, B, answers, rows)
-    return rows[keep], np.cumsum(keep)
-
-
-def _write_distances(A: Shape, B: Shape, answers: np.ndarray, rows: np.ndarray) -> None:
-    """Make contacts, zeroed before, of rows of `distance`."""
-    hit = answers["hit"]
-    for name in ("normal", "point_a", "point_b", "distance", "lower", "upper"):
-        rows[name] = answers[name]
-    for part, name, shape in (("part_a", "facet_a", A), ("part_b", "facet_b", B)):
-        rows[name] = answers[part] if has_facets(shape) else -1
-    rows["apart"] = np.where(hit, -answers["lower"], 0.0)
-    rows["kind"] = np.where(hit, TRANSLATION, GAP)
-    rows["feature_a"] = rows["feature_b"] = -1
-    rows["b"] = 1
-
-
-def _with_distances(
-    A: Shape, B: Shape, X_WA, X_WB, margin: float, slack, rows: np.ndarray, ends: np.ndarray, lacks: np.ndarray
-) -> Rows:
-    """Rows, and those of `distance` behind the contacts of the poses that lack them."""
-    poses = np.flatnonzero(lacks)
-    XA, XB = (X if len(X) == 1 else np.ascontiguousarray(X[poses]) for X in (X_WA, X_WB))
-    counts = np.diff(ends, prepend=0)
-    answers = mesh_rows(A, B, XA, XB, limit=np.inf)
-    appended = np.zeros(len(poses), dtype=CONTACT_DTYPE)
-    _write_distances(A, B, answers, appended)
-    limit = margin if slack is None else margin + slack[poses]
-    keep = (counts[poses] > 0) | (answers["lower"] <= limit)
-    last = np.maximum(ends[poses] - 1, 0)
-    if len(rows):
-        appended["patch"] = np.where(counts[poses] > 0, rows["patch"][last] + 1, 0)
-    with_patches = (counts[poses] > 0) & answers["hit"]
-    appended["upper"][with_patches] = 0.0  # how much shorter another translation might be is not known
-    poses, appended = poses[keep], appended[keep]
-    counts[poses] += 1
-    return np.insert(rows, ends[poses], appended), np.cumsum(counts)
