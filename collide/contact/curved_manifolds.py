@@ -135,7 +135,8 @@ def _open_near(words, at, first, n, error, pair):
         n, mesh, view_i64(words[FACETS_AT] + 8 * first, n), words[ROWS_AT] + ROW * first, corners, normals, states,
         queue, view_i64(words[PATCHES_AT] + 8 * first, n), view_i64(words[SLOTS_AT], n_mesh),
         view_i64(words[SEEN_AT], mesh.n_corners), origin, error, sub(vec3_at(R, 9), origin), axis, points, face,
-        face_features, face_edges, Clipped(points_1, sides_1), Clipped(points_2, sides_2), ManifoldPoints(overlap, features),
+        face_features, face_edges, Clipped(points_1, sides_1), Clipped(points_2, sides_2),
+        ManifoldPoints(overlap, features),
     )  # fmt: skip
     return near, at
 

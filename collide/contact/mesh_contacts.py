@@ -36,8 +36,8 @@ from collide.narrowphase.facets.facets_within import list_near_pairs
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 
-#: Pairs of facets there is space for to begin with, and at most: they take a gigabyte.
-_FEWEST_PAIRS, MAX_PAIRS = 1 << 10, 1 << 18
+#: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
+_FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
@@ -87,7 +87,10 @@ def facet_contacts(
     topology_of(body_of(A)), topology_of(body_of(B))  # made once, before threads ask for them
 
     def answer(piece: slice) -> None:
-        of_piece[piece.start] = _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
+        try:
+            of_piece[piece.start] = _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
+        finally:
+            _of_thread.shrink()
 
     if len(pieces) == 1:
         answer(pieces[0])
@@ -178,6 +181,11 @@ class _OfThread(local):
 
     def grow(self) -> None:
         self._keep(min(4 * self._capacity, MAX_PAIRS))
+
+    def shrink(self) -> None:
+        """Give back what is more than a thread may keep."""
+        if self._capacity > _KEPT_PAIRS:
+            self._keep(_FEWEST_PAIRS)
 
 
 _of_thread = _OfThread()

@@ -26,11 +26,11 @@ def beyond(shape, points) -> np.ndarray:
     x, y, z = np.asarray(points).T
     r = np.hypot(x, y)
     if isinstance(shape, collide.Cylinder):
-        return np.maximum(r - shape.radius, np.abs(z) - shape.height / 2)
+        return np.maximum(r - shape.radius, np.abs(z) - shape.length / 2)
     if isinstance(shape, collide.Cone):
-        slant = np.hypot(shape.radius, shape.height)
-        side = (shape.height * r + shape.radius * (z - shape.height / 2)) / slant
-        return np.maximum(side, -shape.height / 2 - z)
+        slant = np.hypot(shape.radius, shape.length)
+        side = (shape.length * r + shape.radius * (z - shape.length / 2)) / slant
+        return np.maximum(side, -shape.length / 2 - z)
     scaled = np.stack([x, y, z], axis=1) / shape.radii
     return (np.linalg.norm(scaled, axis=1) - 1) * min(shape.radii)
 
