@@ -53,11 +53,12 @@ def _topology(body: Body) -> Topology:
     tree = body.tree
     places = np.empty(len(tree.ids), dtype=np.int32)
     places[tree.ids] = np.arange(len(places))
-    is_mesh = isinstance(body.shape, Mesh)
-    if is_mesh:
-        corners = np.ascontiguousarray(body.shape.survey.corners, dtype=np.int32)
+    shape = body.shape
+    is_mesh = isinstance(shape, Mesh)
+    if isinstance(shape, Mesh):
+        corners = np.ascontiguousarray(shape.survey.corners, dtype=np.int32)
     else:
-        corners = _rows_of_points(convex_set_of(body.shape).points, tree.triangles[places].reshape(-1, 3))
+        corners = _rows_of_points(convex_set_of(shape).points, tree.triangles[places].reshape(-1, 3))
     n_corners = int(corners.max()) + 1
     fans = (np.argsort(corners.ravel(), kind="stable") // 3).astype(np.int32)
     fan_starts = np.zeros(n_corners + 1, dtype=np.int32)

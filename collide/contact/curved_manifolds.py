@@ -325,8 +325,11 @@ def _put_parted(task, n_meeting, n_rows):
     for k in range(n_meeting):
         near.states[k] |= REACHED
         total = add(total, vec3_at(near.normals, 3 * k))
-    for i in range(0, n_meeting + stride, stride):
-        v = vec3_at(near.normals, 3 * i) if i < n_meeting else total
+    for i in range(_TRIED + 1):
+        k = i * stride
+        if k >= n_meeting + stride:
+            break
+        v = vec3_at(near.normals, 3 * k) if k < n_meeting else total
         length = norm(v)
         if not length > 2.0**-20:
             continue
