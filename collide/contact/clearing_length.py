@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from collide.contact.contact_pairs import REACHED
+from collide.contact.contact_pairs import N_REACHED
 from collide.contact.contact_points import see_pair
 from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.kernels import kernel, view_f64, view_i64
@@ -77,11 +77,10 @@ def clearing_length(pairs, A, B, axes, depth, clearing, seen):
 def _slabs_part(pairs, axes, length, clearing, seen):
     """Whether slabs across the normal part all pairs after a translation: rounding of seven terms is counted in."""
     wanted = clearing.radius - length + 8.0 * clearing.error
-    for k in range(pairs.n):
-        if pairs.states[k] & REACHED:
-            least, _ = see_pair(pairs, k, axes, seen)
-            if not least > wanted:
-                return False
+    for i in range(pairs.search[N_REACHED]):
+        least, _ = see_pair(pairs, pairs.queue[i], axes, seen)
+        if not least > wanted:
+            return False
     return True
 
 
@@ -109,9 +108,8 @@ def _facets_part(pairs, A, B, axes, length, clearing, move_a):
     counters = view_i64(clearing.words + 448, 2)
     shift = shift_between(trees.XA, trees.XB)
     error = clearing.error + 2.0**-50 * (norm1(step) + norm1(shift))
-    for k in range(pairs.n):
-        if not pairs.states[k] & REACHED:
-            continue
+    for i in range(pairs.search[N_REACHED]):
+        k = pairs.queue[i]
         a = int(A.places[pairs.facets[INTS_OF_PAIR * k + FACET_A]])
         b = int(B.places[pairs.facets[INTS_OF_PAIR * k + FACET_B]])
         put_in_frame_of_a(trees.placing, trees.B.triangles, 9 * b, trees.corners, 9)

@@ -13,9 +13,11 @@ from collide.narrowphase.facets.facets_within import INTS_OF_PAIR, MEETS, NUMBER
 from collide.numerics.vec3 import Vec3, cross, dot, norm, put_vec3, scale, sub, vec3_at
 
 # What a pair is, bits: its facets meet or nearly; it was told apart by a translation, or is in a patch; its nearest
-# points are local minima; then what searches mark: where they start, what they may pass, what they reached, what
-# was looked at; pairs of the translation in hand; and whether it is known that nearest points are local minima.
-TOUCHING, COVERED, LEAST, SEED, PASSABLE, REACHED, TRIED, WANTED, JUDGED = (1 << bit for bit in range(9))
+# points are local minima; then what searches mark: where they start, what they may pass, what they reached; pairs of
+# the translation in hand; and whether it is known that nearest points are local minima.
+TOUCHING, COVERED, LEAST, SEED, PASSABLE, REACHED, WANTED, JUDGED = (1 << bit for bit in range(8))
+# What is known of the last search: its number, and how many pairs it reached: those in the queue.
+SEARCH, N_REACHED = range(2)
 
 #: Most corners of an overlap of two facets, with what rounding may add: 3 and 3 corners, 9 crossings.
 MAX_POINTS = 15
@@ -23,7 +25,7 @@ MAX_POINTS = 15
 _FLAT_FACET = 2.0**-44
 
 # Workspace, words a pair: of `ContactPairs`, in the order of its fields from `near` on.
-_WORDS = (NUMBERS_OF_PAIR, INTS_OF_PAIR, 18, 6, 6, 9, 9, 10, 9, 1, 1, 1, 3, 1, 1, 1, 80)
+_WORDS = (NUMBERS_OF_PAIR, INTS_OF_PAIR, 18, 6, 6, 9, 9, 10, 9, 1, 1, 1, 1, 2, 3, 1, 1, 1, 80)
 WORDS_OF_PAIRS = sum(_WORDS)
 
 
@@ -33,8 +35,9 @@ class ContactPairs(NamedTuple):
     near, facets : as `list_near_pairs` gives them.
     corners : of both facets (18), seen from A's origin.   normals : unit ones (6), 0 of facets without area.
     ids : numbers of the corners (6).   keys : numbers of the pairs of corners (9): linked pairs share one.
-    by_key, key_starts : pairs at key after key, and where those of each begin.   seen_keys : marks of a search.
-    states : bits.   groups : of the translation that separates the pair, −1 for none.   queue : of a search.
+    by_key, key_starts : pairs at key after key, and where those of each begin.   seen_keys : the last search that
+    came by each.   states : bits.   groups : of the translation that separates the pair, −1 for none.
+    queue, tried, search : of searches: pairs reached, the last one that looked at each pair, SEARCH and N_REACHED.
     directions, slacks, gaps : of pairs that are apart, from A's nearest point to B's, what in it may be rounding, and
     how long it is in errors of a coordinate; infinite of others.   order : numbers of pairs.
     table : of hashes.
@@ -53,6 +56,8 @@ class ContactPairs(NamedTuple):
     states: Any
     groups: Any
     queue: Any
+    tried: Any
+    search: Any
     directions: Any
     slacks: Any
     gaps: Any
@@ -76,23 +81,27 @@ def open_pairs(words_at, capacity, n):
     seen_keys, states = view_i64(at, 9 * capacity), view_i64(at + 9 * step, capacity)
     at += 10 * step
     groups, queue = view_i64(at, capacity), view_i64(at + step, capacity)
-    at += 2 * step
+    tried, search = view_i64(at + 2 * step, capacity), view_i64(at + 3 * step, 2)
+    at += 5 * step
     directions, slacks = view_f64(at, 3 * capacity), view_f64(at + 3 * step, capacity)
     at += 4 * step
     gaps, order, table = view_f64(at, capacity), view_i64(at + step, capacity), view_i64(at + 2 * step, 80 * capacity)
     return ContactPairs(
-        n, near, facets, corners, normals, ids, keys, by_key, key_starts, seen_keys, states, groups, queue, directions,
-        slacks, gaps, order, table,
+        n, near, facets, corners, normals, ids, keys, by_key, key_starts, seen_keys, states, groups, queue, tried,
+        search, directions, slacks, gaps, order, table,
     )  # fmt: skip
 
 
 @kernel
 def pose_pairs(pairs, A, B):
-    """Fill in corners, normals and numbers of corners."""
+    """Fill in corners, normals and numbers of corners; there was no search yet."""
+    pairs.search[SEARCH] = 0
+    pairs.search[N_REACHED] = 0
     for k in range(pairs.n):
         _pose_facet(pairs, k, 0, A)
         _pose_facet(pairs, k, 1, B)
         pairs.states[k] = 0
+        pairs.tried[k] = 0
         pairs.groups[k] = -1
 
 
@@ -173,6 +182,7 @@ def link_pairs(pairs, n_corners_b):
                     table[2 * slot] = key
                     table[2 * slot + 1] = n_keys
                     starts[n_keys] = 0
+                    pairs.seen_keys[n_keys] = 0
                     n_keys += 1
                 number = table[2 * slot + 1]
                 keys[9 * k + 3 * i + j] = number
@@ -190,18 +200,19 @@ def link_pairs(pairs, n_corners_b):
 
 
 @kernel
-def forget_search(pairs, bits):
-    """Take bits from all pairs, and the marks of a search."""
-    for k in range(pairs.n):
-        pairs.states[k] &= ~bits
-    for k in range(9 * pairs.n):
-        pairs.seen_keys[k] = 0
+def begin_search(pairs):
+    """Take the marks of the last search from what it reached; the number of the next."""
+    for i in range(pairs.search[N_REACHED]):
+        pairs.states[pairs.queue[i]] &= ~REACHED
+    pairs.search[N_REACHED] = 0
+    pairs.search[SEARCH] += 1
+    return pairs.search[SEARCH]
 
 
 @kernel
 def spread(pairs):
     """Mark as REACHED all SEED pairs, and all PASSABLE ones that are linked with them through such."""
-    forget_search(pairs, REACHED)
+    number = begin_search(pairs)
     end = 0
     for k in range(pairs.n):
         if pairs.states[k] & SEED:
@@ -214,12 +225,13 @@ def spread(pairs):
         begin += 1
         for i in range(9 * k, 9 * k + 9):
             key = pairs.keys[i]
-            if pairs.seen_keys[key] != 0:
+            if pairs.seen_keys[key] == number:
                 continue
-            pairs.seen_keys[key] = 1
+            pairs.seen_keys[key] = number
             for at in range(pairs.key_starts[key], pairs.key_starts[key + 1]):
                 linked = pairs.by_key[at]
                 if pairs.states[linked] & REACHED == 0 and pairs.states[linked] & PASSABLE:
                     pairs.states[linked] |= REACHED
                     pairs.queue[end] = linked
                     end += 1
+    pairs.search[N_REACHED] = end

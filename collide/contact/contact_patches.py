@@ -16,18 +16,16 @@ from collide.contact.contact_pairs import (
     COVERED,
     JUDGED,
     LEAST,
-    PASSABLE,
+    N_REACHED,
     REACHED,
-    SEED,
+    SEARCH,
     TOUCHING,
-    TRIED,
     WANTED,
     ContactPairs,
+    begin_search,
     facing_a,
     facing_b,
-    forget_search,
     pair_meets,
-    spread,
 )
 from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_points
 from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
@@ -121,9 +119,10 @@ def grow_patch(frame, first, axes, deepest):
     """
     pairs, A, B = frame.pairs, frame.A, frame.B
     view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False)
-    forget_search(pairs, REACHED | TRIED)
+    number = begin_search(pairs)
     n = put_points(pairs, first, A, B, view, frame.points, 0)
-    pairs.states[first] |= REACHED | TRIED
+    pairs.states[first] |= REACHED
+    pairs.tried[first] = number
     pairs.queue[0] = first
     begin, end = 0, 1
     while begin < end:
@@ -131,14 +130,14 @@ def grow_patch(frame, first, axes, deepest):
         begin += 1
         for i in range(9 * k, 9 * k + 9):
             key = pairs.keys[i]
-            if pairs.seen_keys[key] != 0:
+            if pairs.seen_keys[key] == number:
                 continue
-            pairs.seen_keys[key] = 1
+            pairs.seen_keys[key] = number
             for at in range(pairs.key_starts[key], pairs.key_starts[key + 1]):
                 linked = pairs.by_key[at]
-                if pairs.states[linked] & TRIED:
+                if pairs.tried[linked] == number:
                     continue
-                pairs.states[linked] |= TRIED
+                pairs.tried[linked] = number
                 is_seed = pairs.states[linked] & WANTED != 0
                 if not is_seed and not _is_along(frame, linked, axes.nhat):
                     continue
@@ -148,6 +147,7 @@ def grow_patch(frame, first, axes, deepest):
                     pairs.states[linked] |= REACHED
                     pairs.queue[end] = linked
                     end += 1
+    pairs.search[N_REACHED] = end
     return n
 
 
@@ -181,9 +181,9 @@ def seed_group(frame, number):
 
 
 @kernel
-def next_seed(frame):
-    """The next WANTED pair; −1 where none is left."""
-    for k in range(frame.pairs.n):
+def next_seed(frame, first):
+    """The next WANTED pair from ``first`` on; −1 where none is left."""
+    for k in range(first, frame.pairs.n):
         if frame.pairs.states[k] & WANTED:
             return k
     return -1
@@ -195,8 +195,9 @@ def grow_overlap(frame, first, axes, length):
     pairs = frame.pairs
     n = grow_patch(frame, first, axes, DEEPEST * length)
     meets = False
-    for k in range(pairs.n):
-        if pairs.states[k] & REACHED and pairs.states[k] & WANTED:
+    for i in range(pairs.search[N_REACHED]):
+        k = pairs.queue[i]
+        if pairs.states[k] & WANTED:
             meets = meets or pair_meets(pairs, k)
             pairs.states[k] &= ~WANTED
     return Patch(axes, n, meets)
@@ -206,24 +207,39 @@ def grow_overlap(frame, first, axes, length):
 def cover_patch(frame, nhat):
     """The pairs of the patch, and local minima that are linked with them in the same direction, start no patches."""
     pairs = frame.pairs
-    n_passable = 0
-    for k in range(pairs.n):
-        state = pairs.states[k] & ~(SEED | PASSABLE)
-        if state & REACHED:
-            state |= SEED | COVERED
-        pairs.states[k] = state
-        if not state & COVERED and pairs.gaps[k] < math.inf:
-            off = norm(sub(vec3_at(pairs.directions, 3 * k), nhat))
-            if off <= pairs.slacks[k] + _SAME and _is_minimum(frame, k):
-                pairs.states[k] |= PASSABLE
-                n_passable += 1
-    if n_passable == 0:
-        return
-    spread(pairs)
-    for k in range(pairs.n):
-        if pairs.states[k] & REACHED:
-            pairs.states[k] |= COVERED
-        pairs.states[k] &= ~(SEED | PASSABLE)
+    end = pairs.search[N_REACHED]
+    pairs.search[SEARCH] += 1
+    number = pairs.search[SEARCH]
+    begin = 0
+    while begin < end:
+        k = pairs.queue[begin]
+        begin += 1
+        pairs.states[k] |= COVERED
+        for i in range(9 * k, 9 * k + 9):
+            key = pairs.keys[i]
+            if pairs.seen_keys[key] == number:
+                continue
+            pairs.seen_keys[key] = number
+            for at in range(pairs.key_starts[key], pairs.key_starts[key + 1]):
+                linked = pairs.by_key[at]
+                if pairs.tried[linked] == number or pairs.states[linked] & (COVERED | REACHED):
+                    continue
+                pairs.tried[linked] = number
+                if _is_same_minimum(frame, linked, nhat):
+                    pairs.states[linked] |= REACHED
+                    pairs.queue[end] = linked
+                    end += 1
+    pairs.search[N_REACHED] = end
+
+
+@kernel
+def _is_same_minimum(frame, k, nhat):
+    """Whether a pair's nearest points are local minima in a direction."""
+    pairs = frame.pairs
+    if not pairs.gaps[k] < math.inf:
+        return False
+    off = norm(sub(vec3_at(pairs.directions, 3 * k), nhat))
+    return off <= pairs.slacks[k] + _SAME and _is_minimum(frame, k)
 
 
 # --- gaps ---------------------------------------------------------------------------------------

@@ -339,7 +339,7 @@ def _put_patches(frame, ways, rows, clearing, first, is_deep):
     for i in range(ways.counts[N_WAYS]):
         axes = axes_across(vec3_at(ways.ways, 3 * i))
         seed_group(frame, i)
-        seed = next_seed(frame)
+        seed = next_seed(frame, 0)
         while seed >= 0:
             patch = grow_overlap(frame, seed, axes, ways.lengths[i])
             if patch.n > 0:
@@ -349,7 +349,7 @@ def _put_patches(frame, ways, rows, clearing, first, is_deep):
                 number += 1
             else:
                 is_deep = is_deep or patch.meets
-            seed = next_seed(frame)
+            seed = next_seed(frame, seed)
     n_apart = sort_by_gap(frame, n_apart)
     if number == 0:
         need_nearest(frame, n_apart)
