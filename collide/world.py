@@ -251,9 +251,9 @@ class World:
 
         Returns
         -------
-        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. None is left out that is
-            not
-        proven farther apart: ``lower ≤ max_distance`` of all of them. Two half-spaces that meet have distance −inf.
+        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. None is left out
+            that is not proven farther apart: ``lower ≤ max_distance`` of all of them. Two half-spaces that meet have
+            distance −inf.
 
         Raises
         ------
@@ -274,9 +274,8 @@ class World:
 
         Returns
         -------
-        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, one a contact, sorted by (a, b). What they
-            say
-        and promise: `collide.contacts`.
+        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, one a contact, sorted by (a, b). What
+            they say and promise: `collide.contacts`.
 
         Raises
         ------
@@ -336,9 +335,8 @@ class World:
         Returns
         -------
         WorldResult : rows sorted by b, the body's id; a is −1 for the outside shape, and normals point from it to the
-            body.
-        Filters do not apply, and `stats` stays that of the last query of the whole World. O(log n) for bodies that are
-        spread out.
+            body. Filters do not apply, and `stats` stays that of the last query of the whole World. O(log n) for bodies
+            that are spread out.
 
         Raises
         ------
