@@ -270,7 +270,7 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
         n += 1
     first = n_rows
     n_rows = _put_rows(task, axes, of_set, n, meets, number, n_rows)
-    if n_rows > first:
+    if n_rows > first and not meets:
         widen_row(task.space.out + CONTACT * first, distance, row.doubles[LOWER], row.doubles[UPPER])
     return n_rows, 1
 

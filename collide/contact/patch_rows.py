@@ -154,7 +154,7 @@ def put_row(contact_at, points, k, facet_a, facet_b, rows):
 
 @kernel
 def widen_row(contact_at, distance, lower, upper):
-    """Make the distance of a row that of what is nearest in its patch, where the brackets of both overlap."""
+    """Make the gap of a row that of what is nearest in its patch, where the brackets of both overlap."""
     doubles = view_f64(contact_at, CONTACT // 8)
     if doubles[_LOWER] <= upper and lower <= doubles[_UPPER]:
         doubles[_DISTANCE] = distance + 0.0
