@@ -20,6 +20,7 @@ from collide.contact.curved_manifolds import (
     curved_manifolds,
     workspace_words,
 )
+from collide.contact.curved_patches import LAST_BIT
 from collide.contact.distance_contacts import with_distances
 from collide.contact.support_face import ROUND
 from collide.errors import UnsupportedQuery
@@ -53,7 +54,7 @@ class _Near(NamedTuple):
     """Facets near the set at n poses, those that meet it first, the deepest first, then the nearest first.
 
     facets, places : (k,) numbers in the mesh and in its tree.   rows : (k,) PAIR_DTYPE.   starts : (n + 1,).
-    patches : (k,) number of the patch each is in, −1 for none, once these are made.
+    patches : (k,) bits of the patches that each is in, once these are made.
     """
 
     facets: np.ndarray
@@ -137,7 +138,7 @@ def _near(body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop
     facets = body.tree.ids[place].astype(np.int64)
     order = np.lexsort((facets, rows["distance"], ~rows["hit"], pose))
     starts = np.concatenate([[0], np.cumsum(np.bincount(pose, minlength=len(limit)))])
-    return _Near(facets[order], place[order], rows[order], starts, np.full(len(order), -1))
+    return _Near(facets[order], place[order], rows[order], starts, np.zeros(len(order), dtype=np.int64))
 
 
 def _patches(
@@ -203,7 +204,8 @@ def _parted(
     """
     parted = np.ones(len(rows), dtype=bool)
     steps = length[:, None] * rows["normal"]
-    members = [np.flatnonzero((of_facet == p) & (near.patches == row["patch"])) for p, row in zip(pose, rows)]
+    bits = 1 << np.minimum(rows["patch"].astype(np.int64), LAST_BIT)
+    members = [np.flatnonzero((of_facet == p) & (near.patches & bit != 0)) for p, bit in zip(pose, bits)]
     which = np.repeat(np.arange(len(rows)), [len(m) for m in members])
     places = near.places[np.concatenate(members)]
     for X_A, X_B in ((PA.X[pose], _moved(PB.X[pose], steps)), (_moved(PA.X[pose], -steps), PB.X[pose])):

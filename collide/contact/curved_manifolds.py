@@ -26,7 +26,7 @@ from collide.contact.curved_patches import (
     seed_of,
 )
 from collide.contact.manifold_points import GAP, HEIGHT, POINT, ManifoldPoints, V
-from collide.contact.patch_rows import CONTACT, PatchSpace, RowsOf, choose_points, put_row, widen_row
+from collide.contact.patch_rows import CONTACT, PatchSpace, RowsOf, choose_points, facet_of_row, put_row, widen_row
 from collide.contact.reduce_patch import HullSpace
 from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import axes_across, seen_along, support_face
@@ -43,7 +43,7 @@ from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, scale, sub, vec3_
 
 # Header: addresses of the mesh's tree and topology, whether it is solid, how many facets it has; of the curved set's
 # row in a `ShapeTable`, integers and numbers, and in a `HullFaceTable`; most corners of a face; of the facets near it,
-# pose after pose, their rows, where those of each pose begin, and the number of each one's patch; of words by facet and
+# pose after pose, their rows, where those of each pose begin, and bits of each one's patches; of words by facet and
 # corner of the mesh, zeroed; of the workspace, and for how many facets it is; max_contacts; of the poses in hand. Then
 # what a call has done.
 (
@@ -268,10 +268,10 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
         points.errors[0] = max(bracket, 4.0 * near.error)
         points.pairs[0] = k
         n += 1
-    first = n_rows
+    first = task.space.out + CONTACT * n_rows
     n_rows = _put_rows(task, axes, of_set, n, meets, number, n_rows)
-    if n_rows > first and not meets:
-        widen_row(task.space.out + CONTACT * first, distance, row.doubles[LOWER], row.doubles[UPPER])
+    if n_rows > 0 and not meets and near.facets[k] == facet_of_row(first):
+        widen_row(first, distance, row.doubles[LOWER], row.doubles[UPPER])
     return n_rows, 1
 
 

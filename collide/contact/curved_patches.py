@@ -24,10 +24,10 @@ from collide.numerics.vec3 import Vec3, cross, dot, neg, norm, put_vec3, scale, 
 
 # What a facet is, bits: it is in a patch, or in the one in hand; a search looked at it.
 COVERED, REACHED, TRIED = 1, 2, 4
-#: Sines of angles between normals that are the same: those of gaps of curved sets are good to 2⁻²⁶. A normal leaves a
-#: facet at right angles up to the first, and belongs to a patch up to the second; those of depths up to so many times
-#: as much.
-_SAME, _SAME_PATCH, _OF_DEPTHS = 2.0**-20, 2.0**-16, 16.0
+#: Sines of angles between normals that are the same: those of gaps of curved sets are good to 2⁻²⁶, but of gaps that
+#: are next to nothing. A normal leaves a facet at right angles up to the first, and belongs to a patch up to the second;
+#: those of depths up to so many times as much.
+_SAME, _SAME_PATCH, _OF_DEPTHS = 2.0**-20, 2.0**-12, 16.0
 #: Nearest points this near to a corner or an edge, in lengths of the longest edge, are on it.
 _ON = 2.0**-16
 #: A facet is across the normal down to this cosine; of a steeper one an edge, up to this sine, is.
@@ -36,6 +36,8 @@ _ACROSS = 0.7
 _AWAY = -(2.0**-10)
 #: Facets narrower, seen along the normal, than so many errors of a coordinate are edges.
 _MIN_ERRORS = 256.0
+#: The bit of this patch, and of all that follow it.
+LAST_BIT = 62
 
 
 class NearFacets(NamedTuple):
@@ -43,7 +45,7 @@ class NearFacets(NamedTuple):
 
     mesh : all facets.   facets : (n,) numbers.   rows_at : address of their rows of `distance`, against the set.
     corners, normals : 9 and 3 doubles a facet, seen from the mesh's origin; the normal of a facet without area is 0.
-    states : bits.   queue : of a search.   patch_of : number of the patch, −1 for none.
+    states : bits.   queue : of a search.   patches : bits of the patches that each is in.
     slots : a word a facet of the mesh, 1 + its place among these, else 0.   seen : a word a corner of the mesh, marks.
     origin : of the mesh in the world.   error : of a coordinate [m].   shift : of the set's origin from the mesh's [m].
     axis : of a cylinder, a unit vector; 0 of other sets.
@@ -59,7 +61,7 @@ class NearFacets(NamedTuple):
     normals: Any
     states: Any
     queue: Any
-    patch_of: Any
+    patches: Any
     slots: Any
     seen: Any
     origin: Vec3
@@ -90,7 +92,7 @@ def pose_facets(near):
         facet = near.facets[k]
         near.slots[facet] = k + 1
         near.states[k] = 0
-        near.patch_of[k] = -1
+        near.patches[k] = 0
         place = int(near.mesh.places[facet])
         for j in range(3):
             put_vec3(near.corners, 9 * k + 3 * j, posed_corner(near.mesh, place, j))
@@ -149,7 +151,7 @@ def _across_lines(near, p, q, u):
     if not length > 0.0:
         return u
     v = scale((1.0 if dot(w, u) > 0.0 else -1.0) / length, w)
-    return v if norm(cross(u, v)) <= _OF_DEPTHS * _SAME_PATCH else u
+    return v if norm(cross(u, v)) <= _SAME_PATCH else u
 
 
 @kernel
@@ -352,8 +354,7 @@ def cover_facets(near, nhat, number):
     while begin < end:
         k = near.queue[begin]
         begin += 1
-        if near.patch_of[k] < 0:
-            near.patch_of[k] = number
+        near.patches[k] |= 1 << min(number, LAST_BIT)
         near.states[k] |= COVERED
         for i in range(3 * near.facets[k], 3 * near.facets[k] + 3):
             corner = int(near.mesh.corners[i])

@@ -152,10 +152,19 @@ def put_row(contact_at, points, k, facet_a, facet_b, rows):
     words[_PATCH] = rows.number
 
 
+@kernel(inline=True)
+def facet_of_row(contact_at):
+    """The facet of A that a row names."""
+    return view_i32(contact_at, CONTACT // 4)[_FACET_A]
+
+
 @kernel
 def widen_row(contact_at, distance, lower, upper):
-    """Make the gap of a row that of what is nearest in its patch, where the brackets of both overlap."""
+    """Make the gap of a row that of what is nearest in its patch, where the brackets of both overlap, and that one is
+    no wider than to hold the row's."""
     doubles = view_f64(contact_at, CONTACT // 8)
+    if lower <= doubles[_LOWER] and doubles[_UPPER] <= upper:
+        return
     if doubles[_LOWER] <= upper and lower <= doubles[_UPPER]:
         doubles[_DISTANCE] = distance + 0.0
         doubles[_LOWER] = min(doubles[_LOWER], lower)
