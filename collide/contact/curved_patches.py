@@ -25,8 +25,8 @@ from collide.numerics.vec3 import Vec3, cross, dot, neg, norm, put_vec3, scale, 
 # What a facet is, bits: it is in a patch, or in the one in hand; a search looked at it.
 COVERED, REACHED, TRIED = 1, 2, 4
 #: Sines of angles between normals that are the same: those of gaps of curved sets are good to 2⁻²⁶, but of gaps that
-#: are next to nothing. A normal leaves a facet at right angles up to the first, and belongs to a patch up to the second;
-#: those of depths up to so many times as much.
+#: are next to nothing. A normal leaves a facet at right angles up to the first, and belongs to a patch up to the
+#: second; those of depths up to so many times as much.
 _SAME, _SAME_PATCH, _OF_DEPTHS = 2.0**-20, 2.0**-12, 16.0
 #: Nearest points this near to a corner or an edge, in lengths of the longest edge, are on it.
 _ON = 2.0**-16
