@@ -15,13 +15,22 @@ def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
     """Shapes checked; poses as batches (n, 4, 4) or (1, 4, 4), entries not yet checked; whether it is a single pair."""
     X_WA, single_a = pose_batch(X_WA, "X_WA")
     X_WB, single_b = pose_batch(X_WB, "X_WB")
-    counts = {"X_WA": len(X_WA), "X_WB": len(X_WB)}
-    single = single_a and single_b
+    _, single = matched_counts(A, B, {"X_WA": len(X_WA), "X_WB": len(X_WB)})
+    return X_WA, X_WB, single_a and single_b and single
+
+
+def matched_counts(A, B, counts: dict[str, int]) -> tuple[int, bool]:
+    """(the length of a batch, whether A and B are two shapes), of checked shapes and arguments of these lengths.
+
+    counts : by name; single arguments, of length 1, go with all of the others.   A, B : None where there are none.
+    Raises InvalidArgument, and InvalidPose where it is poses that do not match.
+    """
+    single = True
     for name, side in (("A", A), ("B", B)):
         if _is_sequence(side):
             counts[name] = len(side)
             single = False
-        elif not isinstance(side, Shape):
+        elif not isinstance(side, Shape) and not (A is None and B is None):
             raise InvalidArgument(
                 f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(side)}"
             )
@@ -31,7 +40,12 @@ def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
             lengths = ", ".join(f"{argument} {n}" for argument, n in counts.items())
             kind = InvalidPose if name.startswith("X") else InvalidArgument
             raise kind(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
-    return X_WA, X_WB, single
+    return wanted, single
+
+
+def checked_shapes(side) -> list[Shape]:
+    """The shapes of a sequence that has been checked, one a pair."""
+    return [side[k] for k in range(len(side))]
 
 
 def _is_sequence(side) -> bool:

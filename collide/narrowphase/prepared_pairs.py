@@ -15,21 +15,24 @@ _serials = itertools.count()
 _MAX_PARTNERS = 512
 
 
-def prepared_pair(A: Shape, B: Shape) -> Any:
-    """The pair, or None where it has not been prepared. `query.collide` reads the same two attributes by itself."""
-    return getattr(A, "_prepared", {}).get(getattr(B, "_serial", None))
+def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
+    """The pair, or None where it has not been prepared. `query.collide` reads the same two attributes by itself.
+
+    slot : of A, for what it was prepared.
+    """
+    return getattr(A, slot, {}).get(getattr(B, "_serial", None))
 
 
 def single_calls_are_safe() -> bool:
     return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
-def keep_prepared(A: Shape, B: Shape, pair: Any) -> None:
-    if not hasattr(A, "_prepared"):
-        A._store(_prepared={})
+def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:
+    if not hasattr(A, slot):
+        A._store(**{slot: {}})
     if not hasattr(B, "_serial"):
         B._store(_serial=next(_serials))
-    prepared, serial = A._prepared, B._serial
+    prepared, serial = getattr(A, slot), B._serial
     # a list: other threads add and finalizers take
     for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:
         prepared.pop(oldest, None)

@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_kind", "_laid_out", "_parts", "_prepared", "_serial", "_surface", "_topology",
-        "_union", "_walk",
+        "__weakref__", "_bounds", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial",
+        "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -33,6 +33,8 @@ class Shape:
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
+    #: The same for times of impact (`motion/convex_motions.py`).
+    _moving: dict[int, Any]
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.
@@ -43,6 +45,8 @@ class Shape:
     _union: Any
     #: Its parts in the rows that kernels of compounds read (`lowering/compound_layout.py`).
     _laid_out: Any
+    #: Meshes and convex shapes that it is made of, with their trees (`motion/surface_motions.py`).
+    _pieces: tuple
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
 

@@ -1,0 +1,1 @@
+"""Bodies in motion: when two of them first touch."""

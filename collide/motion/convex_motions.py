@@ -1,0 +1,225 @@
+"""Motions of bodies of convex parts, from Python: jobs for `impact_jobs.py`, in as many threads as asked for."""
+
+from __future__ import annotations
+
+from threading import local
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of, code_of
+from collide.lowering.compound_layout import layout_of
+from collide.lowering.shape_table import POSE, ShapeTable
+from collide.motion.convex_impact import FREE
+from collide.motion.impact_jobs import begin_single, find_impacts
+from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
+from collide.motion.moving_body import BODY
+from collide.narrowphase.convex_kernel_calls import scratch
+from collide.narrowphase.pair_kernel import answer_pairs
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
+from collide.results import PAIR_DTYPE
+from collide.shapes.shape import Shape
+from collide.threads import pieces_of, share
+
+#: Jobs done in one call of the kernel: their list stays small beside the motions.
+JOBS_AT_ONCE = 1 << 16
+#: A thread is handed at least so many motions.
+_MIN_MOTIONS_PER_THREAD = 200
+
+
+class Motions(NamedTuple):
+    """n motions, checked: poses (n, 4, 4) or (1, 4, 4) of A and B at both ends; angular velocities (n, 3), (1, 3) or
+    None."""
+
+    X_WA0: np.ndarray
+    X_WA1: np.ndarray
+    X_WB0: np.ndarray
+    X_WB1: np.ndarray
+    omega_WA: np.ndarray | None
+    omega_WB: np.ndarray | None
+
+    def picked(self, some: np.ndarray) -> Motions:
+        """Those of these numbers; what goes with all stays as it is."""
+        columns: list[Any] = [X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self]
+        return Motions(*columns)
+
+    def swapped(self) -> Motions:
+        """Those of B and A."""
+        return Motions(self.X_WB0, self.X_WB1, self.X_WA0, self.X_WA1, self.omega_WB, self.omega_WA)
+
+    def exchanged(self, is_larger: np.ndarray, is_equal: np.ndarray) -> np.ndarray:
+        """(n,) bool: motions to be worked on as those of B and A: where A's shape is the larger, or is equal and its
+        poses are."""
+        out = is_larger.copy()
+        some = np.flatnonzero(is_equal)
+        if len(some):
+            of = self.picked(some).spread(len(some))
+            a, b = (np.concatenate([X0, X1], axis=1).reshape(len(some), -1) for X0, X1 in (of[:2], of[2:4]))
+            first = (a != b).argmax(axis=1)
+            rows = np.arange(len(some))
+            out[some] = a[rows, first] > b[rows, first]
+        return out
+
+    def spread(self, n: int) -> Motions:
+        """The same with n of everything."""
+        columns: list[Any] = [X if X is None else np.broadcast_to(X, (n, *X.shape[1:])) for X in self]
+        return Motions(*columns)
+
+
+class Tables(NamedTuple):
+    """addresses : of a `ShapeTable`'s integers and numbers.   n_shapes : its rows.   parts : (k, PART)."""
+
+    addresses: tuple[int, int]
+    n_shapes: int
+    parts: np.ndarray
+
+
+class _Workspace:
+    """Scratch memory of the kernels."""
+
+    def __init__(self) -> None:
+        self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
+        self.pair, self.bodies = np.array([0, 1], dtype=np.int64), np.zeros(2 * BODY)
+        self.rows = np.zeros(2, dtype=PAIR_DTYPE)
+
+
+class _OfThread(local):
+    def __init__(self) -> None:
+        self.space = _Workspace()
+
+
+class SinglePair:
+    """Two shapes of one convex part each, ready for motions one at a time."""
+
+    def __init__(self, bodies: _Bodies, a: int, b: int):
+        self._bodies = bodies
+        self._jobs = np.array([[0, bodies.first[a], bodies.first[a], bodies.first[b], bodies.first[b]]], dtype=np.int64)
+        self._of_thread = local()
+
+    def ask(self, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
+        """The answer for poses (4, 4) of A and B at both ends; None where it takes more than this, as of bodies in
+        contact at the start, or an error has to be raised."""
+        for X in matrices:
+            if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4) or not X.flags.c_contiguous:
+                return None
+        space = getattr(self._of_thread, "space", None) or self._prepare()
+        if begin_single(space.header_at, *map(address_of, matrices), space.row_at) != 0:
+            return None
+        find_impacts(space.header_at, space.jobs_at, 1, 0.0, 1.0, tolerance, space.row_at)
+        return single_result(space.row, tolerance)
+
+    def _prepare(self) -> _SingleSpace:
+        here = np.eye(4)[None]
+        tables = Tables(self._bodies.table.addresses, len(self._bodies.table.packed), self._bodies.parts)
+        header, row = header_of(tables, Motions(here, here, here, here, None, None)), free_rows(1)
+        space = _SingleSpace(header, row, address_of(header), address_of(self._jobs), address_of(row))
+        self._of_thread.space = space
+        return space
+
+
+class _SingleSpace(NamedTuple):
+    """Header and row of one thread's single motions, and addresses, of the jobs, too."""
+
+    header: np.ndarray
+    row: np.ndarray
+    header_at: int
+    jobs_at: int
+    row_at: int
+
+
+_of_thread = _OfThread()
+
+
+def header_of(tables: Tables, motions: Motions) -> np.ndarray:
+    """What `find_impacts` reads first; it works in the scratch memory of this thread."""
+    space, poses, omegas = _of_thread.space, motions[:4], motions[4:]
+    return np.array(
+        (
+            code_of(answer_pairs), *tables.addresses, address_of(space.poses), address_of(space.shape_of),
+            address_of(space.pair), *scratch(), address_of(space.bodies), address_of(space.rows),
+            address_of(space.rows[1:]), address_of(tables.parts), len(tables.parts),
+            *(address_of(X) for X in poses), *(16 * (len(X) > 1) for X in poses),
+            *(0 if w is None else address_of(w) for w in omegas),
+            *(0 if w is None else 3 * (len(w) > 1) for w in omegas), tables.n_shapes,
+        ),
+        dtype=np.int64,
+    )  # fmt: skip
+
+
+class _Bodies:
+    """Distinct shapes, part by part, in the tables that kernels read."""
+
+    def __init__(self, shapes: list[Shape]):
+        layouts = [layout_of(shape) for shape in shapes]
+        self.counts = np.array([len(layout.packed) for layout in layouts], dtype=np.int64)
+        self.first = np.cumsum(self.counts) - self.counts
+        self.is_simple = len(layouts) == int(self.counts.sum())
+        contents = [b"".join(packed.content for packed in layout.packed) for layout in layouts]
+        self.ranks = np.array([sorted(contents).index(content) for content in contents], dtype=np.int64)
+        self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
+        self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
+        self.table.build_trees(np.arange(len(self.table.packed)))
+        self.single = SinglePair(self, 0, len(shapes) - 1) if self.is_simple and len(shapes) <= 2 else None
+
+    def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
+        """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
+        on; in an order that does not depend on which of them is A."""
+        if self.is_simple:
+            row_a, row_b = self.first[a], self.first[b]
+            return np.ascontiguousarray(np.array([np.arange(first, first + len(a)), row_a, row_a, row_b, row_b]).T)
+        n_b, counts = self.counts[b], self.counts[a] * self.counts[b]
+        motion = np.repeat(np.arange(len(a)), counts)
+        which = np.arange(len(motion)) - np.repeat(np.cumsum(counts) - counts, counts)
+        some = motions.picked(np.arange(first, first + len(a)))
+        flip = some.exchanged(self.ranks[a] > self.ranks[b], self.ranks[a] == self.ranks[b])[motion]
+        n_a, n_b = self.counts[a][motion], n_b[motion]
+        part_a = self.first[a][motion] + np.where(flip, which % n_a, which // n_b)
+        part_b = self.first[b][motion] + np.where(flip, which // n_a, which % n_b)
+        return np.ascontiguousarray(np.stack([motion + first, part_a, part_a, part_b, part_b], axis=1))
+
+
+def _bodies_of(shapes: list[Shape]) -> _Bodies:
+    """Those of one pair are kept with A: a simulator asks about the same two again and again."""
+    if len(shapes) > 2:
+        return _Bodies(shapes)
+    bodies = prepared_pair(shapes[0], shapes[-1], "_moving")
+    if bodies is None:
+        bodies = _Bodies(shapes)
+        keep_prepared(shapes[0], shapes[-1], bodies, "_moving")
+    return bodies
+
+
+def single_impact(A: Any, B: Any, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
+    """The answer for two shapes that were asked about before; None where there is none, as in `SinglePair.ask`."""
+    bodies = prepared_pair(A, B, "_moving")
+    return None if bodies is None or bodies.single is None else bodies.single.ask(matrices, tolerance)
+
+
+def convex_impacts(
+    shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions, tolerance: float, threads: int
+) -> np.ndarray:
+    """Rows of `IMPACT_DTYPE` for n motions of bodies of convex parts.
+
+    shapes : distinct ones.   a, b : (n,) int64, which of them A and B are.
+    """
+    n = len(a)
+    rows = free_rows(n)
+    bodies = _bodies_of(shapes)
+    per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
+    at_once = max(JOBS_AT_ONCE // per_motion, 1)
+
+    def work(piece: slice) -> None:
+        header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
+        for first in range(piece.start, piece.stop, at_once):
+            some = slice(first, min(first + at_once, piece.stop))
+            jobs = bodies.jobs(a[some], b[some], first, motions)
+            find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
+
+    workers = min(threads, n * per_motion // _MIN_MOTIONS_PER_THREAD)
+    if workers < 2:
+        work(slice(0, n))
+    else:
+        share(pieces_of(n, workers, max(_MIN_MOTIONS_PER_THREAD // per_motion, 1)), work, workers)
+    rows["part_a"] -= np.where(rows["status"] == FREE, 0, bodies.first[a])
+    rows["part_b"] -= np.where(rows["status"] == FREE, 0, bodies.first[b])
+    return rows

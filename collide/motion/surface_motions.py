@@ -1,0 +1,380 @@
+"""Motions of bodies with meshes among their pieces: spans of time, facets that may meet in them, and a job a facet.
+
+A piece is a mesh or a convex shape at a pose in its body. In a span of length h around its middle no point of one body
+comes nearer the other than μ h / 2, μ a bound of the speed of one body seen from the world, from A or from B (motion
+bounds, Mirtich 1996). Facets farther apart than that at the middle are free in all of the span (facets_within: a
+traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span
+is cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are
+apart at the start first meet in their surfaces, and a surface is its facets.
+
+A half-space meets a mesh where it meets the mesh's hull.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.compound_table import PART, TURNED
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
+from collide.lowering.facet_table import Facets, FacetTable
+from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.parts import convex_set_of
+from collide.lowering.shape_table import RANK, SLOP, ShapeTable
+from collide.mesh.bvh import MeshTree
+from collide.motion.convex_impact import OPEN
+from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
+from collide.motion.impact_jobs import find_impacts
+from collide.motion.impact_rows import flipped_impacts
+from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
+from collide.narrowphase.convex_batches import convex_rows
+from collide.narrowphase.facets.facet_queries import facets_within
+from collide.narrowphase.facets.mesh_batches import pair_rows
+from collide.narrowphase.facets.near_facets import near_facets
+from collide.shapes.compound import Compound
+from collide.shapes.mesh import Mesh
+from collide.shapes.primitives import Sphere
+from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.transforms import SMALLEST
+
+#: So many pairs of facets at most are jobs of one span, and in proportion more where it is shorter than _SHORT: where
+#: flat and finely cut surfaces come together at once, no span is short enough for few.
+_MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
+#: Spans shorter than this are not cut any more.
+_SHORTEST = 2.0**-46
+#: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
+_BALLS_OUTWARD = 1e-2
+_ULP = 2.0**-53
+
+
+class Piece(NamedTuple):
+    """A mesh or a convex shape in a body.
+
+    X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
+    reach : greatest distance of its points from its own origin, a swept radius included [m].
+    slop : how far rounding of X_CS may have moved it.
+    tree, radius : its facets, or those of a polytope around it, and how far its surface may be from them: a swept ball,
+    or the polytope's distance. None for half-spaces.
+    is_curved : whether it is such a polytope.   packed : as a convex set; None of meshes.
+    """
+
+    shape: Shape
+    X_CS: np.ndarray
+    number: int
+    reach: float
+    slop: float
+    tree: MeshTree | None
+    radius: float
+    is_curved: bool
+    packed: PackedConvex | None
+
+    @property
+    def is_mesh(self) -> bool:
+        return self.packed is None
+
+    def corners(self, facets: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) of a mesh's facets by their numbers."""
+        mesh: Any = self.shape
+        return mesh.vertices[mesh.faces[facets]]
+
+
+@kept_with_shape("_pieces")
+def pieces_of(shape: Shape) -> tuple[Piece, ...]:
+    """The meshes and convex shapes that a shape is made of."""
+    flat = list(_flattened(shape, IDENTITY, 0.0))
+    return tuple(_piece(item, X, slop, k) for k, (item, X, slop) in enumerate(flat))
+
+
+def _flattened(shape: Shape, X: np.ndarray, slop: float) -> Iterator[tuple[Shape, np.ndarray, float]]:
+    if not isinstance(shape, Compound):
+        yield shape, X, slop
+        return
+    for item, X_CS in shape.items:
+        exact = np.array_equal(X, IDENTITY)
+        lost = 0.0 if exact else 16 * _ULP * float(np.abs(X_CS[:3, 3]).sum() + np.abs(X[:3, 3]).sum() + _extent(item))
+        yield from _flattened(item, X_CS if exact else X @ X_CS, slop + lost)
+
+
+def _extent(shape: Shape) -> float:
+    """Greatest distance of a shape's points from its origin; 0 of a half-space."""
+    if isinstance(shape, Compound):
+        return max(float(np.linalg.norm(X[:3, 3])) + 1.001 * _extent(item) for item, X in shape.items)
+    if isinstance(shape, Mesh):
+        return float(np.sqrt(np.square(shape.vertices).sum(axis=1).max()))
+    packed = convex_set_of(shape)
+    return packed.reach + packed.radius
+
+
+def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
+    reach = _extent(shape) * (1 + 1e-12)
+    if isinstance(shape, Mesh):
+        return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, False, None)
+    packed = convex_set_of(shape)
+    if is_halfspace(shape):
+        return Piece(shape, X_CS, number, reach, slop, None, 0.0, False, packed)
+    if kind_of(shape) in WITH_FACETS:
+        body = body_of(shape)
+        return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, False, packed)
+    tree = enclosure_of(shape).outer.tree
+    return Piece(shape, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
+
+
+def _thickness(shape: Shape, tree: MeshTree) -> float:
+    """How far a polytope around a convex shape is from it at most, at its corners [m]; its surface is as far from the
+    shape's."""
+    corners = np.unique(tree.triangles.reshape(-1, 3), axis=0)
+    places = np.tile(np.eye(4), (len(corners), 1, 1))
+    places[:, :3, 3] = corners
+    rows = convex_rows(Sphere(SMALLEST), shape, places, np.eye(4)[None], depths=False)
+    return float(rows["upper"].max(initial=0.0)) * (1 + 1e-12) + 1e-12 * _extent(shape)
+
+
+def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """Fill rows of `IMPACT_DTYPE` for n motions of two bodies that are apart at the start.
+
+    motions : poses (n, 4, 4).   rows : (n,) as `clear_impacts` leaves them.
+    """
+    order_a, order_b = _order(A), _order(B)
+    exchanged = motions.exchanged(np.full(len(rows), order_a > order_b), np.full(len(rows), order_a == order_b))
+    for flip in (False, True):  # swapped questions are worked out on the same numbers
+        some = np.flatnonzero(exchanged == flip)
+        if not len(some):
+            continue
+        part = rows[some]
+        if flip:
+            _search_all(B, A, motions.picked(some).swapped(), tolerance, part)
+        else:
+            _search_all(A, B, motions.picked(some), tolerance, part)
+        rows[some] = flipped_impacts(part) if flip else part
+
+
+def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """`surface_impacts` in the order worked on."""
+    pieces = [(a, b) for a in pieces_of(A) for b in pieces_of(B)]
+    convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
+    for a, b in convex:
+        _convex_pieces(a, b, motions, tolerance, rows)
+    is_part = isinstance(A, Compound), isinstance(B, Compound)
+    of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
+    large = []
+    for a, b in of_facets:
+        pairs = _all_facets(a, b)
+        if pairs is None:
+            large.append((a, b))
+        else:
+            _search_few(a, b, pairs, motions, tolerance, rows, is_part)
+    for k in np.flatnonzero(_come_near(motions, large)).tolist():
+        motion = motions.picked(np.array([k]))
+        for a, b in large:
+            _search(a, b, motion, tolerance, rows[k : k + 1], is_part)
+
+
+def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
+    """(k, 2) all pairs of facets, a convex piece counting as one, where they are so few that no span need be cut."""
+    ids = [np.unique(p.tree.ids) if p.is_mesh else np.zeros(1, dtype=np.int64) for p in (a, b)]  # type: ignore[union-attr]
+    if len(ids[0]) * len(ids[1]) > _MAX_JOBS:
+        return None
+    return np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, tolerance: float, rows, is_part) -> None:
+    """`_search` for all motions at once, by all pairs of facets."""
+    near = np.flatnonzero(_come_near(motions, [(a, b)]))
+    table, jobs, ids = _jobs(a, b, pairs)
+    parts, numbers = _parts(a, b), [np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)]
+    before = _clear_parts(rows)
+    at_once = max(JOBS_AT_ONCE // len(jobs), 1)
+    for first in range(0, len(near), at_once):
+        some = near[first : first + at_once]
+        these = np.tile(jobs, (len(some), 1))
+        these[:, 0] = np.repeat(some, len(jobs))
+        _do(table, len(table.ints), parts, motions, these, 0.0, 1.0, tolerance, rows)
+    _name_parts(rows, before, *numbers)
+
+
+def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
+    """(n,) bool: motions in which balls around both bodies' origins meet that hold the pieces; rounding counts as
+    meeting."""
+    if not pieces:
+        return np.zeros(1, dtype=bool)
+    reach = max(sum(p.reach + float(np.linalg.norm(p.X_CS[:3, 3])) for p in pair) for pair in pieces)
+    (a0, a1), (b0, b1) = (tuple(X[:, :3, 3] for X in ends) for ends in (motions[:2], motions[2:4]))
+    d0 = b0 - a0
+    v = (b1 - a1) - d0
+    square = (v * v).sum(axis=1)
+    middle = np.clip(-(d0 * v).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    farthest = np.linalg.norm(d0, axis=1) + np.linalg.norm(v, axis=1)
+    rounding = 2.0**-30 * (reach + farthest + sum(p.slop for pair in pieces for p in pair))
+    stretch = np.maximum(_stretches(motions.X_WA0), _stretches(motions.X_WB0)) + _BALLS_OUTWARD
+    return np.linalg.norm(d0 + middle[:, None] * v, axis=1) <= reach * stretch + rounding
+
+
+def _stretches(X: np.ndarray) -> np.ndarray:
+    """(n,) bounds of |R|: 1 of rotations, but matrices may be unchecked."""
+    products = np.abs(X[:, :3, :3].transpose(0, 2, 1) @ X[:, :3, :3])
+    return np.sqrt(products.sum(axis=2).max(axis=1))
+
+
+def _order(shape: Shape) -> list[bytes]:
+    contents: list[Any] = [piece.tree if piece.packed is None else piece.packed for piece in pieces_of(shape)]
+    return [of.content for of in contents]
+
+
+def _needs_facets(a: Piece, b: Piece) -> bool:
+    return (a.is_mesh and b.tree is not None) or (b.is_mesh and a.tree is not None)
+
+
+def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
+    """Pieces that are convex, or a half-space and a mesh, for all motions."""
+    packed = [p.packed if p.packed is not None else convex_set_of(p.shape.convex_hull) for p in (a, b)]  # type: ignore[attr-defined]
+    table = ShapeTable([p._replace(slop=p.slop + piece.slop) for p, piece in zip(packed, (a, b))])
+    table.build_trees(np.arange(2))
+    n = len(rows)
+    jobs = np.zeros((n, 5), dtype=np.int64)
+    jobs[:, 0], jobs[:, 3:] = np.arange(n), 1
+    before = _clear_parts(rows)
+    _do(table, 2, _parts(a, b), motions, jobs, 0.0, 1.0, tolerance, rows)
+    _name_parts(rows, before, np.full(2, a.number), np.full(2, b.number))
+
+
+def _clear_parts(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts that rows name; from now on they name none, so that what a kernel finds can be told."""
+    before = rows["part_a"].copy(), rows["part_b"].copy()
+    rows["part_a"] = rows["part_b"] = -1
+    return before
+
+
+def _name_parts(rows: np.ndarray, before: tuple[np.ndarray, np.ndarray], a: np.ndarray, b: np.ndarray) -> None:
+    """Rows name the parts that stand at the table's rows, a and b, where a kernel wrote any; else those before."""
+    for name, old, numbers in zip(("part_a", "part_b"), before, (a, b)):
+        at = rows[name]
+        rows[name] = np.where(at < 0, old, numbers[at])
+
+
+def _parts(a: Piece, b: Piece) -> np.ndarray:
+    parts = np.zeros((2, PART))
+    for row, piece in zip(parts, (a, b)):
+        row[:9], row[9:12] = piece.X_CS[:3, :3].ravel(), piece.X_CS[:3, 3]
+        row[TURNED] = not np.array_equal(piece.X_CS, IDENTITY)
+    return parts
+
+
+def _do(table, n_shapes: int, parts, motions: Motions, jobs, begin: float, end: float, tolerance: float, rows) -> None:
+    header = header_of(Tables(table.addresses, n_shapes, parts), motions)
+    find_impacts(address_of(header), address_of(jobs), len(jobs), begin, end, tolerance, address_of(rows))
+
+
+class _Spans:
+    """Spans of one motion of two pieces."""
+
+    def __init__(self, a: Piece, b: Piece, motion: Motions):
+        self.a, self.b = a, b
+        self.parts, self.reaches = _parts(a, b), np.array([a.reach, b.reach, a.slop + b.slop])
+        self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
+        self._held = motion
+        addresses = [0 if X is None else address_of(X) for X in motion]
+        self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
+
+    def _describe(self, begin: float, end: float) -> np.ndarray:
+        describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
+        return self._out
+
+    def time_of_balls(self) -> tuple[float, float]:
+        """The time in which balls about both bodies' origins meet; begin > end where they never do."""
+        return tuple(self._describe(0.0, 1.0)[BEGIN : END + 1].tolist())
+
+    def near_facets(self, begin: float, end: float) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
+        out, max_pairs = self._describe(begin, end), _max_jobs(end - begin)
+        if (self.a.is_curved or self.b.is_curved) and out[REACH] < self.a.radius + self.b.radius:
+            return self._near_curved(out, max_pairs)
+        X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
+        reach = float(out[REACH]) + self.a.radius + self.b.radius
+        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
+        return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
+
+    def _near_curved(self, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
+        """The same where the polytope around a curved piece is farther from it than anything moves in the span.
+
+        The distance says whether anything is near at all, its normal which facets may be.
+        """
+        matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
+        side = 0 if self.a.is_mesh else 1
+        mesh, curved = (self.a, self.b) if side == 0 else (self.b, self.a)
+        X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
+        row = pair_rows(mesh.shape, curved.shape, X_M, X_C, limit=reach, depths=False)[0]
+        if row["lower"] > reach:
+            return np.zeros((0, 2), dtype=np.int64)
+        tree: Any = mesh.tree
+        near = near_facets(tree, curved.packed, as_given(X_M), as_given(X_C), row["normal"][None], np.array([reach]))  # type: ignore[arg-type]
+        if len(near.place) > max_pairs < _MAX_JOBS_OF_ALL:
+            return None
+        facets = np.zeros((len(near.place), 2), dtype=np.int64)
+        facets[:, side] = tree.ids[near.place]
+        return facets
+
+
+def _max_jobs(span: float) -> int:
+    return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
+
+
+def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
+    """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far.
+
+    is_part : whether A and B are compounds, of which rows name the part; else the facet.
+    """
+    spans = _Spans(a, b, motion)
+    begin, end = spans.time_of_balls()
+    spans_to_do = [(begin, end)] if begin <= end else []
+    while spans_to_do:
+        begin, end = spans_to_do.pop()
+        end = min(end, float(row["upper"][0]))
+        if begin > end:
+            continue
+        near = spans.near_facets(begin, end)
+        if near is None:
+            middle = 0.5 * (begin + end)
+            if end - begin < _SHORTEST:  # more facets together than can be looked at: open from here on
+                if begin < row["lower"][0]:
+                    row["lower"], row["status"] = begin, OPEN
+                continue
+            spans_to_do += [(middle, end), (begin, middle)]
+            continue
+        if len(near) == 0:
+            continue
+        table, jobs, ids = _jobs(a, b, near)
+        before = _clear_parts(row)
+        _do(table, len(table.ints), spans.parts, motion, jobs, begin, end, tolerance, row)
+        _name_parts(row, before, *(np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)))
+
+
+def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
+    """(table of facets, jobs of one motion, which facet each row of the table is) for pairs of facets that are near.
+
+    A convex piece is one shape beside the facets of the mesh, not facet by facet.
+    """
+    if a.is_mesh and b.is_mesh:
+        (ids_a, which_a), (ids_b, which_b) = (np.unique(column, return_inverse=True) for column in near.T)
+        table: Any = Facets(np.concatenate([a.corners(ids_a), b.corners(ids_b)]))
+        table.ints[len(ids_a) :, RANK] = 1
+        table.numbers[: len(ids_a), SLOP] = a.slop
+        table.numbers[len(ids_a) :, SLOP] = b.slop
+        ids = np.concatenate([ids_a, ids_b])
+        rows_a, rows_b = which_a.ravel(), which_b.ravel() + len(ids_a)
+    else:
+        mesh, convex = (a, b) if a.is_mesh else (b, a)
+        facets = np.unique(near[:, 0 if a.is_mesh else 1])
+        table = FacetTable(mesh.corners(facets), convex.packed)  # type: ignore[arg-type]
+        table.numbers[:-1, SLOP] = mesh.slop
+        table.numbers[-1, SLOP] += convex.slop
+        ids = np.append(facets, 0)
+        of_mesh, of_convex = np.arange(len(facets)), np.full(len(facets), len(facets))
+        rows_a, rows_b = (of_mesh, of_convex) if a.is_mesh else (of_convex, of_mesh)
+    zeros = np.zeros(len(rows_a), dtype=np.int64)
+    jobs = np.ascontiguousarray(np.stack([zeros, rows_a, zeros, rows_b, zeros + 1], axis=1), dtype=np.int64)
+    return table, jobs, ids
