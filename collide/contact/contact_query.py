@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Margins beyond this are no margins, and would overflow squared.
 _LARGEST_MARGIN = 1e50
+#: More contacts than a patch can have, and a number that kernels take.
+_ALL_CONTACTS = 2**31 - 1
 
 
 def contacts(
@@ -78,7 +80,7 @@ def contacts(
     """
     if margin.__class__ is not float or not 0.0 <= margin <= _LARGEST_MARGIN:
         margin = check_margin("contacts", margin)
-    if max_contacts.__class__ is not int or max_contacts < 1:
+    if max_contacts.__class__ is not int or not 1 <= max_contacts <= _ALL_CONTACTS:
         max_contacts = check_max_contacts("contacts", max_contacts)
     if threads.__class__ is not int or threads != 1:
         threads = check_threads(threads)
@@ -104,5 +106,5 @@ def check_margin(name: str, value) -> float:
 
 
 def check_max_contacts(name: str, value) -> int:
-    """How many contacts a patch may have."""
-    return checks.integer(f"{name}: max_contacts", value, 1)
+    """How many contacts a patch may have; a number that no patch reaches stands for all of them."""
+    return min(checks.integer(f"{name}: max_contacts", value, 1), _ALL_CONTACTS)
