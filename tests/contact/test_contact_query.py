@@ -57,3 +57,12 @@ def test_boxes_are_prepared_for_single_calls_by_their_first_contacts():
     first = contacts(A, B, EYE, X_WB)
     assert prepared_pair(A, B).of_contacts is not None
     assert len(first) > 2 and first.rows.tobytes() == contacts(A, B, EYE, X_WB).rows.tobytes()
+
+
+def test_any_number_of_contacts_may_be_asked_for():
+    """Numbers beyond what a patch can have stand for all: the long way (first call) and the prepared one agree."""
+    shapes = collide.Box((1, 1, 1)), collide.Box((1, 1, 1))
+    X_WB = collide.pose((0.1, 0.2, 1.0))
+    rows = [collide.contacts(*shapes, np.eye(4), X_WB, max_contacts=n) for n in (10**30, 10**30, 2**31, 2**63, 100)]
+    assert len(rows[0]) == 4
+    assert all(np.array_equal(r.rows, rows[0].rows) for r in rows)
