@@ -69,8 +69,9 @@ class HeightField(Mesh):
     (i, j); walls and bottom follow (`cells_of` tells them apart). Vertex i·c + j is the grid point (i, j).
 
     The surface closes by construction, so nothing is welded and no edge is looked for: O(r c), 0.15 µs a facet. Its
-    box-tree is built when a query first needs it and costs ten times as much: seconds for a million cells. Files and pickles hold heights,
-    cell and bottom alone. `scaled` copies are meshes; their facets are numbered as those of their ``base``.
+    box-tree is built when a query first needs it and costs ten times as much: seconds for a million cells. Files and
+    pickles hold heights, cell and bottom alone. `scaled` copies are meshes; their facets are numbered as those of their
+    ``base``.
     """
 
     __slots__ = ("bottom", "cell", "heights")
@@ -234,8 +235,8 @@ def _check_bottom(bottom, heights: np.ndarray, x: np.ndarray, y: np.ndarray) -> 
         )
     if number < -LARGEST:
         raise InvalidShape(
-            f"HeightField: heights: the bottom would be at {number:g} m, beyond {LARGEST:g} m; scale the scene, or give "
-            "bottom"
+            f"HeightField: heights: the bottom would be at {number:g} m, beyond {LARGEST:g} m; scale the scene, or "
+            "give bottom"
         )
     return number
 
