@@ -107,9 +107,9 @@ __all__ = [
     "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
     "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
     "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "TimeOfImpact", "UnknownBody",
-    "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
-    "get_library", "moved_poses", "overlay", "pose", "poses_in_motion", "raycast", "self_collisions", "tessellate",
-    "time_of_impact", "verify", "walk",
+    "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains", "distance",
+    "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion", "raycast",
+    "self_collisions", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

@@ -130,8 +130,8 @@ class HeightField(Mesh):
         row_count, columns = self.heights.shape[0] - 1, self.heights.shape[1] - 1
         on_top = (numbers >= 0) & (numbers < 2 * row_count * columns)
         parts = (numbers // (2 * columns), numbers // 2 % columns, numbers % 2)
-        found = [np.where(on_top, part, -1) for part in parts]
-        return GridCells(*(found if numbers.ndim else [int(part) for part in found]))
+        cells = [np.where(on_top, part, -1) for part in parts]
+        return GridCells(*(cells if numbers.ndim else [int(part) for part in cells]))
 
     def save(self, path) -> None:
         """Write heights, cell and bottom to an ``.npz`` file.

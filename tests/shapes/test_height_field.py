@@ -175,7 +175,7 @@ def test_spheres_are_as_near_as_the_nearest_triangle():
         centre = (rng.uniform(-0.7, 0.7, 3) * (*size, 1.5)).tolist()
         centre = [round(8 * v) / 8 for v in centre] if number % 2 else centre
         radius = float(rng.choice([0.125, 0.25, 0.5]))
-        source = "A = collide.HeightField({heights}, {cell}, bottom={bottom}); B = collide.Sphere({radius}); at = {centre}"
+        source = "A = collide.HeightField({heights}, {cell}, bottom={bottom}), collide.Sphere({radius}), {centre}"
         with reproducing(source, **parameters(field), radius=radius, centre=centre):
             told[judge_sphere(field, centre, radius)] += 1
     assert told[True] > 50 and told[False] > 20, told
@@ -218,7 +218,8 @@ def test_every_query_answers_as_for_its_mesh():
     others = [
         collide.Sphere(0.2), collide.Capsule(0.1, 0.4), collide.Box((0.3, 0.2, 0.4)), collide.Cylinder(0.2, 0.3),
         collide.Cone(0.2, 0.3), collide.Ellipsoid((0.1, 0.2, 0.3)), collide.Halfspace((0, 0.1, -1), -0.2),
-        HeightField(rng.normal(size=(3, 3)) * 0.1, 0.2), collide.ConvexHull(rng.normal(size=(12, 3)) * 0.2, radius=0.05),
+        HeightField(rng.normal(size=(3, 3)) * 0.1, 0.2),
+        collide.ConvexHull(rng.normal(size=(12, 3)) * 0.2, radius=0.05),
         collide.Compound([(collide.Sphere(0.1), EYE), (collide.Box((0.5, 0.1, 0.1)), pose(t=(0, 0, 0.2)))]),
     ]  # fmt: skip
     X = np.array([random_pose(rng, 0.7) for _ in others])
