@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from collide import errors as errors
     from collide import results as results
     from collide import transforms as transforms
+    from collide.casts.ray_hits import RayHits
+    from collide.casts.raycast import raycast
+    from collide.casts.shape_cast import ShapeCasts, shape_cast
     from collide.certificates.certificate import Certificate, CertificateRefused
     from collide.certificates.make_certificate import certify
     from collide.certificates.verify import verify
@@ -60,9 +63,9 @@ if TYPE_CHECKING:
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
-    from collide.surface_queries.raycast import RayHits, raycast
     from collide.transforms import pose
     from collide.world import World
+    from collide.world_hits import WorldHits
 
 __version__ = "0.1.0"
 
@@ -71,6 +74,9 @@ _HOMES = {
         "CollideError", "InvalidArgument", "InvalidPose", "InvalidShape", "MissingExtra", "SceneError",
         "UnknownBody", "UnsupportedQuery",
     ),
+    "collide.casts.ray_hits": ("RayHits",),
+    "collide.casts.raycast": ("raycast",),
+    "collide.casts.shape_cast": ("ShapeCasts", "shape_cast"),
     "collide.certificates.certificate": ("Certificate", "CertificateRefused"),
     "collide.certificates.make_certificate": ("certify",),
     "collide.certificates.verify": ("verify",),
@@ -79,7 +85,6 @@ _HOMES = {
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
-    "collide.surface_queries.raycast": ("RayHits", "raycast"),
     "collide.hierarchies.hierarchy_queries": ("walk",),
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
@@ -93,6 +98,7 @@ _HOMES = {
     "collide.shapes.tessellation": ("tessellate",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
+    "collide.world_hits": ("WorldHits",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -106,10 +112,10 @@ __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
     "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
     "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
-    "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeSet", "Sphere", "TimeOfImpact", "UnknownBody",
-    "UnsupportedQuery", "World", "WorldResult", "certify", "collide", "contacts", "contains", "distance",
-    "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion", "raycast",
-    "self_collisions", "tessellate", "time_of_impact", "verify", "walk",
+    "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact",
+    "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts",
+    "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose",
+    "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

@@ -102,6 +102,34 @@ def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.n
     return np.array(read, dtype=np.float64).reshape(numbers_given.shape)
 
 
+def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
+    """((n, 3) finite float64, whether a single vector was handed in). Raises InvalidArgument."""
+    read = array(f"{caller}: {name}", values, "(3,) or (N, 3)", InvalidArgument)
+    if read.ndim not in (1, 2) or read.shape[-1] != 3:
+        raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {read.shape}")
+    rows = np.ascontiguousarray(read.reshape(-1, 3))
+    refuse_rows(caller, name, rows, ~np.isfinite(rows).all(axis=1), "has entries that are not finite")
+    return rows, read.ndim == 1
+
+
+def refuse_rows(caller: str, name: str, rows: np.ndarray, bad: np.ndarray, complaint: str) -> None:
+    """Raises InvalidArgument naming the first bad row, where there is one."""
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise InvalidArgument(f"{caller}: {name}[{k}] {complaint}, got {rows[k].tolist()}")
+
+
+def matched_count(caller: str, **counts: int) -> int:
+    """The length of a batch: that of all arguments, or of all but single ones. Raises InvalidArgument."""
+    n = max(counts.values()) if min(counts.values()) else 0
+    if any(count not in (1, n) for count in counts.values()):
+        lengths = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise InvalidArgument(
+            f"{caller}: lengths do not match: {lengths}; batches must be equally long, or a single one"
+        )
+    return n
+
+
 def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
     """Anything that is an array or can be one, of any type: nothing ragged, masked, or nested without end."""
     if _is_masked(value) or (isinstance(value, (list, tuple)) and any(map(_is_masked, value))):

@@ -12,6 +12,7 @@ import numpy as np
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.filters import CULLED, count_skipped
+from collide.casts.posed_parts import PosedParts
 from collide.errors import UnsupportedQuery
 from collide.lazy_modules import lazy_module
 from collide.lowering.packed_convex import PackedConvex
@@ -240,6 +241,32 @@ class PackedWorld:
         is_empty[owner[near]] = False
         near[first_of_each[is_empty]] = True
         return np.stack([i[near], j[near]], axis=1), owner[near]
+
+    # --- casts ----------------------------------------------------------------------------------
+
+    @property
+    def tree(self) -> BoxTree | None:
+        """The box-tree over bodies; None of a World without any."""
+        return self._tree
+
+    @property
+    def shapes(self) -> list[Shape]:
+        """The distinct shapes.   shape_of : (n,) which of them each body has.   meshed : (n,) bool."""
+        return self._shapes
+
+    @property
+    def shape_of(self) -> np.ndarray:
+        return self._shape_of
+
+    @property
+    def meshed(self) -> np.ndarray:
+        return self._meshed
+
+    def posed_parts(self) -> tuple[PosedParts, np.ndarray, np.ndarray]:
+        """(all parts, (parts,) the body of each, (n + 1,) the first part of each body and the number of all)."""
+        self._table.build_trees(self._row_of)
+        parts = PosedParts(self._table, self._poses, self._row_of, self.X_WBs[self._body_of], self._X_BP)
+        return parts, self._body_of, self._first
 
     # --- an outside shape -----------------------------------------------------------------------
 

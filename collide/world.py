@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 import time
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -14,21 +13,25 @@ from collide.certificates.make_certificate import certify
 from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lazy_modules import lazy_module
-from collide.log import log_duration
 from collide.packed_world import PackedWorld, QueryRecord
 from collide.results import WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
-from collide.transforms import as_pose
-from collide.world_bodies import BodiesAsTheyStood, Body, WorldBodies
+from collide.transforms import as_pose, as_poses
+from collide.world_bodies import Body
+from collide.world_hits import WorldHits
+from collide.world_scene import WorldScene
 
 __all__ = ["Body", "World"]
 
 #: Contacts need what meshes need, which other questions about convex scenes do not.
 contact_query = lazy_module("collide.contact.contact_query")
+#: And so do casts.
+casts = lazy_module("collide.world_casts")
+cast_arguments = lazy_module("collide.casts.cast_arguments")
 
 
-class World:
+class World(WorldScene):
     """Bodies that may touch, and the questions one asks of them.
 
     A pair of bodies is tested unless both are static, their groups and masks exclude each other
@@ -45,159 +48,13 @@ class World:
     """
 
     def __init__(self) -> None:
-        self._bodies = WorldBodies()
-        self._allowed: dict[tuple[int, int], str] = {}
-        self._packed: PackedWorld | None = None
+        super().__init__()
         self._stats: dict = {}
         self._last_query: QueryRecord | None = None
 
     def __getstate__(self) -> dict:
-        """What a copy or a pickle takes along: bodies, names and what is allowed. The rest is made again."""
-        return {
-            "_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed), "_packed": None,
-            "_stats": copy.deepcopy(self.stats), "_last_query": None,
-        }  # fmt: skip
-
-    # --- bodies ---------------------------------------------------------------------------------
-
-    def add(
-        self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
-        mask: int = 0xFFFF,
-    ) -> int:  # fmt: skip
-        """Add a body.
-
-        Parameters
-        ----------
-        shape : any shape.
-        X_WB : (4, 4) pose of the body in the world W [m], or what `collide.transforms.as_poses` takes for one; the
-            identity if left out. It is copied.
-        name : not empty, unique in this World; "body 7" and so on if left out.
-        static : never tested against other static bodies.
-        group, mask : bit sets of up to 32 bits: the groups it is in, and those it is tested against.
-
-        Returns
-        -------
-        The body's id, an integer that is never used again. Ids ascend. About 3 µs.
-
-        Raises
-        ------
-        InvalidArgument, InvalidPose : naming the argument and the value; nothing is added.
-        """
-        identity = self._bodies.add(shape, X_WB, name, static, group, mask)
-        self._packed = None
-        return identity
-
-    def remove(self, body: int | str) -> None:
-        """Take a body out, and what was allowed for it.
-
-        Parameters
-        ----------
-        body : its id or name.
-
-        Raises
-        ------
-        UnknownBody
-        """
-        identity = self._bodies.id_of(body)
-        self._bodies.remove(identity)
-        if self._allowed:
-            self._allowed = {pair: reason for pair, reason in self._allowed.items() if identity not in pair}
-        self._packed = None
-
-    def set_pose(self, body: int | str, X_WB) -> None:
-        """Move a body. About 2 µs.
-
-        Parameters
-        ----------
-        body : its id or name.
-        X_WB : (4, 4) its new pose in the world W [m]; it is copied.
-
-        Raises
-        ------
-        UnknownBody, InvalidPose
-        """
-        self._bodies.move(self._bodies.id_of(body), X_WB)
-
-    def set_poses(self, bodies: Iterable[int | str], X_WBs) -> None:
-        """Move k bodies. About 0.1 µs a body, by ids.
-
-        Parameters
-        ----------
-        bodies : (k,) ids, best as integers or an integer array, or names. Of a body named twice the last pose counts.
-        X_WBs : (k, 4, 4) their new poses in the world W [m], in this order; they are copied.
-
-        Raises
-        ------
-        UnknownBody, InvalidPose : then no body has moved.
-        """
-        self._bodies.move_many(bodies, X_WBs)
-
-    def allow(self, a, b=None, *, reason: str = "allowed") -> None:
-        """Never test a pair: ``allow("link3", "link4")``; or many, ``allow(matrix)``.
-
-        Parameters
-        ----------
-        a, b : ids or names of two bodies; or a alone, a symmetric boolean matrix (n, n) over the n bodies in the order
-            of `ids`, True for pairs that are not tested.
-        reason : a few words; `stats` counts skipped pairs under it. A pair keeps its first.
-
-        Raises
-        ------
-        UnknownBody; InvalidArgument : the same body twice, or a matrix of another form.
-        """
-        if b is None:
-            matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
-            self._allow_matrix(matrix, reason)
-        else:
-            i, j = self._bodies.id_of(a), self._bodies.id_of(b)
-            if i == j:
-                name = self._bodies.name_of(i)
-                raise InvalidArgument(f'World.allow: "{name}" twice; a body is never tested against itself')
-            self._allowed.setdefault((min(i, j), max(i, j)), str(reason))
-        self._packed = None
-
-    def _allow_matrix(self, matrix: np.ndarray, reason: str) -> None:
-        n = len(self)
-        if matrix.shape != (n, n) or matrix.dtype != bool or (matrix != matrix.T).any():
-            raise InvalidArgument(
-                f"World.allow: a matrix must be symmetric, boolean and ({n}, {n}) for the {n} bodies, "
-                f"got {matrix.dtype} {matrix.shape}"
-            )
-        ids = self.ids
-        for i, j in np.argwhere(np.triu(matrix, 1)).tolist():
-            self._allowed.setdefault((ids[i], ids[j]), str(reason))
-
-    def __len__(self) -> int:
-        return len(self._bodies)
-
-    @property
-    def ids(self) -> list[int]:
-        """Ids of all bodies, ascending."""
-        return self._bodies.ids
-
-    @property
-    def names(self) -> dict[int, str]:
-        """Name of each body, by id."""
-        return self._bodies.names
-
-    def body(self, body: int | str) -> Body:
-        """The body of this id or name, as it stands now.
-
-        Parameters
-        ----------
-        body : its id or name.
-
-        Returns
-        -------
-        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves do not reach it.
-
-        Raises
-        ------
-        UnknownBody
-        """
-        return self._bodies.body(self._bodies.id_of(body))
-
-    # --- queries --------------------------------------------------------------------------------
+        """What a copy or a pickle takes along: the scene and `stats`."""
+        return super().__getstate__() | {"_stats": copy.deepcopy(self.stats), "_last_query": None}
 
     def collides(self, *, security_margin: float = 0.0) -> bool:
         """Whether any tested pair hits; stops at the first that does.
@@ -353,10 +210,101 @@ class World:
         rows["a"], bodies[-1] = -1, Body(-1, "query", shape, X_WS, False, 0, 0)
         return WorldResult(rows, bodies, certify)
 
-    @property
-    def allowed(self) -> dict[tuple[int, int], str]:
-        """Pairs never tested: {(id, id): reason}, the smaller id first."""
-        return dict(self._allowed)
+    def raycast(
+        self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
+        group: int | None = None, mask: int | None = None,
+    ) -> WorldHits:  # fmt: skip
+        """What rays meet first, or everything that they meet.
+
+        Parameters
+        ----------
+        origins_W : (3,) or (N, 3) where rays begin, in W [m].
+        directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single origin or direction goes with every
+            one of the others.
+        max_distance : [lengths of the direction], ≥ 0, as of `collide.raycast`.
+        all_hits : every place where a ray meets the surface of a body, not only the first.
+        group, mask : bit sets: bodies count with ``(group & mask_B) and (group_B & mask)``; None: all of them. Whether
+            bodies are static, and which pairs are allowed, has no say.
+
+        Returns
+        -------
+        WorldHits : a row a ray, ``body`` the id of the first body it meets, −1 for none; with ``all_hits`` a row for
+            every place, by ray, distance and body, and ``starts``. What the rest means and promises:
+            `collide.raycast`. `stats` stays as it is.
+
+        Raises
+        ------
+        InvalidArgument : as of `collide.raycast`.
+
+        Notes
+        -----
+        Rays go through the box-tree, nearest box first: about O(log n) a ray for bodies that are spread out.
+        """
+        limit = checks.limit("World.raycast: max_distance", max_distance, "")
+        origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
+        which = casts.checked_filter("World.raycast", group, mask)
+        rows, starts = casts.cast_rays(self._pack(), origins, directions, limit, all_hits, which)
+        return self._hits(rows, starts)
+
+    def shape_cast(
+        self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, group: int | None = None,
+        mask: int | None = None,
+    ) -> WorldHits:  # fmt: skip
+        """The first body that an outside shape touches when it is moved along a direction.
+
+        Parameters
+        ----------
+        shape : any shape but half-spaces.
+        X_WS : (4, 4) or (N, 4, 4) its poses in the world W [m] before it moves.
+        direction_W : (3,) or (N, 3) in W, of the motion; it need not be a unit vector.
+        max_distance : [lengths of the direction], ≥ 0, as of `collide.shape_cast`.
+        group, mask : as of `raycast`.
+
+        Returns
+        -------
+        WorldHits : a row a cast, ``body`` the id of the first body touched, −1 for none. Of several touched at the same
+            place the one with the smallest id. What the rest means and promises: `collide.shape_cast`.
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose, UnsupportedQuery : as of `collide.shape_cast`.
+        """
+        limit = checks.limit("World.shape_cast: max_distance", max_distance, "")
+        if not isinstance(shape, Shape):
+            raise InvalidArgument(f"World.shape_cast: shape must be a shape, got {checks.describe(shape)}")
+        X_WS = as_poses(X_WS, "World.shape_cast: X_WS")
+        directions, _ = cast_arguments.checked_directions("World.shape_cast", "direction_W", direction_W, "a cast")
+        n = checks.matched_count("World.shape_cast", X_WS=len(X_WS), direction_W=len(directions.vectors))
+        cast_arguments.refuse_unbounded("World.shape_cast: shape", shape)
+        which = casts.checked_filter("World.shape_cast", group, mask)
+        X_WS = np.ascontiguousarray(np.broadcast_to(X_WS, (n, 4, 4)))
+        return self._hits(casts.cast_shape(self._pack(), shape, X_WS, directions.repeated(n), limit, which))
+
+    def nearest(
+        self, points_W, *, max_distance: float = math.inf, group: int | None = None, mask: int | None = None
+    ) -> WorldHits:
+        """The body nearest to a point.
+
+        Parameters
+        ----------
+        points_W : (3,) or (N, 3) in W [m], within 1e50.
+        max_distance : [m], ≥ 0: bodies farther than this do not count.
+        group, mask : as of `raycast`.
+
+        Returns
+        -------
+        WorldHits : a row a point: ``body`` the id of the body with the least signed distance, −1 for none, ``distance``
+            [m] to it, below 0 for points inside, ``point`` its nearest point, ``normal`` from the point to it.
+            What these mean and promise: `collide.distance` of a point and a body.
+
+        Raises
+        ------
+        InvalidArgument
+        """
+        limit = checks.limit("World.nearest: max_distance", max_distance)
+        points = cast_arguments.checked_points("World.nearest", "points_W", points_W)
+        which = casts.checked_filter("World.nearest", group, mask)
+        return self._hits(casts.nearest_bodies(self._pack(), points, limit, which))
 
     @property
     def stats(self) -> dict:
@@ -396,26 +344,13 @@ class World:
     def _result(self, rows: np.ndarray) -> WorldResult:
         return WorldResult(rows, self._to_ids(rows), certify)
 
-    def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
-        """The bodies at the positions that rows name; in the rows, in place, their ids."""
-        packed = self._pack()
-        is_named = np.zeros(len(packed.roster.ids), dtype=bool)
-        is_named[rows["a"]] = is_named[rows["b"]] = True
-        positions = np.flatnonzero(is_named)
-        rows["a"], rows["b"] = packed.roster.ids[rows["a"]], packed.roster.ids[rows["b"]]
-        return BodiesAsTheyStood(packed.roster, positions, packed.X_WBs[positions])
-
-    def _pack(self) -> PackedWorld:
-        moved = self._bodies.take_moved()
-        if self._packed is None:
-            with log_duration("tables and box-tree of a World of %d bodies made", len(self)):
-                roster = self._bodies.roster()
-                position = {identity: k for k, identity in enumerate(roster.ids.tolist())} if self._allowed else {}
-                allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
-                self._packed = PackedWorld(roster, self._bodies.poses(), allowed)
-        elif len(moved):
-            self._packed.move(moved, self._bodies.poses()[moved])
-        return self._packed
+    def _hits(self, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
+        """Rows whose bodies are positions, with their ids."""
+        roster = self._pack().roster
+        named = np.unique(rows["body"][rows["body"] >= 0])
+        met = rows["body"] >= 0
+        rows["body"][met] = roster.ids[rows["body"][met]]
+        return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)
 
 
 def _within(rows: np.ndarray, limit: float) -> np.ndarray:

@@ -74,9 +74,14 @@ def workspace_integers(largest: int) -> int:
     return 2 * 2 * largest + 2 * max_corners(largest) + 2 * max_corners(largest) + max_corners(largest)
 
 
-@kernel(inline=True)
-def max_corners(largest):
+def max_corners(largest: int) -> int:
     """Corners that an overlap may have, and one point more."""
+    return 2 * largest + 8
+
+
+@kernel(inline=True)
+def _max_corners(largest):
+    """The same for kernels: Python calls none of them but entries."""
     return 2 * largest + 8
 
 
@@ -98,7 +103,7 @@ def convex_manifolds(
     ends = view_i64(ends_at, n)
     poses = view_f64(header[POSES_AT], 2 * POSE)
     shape_of = view_i64(header[SHAPE_OF_AT], 2)
-    max_rows = min(max_contacts, max_corners(header[LARGEST]))
+    max_rows = min(max_contacts, _max_corners(header[LARGEST]))
     n_rows = header[ROWS_DONE]
     for k in range(header[PAIRS_DONE], n):
         if capacity - n_rows < max_rows:
@@ -132,7 +137,7 @@ def put_manifold(header, row, margin, max_contacts, out_at):
     error = _error(pair, row)
     largest = header[LARGEST]
     doubles, integers = header[DOUBLES_AT], header[INTEGERS_AT]
-    n_max = max_corners(largest)
+    n_max = _max_corners(largest)
     of_b = support_face(
         pair, pair.B, header[FACES_AT], axes, -1.0, pair.t, largest, doubles + 24 * largest, integers + 16 * largest
     )

@@ -11,8 +11,8 @@ from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.shape_table import POSE, ShapeTable
 from collide.motion.convex_impact import FREE
-from collide.motion.impact_jobs import find_impacts
-from collide.motion.impact_rows import free_rows
+from collide.motion.impact_jobs import begin_single, find_impacts
+from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.moving_body import BODY
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -22,7 +22,7 @@ from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 
 #: Jobs done in one call of the kernel: their list stays small beside the motions.
-_JOBS_AT_ONCE = 1 << 16
+JOBS_AT_ONCE = 1 << 16
 #: A thread is handed at least so many motions.
 _MIN_MOTIONS_PER_THREAD = 200
 
@@ -88,6 +88,45 @@ class _OfThread(local):
         self.space = _Workspace()
 
 
+class SinglePair:
+    """Two shapes of one convex part each, ready for motions one at a time."""
+
+    def __init__(self, bodies: _Bodies, a: int, b: int):
+        self._bodies = bodies
+        self._jobs = np.array([[0, bodies.first[a], bodies.first[a], bodies.first[b], bodies.first[b]]], dtype=np.int64)
+        self._of_thread = local()
+
+    def ask(self, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
+        """The answer for poses (4, 4) of A and B at both ends; None where it takes more than this, as of bodies in
+        contact at the start, or an error has to be raised."""
+        for X in matrices:
+            if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4) or not X.flags.c_contiguous:
+                return None
+        space = getattr(self._of_thread, "space", None) or self._prepare()
+        if begin_single(space.header_at, *map(address_of, matrices), space.row_at) != 0:
+            return None
+        find_impacts(space.header_at, space.jobs_at, 1, 0.0, 1.0, tolerance, space.row_at)
+        return single_result(space.row, tolerance)
+
+    def _prepare(self) -> _SingleSpace:
+        here = np.eye(4)[None]
+        tables = Tables(self._bodies.table.addresses, len(self._bodies.table.packed), self._bodies.parts)
+        header, row = header_of(tables, Motions(here, here, here, here, None, None)), free_rows(1)
+        space = _SingleSpace(header, row, address_of(header), address_of(self._jobs), address_of(row))
+        self._of_thread.space = space
+        return space
+
+
+class _SingleSpace(NamedTuple):
+    """Header and row of one thread's single motions, and addresses, of the jobs, too."""
+
+    header: np.ndarray
+    row: np.ndarray
+    header_at: int
+    jobs_at: int
+    row_at: int
+
+
 _of_thread = _OfThread()
 
 
@@ -120,6 +159,7 @@ class _Bodies:
         self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
         self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
         self.table.build_trees(np.arange(len(self.table.packed)))
+        self.single = SinglePair(self, 0, len(shapes) - 1) if self.is_simple and len(shapes) <= 2 else None
 
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
@@ -149,6 +189,12 @@ def _bodies_of(shapes: list[Shape]) -> _Bodies:
     return bodies
 
 
+def single_impact(A: Any, B: Any, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
+    """The answer for two shapes that were asked about before; None where there is none, as in `SinglePair.ask`."""
+    bodies = prepared_pair(A, B, "_moving")
+    return None if bodies is None or bodies.single is None else bodies.single.ask(matrices, tolerance)
+
+
 def convex_impacts(
     shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions, tolerance: float, threads: int
 ) -> np.ndarray:
@@ -160,7 +206,7 @@ def convex_impacts(
     rows = free_rows(n)
     bodies = _bodies_of(shapes)
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
-    at_once = max(_JOBS_AT_ONCE // per_motion, 1)
+    at_once = max(JOBS_AT_ONCE // per_motion, 1)
 
     def work(piece: slice) -> None:
         header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)

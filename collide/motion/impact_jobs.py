@@ -23,6 +23,7 @@ from collide.motion.convex_impact import (
 )
 from collide.motion.moving_body import BODY
 from collide.motion.moving_pair import BodyMotion, moving_pair
+from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.rows import NORMAL, POINT_A, POINT_B, view_row
 from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
 from collide.transforms import ROTATION_TOLERANCE
@@ -86,9 +87,34 @@ def find_impacts(header_at, jobs_at, n, begin, end, tolerance, rows_at):
     return 0
 
 
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def begin_single(header_at, XA0_at, XA1_at, XB0_at, XB1_at, row_at):
+    """Make ready for one motion: 0, or −1 where a matrix is no pose.
+
+    header : for `find_impacts`, which is to have the addresses of the matrices.   row : of the answer.
+    """
+    header = view_i64(header_at, HEADER)
+    poses = view_f64(header[POSES_AT], 2 * POSE)
+    header[XA0_AT] = XA0_at
+    header[XA1_AT] = XA1_at
+    header[XB0_AT] = XB0_at
+    header[XB1_AT] = XB1_at
+    for k in range(4):
+        if not set_pose(poses, 0, view_f64(header[XA0_AT + k], 16), True):
+            return -1
+    _empty_rows(row_at, 1)
+    return 0
+
+
 @entry("int64(int64, int64)")
 def clear_impacts(rows_at, n):
     """Rows of answers become those of motions without any contact; returns 0."""
+    _empty_rows(rows_at, n)
+    return 0
+
+
+@kernel
+def _empty_rows(rows_at, n):
     for k in range(n):
         numbers = view_f64(rows_at + ANSWER * k, DOUBLES_OF_ROW)
         words = view_i32(rows_at + ANSWER * k + 8 * DOUBLES_OF_ROW, 4)
@@ -97,7 +123,6 @@ def clear_impacts(rows_at, n):
         numbers[LOWER] = numbers[UPPER] = math.inf
         words[JOB_A] = words[JOB_B] = words[QUERIES] = 0
         words[STATUS] = FREE
-    return 0
 
 
 @kernel(inline=True)

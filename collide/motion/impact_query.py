@@ -12,7 +12,7 @@ from collide.batches import answer_batch
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.kinds import Kind, kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
-from collide.motion.convex_motions import Motions, convex_impacts
+from collide.motion.convex_motions import Motions, convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.placed_motion import poses_at
@@ -89,15 +89,18 @@ def time_of_impact(
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)
+    if check_poses and omega_WA is None and omega_WB is None:
+        single_answer = single_impact(A, B, (X_WA0, X_WA1, X_WB0, X_WB1), width)
+        if single_answer is not None:
+            return single_answer
     matrices = {"X_WA0": X_WA0, "X_WA1": X_WA1, "X_WB0": X_WB0, "X_WB1": X_WB1}
     poses, singles = zip(*(_checked_poses(X, name, check_poses) for name, X in matrices.items()))
     turns = {"omega_WA": omega_WA, "omega_WB": omega_WB}
     omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
-    single = all(singles) and all(single_omegas)
     n, are_shapes = matched_counts(A, B, counts)
     question = _Question(*_distinct(A, B, n), Motions(*poses, *omegas), width, n_threads)
-    return as_result(_answer(question), width, single and are_shapes)
+    return as_result(_answer(question), width, are_shapes and all(singles) and all(single_omegas))
 
 
 def poses_in_motion(

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.motion.convex_impact import FREE
-from collide.motion.impact_jobs import clear_impacts
+from collide.motion.convex_impact import CONTACT, FREE, OPEN
+from collide.motion.impact_jobs import DOUBLES_OF_ROW, clear_impacts
 
 #: One row a motion: bracket of the first contact, normal and points in W [m]; which parts meet; questions to GJK; how
 #: the search ended (`convex_impact.py`).
@@ -78,6 +78,21 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
             "normal", "point_a", "point_b", "part_a", "part_b", "queries")),
     )  # fmt: skip
     return TimeOfImpact(*(_scalar(column[0]) if single else column for column in columns))
+
+
+def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:
+    """The same of one motion of two convex parts; None of one that begins in contact, or may, or is refused."""
+    status, values = int(row["status"][0]), row.view(np.float64)[:DOUBLES_OF_ROW].copy()
+    if status == FREE:
+        lower = upper = 1.0
+    else:
+        lower, upper = values[:2].tolist()
+        if status not in (CONTACT, OPEN) or upper == 0.0:
+            return None
+    normal, point_a, point_b = values[2:5], values[5:8], values[8:11]
+    certified = upper - lower <= tolerance
+    queries = int(row["queries"][0])
+    return TimeOfImpact(status != FREE, lower, lower, upper, certified, normal, point_a, point_b, 0, 0, queries)  # type: ignore[arg-type]
 
 
 def _scalar(value):

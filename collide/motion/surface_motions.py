@@ -28,7 +28,7 @@ from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.convex_impact import OPEN
-from collide.motion.convex_motions import Motions, Tables, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
@@ -47,6 +47,8 @@ from collide.transforms import SMALLEST
 _MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
+#: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
+_BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
 
 
@@ -141,6 +143,8 @@ def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows
     exchanged = motions.exchanged(np.full(len(rows), order_a > order_b), np.full(len(rows), order_a == order_b))
     for flip in (False, True):  # swapped questions are worked out on the same numbers
         some = np.flatnonzero(exchanged == flip)
+        if not len(some):
+            continue
         part = rows[some]
         if flip:
             _search_all(B, A, motions.picked(some).swapped(), tolerance, part)
@@ -157,10 +161,63 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
         _convex_pieces(a, b, motions, tolerance, rows)
     is_part = isinstance(A, Compound), isinstance(B, Compound)
     of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
-    for k in range(len(rows)):
+    large = []
+    for a, b in of_facets:
+        pairs = _all_facets(a, b)
+        if pairs is None:
+            large.append((a, b))
+        else:
+            _search_few(a, b, pairs, motions, tolerance, rows, is_part)
+    for k in np.flatnonzero(_come_near(motions, large)).tolist():
         motion = motions.picked(np.array([k]))
-        for a, b in of_facets:
+        for a, b in large:
             _search(a, b, motion, tolerance, rows[k : k + 1], is_part)
+
+
+def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
+    """(k, 2) all pairs of facets, a convex piece counting as one, where they are so few that no span need be cut."""
+    ids = [np.unique(p.tree.ids) if p.is_mesh else np.zeros(1, dtype=np.int64) for p in (a, b)]  # type: ignore[union-attr]
+    if len(ids[0]) * len(ids[1]) > _MAX_JOBS:
+        return None
+    return np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, tolerance: float, rows, is_part) -> None:
+    """`_search` for all motions at once, by all pairs of facets."""
+    near = np.flatnonzero(_come_near(motions, [(a, b)]))
+    table, jobs, ids = _jobs(a, b, pairs)
+    parts, numbers = _parts(a, b), [np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)]
+    before = _clear_parts(rows)
+    at_once = max(JOBS_AT_ONCE // len(jobs), 1)
+    for first in range(0, len(near), at_once):
+        some = near[first : first + at_once]
+        these = np.tile(jobs, (len(some), 1))
+        these[:, 0] = np.repeat(some, len(jobs))
+        _do(table, len(table.ints), parts, motions, these, 0.0, 1.0, tolerance, rows)
+    _name_parts(rows, before, *numbers)
+
+
+def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
+    """(n,) bool: motions in which balls around both bodies' origins meet that hold the pieces; rounding counts as
+    meeting."""
+    if not pieces:
+        return np.zeros(1, dtype=bool)
+    reach = max(sum(p.reach + float(np.linalg.norm(p.X_CS[:3, 3])) for p in pair) for pair in pieces)
+    (a0, a1), (b0, b1) = (tuple(X[:, :3, 3] for X in ends) for ends in (motions[:2], motions[2:4]))
+    d0 = b0 - a0
+    v = (b1 - a1) - d0
+    square = (v * v).sum(axis=1)
+    middle = np.clip(-(d0 * v).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    farthest = np.linalg.norm(d0, axis=1) + np.linalg.norm(v, axis=1)
+    rounding = 2.0**-30 * (reach + farthest + sum(p.slop for pair in pieces for p in pair))
+    stretch = np.maximum(_stretches(motions.X_WA0), _stretches(motions.X_WB0)) + _BALLS_OUTWARD
+    return np.linalg.norm(d0 + middle[:, None] * v, axis=1) <= reach * stretch + rounding
+
+
+def _stretches(X: np.ndarray) -> np.ndarray:
+    """(n,) bounds of |R|: 1 of rotations, but matrices may be unchecked."""
+    products = np.abs(X[:, :3, :3].transpose(0, 2, 1) @ X[:, :3, :3])
+    return np.sqrt(products.sum(axis=2).max(axis=1))
 
 
 def _order(shape: Shape) -> list[bytes]:

@@ -13,12 +13,14 @@ import numpy as np
 
 from collide import argument_checks as checks
 from collide.batches import answer_batch
+from collide.casts.raycast import raycast
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import MeshTree
 from collide.mesh.shell_volumes import without_area
 from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
 from collide.numerics.exact_points import minus, on_one_grid, placed
@@ -26,10 +28,7 @@ from collide.results import UNDECIDED as SIGN_OPEN
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-from collide.surface_queries.checked_arguments import matched_count, refuse_rows, vectors
-from collide.surface_queries.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.surface_queries.inside_by_definition import holds
-from collide.surface_queries.raycast import raycast
 from collide.transforms import LARGEST, poses_as_given
 
 #: The facets without area of meshes that have been asked.
@@ -66,10 +65,10 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
         raise InvalidArgument(
             f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
         )
-    points, single_point = vectors("contains", "points_W", points_W)
-    refuse_rows("contains", "points_W", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+    points, single_point = checks.vectors("contains", "points_W", points_W)
+    checks.refuse_rows("contains", "points_W", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
     X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
-    n = matched_count("contains", X_WA=len(X_WA), points_W=len(points))
+    n = checks.matched_count("contains", X_WA=len(X_WA), points_W=len(points))
     points = np.ascontiguousarray(np.broadcast_to(points, (n, 3)))
     if n == 0:
         return np.zeros(0, dtype=bool)

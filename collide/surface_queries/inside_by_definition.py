@@ -13,12 +13,12 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of, has_facets
+from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, ray_crossing
 from collide.numerics.exact_points import cross, inner, minus
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Cone, Cylinder, Ellipsoid, Halfspace
 from collide.shapes.shape import Shape
-from collide.surface_queries.facet_geometry import RAY_DIRECTIONS, ray_crossing
 
 #: A facet this much farther than it may be, in units of the largest coordinate, is not looked at in fractions.
 _SLACK = 1e-9

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from collide import Box, Capsule, ConvexHull, InvalidArgument, InvalidPose, Mesh, Sphere, UnsupportedQuery
-from collide.surface_queries.checked_arguments import matched_count, refuse_rows, two_bodies, vectors
+from collide.argument_checks import matched_count, refuse_rows, vectors
+from collide.surface_queries.checked_arguments import two_bodies
 
 EYE = np.eye(4)
 MESH = Mesh(np.eye(3), [[0, 1, 2]], solid=False)

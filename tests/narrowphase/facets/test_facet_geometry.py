@@ -11,14 +11,14 @@ from naive import random_pose, rng_of
 from naive_triangles import as_integers, minus, winding, world_points
 
 from collide.mesh.build_bvh import build_mesh_tree
-from collide.numerics.exact_points import placed
-from collide.surface_queries.facet_geometry import (
+from collide.narrowphase.facets.facet_geometry import (
     RAY_DIRECTIONS,
     FacetCorners,
     exact_point,
     facet_normals,
     ray_crossing,
 )
+from collide.numerics.exact_points import placed
 
 
 def test_corners_by_number():

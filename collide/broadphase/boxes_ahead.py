@@ -1,0 +1,173 @@
+"""Boxes of a `BoxTree` that a moved box or a ray comes to, and those near a point: candidates, with bounds.
+
+A box that is moved meets another where a ray meets their Minkowski difference, a box as well: three slabs.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.broadphase.box_tree import BoxTree
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+
+#: Doubles of a question: low and high corner of the box that moves, the direction, and the largest t that counts.
+SWEEP = 10
+#: Relative error of a t where a slab begins or ends, a product with an inverse, with a margin.
+_ROUNDING = 2.0**-50
+#: Coordinates are smaller than this; those of boxes that hold nothing are infinite.
+_LARGEST = 1e300
+
+
+@kernel(inline=True)
+def downwards(x):
+    """A difference of two coordinates, moved down by more than it is off; infinities stay."""
+    return x - min(abs(x), _LARGEST) * _ROUNDING
+
+
+@kernel(inline=True)
+def upwards(x):
+    return x + min(abs(x), _LARGEST) * _ROUNDING
+
+
+@kernel(inline=True)
+def slab_entry(low, high, inverse, first, last):
+    """(first, last) of the t in [first, last] with low ≤ t step ≤ high, rounded outwards.
+
+    inverse : of the step, infinite where it is 0.
+    """
+    if abs(inverse) == math.inf:
+        return (first, last) if low <= 0.0 <= high else (math.inf, -math.inf)
+    near = low * inverse
+    far = high * inverse
+    if inverse < 0.0:
+        near, far = far, near
+    return max(first, downwards(near)), min(last, upwards(far))
+
+
+@kernel(inline=True)
+def box_entry(nodes, node, sweep, at, limit):
+    """The t at which a swept box comes to that of a node, from below; infinite where it does not within the limit."""
+    first = 0.0
+    last = limit
+    for axis in range(3):
+        # Sums of two coordinates are rounded: outwards by an ulp of the larger.
+        low = nodes[6 * node + axis] - sweep[at + 3 + axis]
+        high = nodes[6 * node + 3 + axis] - sweep[at + axis]
+        step = sweep[at + 6 + axis]
+        inverse = 1.0 / step if step != 0.0 else math.inf
+        first, last = slab_entry(downwards(low), upwards(high), inverse, first, last)
+    return first if first <= last else math.inf
+
+
+@kernel(inline=True)
+def box_gap(nodes, node, point, at):
+    """The distance of a point from the box of a node, from below."""
+    square = 0.0
+    for axis in range(3):
+        x = point[at + axis]
+        out = max(nodes[6 * node + axis] - x, x - nodes[6 * node + 3 + axis], 0.0)
+        square += out * out
+    return math.sqrt(square) * (1.0 - _ROUNDING)
+
+
+@kernel(inline=True)
+def _farthest_corner(nodes, node, point, at):
+    """The distance of a point from the farthest corner of the box of a node, from above."""
+    square = 0.0
+    for axis in range(3):
+        x = point[at + axis]
+        out = max(nodes[6 * node + 3 + axis] - x, x - nodes[6 * node + axis])
+        square += out * out
+    return math.sqrt(square) * (1.0 + _ROUNDING)
+
+
+@kernel
+def _nearest_of_all(nodes, leaves, point, at):
+    """A distance within which there is a body, from above: down to a near leaf, then through what may be nearer."""
+    node = 1
+    while node < leaves:
+        node = 2 * node
+        if box_gap(nodes, node + 1, point, at) < box_gap(nodes, node, point, at):
+            node += 1
+    best = _farthest_corner(nodes, node, point, at)
+    node = 1
+    while node > 0:
+        if box_gap(nodes, node, point, at) < best:
+            if node < leaves:
+                node = 2 * node
+                continue
+            best = min(best, _farthest_corner(nodes, node, point, at))
+        while node & 1:
+            node >>= 1
+        node = node + 1 if node > 0 else 0
+    return best
+
+
+@entry("int64(int64, int64, boolean, int64, int64, int64, int64, int64, int64, int64)")
+def boxes_ahead(
+    questions_at, n, of_points, nodes_at, leaves, order_at, n_order, pairs_at, bounds_at, capacity
+):
+    """Pairs (question, body) of boxes that are come to, with t from below; returns how many there are.
+
+    questions : SWEEP doubles each; ``of_points``, a point is the low corner, every box is named whose distance from it
+        is at most the limit, and bounds are distances.
+    pairs : out, two integers each, of the first ``capacity``.   bounds : out, a double each.
+    """
+    questions = view_f64(questions_at, SWEEP * n)
+    nodes = view_f64(nodes_at, 12 * leaves)
+    order = view_i64(order_at, n_order)
+    pairs = view_i64(pairs_at, 2 * capacity)
+    bounds = view_f64(bounds_at, capacity)
+    count = 0
+    for k in range(n):
+        at = SWEEP * k
+        limit = questions[at + 9]
+        if of_points:
+            limit = min(limit, _nearest_of_all(nodes, leaves, questions, at))
+        node = 1
+        while node > 0:
+            if of_points:
+                bound = box_gap(nodes, node, questions, at)
+                bound = bound if bound <= limit else math.inf
+            else:
+                bound = box_entry(nodes, node, questions, at, limit)
+            is_met = bound < math.inf
+            if is_met and node < leaves:
+                node = 2 * node
+                continue
+            if is_met and node - leaves < n_order:
+                if count < capacity:
+                    pairs[2 * count] = k
+                    pairs[2 * count + 1] = order[node - leaves]
+                    bounds[count] = bound
+                count += 1
+            while node & 1:  # to the next subtree to the right
+                node >>= 1
+            node = node + 1 if node > 0 else 0
+    return count
+
+
+def bodies_ahead(tree: BoxTree, questions: np.ndarray, of_points: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 2) questions and bodies, (k,) bounds of t or distance from below), by question and bound.
+
+    questions : (n, SWEEP) float64.   Bodies without end are with every question, at 0.
+    """
+    capacity = 64 + 16 * len(questions)
+    while True:
+        pairs, bounds = np.empty((capacity, 2), dtype=np.int64), np.empty(capacity)
+        count = boxes_ahead(
+            address_of(questions), len(questions), of_points, address_of(tree.nodes), tree.leaves,
+            address_of(tree.order), len(tree.order), address_of(pairs), address_of(bounds), capacity,
+        )  # fmt: skip
+        if count <= capacity:
+            break
+        capacity = count
+    pairs, bounds = pairs[:count], bounds[:count]
+    if len(tree.unbounded):
+        n, m = len(questions), len(tree.unbounded)
+        unbounded = np.stack([np.repeat(np.arange(n), m), np.tile(tree.unbounded, n)], axis=1)
+        pairs, bounds = np.concatenate([pairs, unbounded]), np.concatenate([bounds, np.zeros(n * m)])
+    order = np.lexsort((pairs[:, 1], bounds, pairs[:, 0]))
+    return pairs[order], bounds[order]

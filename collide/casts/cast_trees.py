@@ -1,0 +1,375 @@
+"""Casts against the facets of a mesh: of a convex set, or of another mesh's facets, along two box-trees.
+
+A box moved along a direction meets another where a ray meets a third (`broadphase/boxes_ahead.py`), here in the frame
+and the units of B's tree. Pairs of boxes are opened nearest first; a pair of facets, or a facet and the convex set, is
+a cast of convex sets (`portal.py`). What is proven of one bounds how far it is worth looking (van den Bergen 2004).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from collide.broadphase.boxes_ahead import slab_entry
+from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE
+from collide.casts.portal import BEHIND, HIT, MISS, OPEN, cast_line
+from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS, open_cast
+from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH
+from collide.mesh.bvh import CENTRE, EXPONENT, WIDTH, box_at, link_of, open_tree
+from collide.mesh.bvh import REACH as TREE_REACH
+from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, difference_point
+from collide.narrowphase.posed_pair import PosedBody, PosedPair, posed_body, stretch_of
+from collide.numerics.vec3 import (
+    Vec3,
+    absolute,
+    add,
+    cross,
+    dot,
+    max_abs,
+    neg,
+    norm,
+    put_vec3,
+    rotate,
+    scale,
+    sub,
+    vec3_at,
+)
+from collide.support.shape_kinds import POINTS
+
+#: Boxes or pairs of them that may wait.
+STACK = 4096
+#: Doubles of workspace: of a cast, two poses, the corners of two facets, and keys of what waits; integers: of a cast,
+#: and what waits.
+TREE_CAST_DOUBLES = CAST_DOUBLES + 2 * POSE + 48 + STACK
+TREE_CAST_INTEGERS = CAST_INTEGERS + STACK
+#: Doubles of a candidate: a row of `cast_pairs.py`, the facets of A (−1 of a convex set) and of B, and the question.
+CANDIDATE = CAST_ROW + 3
+FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
+
+# Integers of a header: addresses of A's tree (0 for a convex set) and B's, of the shape table, poses of A and of B and
+# from one question to the next, questions, candidates, and how many of them there is room for.
+(
+    TREE_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
+) = range(11)  # fmt: skip
+HEADER = 11
+_LOW = 0xFFFFFFFF
+
+
+class _Matrix(NamedTuple):
+    """Three rows."""
+
+    x: Vec3
+    y: Vec3
+    z: Vec3
+
+
+class _Sweep(NamedTuple):
+    """One question.
+
+    pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
+    In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
+    inverse : of the direction there, component by component.
+    rotation : from A's tree to it, coordinates.   shift : where the centre of A's tree is.
+    pad : by what boxes are widened.
+    """
+
+    pair: Any
+    d: Vec3
+    error: float
+    size: float
+    middle: Vec3
+    half: Vec3
+    inverse: Vec3
+    rotation: _Matrix
+    shift: Vec3
+    pad: float
+
+
+class _Work(NamedTuple):
+    """Workspace: corners of two facets, what waits with its keys, addresses of what a cast needs."""
+
+    corners: Any
+    stack: Any
+    keys: Any
+    doubles_at: int
+    integers_at: int
+
+
+@kernel(inline=True)
+def _times(m, v):
+    return Vec3(dot(m.x, v), dot(m.y, v), dot(m.z, v))
+
+
+@kernel(inline=True)
+def _inverse_rows(R, at):
+    """Rows of R⁻¹."""
+    a, b, c = vec3_at(R, at), vec3_at(R, at + 3), vec3_at(R, at + 6)
+    p, q, r = cross(b, c), cross(c, a), cross(a, b)
+    share = 1.0 / dot(a, p)
+    return _Matrix(
+        scale(share, Vec3(p.x, q.x, r.x)), scale(share, Vec3(p.y, q.y, r.y)), scale(share, Vec3(p.z, q.z, r.z))
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _stretch(R, p):
+    return stretch_of(
+        R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
+        R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
+        R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
+        R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
+        R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
+        R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
+    )
+
+
+@kernel(inline=True)
+def _extent_along(pair, v, radius, points, ids):
+    """How far A reaches along v in W's axes, from its own origin."""
+    difference_point(pair, points, ids, 0, v)
+    return dot(vec3_at(points, POINT_OF_A), v) + radius * norm(v)
+
+
+@kernel(inline=True)
+def _facet_body(corners):
+    """A `PosedBody` over the corners of one facet, eight columns of which five are copies."""
+    return PosedBody(corners, 3, 8, POINTS, 0, 0, 0, 0, 0)
+
+
+@kernel(inline=True)
+def _put_corners(corners, at, triangles, facet):
+    for axis in range(3):
+        for k in range(8):
+            corners[at + 8 * axis + k] = triangles[9 * facet + 3 * (k if k < 3 else 0) + axis]
+
+
+@kernel
+def _posed_pair(header, k, poses, corners_at):
+    """Both sides at the poses of question k, copied to ``poses``."""
+    of_a = view_f64(header[POSES_A] + 8 * header[STEP_A] * k, POSE)
+    of_b = view_f64(header[POSES_B] + 8 * header[STEP_B] * k, POSE)
+    for i in range(POSE):
+        poses[i] = of_a[i]
+        poses[POSE + i] = of_b[i]
+    ints = view_i64(header[INTS_AT], INTS)
+    A = posed_body(ints, 0, 0)
+    if header[TREE_A] != 0:
+        A = _facet_body(view_f64(corners_at, 24))
+    B = _facet_body(view_f64(corners_at + 8 * 24, 24))
+    B = PosedBody(B.coords, 3, 8, POINTS, 0, 0, POSE, 0, 0)
+    t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
+    return PosedPair(A, B, view_f64(header[NUMBERS_AT], NUMBERS), poses, t)
+
+
+@kernel
+def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
+    """The `_Sweep` of question k.   a, b : both trees; b twice where A is none."""
+    numbers, poses = pair.numbers, pair.poses
+    is_convex = header[TREE_A] == 0
+    reach_a = numbers[REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
+    radius = numbers[RADIUS] if is_convex else 0.0
+    reach_a = reach_a * _stretch(poses, 0) + radius
+    reach_b = norm(vec3_at(b.numbers, TREE_REACH)) * _stretch(poses, POSE)
+    size = reach_a + reach_b + norm(pair.t)
+    error = ERROR * size + poses[POSE_SLOP] + poses[POSE + POSE_SLOP]
+    unit = math.ldexp(1.0, int(-b.header[EXPONENT]))
+    inverse = _inverse_rows(poses, POSE)
+    rows = _Matrix(scale(unit, inverse.x), scale(unit, inverse.y), scale(unit, inverse.z))
+    centre = scale(unit, vec3_at(b.numbers, CENTRE))
+    origin = sub(_times(rows, neg(pair.t)), centre)
+    d = vec3_at(view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION), 0)
+    zero = Vec3(0.0, 0.0, 0.0)
+    middle, half, shift, rotation = origin, zero, zero, rows
+    if is_convex:
+        points, ids = view_f64(doubles_at, 9), view_i64(integers_at, 2)
+        high = Vec3(
+            _extent_along(pair, rows.x, radius, points, ids), _extent_along(pair, rows.y, radius, points, ids),
+            _extent_along(pair, rows.z, radius, points, ids),
+        )  # fmt: skip
+        low = Vec3(
+            -_extent_along(pair, neg(rows.x), radius, points, ids),
+            -_extent_along(pair, neg(rows.y), radius, points, ids),
+            -_extent_along(pair, neg(rows.z), radius, points, ids),
+        )
+        middle = add(origin, scale(0.5, add(low, high)))
+        half = scale(0.5, sub(high, low))
+    else:
+        # x ↦ rows R_A (centre + 2^e x): coordinates of A's tree in those of B's.
+        columns = _Matrix(
+            Vec3(poses[0], poses[3], poses[6]), Vec3(poses[1], poses[4], poses[7]), Vec3(poses[2], poses[5], poses[8])
+        )
+        x, y, z = _times(rows, columns.x), _times(rows, columns.y), _times(rows, columns.z)
+        of_a = math.ldexp(1.0, int(a.header[EXPONENT]))
+        rotation = _Matrix(
+            scale(of_a, Vec3(x.x, y.x, z.x)), scale(of_a, Vec3(x.y, y.y, z.y)), scale(of_a, Vec3(x.z, y.z, z.z))
+        )
+        shift = add(origin, _times(rows, rotate(poses, 0, vec3_at(a.numbers, CENTRE))))
+    widest = max(norm(rows.x), norm(rows.y), norm(rows.z))
+    pad = 4.0 * widest * (error + 2.0**-44 * size) + 2.0**-44 * (norm(origin) + norm(centre) + 1.0)
+    step = _times(rows, d)
+    inverse = Vec3(_inverted(step.x, step), _inverted(step.y, step), _inverted(step.z, step))
+    return _Sweep(pair, d, error, size, middle, half, inverse, rotation, shift, pad)
+
+
+@kernel(inline=True)
+def _inverted(x, step):
+    """1 / x; infinite where the component of a step is 0 but for rounding: ``pad`` holds what it moves."""
+    return 1.0 / x if abs(x) > 2.0**-48 * max_abs(step) else math.inf
+
+
+@kernel(inline=True)
+def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
+    """t at which the box of A behind a reference comes to that of B, from below; infinite for later than ``best``."""
+    box = box_at(b.boxes, ref_b)
+    middle, half = sweep.middle, sweep.half
+    if has_tree_a:
+        of_a = box_at(a.boxes, ref_a)
+        rotation = sweep.rotation
+        middle = add(sweep.shift, _times(rotation, of_a.centre))
+        half = Vec3(
+            dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
+            dot(absolute(rotation.z), of_a.half),
+        )  # fmt: skip
+    gap = sub(box.centre, middle)
+    wide = add(box.half, half)
+    pad = sweep.pad + 2.0**-40 * (abs(gap.x) + abs(gap.y) + abs(gap.z))
+    first, last = slab_entry(gap.x - wide.x - pad, gap.x + wide.x + pad, sweep.inverse.x, 0.0, best)
+    first, last = slab_entry(gap.y - wide.y - pad, gap.y + wide.y + pad, sweep.inverse.y, first, last)
+    first, last = slab_entry(gap.z - wide.z - pad, gap.z + wide.z + pad, sweep.inverse.z, first, last)
+    return first if first <= last else math.inf
+
+
+@kernel
+def _cast_facets(sweep, work, radius, limit, best, row):
+    """Write the row of what the pair holds now; the largest t that is still of interest afterwards, at first ``best``.
+
+    The bodies are known to be apart at the start.
+    """
+    cast = open_cast(
+        sweep.pair, sweep.d, radius, 0.0, sweep.error, sweep.size, work.doubles_at, work.integers_at
+    )  # fmt: skip
+    met = cast_line(cast, limit, False)
+    status = met.status
+    if met.lower > best:
+        status = MISS
+    elif status == BEHIND:
+        status = MISS if met.upper <= 0.0 else OPEN
+    row[STATUS] = status
+    row[LOWER] = max(met.lower, 0.0)
+    row[VALUE] = max(met.value, 0.0)
+    row[UPPER] = met.upper
+    row[SIZE] = sweep.size / cast.length
+    put_vec3(row, NORMAL, met.normal)
+    put_vec3(row, TOUCHING, add(met.point, vec3_at(sweep.pair.poses, POSE + 9)))
+    return min(best, met.upper) if status == HIT else best
+
+
+@kernel(inline=True)
+def _push(work, top, base, word, key):
+    """Put a word onto the stack, which from ``base`` on stays in order, the nearest on top."""
+    at = top
+    while at > base and work.keys[at - 1] < key:
+        work.keys[at] = work.keys[at - 1]
+        work.stack[at] = work.stack[at - 1]
+        at -= 1
+    work.keys[at] = key
+    work.stack[at] = word
+
+
+@kernel
+def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
+    """Push the children of the larger box of a pair; the stack's new height."""
+    link_a = link_of(a.links, ref_a) if has_tree_a else -1
+    link_b = link_of(b.links, ref_b)
+    opens_a = link_a >= 0
+    if opens_a and link_b >= 0:
+        of_a, of_b = box_at(a.boxes, ref_a).half, box_at(b.boxes, ref_b).half
+        rotation = sweep.rotation
+        size_a = dot(absolute(rotation.x), of_a) + dot(absolute(rotation.y), of_a) + dot(absolute(rotation.z), of_a)
+        opens_a = size_a > of_b.x + of_b.y + of_b.z
+    base = top
+    for slot in range(WIDTH):
+        child_a = WIDTH * link_a + slot if opens_a else ref_a
+        child_b = ref_b if opens_a else WIDTH * link_b + slot
+        tree = a.boxes if opens_a else b.boxes
+        child = child_a if opens_a else child_b
+        if not box_at(tree, child).half.x >= 0.0:
+            continue
+        key = _entry_of(sweep, a, b, child_a, child_b, has_tree_a, best)
+        if key < math.inf:
+            _push(work, top, base, (child_a << 32) | child_b, key)
+            top += 1
+    return top
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
+    """Candidates for the first contacts of questions ``first`` … n − 1 that are apart at the start.
+
+    header : HEADER integers.   count : one integer, how many candidates there are, in and out.
+    doubles, integers : workspace (TREE_CAST_DOUBLES, TREE_CAST_INTEGERS).
+    Returns how many questions are answered; fewer than n where there is no room for more candidates.
+    """
+    header = view_i64(header_at, HEADER)
+    count = view_i64(count_at, 1)
+    has_tree_a = header[TREE_A] != 0
+    b = open_tree(header[TREE_B])
+    a = open_tree(header[TREE_A] if has_tree_a else header[TREE_B])
+    poses_at = doubles_at + 8 * CAST_DOUBLES
+    corners_at = poses_at + 8 * 2 * POSE
+    work = _Work(
+        view_f64(corners_at, 48), view_i64(integers_at + 8 * CAST_INTEGERS, STACK),
+        view_f64(corners_at + 8 * 48, STACK), doubles_at, integers_at,
+    )  # fmt: skip
+    for k in range(first, n):
+        begin = count[0]
+        question = view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION)
+        pair = _posed_pair(header, k, view_f64(poses_at, 2 * POSE), corners_at)
+        sweep = _sweep_of(header, k, a, b, pair, doubles_at, integers_at)
+        if not _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], count):
+            count[0] = begin
+            return k
+    return n
+
+
+@kernel
+def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
+    """All candidates of one question; False where there is no room for them."""
+    best = limit
+    radius = 0.0 if has_tree_a else sweep.pair.numbers[RADIUS]
+    top = 0
+    if _entry_of(sweep, a, b, 0, 0, has_tree_a, best) < math.inf:
+        work.stack[0] = 0
+        work.keys[0] = 0.0
+        top = 1
+    while top > 0:
+        top -= 1
+        if work.keys[top] > best:
+            continue
+        ref_a, ref_b = work.stack[top] >> 32, work.stack[top] & _LOW
+        link_a = link_of(a.links, ref_a) if has_tree_a else -1
+        link_b = link_of(b.links, ref_b)
+        if link_a >= 0 or link_b >= 0:
+            if top + WIDTH > STACK:
+                return False
+            top = _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top)
+            continue
+        run_a, run_b = ~link_a, ~link_b
+        n_a = run_a & 7 if has_tree_a else 1
+        if count[0] + n_a * (run_b & 7) > header[CAPACITY]:
+            return False
+        for i in range(n_a):
+            if has_tree_a:
+                _put_corners(work.corners, 0, a.triangles, (run_a >> 3) + i)
+            for j in range(run_b & 7):
+                _put_corners(work.corners, 24, b.triangles, (run_b >> 3) + j)
+                row = view_f64(header[CANDIDATES_AT] + 8 * CANDIDATE * count[0], CANDIDATE)
+                best = _cast_facets(sweep, work, radius, limit, best, row)
+                if row[STATUS] != MISS:
+                    row[FACET_A] = a.ids[(run_a >> 3) + i] if has_tree_a else -1
+                    row[FACET_B] = b.ids[(run_b >> 3) + j]
+                    row[OF_QUESTION] = k
+                    count[0] += 1
+    return True

@@ -1,0 +1,119 @@
+"""Where a cast of polytopes first touches, in exact numbers: a linear program of four rows, with no tolerance.
+
+A + t d meets B for the least t ≥ 0 with Σ μ (a − b) + t d = 0, Σ μ = 1, μ ≥ 0, over all pairs of vertices (a, b). The
+simplex method prices them by support mappings, so that a round costs a look at every vertex, not at every pair. Ties of
+the ratio test are broken lexicographically (G. Dantzig, A. Orden and P. Wolfe, "The generalized simplex method", 1955):
+no basis comes twice, and it ends. Artificial variables that begin the basis cost infinitely more than t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from collide.numerics.exact_points import Point, inner, minus
+
+_ARTIFICIAL, _T = -1, -2
+
+
+class ExactCast(NamedTuple):
+    """t : the least one, None where nothing is ever met.
+
+    normal : an outward normal of A ⊖ B at the point of touching, exact and of any length; zeros where t is 0.
+    weights : {(i, j): weight} of pairs of vertices that touch: Σ weight · a_i is where, before the motion.
+    """
+
+    t: Fraction | None
+    normal: tuple[Fraction, Fraction, Fraction]
+    weights: dict[tuple[int, int], Fraction]
+
+
+class _Basis(NamedTuple):
+    """A basis of the program: all entries are integers over ``denominator[0]``, which is positive.
+
+    names : of the four basic variables: _ARTIFICIAL, _T, or a pair of vertices.
+    rows : four of five, the inverse of the basis and the value of the variable.
+    """
+
+    names: list
+    rows: list[list[int]]
+    denominator: list[int]
+
+
+def cast_exactly(A: Sequence[Point], B: Sequence[Point], d: Sequence[int]) -> ExactCast:
+    """The first contact of the hull of A, moved along d, with the hull of B.
+
+    A, B : integer points on one grid.   d : integers, in units of the same grid a unit of t; not 0.
+    """
+    basis = _Basis([_ARTIFICIAL] * 4, [[int(i == j) for j in range(4)] + [int(i == 3)] for i in range(4)], [1])
+    while True:
+        far, near = _prices(basis, _ARTIFICIAL), _prices(basis, _T)
+        column = _entering(A, B, d, far, near, basis.denominator[0])
+        if column is None:
+            break
+        name, entries = column
+        pivots = [sum(row[k] * entries[k] for k in range(4)) for row in basis.rows]
+        _exchange(basis, pivots, _leaving(basis.rows, pivots), name)
+    values = [Fraction(row[4], basis.denominator[0]) for row in basis.rows]
+    zero = Fraction(0), Fraction(0), Fraction(0)
+    if any(name == _ARTIFICIAL and value for name, value in zip(basis.names, values)):
+        return ExactCast(None, zero, {})
+    t = sum((value for name, value in zip(basis.names, values) if name == _T), Fraction(0))
+    weights = {name: value for name, value in zip(basis.names, values) if isinstance(name, tuple) and value}
+    normal = Fraction(near[0]), Fraction(near[1]), Fraction(near[2])
+    return ExactCast(t, normal if t else zero, weights)
+
+
+def _prices(basis: _Basis, name: int) -> list[int]:
+    """Prices of the four rows where the variables of a name cost 1, and no others."""
+    return [sum(row[k] for of, row in zip(basis.names, basis.rows) if of == name) for k in range(4)]
+
+
+def _entering(A, B, d, far: list[int], near: list[int], unit: int):
+    """(name, column) of a variable that makes the sums less, the artificial one first; None at the optimum."""
+    n = far[0], far[1], far[2]
+    heights_a, heights_b = [inner(n, a) for a in A], [-inner(n, b) for b in B]
+    highest_a, highest_b = max(heights_a), max(heights_b)
+    gain = highest_a + highest_b + far[3]
+    if gain > 0:
+        i, j = heights_a.index(highest_a), heights_b.index(highest_b)
+        return (i, j), (*minus(A[i], B[j]), 1)
+    time = near[0], near[1], near[2]
+    price_of_t = inner(n, d)
+    if price_of_t > 0 or (price_of_t == 0 and inner(time, d) > unit):
+        return _T, (*d, 0)
+    if gain < 0:
+        return None
+    i = max((k for k, height in enumerate(heights_a) if height == highest_a), key=lambda k: inner(time, A[k]))
+    j = min((k for k, height in enumerate(heights_b) if height == highest_b), key=lambda k: inner(time, B[k]))
+    if inner(time, minus(A[i], B[j])) + near[3] > 0:
+        return (i, j), (*minus(A[i], B[j]), 1)
+    return None
+
+
+def _leaving(rows: list[list[int]], pivots: list[int]) -> int:
+    """The row that leaves: the least of (value, inverse) over the pivot, lexicographically, where that is positive."""
+    best = -1
+    for k in range(4):
+        if pivots[k] > 0 and (best < 0 or _is_before(rows[k], pivots[k], rows[best], pivots[best])):
+            best = k
+    return best
+
+
+def _is_before(row: list[int], pivot: int, best: list[int], pivot_of_best: int) -> bool:
+    for column in (4, 0, 1, 2, 3):
+        difference = row[column] * pivot_of_best - best[column] * pivot
+        if difference:
+            return difference < 0
+    return False
+
+
+def _exchange(basis: _Basis, pivots: list[int], leaving: int, name) -> None:
+    """A pivot in integers, without a gcd: E. H. Bareiss 1968; J. Edmonds 1967."""
+    rows, pivot, before = basis.rows, pivots[leaving], basis.denominator[0]
+    for k in range(4):
+        if k != leaving:
+            rows[k] = [(x * pivot - pivots[k] * y) // before for x, y in zip(rows[k], rows[leaving])]
+    basis.denominator[0] = pivot
+    basis.names[leaving] = name

@@ -1,0 +1,133 @@
+"""Shapes at many poses as rows of convex parts, for kernels that take parts by number."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.certificates.exact_parts import ExactPart, exact_part
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.parts import parts_of
+from collide.lowering.shape_table import REACH, PoseTable, ShapeTable, has_own_pose, pose_table
+from collide.shapes.shape import Shape
+
+
+class PosedParts(NamedTuple):
+    """Parts of two sides, A's first, each in the world.
+
+    table : of their shapes.   poses : a row a part.   shape_of : (parts,) their rows of the table.
+    body_poses, part_poses : (parts, 4, 4) of the body in W, and of the part in it.
+    """
+
+    table: ShapeTable
+    poses: PoseTable
+    shape_of: np.ndarray
+    body_poses: np.ndarray
+    part_poses: np.ndarray
+
+    def packed(self, part: int) -> PackedConvex:
+        return self.table.packed[int(self.shape_of[part])]
+
+    def exact(self, part: int) -> ExactPart:
+        """A part as exact numbers."""
+        return exact_part(self.packed(part), self.body_poses[part], self.part_poses[part])
+
+
+class PartPairs(NamedTuple):
+    """Pairs of parts that n questions come down to.
+
+    parts : the parts of both sides.   pairs : (k, 2) part numbers.   owner : (k,) the question each belongs to.
+    item_a, item_b : (k,) the numbers of the parts in their own bodies.
+    """
+
+    parts: PosedParts
+    pairs: np.ndarray
+    owner: np.ndarray
+    item_a: np.ndarray
+    item_b: np.ndarray
+
+
+def posed_parts(items: list[tuple[PackedConvex, np.ndarray]], X_WA: np.ndarray) -> PosedParts:
+    """Convex parts (packed, pose in A) of one body at its poses (n, 4, 4): all of the first pose, then of the next."""
+    m, n = len(items), len(X_WA)
+    table = ShapeTable([packed for packed, _ in items])
+    shape_of = np.tile(np.arange(m), n)
+    table.build_trees(shape_of)
+    body_poses = np.repeat(X_WA, m, axis=0)
+    part_poses = np.tile(np.array([X for _, X in items]).reshape(-1, 4, 4), (n, 1, 1))
+    poses = pose_table(body_poses, part_poses, table.numbers[shape_of, REACH])
+    return PosedParts(table, poses, shape_of, body_poses, part_poses)
+
+
+class _Side(NamedTuple):
+    """One side of n questions: parts of one shape, or of one a question.
+
+    shape_of, body_poses, part_poses : of all parts.   first, counts : (n,) the parts of each question.
+    """
+
+    shape_of: np.ndarray
+    body_poses: np.ndarray
+    part_poses: np.ndarray
+    first: np.ndarray
+    counts: np.ndarray
+
+
+def part_pairs(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PartPairs:
+    """All pairs of parts of A and B, question by question.
+
+    A, B : a shape, or n of them.   X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for all.
+    """
+    packed: list[PackedConvex] = []
+    rows: dict[tuple[bytes, float], int] = {}
+
+    def row_of(part: PackedConvex) -> int:
+        key = part.content, part.slop
+        if key not in rows:
+            rows[key] = len(packed)
+            packed.append(part)
+        return rows[key]
+
+    side_a, side_b = _side(A, X_WA, n, row_of), _side(B, X_WB, n, row_of)
+    shape_of = np.concatenate([side_a.shape_of, side_b.shape_of])
+    body_poses = np.concatenate([side_a.body_poses, side_b.body_poses])
+    part_poses = np.concatenate([side_a.part_poses, side_b.part_poses])
+    table = ShapeTable(packed)
+    table.build_trees(shape_of)
+    reach = table.numbers[shape_of, REACH]
+    poses = pose_table(body_poses, part_poses, reach, has_own_pose(part_poses))
+    parts = PosedParts(table, poses, shape_of, body_poses, part_poses)
+    n_pairs = side_a.counts * side_b.counts
+    owner = np.repeat(np.arange(n), n_pairs)
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(n_pairs) - n_pairs, n_pairs)
+    item_a, item_b = np.divmod(within, np.maximum(side_b.counts[owner], 1))
+    pairs = np.stack(
+        [side_a.first[owner] + item_a, len(side_a.shape_of) + side_b.first[owner] + item_b], axis=1
+    )  # fmt: skip
+    return PartPairs(parts, np.ascontiguousarray(pairs), owner, item_a, item_b)
+
+
+def _side(shapes, X: np.ndarray, n: int, row_of) -> _Side:
+    if isinstance(shapes, Shape):
+        parts = parts_of(shapes)
+        m, k = len(parts), len(X)
+        shape_of = np.tile(np.array([row_of(packed) for packed, _ in parts], dtype=np.int64), k)
+        part_poses = np.tile(np.array([pose for _, pose in parts]).reshape(-1, 4, 4), (k, 1, 1))
+        first = m * np.arange(n) if k == n else np.zeros(n, dtype=np.int64)
+        return _Side(shape_of, np.repeat(X, m, axis=0), part_poses, first, np.full(n, m))
+    numbers: dict[int, int] = {}
+    distinct: list[Shape] = []
+    for shape in shapes:
+        if id(shape) not in numbers:
+            numbers[id(shape)] = len(distinct)
+            distinct.append(shape)
+    which = np.array([numbers[id(shape)] for shape in shapes], dtype=np.int64)
+    of_shapes = [parts_of(shape) for shape in distinct]
+    all_rows = np.array([row_of(packed) for parts in of_shapes for packed, _ in parts], dtype=np.int64)
+    all_poses = np.array([pose for parts in of_shapes for _, pose in parts]).reshape(-1, 4, 4)
+    sizes = np.array([len(parts) for parts in of_shapes], dtype=np.int64)
+    counts = sizes[which]
+    first = np.cumsum(counts) - counts
+    at = np.repeat((np.cumsum(sizes) - sizes)[which] - first, counts) + np.arange(counts.sum())
+    body_poses = np.repeat(np.broadcast_to(X, (n, 4, 4)), counts, axis=0)
+    return _Side(all_rows[at], body_poses, all_poses[at], first, counts)

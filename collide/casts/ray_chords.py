@@ -1,0 +1,305 @@
+"""The chord that a line cuts out of a convex set, in closed form: spheres, capsules, cylinders, cones, ellipsoids,
+half-spaces.
+
+A chord is [first, last], each end inside a proven bracket. Slabs and quadrics are cut with the line one by one and the
+intervals with each other, as E. Haines does it for the planes of a polyhedron ("Fast ray–convex polyhedron
+intersection", Graphics Gems II, 1991). Quadrics are worked out from the point of the line nearest their middle, where
+nothing large cancels.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from collide.kernels import kernel
+from collide.numerics.vec3 import Vec3, add, cross, dot, norm, scale, sub
+
+#: What is said of a line and a set: it misses it; meets it; doubles cannot tell.
+MISSED, MET, UNCLEAR = range(3)
+
+_ROUNDING = 2.0**-49
+
+
+class Line(NamedTuple):
+    """{origin + t direction}, as seen from where a shape stands.
+
+    length : |direction|.   error : how far a point of it near the shape may be from where it was worked out.
+    """
+
+    origin: Vec3
+    direction: Vec3
+    length: float
+    error: float
+
+
+class Chord(NamedTuple):
+    """What a line and a convex set share: t from first to last.
+
+    state : MISSED, MET or UNCLEAR.   first_lower ≤ first ≤ first_upper, last_lower ≤ last ≤ last_upper : brackets.
+    first_side, last_side : which piece of the surface is met there: 0 round it, 1 below, 2 above.
+    """
+
+    state: int
+    first_lower: float
+    first: float
+    first_upper: float
+    last_lower: float
+    last: float
+    last_upper: float
+    first_side: int
+    last_side: int
+
+
+@kernel(inline=True)
+def nothing():
+    return Chord(MISSED, math.inf, math.inf, math.inf, -math.inf, -math.inf, -math.inf, -1, -1)
+
+
+@kernel(inline=True)
+def everything(state):
+    """The whole line."""
+    return Chord(state, -math.inf, -math.inf, -math.inf, math.inf, math.inf, math.inf, -1, -1)
+
+
+@kernel(inline=True)
+def common(a, b):
+    """The chord of the intersection of two sets."""
+    if a.state == MISSED or b.state == MISSED:
+        return nothing()
+    first_lower, first_upper = max(a.first_lower, b.first_lower), max(a.first_upper, b.first_upper)
+    last_lower, last_upper = min(a.last_lower, b.last_lower), min(a.last_upper, b.last_upper)
+    if first_lower > last_upper:
+        return nothing()
+    met = first_upper <= last_lower and a.state == MET and b.state == MET
+    return Chord(
+        MET if met else UNCLEAR, first_lower, max(a.first, b.first), first_upper, last_lower, min(a.last, b.last),
+        last_upper, a.first_side if a.first >= b.first else b.first_side,
+        a.last_side if a.last <= b.last else b.last_side,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def together(a, b):
+    """The chord of the union of two sets that is convex."""
+    if a.state == MISSED:
+        return b
+    if b.state == MISSED:
+        return a
+    state = MET if a.state == MET or b.state == MET else UNCLEAR
+    # What may be no chord bounds nothing inwards.
+    counts_a, counts_b = a.state == MET or state == UNCLEAR, b.state == MET or state == UNCLEAR
+    first_upper = min(a.first_upper if counts_a else math.inf, b.first_upper if counts_b else math.inf)
+    last_lower = max(a.last_lower if counts_a else -math.inf, b.last_lower if counts_b else -math.inf)
+    return Chord(
+        state, min(a.first_lower, b.first_lower), min(a.first, b.first), first_upper, last_lower, max(a.last, b.last),
+        max(a.last_upper, b.last_upper), a.first_side if a.first <= b.first else b.first_side,
+        a.last_side if a.last >= b.last else b.last_side,
+    )  # fmt: skip
+
+
+@kernel
+def ball_chord(m, g, radius, error, side):
+    """Of |m + t g| ≤ radius; error : of a point m + t g near the chord."""
+    square = dot(g, g)
+    if not square > 0.0:
+        return everything(UNCLEAR)
+    middle = -dot(m, g) / square
+    c = add(m, scale(middle, g))
+    beside = dot(c, c)
+    rest = radius * radius - beside
+    slack = (2.0 * math.sqrt(beside) + error) * error + _ROUNDING * radius * radius
+    if rest < -slack:
+        return nothing()
+    inner = math.sqrt(max(rest - slack, 0.0) / square)
+    half = math.sqrt(max(rest, 0.0) / square)
+    outer = math.sqrt(max(rest + slack, 0.0) / square)
+    off = 2.0 * error / math.sqrt(square) + _ROUNDING * (abs(middle) + outer)
+    return Chord(
+        MET if rest > slack else UNCLEAR, middle - outer - off, middle - half, middle - inner + off,
+        middle + inner - off, middle + half, middle + outer + off, side, side,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def slab_chord(origin, step, low, high, line, low_side, high_side):
+    """Of low ≤ origin + t step ≤ high."""
+    if abs(step) <= 2.0**-46 * line.length:
+        # Along the slab: as far as the shape reaches, the step moves nothing by more than the error.
+        error = line.error + abs(step) / line.length * (abs(origin) + (high - low))
+        if origin < low - error or origin > high + error:
+            return nothing()
+        return everything(MET if low + error < origin < high - error else UNCLEAR)
+    near = (low - origin) / step
+    far = (high - origin) / step
+    near_off = line.error / abs(step) + _ROUNDING * abs(near)
+    far_off = line.error / abs(step) + _ROUNDING * abs(far)
+    if step > 0.0:
+        return Chord(
+            MET, near - near_off, near, near + near_off, far - far_off, far, far + far_off, low_side, high_side
+        )  # fmt: skip
+    return Chord(MET, far - far_off, far, far + far_off, near - near_off, near, near + near_off, high_side, low_side)
+
+
+@kernel(inline=True)
+def halfspace_chord(line, normal, offset, error):
+    """Of normal·x ≤ offset; error : of a point's height, in units of |normal|."""
+    length = norm(normal)
+    height = (dot(normal, line.origin) - offset) / length
+    pace = dot(normal, line.direction) / length
+    if abs(pace) <= 2.0**-46 * line.length:
+        if height > error:
+            return everything(UNCLEAR) if pace != 0.0 else nothing()
+        return everything(MET if height < -error and pace == 0.0 else UNCLEAR)
+    t = -height / pace
+    off = error / abs(pace) + 2.0**-46 * line.length / abs(pace) * abs(t)
+    if pace < 0.0:
+        return Chord(MET, t - off, t, t + off, math.inf, math.inf, math.inf, 0, -1)
+    return Chord(MET, -math.inf, -math.inf, -math.inf, t - off, t, t + off, -1, 0)
+
+
+@kernel
+def capsule_chord(line, start, end, radius):
+    """Of the points no farther than ``radius`` from the segment between two points."""
+    m = sub(line.origin, start)
+    axis = sub(end, start)
+    square = dot(axis, axis)
+    ends = together(
+        ball_chord(m, line.direction, radius, line.error, 1),
+        ball_chord(sub(line.origin, end), line.direction, radius, line.error, 2),
+    )
+    if not square > 0.0:
+        return ends
+    length = math.sqrt(square)
+    unit = scale(1.0 / length, axis)
+    slab = slab_chord(dot(m, unit), dot(line.direction, unit), 0.0, length, line, 1, 2)
+    across, step = cross(m, unit), cross(line.direction, unit)
+    return together(ends, _clipped(slab, across, step, radius, line, 0))
+
+
+@kernel(inline=True)
+def _clipped(slab, across, step, radius, line, side):
+    """A cylinder of endless length, |across + t step| ≤ radius, cut off by a slab.
+
+    Where the line is within it at both ends of the slab it is so in between, and outside where the way between them is
+    too short to get in: nothing else is asked of a line that runs along the axis.
+    """
+    if slab.state == MET and slab.first > -math.inf:
+        a, b = add(across, scale(slab.first, step)), add(across, scale(slab.last, step))
+        off = (slab.first_upper - slab.first_lower + slab.last_upper - slab.last_lower) * norm(step)
+        if max(norm(a), norm(b)) + off < radius * (1.0 - _ROUNDING) - 2.0 * line.error:
+            return slab
+        if norm(a) - norm(sub(b, a)) - off > radius * (1.0 + _ROUNDING) + 2.0 * line.error:
+            return nothing()
+    return common(ball_chord(across, step, radius, 2.0 * line.error, side), slab)
+
+
+@kernel
+def cylinder_chord(line, radius, half):
+    """Of a cylinder along z from −half to half."""
+    o, d = line.origin, line.direction
+    slab = slab_chord(o.z, d.z, -half, half, line, 1, 2)
+    return _clipped(slab, Vec3(o.x, o.y, 0.0), Vec3(d.x, d.y, 0.0), radius, line, 0)
+
+
+@kernel
+def box_chord(line, half):
+    """Of a box along the axes; sides 1 and 2 are those across x, 3 and 4 across y, 5 and 6 across z."""
+    o, d = line.origin, line.direction
+    chord = slab_chord(o.x, d.x, -half.x, half.x, line, 1, 2)
+    chord = common(chord, slab_chord(o.y, d.y, -half.y, half.y, line, 3, 4))
+    return common(chord, slab_chord(o.z, d.z, -half.z, half.z, line, 5, 6))
+
+
+@kernel
+def ellipsoid_chord(line, radii):
+    """Of an ellipsoid along the axes: a unit ball in units of its radii."""
+    o, d = line.origin, line.direction
+    least = min(radii.x, radii.y, radii.z)
+    m = Vec3(o.x / radii.x, o.y / radii.y, o.z / radii.z)
+    g = Vec3(d.x / radii.x, d.y / radii.y, d.z / radii.z)
+    return ball_chord(m, g, 1.0, line.error / least + _ROUNDING * norm(m), 0)
+
+
+@kernel
+def cone_chord(line, radius, half):
+    """Of a cone with its base at z = −half and its tip at half."""
+    d = line.direction
+    slab = slab_chord(line.origin.z, d.z, -half, half, line, 1, -1)
+    if slab.state == MISSED:
+        return slab
+    slope = 0.5 * radius / half
+    if slab.state == MET and slab.first > -math.inf:
+        off = (slab.first_upper - slab.first_lower + slab.last_upper - slab.last_lower) * line.length
+        deepest = max(_outside_cone(line, slab.first, slope, half), _outside_cone(line, slab.last, slope, half))
+        if deepest + (1.0 + slope) * (off + 2.0 * line.error) < 0.0:
+            return slab
+    return common(_nappe_chord(line, slope, half), slab)
+
+
+@kernel(inline=True)
+def _outside_cone(line, t, slope, half):
+    """How far a point of the line is outside the cone, measured across z."""
+    p = add(line.origin, scale(t, line.direction))
+    return math.sqrt(p.x * p.x + p.y * p.y) - slope * (half - p.z)
+
+
+@kernel
+def _nappe_chord(line, slope, half):
+    """Of the endless cone |(x, y)| ≤ slope (half − z): where a quadratic a t² + 2 b t + c is at most 0, on one side."""
+    d = line.direction
+    middle = -dot(line.origin, d) / (line.length * line.length)
+    q = add(line.origin, scale(middle, d))
+    s = slope * (half - q.z)
+    ds = -slope * d.z
+    a = d.x * d.x + d.y * d.y - ds * ds
+    b = q.x * d.x + q.y * d.y - s * ds
+    c = q.x * q.x + q.y * q.y - s * s
+    # Errors of the three, from that of points and of the direction.
+    wide = 1.0 + slope
+    reach = math.sqrt(q.x * q.x + q.y * q.y) + abs(s)
+    off_a = 2.0**-47 * wide * wide * line.length * line.length
+    off_b = wide * line.length * (wide * line.error + 2.0**-47 * reach)
+    off_c = 2.0 * reach * wide * line.error + (wide * line.error) ** 2 + _ROUNDING * reach * reach
+    root = b * b - a * c
+    off_root = 2.0 * abs(b) * off_b + off_b * off_b + abs(a) * off_c + abs(c) * off_a + off_a * off_c
+    if root < -off_root and a > off_a:
+        return nothing()
+    if not root > 4.0 * off_root:
+        return everything(UNCLEAR)
+    root = math.sqrt(root)
+    sum_ = -(b + math.copysign(root, b))
+    near = c / sum_
+    near_off = _off_root(near, off_a, off_b, off_c, root)
+    if abs(a) <= 2.0 * off_a:  # along a generator: the other end is far away
+        far_sign = -math.copysign(1.0, b)  # where the quadratic goes to −∞
+        if s + ds * (near + far_sign * abs(near) + far_sign * reach / line.length) < 0.0:
+            return nothing()
+        return _half_line(near + middle, near_off + _ROUNDING * abs(middle), far_sign)
+    far = sum_ / a
+    far_off = _off_root(far, off_a, off_b, off_c, root)
+    if near > far:
+        near, far, near_off, far_off = far, near, far_off, near_off
+    if a > 0.0:
+        if s - ds * b / a < 0.0:
+            return nothing()
+        near, far = near + middle, far + middle
+        near_off += _ROUNDING * (abs(middle) + abs(near))
+        far_off += _ROUNDING * (abs(middle) + abs(far))
+        return Chord(MET, near - near_off, near, near + near_off, far - far_off, far, far + far_off, 0, 0)
+    if ds > 0.0:
+        return _half_line(far + middle, far_off + _ROUNDING * abs(middle), 1.0)
+    return _half_line(near + middle, near_off + _ROUNDING * abs(middle), -1.0)
+
+
+@kernel(inline=True)
+def _off_root(t, off_a, off_b, off_c, root):
+    """How far a root of the quadratic may be off: the error of its value over half its slope."""
+    return (off_a * t * t + 2.0 * off_b * abs(t) + off_c) / root + _ROUNDING * abs(t)
+
+
+@kernel(inline=True)
+def _half_line(t, off, sign):
+    if sign > 0.0:
+        return Chord(MET, t - off, t, t + off, math.inf, math.inf, math.inf, 0, -1)
+    return Chord(MET, -math.inf, -math.inf, -math.inf, t - off, t, t + off, -1, 0)

@@ -1,0 +1,122 @@
+"""What rays meet, row by row, and the answers that are made of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.casts.directions import Directions
+
+
+class RayHits(NamedTuple):
+    """Where rays first meet a body, or, with ``all_hits``, every place where they meet its surface.
+
+    hit : (N,) bool. Of meshes, polytopes and half-spaces decided exactly; where rounding leaves it open of others,
+        True.
+    distance : t of the point origin + t · direction: lengths in units of the direction's, metres for unit directions.
+        ``inf`` where nothing is met.
+    lower, upper : lower ≤ truth ≤ upper is proven where ``certified``; then no wider apart than 2⁻³⁶ of t of the body's
+        far side.
+    point : in W [m], origin + distance · direction, rounded; zeros where nothing is met.
+    normal : outward unit normal of the surface in W: of a facet that from which its corners run counter-clockwise.
+        Zeros for a facet without area, and where nothing is met.
+    facet : number of the facet of a `Mesh`, `Box`, `ConvexHull` or `HPolytope`; of several met at the same point the
+        least. Of cylinders and cones 0 round about, 1 below and 2 above, of capsules 1 and 2 on the balls at their
+        ends; 0 of balls, ellipsoids and half-spaces. −1 where nothing is met, and for polytopes within a `Compound`,
+        or swept by a ball.
+    starts : (N + 1,) with ``all_hits``, where the places of each ray begin and end: then the fields above and below,
+        but for ``hit``, have a row for every place, by distance, then item and facet. None otherwise.
+    certified : that hit or miss is proven, and the bracket is as narrow as said. Rays that touch a curved surface, or
+        begin on one, within rounding are not.
+    item : number of the part of a `Compound` that is met, 0 of other shapes; −1 where nothing is met.
+
+    Single rays at single poses give scalars and (3,), unless ``all_hits``.
+    """
+
+    hit: np.ndarray
+    distance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    facet: np.ndarray
+    starts: np.ndarray | None = None
+    certified: np.ndarray | None = None
+    item: np.ndarray | None = None
+
+
+class RayEvents(NamedTuple):
+    """Places where rays meet a surface.
+
+    ray : (k,) numbers of the rays.   t : (k, 3) value, from below, from above, in units of the directions given.
+    normal : (k, 3) in W.   facet, item : (k,).
+    proven : (k,) bool, that it is met is proven, with t within the bracket.
+    certified : (k,) bool, the bracket is narrow, too.
+    """
+
+    ray: np.ndarray
+    t: np.ndarray
+    normal: np.ndarray
+    facet: np.ndarray
+    item: np.ndarray
+    proven: np.ndarray
+    certified: np.ndarray
+
+    def of(self, rows: np.ndarray) -> RayEvents:
+        return RayEvents._make(column[rows] for column in self)
+
+
+def joined(events: list[RayEvents]) -> RayEvents:
+    return RayEvents._make(np.concatenate(columns) for columns in zip(*events))
+
+
+def in_order(events: RayEvents) -> RayEvents:
+    """Ray by ray, along each by t, then item and facet."""
+    return events.of(np.lexsort((events.facet, events.item, events.t[:, 0], events.ray)))
+
+
+def first_of_each(events: RayEvents) -> RayEvents:
+    """Of events in order the first of each ray, its bracket and what is certain of it with regard to the others."""
+    ray = events.ray
+    starts = np.flatnonzero(np.diff(ray, prepend=-1))
+    first = events.of(starts)
+    if not len(starts) or len(starts) == len(ray):
+        return first
+    t = first.t.copy()
+    t[:, 1] = np.minimum.reduceat(events.t[:, 1], starts)
+    upper = np.minimum.reduceat(np.where(events.proven, events.t[:, 2], np.inf), starts)
+    t[:, 2] = np.where(np.isinf(upper), np.maximum.reduceat(events.t[:, 2], starts), upper)
+    matters = events.t[:, 1] <= np.repeat(t[:, 2], np.diff([*starts, len(ray)]))
+    certified = np.logical_and.reduceat(events.certified | ~matters, starts)
+    return first._replace(
+        t=t, proven=np.logical_or.reduceat(events.proven, starts), certified=certified
+    )  # fmt: skip
+
+
+def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, every: bool, single: bool) -> RayHits:
+    """The answer to n rays: of events in order, every one of them or the first of each ray."""
+    n = len(origins)
+    if not every:
+        events = first_of_each(events)
+    ray, t = events.ray, events.t
+    step = np.ldexp(directions.vectors[ray], directions.exponents[ray, None])
+    columns = (
+        np.ones(len(ray), dtype=bool), t[:, 0], t[:, 1], t[:, 2], origins[ray] + t[:, :1] * step, events.normal,
+        events.facet, None, events.certified, events.item,
+    )  # fmt: skip
+    if every:
+        starts = np.concatenate([[0], np.cumsum(np.bincount(ray, minlength=n))])
+        return RayHits(np.diff(starts) > 0, *columns[1:7], starts, *columns[8:])
+    full = _nothing(n)
+    for into, values in zip(full, columns):
+        if into is not None:
+            into[ray] = values
+    return RayHits._make(None if values is None else values[0] for values in full) if single else full
+
+
+def _nothing(n: int) -> RayHits:
+    """Of rays that meet nothing."""
+    hit, (t, lower, upper), none = np.zeros(n, dtype=bool), np.full((3, n), np.inf), np.full(n, -1, dtype=np.int64)
+    zeros = np.zeros((2, n, 3))
+    return RayHits(hit, t, lower, upper, zeros[0], zeros[1], none, None, np.ones(n, dtype=bool), none.copy())

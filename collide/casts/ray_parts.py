@@ -1,0 +1,213 @@
+"""Rays against posed convex parts: chords in doubles, and what these leave open of polytopes decided exactly."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from threading import local
+
+import numpy as np
+
+from collide.broadphase.box_tree import BoxTree
+from collide.casts.cut_parts import (
+    FIRST,
+    FIRST_LOWER,
+    FIRST_NORMAL,
+    FIRST_SIDE,
+    FIRST_UPPER,
+    LAST,
+    LAST_LOWER,
+    LAST_NORMAL,
+    LAST_SIDE,
+    LAST_UPPER,
+    RAY,
+    RAY_ROW,
+    STATE,
+    cut_parts,
+)
+from collide.casts.directions import Directions
+from collide.casts.exact_cast import cast_exactly
+from collide.casts.posed_parts import PosedParts
+from collide.casts.ray_chords import MET, MISSED, UNCLEAR
+from collide.casts.ray_hits import RayEvents
+from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
+from collide.kernels import address_of
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.numerics.exact_points import inner, integers, on_one_grid, rounded
+
+#: Brackets wider than this, in units of t of the far side, are not certified.
+_MAX_WIDTH = 2.0**-36
+
+
+class _Workspace(local):
+    """Scratch memory of one thread."""
+
+    def __init__(self) -> None:
+        self.doubles = np.zeros(TREE_RAY_DOUBLES)
+        self.integers = np.zeros(TREE_RAY_INTEGERS, dtype=np.int64)
+        self.addresses = address_of(self.doubles), address_of(self.integers)
+
+
+_workspace = _Workspace()
+
+
+def parts_met(
+    parts: PosedParts, questions: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
+) -> RayEvents:
+    """Where rays enter and leave convex parts, from their origins on to the limit.
+
+    questions : (k, 2) int64, a ray and a part each.   limit : of t, in lengths of the directions given.
+    every : both ends of each; else at least the first.   The events' items are numbers of the questions.
+    """
+    rows = np.zeros((len(questions), RAY_ROW))
+    if len(questions):
+        rays = _as_rays(origins, directions)
+        cut_parts(
+            *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
+            address_of(rays), len(questions), every, address_of(rows), *_workspace.addresses,
+        )  # fmt: skip
+    limits = directions.limits(limit)[questions[:, 0]]
+    met = np.flatnonzero(rows[:, STATE] != MISSED)
+    rows, asked, limits = rows[met], questions[met], limits[met]
+    exact = np.zeros(len(rows), dtype=bool)
+    for k in np.flatnonzero(_are_open(rows, limits)).tolist():
+        if _has_exact_numbers(parts, asked[k, 1]):
+            exact[k] = True
+            _settle(parts, asked[k], origins, directions.vectors, limits[k], rows[k])
+    return _events(rows, met, asked, limits, exact, directions)
+
+
+def candidate_parts(
+    parts: PosedParts, tree: BoxTree, first: np.ndarray, skipped: np.ndarray, meshed: np.ndarray, origins, directions,
+    limit: float, every: bool,
+) -> np.ndarray:  # fmt: skip
+    """(k, 2) int64: rays and parts that may make a ray's first wall, or any, of the bodies of a tree that have an end.
+
+    first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of those not asked, and of
+    those whose parts are only bounds.   The rest as of `parts_met`.
+    """
+    n = len(origins)
+    rays = _as_rays(origins, directions)
+    limits = directions.limits(limit)
+    header = np.array(
+        [
+            address_of(tree.nodes), tree.leaves, address_of(tree.order), len(tree.order), address_of(first),
+            len(first) - 1, address_of(skipped), address_of(meshed),
+        ],
+        dtype=np.int64,
+    )  # fmt: skip
+    capacity = 64 + 4 * n
+    while True:
+        pairs = np.empty((capacity, 2), dtype=np.int64)
+        count = parts_on_rays(
+            *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(header),
+            address_of(rays), address_of(limits), n, every, address_of(pairs), capacity, *_workspace.addresses,
+        )  # fmt: skip
+        if count <= capacity:
+            return pairs[:count]
+        capacity = count
+
+
+def _as_rays(origins: np.ndarray, directions: Directions) -> np.ndarray:
+    rays = np.empty((len(origins), RAY))
+    rays[:, :3], rays[:, 3:] = origins, directions.vectors
+    return rays
+
+
+def _are_open(rows: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """(k,) bool: chords that doubles cannot tell for certain, or ends that they cannot place well enough: on which side
+    of the origin or of the limit.
+    """
+    is_open = rows[:, STATE] == UNCLEAR
+    for lower, upper in ((FIRST_LOWER, FIRST_UPPER), (LAST_LOWER, LAST_UPPER)):
+        is_open |= (rows[:, lower] <= 0.0) & (rows[:, upper] >= 0.0)
+        is_open |= (rows[:, lower] <= limits) & (rows[:, upper] > limits)
+        is_open |= _are_wide(rows, lower, upper) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
+    return is_open
+
+
+def _are_wide(rows: np.ndarray, lower: int, upper: int) -> np.ndarray:
+    ends = np.abs(rows[:, [FIRST, LAST]])
+    far = np.where(np.isfinite(ends), ends, 0.0).max(axis=1)
+    finite = np.isfinite(rows[:, upper]) & np.isfinite(rows[:, lower])
+    with np.errstate(invalid="ignore"):
+        return finite & ~(rows[:, upper] - rows[:, lower] <= _MAX_WIDTH * far)
+
+
+def _events(rows, met, asked, limits, exact, directions: Directions) -> RayEvents:
+    """The ends of chords that count: from the origin to the limit."""
+    both = []
+    ends = (FIRST, FIRST_LOWER, FIRST_UPPER, FIRST_NORMAL, FIRST_SIDE), (LAST, LAST_LOWER, LAST_UPPER, LAST_NORMAL,
+                                                                         LAST_SIDE)  # fmt: skip
+    for value, lower, upper, normal, side in ends:
+        counts = np.isfinite(rows[:, value]) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
+        proven = (rows[:, STATE] == MET) & (rows[:, lower] >= 0.0) & (rows[:, upper] <= limits)
+        # What was decided exactly is as it is said, within doubles that hold it.
+        counts &= ~exact | ((rows[:, value] >= 0.0) & (rows[:, value] <= limits))
+        proven |= exact
+        k = np.flatnonzero(counts)
+        t = np.clip(rows[k][:, [value, lower, upper]], 0.0, None)
+        t[:, :2] = np.minimum(t[:, :2], limits[k, None])
+        narrow = ~_are_wide(rows[k], lower, upper)
+        both.append(
+            RayEvents(
+                asked[k, 0], t, rows[k][:, normal : normal + 3], rows[k, side].astype(np.int64), met[k], proven[k],
+                proven[k] & narrow,
+            )
+        )  # fmt: skip
+    ray = np.concatenate([events.ray for events in both])
+    t = np.concatenate([events.t for events in both])
+    with np.errstate(over="ignore", under="ignore"):
+        t = np.ldexp(t, -directions.exponents[ray, None])
+    columns = [np.concatenate(columns) for columns in zip(*both)]
+    return RayEvents(ray, t, *columns[2:])
+
+
+# --- exactly ------------------------------------------------------------------------------------
+
+
+def _has_exact_numbers(parts: PosedParts, part: int) -> bool:
+    packed = parts.packed(part)
+    return packed.kind in (POINTS, HALFSPACE) and not (packed.radius or packed.slop)
+
+
+def _settle(parts: PosedParts, asked, origins, vectors, limit: float, row: np.ndarray) -> None:
+    """Write a row anew from exact numbers: MISSED ends are infinite, ends that do not count are so as well."""
+    origin, direction = origins[asked[0]], vectors[asked[0]]
+    if parts.packed(asked[1]).kind == HALFSPACE:
+        first, last = _chord_of_plane(parts, asked[1], origin, direction)
+    else:
+        first, last = _chord_of_points(parts, asked[1], origin, direction)
+    row[STATE] = MET
+    row[FIRST_SIDE] = row[LAST_SIDE] = -1.0 if parts.packed(asked[1]).kind != HALFSPACE else 0.0
+    for value, t in ((FIRST, first), (LAST, last)):
+        row[value - 1 : value + 2] = np.nan
+        if t is not None and 0 <= t <= float(limit):
+            row[value], row[value - 1], row[value + 1] = rounded(t)
+            row[value] = min(row[value], limit)
+            row[value - 1] = max(row[value - 1], 0.0)
+
+
+def _chord_of_points(parts: PosedParts, part: int, origin, direction) -> tuple[Fraction | None, Fraction | None]:
+    """Exact t at which a ray's line enters and leaves a hull: casts of a point from far away, to and fro."""
+    d, d_exponent = integers(direction)
+    whole, o_exponent = integers(origin)
+    ((o,), vertices), grid = on_one_grid(([(whole[0], whole[1], whole[2])], o_exponent), parts.exact(part).vertices)
+    unit = Fraction(2) ** (grid - d_exponent)
+    # Farther than all of it is from the origin: the largest component of d is at least 1.
+    far = 4 * max(abs(c - b) for v in [*vertices, (0, 0, 0)] for c, b in zip(v, o)) + 1
+    ends = []
+    for sign in (1, -1):
+        begin = (o[0] - sign * far * d[0], o[1] - sign * far * d[1], o[2] - sign * far * d[2])
+        t = cast_exactly([begin], vertices, [sign * c for c in d]).t
+        ends.append(None if t is None else sign * (t - far) * unit)
+    return ends[0], ends[1]
+
+
+def _chord_of_plane(parts: PosedParts, part: int, origin, direction) -> tuple[Fraction | None, Fraction | None]:
+    """Exact t at which a ray's line enters, or else leaves, a half-space; 0 for one that runs in its plane."""
+    normal, offset = parts.exact(part).plane
+    height = inner(normal, [Fraction(v) for v in origin.tolist()]) - offset
+    pace = inner(normal, [Fraction(v) for v in direction.tolist()])
+    if pace == 0:
+        return (Fraction(0), None) if height == 0 else (None, None)
+    return (-height / pace, None) if pace < 0 else (None, -height / pace)

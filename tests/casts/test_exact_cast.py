@@ -1,0 +1,58 @@
+"""The exact program of casts against facets by definition, and by hand where the difference is flat."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from cast_oracles import exact_first_contact
+from naive import rng_of
+from reproduction import reproducing
+
+from collide.casts.exact_cast import cast_exactly
+
+
+def test_solids_are_those_of_their_facets():
+    rng = rng_of("exact casts")
+    outcomes = []
+    while len(outcomes) < 120:
+        A, B = (rng.integers(-3, 4, size=(4, 3)).tolist() for _ in range(2))
+        A = [[x + s for x, s in zip(a, shift)] for shift in [rng.integers(-5, 6, size=3).tolist()] for a in A]
+        d = rng.integers(-2, 3, size=3).tolist()
+        if not any(d):
+            continue
+        try:
+            truth = exact_first_contact(A, B, tuple(d))
+        except ValueError:
+            continue
+        source = "from collide.casts.exact_cast import cast_exactly; print(cast_exactly({A}, {B}, {d}))"
+        with reproducing(source, A=A, B=B, d=d):
+            contact = cast_exactly(A, B, d)
+            assert contact.t == truth
+            if truth is not None:
+                assert sum(contact.weights.values()) == 1 and all(w > 0 for w in contact.weights.values())
+                for axis in range(3):  # the two points that touch are one
+                    gap = sum(w * (A[i][axis] - B[j][axis]) for (i, j), w in contact.weights.items())
+                    assert gap + truth * d[axis] == 0
+            if truth:
+                n = contact.normal
+                assert sum(x * y for x, y in zip(n, d)) > 0
+        outcomes.append("miss" if truth is None else "start" if truth == 0 else "hit")
+    assert min(outcomes.count(kind) for kind in ("miss", "start", "hit")) > 8, outcomes
+
+
+@pytest.mark.parametrize(
+    ("A", "B", "d", "t"),
+    [
+        ([(0, 0, 0)], [(6, 0, 0)], (4, 0, 0), Fraction(3, 2)), ([(0, 0, 0)], [(6, 0, 1)], (4, 0, 0), None),
+        ([(0, 0, 0)], [(-6, 0, 0)], (4, 0, 0), None), ([(1, 2, 3)], [(1, 2, 3)], (1, 1, 1), Fraction(0)),
+        ([(0, 0, 0), (0, 2, 0)], [(5, 2, 0), (5, 4, 0)], (1, 0, 0), Fraction(5)),
+        ([(0, 0, 0), (0, 2, 0)], [(5, 3, 0), (5, 4, 0)], (1, 0, 0), None),
+        ([(0, 0, 0), (2, 0, 0)], [(5, 0, 0), (9, 0, 0)], (2, 0, 0), Fraction(3, 2)),
+        ([(0, 0, 0), (2, 0, 0), (0, 2, 0)], [(6, 1, 0), (8, 1, 0), (7, 5, 0)], (1, 0, 0), Fraction(5)),
+        ([(0, 0, 0), (2, 0, 0), (0, 2, 0)], [(6, 0, 3), (8, 1, 3), (7, 5, 3)], (0, 0, 1), None),
+    ],
+)  # fmt: skip
+def test_points_segments_and_flat_sets(A, B, d, t):
+    assert cast_exactly(A, B, d).t == t
+    assert cast_exactly(A * 2, B + B[:1], d).t == t
