@@ -11,7 +11,7 @@ every gap measured is within a few of them (`_bound`).
 from __future__ import annotations
 
 from collide.contact.clip_polygons import Clipped
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import (
     GAP as POINT_GAP,
 )
@@ -53,16 +53,11 @@ _U = 2.0**-53
 HEADER = 13
 
 
-def _at(field: str, unit: int) -> int:
-    assert CONTACT_DTYPE.fields is not None
-    return CONTACT_DTYPE.fields[field][1] // unit
-
-
 _CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_A, _B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_A, _B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 def workspace_doubles(largest: int) -> int:
