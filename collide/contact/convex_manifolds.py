@@ -11,7 +11,7 @@ every gap measured is within a few of them (`_bound`).
 from __future__ import annotations
 
 from collide.contact.clip_polygons import Clipped
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import (
     GAP as POINT_GAP,
 )
@@ -53,16 +53,11 @@ _U = 2.0**-53
 HEADER = 13
 
 
-def _at(field: str, unit: int) -> int:
-    assert CONTACT_DTYPE.fields is not None
-    return CONTACT_DTYPE.fields[field][1] // unit
-
-
 _CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_A, _B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_A, _B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 def workspace_doubles(largest: int) -> int:
@@ -74,9 +69,14 @@ def workspace_integers(largest: int) -> int:
     return 2 * 2 * largest + 2 * max_corners(largest) + 2 * max_corners(largest) + max_corners(largest)
 
 
-@kernel(inline=True)
-def max_corners(largest):
+def max_corners(largest: int) -> int:
     """Corners that an overlap may have, and one point more."""
+    return 2 * largest + 8
+
+
+@kernel(inline=True)
+def _max_corners(largest):
+    """The same for kernels: Python calls none of them but entries."""
     return 2 * largest + 8
 
 
@@ -98,7 +98,7 @@ def convex_manifolds(
     ends = view_i64(ends_at, n)
     poses = view_f64(header[POSES_AT], 2 * POSE)
     shape_of = view_i64(header[SHAPE_OF_AT], 2)
-    max_rows = min(max_contacts, max_corners(header[LARGEST]))
+    max_rows = min(max_contacts, _max_corners(header[LARGEST]))
     n_rows = header[ROWS_DONE]
     for k in range(header[PAIRS_DONE], n):
         if capacity - n_rows < max_rows:
@@ -132,7 +132,7 @@ def put_manifold(header, row, margin, max_contacts, out_at):
     error = _error(pair, row)
     largest = header[LARGEST]
     doubles, integers = header[DOUBLES_AT], header[INTEGERS_AT]
-    n_max = max_corners(largest)
+    n_max = _max_corners(largest)
     of_b = support_face(
         pair, pair.B, header[FACES_AT], axes, -1.0, pair.t, largest, doubles + 24 * largest, integers + 16 * largest
     )

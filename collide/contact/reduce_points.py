@@ -8,10 +8,10 @@ from collide.kernels import kernel
 
 @kernel
 def select_points(manifold, n, first, max_points, order):
-    """Numbers of at area_beyond ``max_points`` of n points around a polygon, beginning with ``first``; how many.
+    """Numbers of at most ``max_points`` of n points around a polygon, beginning with ``first``; how many.
 
     order : becomes them, counter-clockwise. Beyond ``max_points``: the first, the farthest from it, then one by one
-    those that add area_beyond area. O(n · max_points²).
+    those that add most area. O(n · max_points²).
     """
     if n <= max_points:
         for k in range(n):

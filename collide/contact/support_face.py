@@ -41,8 +41,11 @@ from collide.support.support_tree_query import extreme_vertex_listed
 _ACROSS = 0.7
 #: Corners of the polygon within a cylinder's end or a cone's base.
 ROUND = 8
-#: Sines below this count as 0: a cylinder stands upright.
-_UPRIGHT = 2.0**-30
+#: Sines below this count as 0: a cylinder stands upright. At rest it tilts this way and that by less, and corners that
+#: went around with its lowest point would never let it rest.
+_UPRIGHT = 2.0**-20
+#: Of the radius and the sine: by so much the lowest point may be lower than the lowest corner of an upright octagon.
+_SAGITTA = 1.0 - math.cos(math.pi / ROUND) + 2.0**-50
 
 #: What a feature number names: number · 4 + one of these. CURVED numbers the corners of a polygon within an end.
 VERTEX, EDGE, FACE, CURVED = range(4)
@@ -133,7 +136,7 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     if body.kind == POINTS:
         n, triangle, normal, flatness, feature = _hull_corners(body, faces_at, g, facing, corners, features, edges)
     elif body.kind == CYLINDER or body.kind == CONE:
-        n, normal = _round_corners(pair, body, g, corners, features, edges)
+        n, normal, flatness = _round_corners(pair, body, g, corners, features, edges)
     else:
         n = 1
         put_vec3(corners, 0, curved_support(body.kind, pair.numbers, body.params_at, g))
@@ -228,22 +231,24 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
 
 @kernel(inline=True)
 def _round_corners(pair, body, g, corners, features, edges):
-    """The same of a cylinder or a cone; (their number, the normal of an end)."""
+    """The same of a cylinder or a cone; (their number, the normal of an end, its flatness)."""
     radius = pair.numbers[body.params_at]
     half = pair.numbers[body.params_at + 1]
     aside = math.sqrt(g.x * g.x + g.y * g.y)
     length = norm(g)
     x, y = 1.0, 0.0
+    flatness = _SAGITTA * radius * aside / length
     if aside > _UPRIGHT * length:
         x = g.x / aside
         y = g.y / aside
+        flatness = 0.0
     up = g.z / length
     normal = Vec3(0.0, 0.0, 0.0)
     is_cone = body.kind == CONE
     if -up >= _ACROSS or (up >= _ACROSS and not is_cone):
         z = half if up > 0.0 else -half
         _put_disc(x, y, radius, z, corners, features, edges)
-        return np.int64(ROUND), Vec3(0.0, 0.0, 1.0 if up > 0.0 else -1.0)
+        return np.int64(ROUND), Vec3(0.0, 0.0, 1.0 if up > 0.0 else -1.0), flatness
     # A line on the side, from the lower end to the upper one; a cone's apex where that is what is in front.
     put_vec3(corners, 0, Vec3(x * radius, y * radius, -half))
     if is_cone:
@@ -256,20 +261,29 @@ def _round_corners(pair, body, g, corners, features, edges):
     line = sub(vec3_at(corners, 3), vec3_at(corners, 0))
     slope = dot(line, g) / (norm(line) * length)
     if abs(slope) <= _ACROSS:
-        return np.int64(2), normal
+        return np.int64(2), normal, 0.0
     if slope > 0.0:
         put_vec3(corners, 0, vec3_at(corners, 3))
         features[0] = features[1]
-    return np.int64(1), normal
+    return np.int64(1), normal, 0.0
 
 
 @kernel(inline=True)
 def _put_disc(x, y, radius, z, corners, features, edges):
-    """Corners of a regular octagon within a disc, the first towards (x, y); counter-clockwise seen from outside."""
+    """Corners of a regular octagon within a disc, one of them towards (x, y); counter-clockwise seen from outside.
+
+    Numbers turn with the body, and corners, too, but for the least angle that brings one of them there: at rest (x, y)
+    is the direction of a tilt of rounding size, another one each time.
+    """
+    turn_c, turn_s = -1.0, 0.0
+    for k in range(ROUND):
+        c, s = _cosine_of_eighths(k), _cosine_of_eighths(k + ROUND - 2)
+        if x * c + y * s > turn_c:
+            turn_c, turn_s = x * c + y * s, y * c - x * s
     for k in range(ROUND):
         eighth = k if z > 0.0 else ROUND - 1 - k
         c, s = _cosine_of_eighths(eighth), _cosine_of_eighths(eighth + ROUND - 2)
-        put_vec3(corners, 3 * k, Vec3(radius * (x * c - y * s), radius * (y * c + x * s), z))
+        put_vec3(corners, 3 * k, Vec3(radius * (turn_c * c - turn_s * s), radius * (turn_c * s + turn_s * c), z))
         features[k] = 4 * eighth + CURVED
         edges[k] = 4 * (ROUND + eighth) + CURVED
 

@@ -48,3 +48,12 @@ def test_counts_that_do_not_match():
             contacts(SHAPES[0], bad, EYE, EYE)
     with pytest.raises(InvalidPose, match=r"X_WB\[1\]"):
         collide.contacts(SHAPES[0], SHAPES[1], EYE, np.array([EYE, EYE * np.nan]))
+
+
+def test_any_number_of_contacts_may_be_asked_for():
+    """Numbers beyond what a patch can have stand for all: the long way (first call) and the prepared one agree."""
+    shapes = collide.Box((1, 1, 1)), collide.Box((1, 1, 1))
+    X_WB = collide.pose((0.1, 0.2, 1.0))
+    rows = [collide.contacts(*shapes, np.eye(4), X_WB, max_contacts=n) for n in (10**30, 10**30, 2**31, 2**63, 100)]
+    assert len(rows[0]) == 4
+    assert all(np.array_equal(r.rows, rows[0].rows) for r in rows)
