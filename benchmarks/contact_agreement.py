@@ -236,7 +236,8 @@ def main() -> int:
     for k in worst[:10]:
         log(f"ours is wrong: resting_pairs({k + 1}, {options.seed})[-1], {pairs[k].kind}, {errors['collide', k]}")
     if not options.no_csv:
-        log(f"written: {write('contact-agreement', rows, machine()).name}")
+        texts = [{key: f"{v:.4g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows]
+        log(f"written: {write('contact-agreement', texts, machine()).name}")
     return 0
 
 
