@@ -217,7 +217,7 @@ def show(rows: list[dict]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=10_000, help="how many (default: 10,000)")
-    parser.add_argument("--judge", type=int, default=1000, help="how many that differ are judged (default: 1,000)")
+    parser.add_argument("--judge", type=int, default=10_000, help="how many that differ are judged (default: all)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
     options = parser.parse_args()
