@@ -217,7 +217,7 @@ def show(rows: list[dict]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=int, default=10_000, help="how many (default: 10,000)")
-    parser.add_argument("--judge", type=int, default=1000, help="how many that differ are judged (default: 1,000)")
+    parser.add_argument("--judge", type=int, default=10_000, help="how many that differ are judged (default: all)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
     options = parser.parse_args()
@@ -236,7 +236,8 @@ def main() -> int:
     for k in worst[:10]:
         log(f"ours is wrong: resting_pairs({k + 1}, {options.seed})[-1], {pairs[k].kind}, {errors['collide', k]}")
     if not options.no_csv:
-        log(f"written: {write('contact-agreement', rows, machine()).name}")
+        texts = [{key: f"{v:.4g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows]
+        log(f"written: {write('contact-agreement', texts, machine()).name}")
     return 0
 
 
