@@ -94,14 +94,14 @@ def measured(scene: str, n: int, when: str, rounds: int) -> list[dict]:
     assert np.array_equal(runs[None][0]["qpos"], runs["cull"][0]["qpos"]), "culled steps are not MuJoCo's"
     rows = []
     for what in ("step", "collision"):
-        own = statistics.median(run[what] for run in runs[None])
+        of_mujoco = statistics.median(run[what] for run in runs[None])
         for mode in CONTESTANTS:
             times = sorted(run[what] for run in runs[mode])
             rows.append({
                 "scene": scene, "bodies": n, "when": when, "what": what, "mode": mode or "MuJoCo alone",
                 "contacts": runs[mode][0]["contacts"], "median_ms": 1e3 * statistics.median(times),
                 "least_ms": 1e3 * times[0], "largest_ms": 1e3 * times[-1],
-                "ratio": statistics.median(times) / own,
+                "ratio": statistics.median(times) / of_mujoco,
             })  # fmt: skip
     return rows
 
