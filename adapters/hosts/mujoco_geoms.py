@@ -47,9 +47,8 @@ def geom_shapes(model) -> GeomShapes:
             remaining[geom] = f"{KINDS[kind] if kind < N else f'geoms of kind {kind}'}: left to MuJoCo"
             continue
         name = KINDS[kind]
-        key = (kind, int(model.geom_dataid[geom])) if name == "mesh" else (kind, model.geom_size[geom].tobytes())
-        if kind == PLANE:
-            key = (kind,)
+        numbers = int(model.geom_dataid[geom]) if name == "mesh" else model.geom_size[geom].tobytes()
+        key = (kind, 0 if kind == PLANE else numbers)
         if key not in known:
             known[key] = len(shapes)
             try:

@@ -86,7 +86,9 @@ def table() -> list:
 
 
 @pytest.fixture(autouse=True)
-def nothing_stays():
+def nothing_stays(tmp_path, monkeypatch):
+    """MuJoCo writes its warnings into the current folder."""
+    monkeypatch.chdir(tmp_path)
     before = table()
     yield
     assert table() == before and not is_hooked(), "a test left its functions in the table"
