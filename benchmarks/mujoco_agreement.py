@@ -2,10 +2,10 @@
 
     python benchmarks/mujoco_agreement.py [--pairs 10000]
 
-Pairs of every two kinds, turned at random, are placed at a depth or a gap of 3e-2 to 1e-7 of 0.1 m. Truth is the bracket
-of `collide.distance`, whose tests judge it in rational arithmetic. A verdict is wrong where a pair that is proven to
-overlap has no contact of negative distance, or one that is proven to be apart has one. A depth is off by the difference
-between the deepest contact's and the bracket.
+Pairs of every two kinds, turned at random, are placed at a depth or a gap of 3e-2 to 1e-7 of 0.1 m. Truth is the
+bracket of `collide.distance`, whose tests judge it in rational arithmetic. A verdict is wrong where a pair that is proven
+to overlap has no contact of negative distance, or one that is proven to be apart has one. A depth is off by the
+difference between the deepest contact's and the bracket.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ def main() -> None:
             if any(is_wrong[1:]) or off[1]:
                 print("collide is off:", a, b, data.qpos.tolist(), answers, truth)
     print(f"MuJoCo {mujoco.__version__}, {done} pairs; a pair counts under each of its kinds")
-    print(f"{'':10} {'pairs':>6} | wrong verdicts: MuJoCo {'collide':>8} | depth off by > 1e-4 m: MuJoCo {'collide':>8}")
+    heads = f"wrong verdicts: MuJoCo {'collide':>8} | depth off by > 1e-4 m: MuJoCo {'collide':>8}"
+    print(f"{'':10} {'pairs':>6} | {heads}")
     for kind, (n, wrong, ours_wrong, off_by, ours_off) in counts.items():
         print(f"{kind:10} {n:6} | {wrong:22} {ours_wrong:8} | {off_by:29} {ours_off:8}")
 
