@@ -3,7 +3,7 @@
     python benchmarks/mujoco_agreement.py [--pairs 10000]
 
 Pairs of every two kinds, turned at random, are placed at a depth or a gap of 3e-2 to 1e-7 of 0.1 m. Truth is the
-bracket of `collide.distance`, whose tests judge it in rational arithmetic. A verdict is wrong where a pair that is proven
+bracket of `collide.distance`, whose tests judge it in rational arithmetic. A verdict is wrong where a pair proven
 to overlap has no contact of negative distance, or one that is proven to be apart has one. A depth is off by the
 difference between the deepest contact's and the bracket.
 """
