@@ -10,7 +10,6 @@ from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import GAP as POINT_GAP
 from collide.contact.manifold_points import HEIGHT, POINT, V
 from collide.contact.reduce_patch import HullSpace, reduce_patch
-from collide.contact.reduce_points import select_points
 from collide.kernels import kernel, view_f64, view_i32
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
 from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
@@ -118,8 +117,7 @@ def choose_points(points, n, error, limit, space):
     """
     n = _keep_near(points, n, limit)
     tolerance = max(_ERRORS * error, _SHARE * _extent(points, n))
-    n = reduce_patch(points, n, tolerance, space.target, space.hull)
-    return select_points(space.target.manifold, n, 0, space.max_contacts, space.hull.order)
+    return reduce_patch(points, n, tolerance, space.max_contacts, space.target, space.hull)
 
 
 @kernel
