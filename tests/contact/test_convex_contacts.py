@@ -104,6 +104,23 @@ def test_faces_over_each_other(height):
     near(ball.point_a, [(0, 0, 0.25)], 1e-6)
 
 
+@pytest.mark.parametrize("shape", [collide.Capsule(0.08, 0.4), collide.Cylinder(0.08, 0.4)])
+def test_a_line_over_the_end_of_a_cylinder_has_both_its_ends(shape):
+    """The nearest point is on the rim, beyond the octagon: the far end is no point between it and the near one."""
+    several = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        tilt, yaw, turned = 10 ** rng.uniform(-6, -3), *rng.uniform(-3, 3, 2)
+        X_WB = collide.pose((*rng.uniform(-0.02, 0.02, 2), 0.23), rpy=(0.5 * np.pi + tilt, 0, yaw))
+        ground, X_WA = collide.Cylinder(0.1, 0.3), collide.pose((0, 0, 0), rpy=(0, 0, turned))
+        X_WB[2, 3] -= collide.distance(ground, shape, X_WA, X_WB).distance - rng.choice([-1e-4, 0.0, 1e-4])
+        c = collide.contacts(ground, shape, X_WA, X_WB, margin=2e-3)
+        ends = c.point[:, :2]
+        assert len(c) == 2 and np.linalg.norm(ends[1] - ends[0]) > 0.15, (seed, tilt, c.point, c.distance)
+        several += abs(np.hypot(*ends[0]) - 0.1) < 1e-7
+    assert several > 10  # that begin on the rim
+
+
 def test_compounds_are_asked_part_by_part():
     legs = [(collide.Box((0.25, 0.25, 0.5)), collide.pose((x, y, 0))) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
     stool = collide.Compound(

@@ -45,7 +45,7 @@ def test_a_box_on_a_flat_field_stands_on_its_four_corners(height):
     field, rng = flat(), rng_of("box on a flat field", height)
     for number in range(16):
         sides = rng.integers(1, 5, 3) / 8 if number % 2 else rng.uniform(0.1, 0.9, 3)
-        place = rng.integers(-6, 7, 2) / 8 if number % 2 else rng.uniform(-0.5, 0.5, 2)
+        place = rng.integers(-5, 6, 2) / 8 if number % 2 else rng.uniform(-0.5, 0.5, 2)
         X_WB = collide.pose((*place, 0.5 * sides[2] + height), rpy=(0, 0, 0 if number % 4 == 1 else rng.uniform(-3, 3)))
         c = collide.contacts(field, collide.Box(sides), EYE, X_WB, margin=MARGIN)
         told = f"{spell(sides)} at {spell(X_WB)}: {c.rows}"
