@@ -243,7 +243,7 @@ def reduce_patch(points, n, tolerance, max_contacts, target, space):
     n_corners = hull_of_patch(points, n, tolerance, space)
     n_ring = _put_ring(points, n, n_corners, tolerance, target, space)
     mark_carrying(points.manifold.points, n, n_corners, tolerance, space)
-    n_target = _put_inner(points, n, n_ring, target, space)
+    n_target = _put_inner(points, n, n_ring, tolerance, target, space)
     if n_target == n_ring or n_target <= max_contacts:
         return select_points(target.manifold, n_target, 0, max_contacts, space.order)
     for k in range(n_target):
@@ -290,15 +290,17 @@ def _put_ring(points, n, n_corners, tolerance, target, space):
 
 
 @kernel
-def _put_inner(points, n, n_ring, target, space):
-    """Append points that may carry and are not in ``target`` to it; how many there are then."""
+def _put_inner(points, n, n_ring, tolerance, target, space):
+    """Append points that may carry to ``target``, where none of those around the patch is; how many there are then."""
+    p = points.manifold.points
     n_target = n_ring
     for i in range(n):
         if space.remaining[i] < STEEP:
             continue
         is_new = True
         for k in range(n_ring):
-            is_new = is_new and space.order[k] != i
+            at = POINT * space.order[k]
+            is_new = is_new and max(abs(p[POINT * i] - p[at]), abs(p[POINT * i + V] - p[at + V])) > 2.0 * tolerance
         if is_new:
             space.order[n_target] = i
             copy_of_points(points, i, target, n_target)
