@@ -2,8 +2,8 @@
 
 Names, defaults, fields and conventions are those of python-fcl 0.7, measured: quaternions w, x, y, z; full lengths;
 contact normals from ``o1`` to ``o2``; depths positive; −1 for the distance of objects that meet, without
-``enable_signed_distance``; meshes are surfaces, `Convex` is a solid; results collect over calls. docs/hosts.md says what
-is different, and why.
+``enable_signed_distance``; meshes are surfaces, `Convex` is a solid; results collect over calls. docs/hosts.md says
+what is different, and why.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import platform
 import sys
 import tempfile
 from dataclasses import dataclass, field
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import collide
@@ -53,6 +53,7 @@ class Examination:
 
     installed: list[Check] = field(default_factory=list)
     optional: list[Check] = field(default_factory=list)
+    hosts: list[Check] = field(default_factory=list)
     caches: list[Check] = field(default_factory=list)
     answers: list[Check] = field(default_factory=list)
 
@@ -62,7 +63,7 @@ class Examination:
         return all(check.passed is not False for check in self._all())
 
     def _all(self) -> list[Check]:
-        return [*self.installed, *self.optional, *self.caches, *self.answers]
+        return [*self.installed, *self.optional, *self.hosts, *self.caches, *self.answers]
 
     def verdict(self) -> str:
         """The examination in one line."""
@@ -75,6 +76,7 @@ class Examination:
         return [
             _table("INSTALLED", self.installed),
             _table("OPTIONAL  pip install 'collide-robotics[EXTRA]'", self.optional),
+            _table("HOSTS  programs of other engines that run on collide", self.hosts),
             _table("KEPT BETWEEN RUNS", self.caches),
             _table("SELF-CHECK  pairs with known answers", self.answers),
         ]
@@ -95,7 +97,7 @@ def examine(progress=None) -> Examination:
     """
     with (progress or silent)("asking pairs with known answers"):
         answers = _answers()
-    return Examination(_installed(), _optional(), _caches(), answers)
+    return Examination(_installed(), _optional(), _hosts(), _caches(), answers)
 
 
 def _installed() -> list[Check]:
@@ -143,6 +145,22 @@ def _optional() -> list[Check]:
         for name, extra, purpose in OPTIONAL
         for version in [package_version(name)]
     ]
+
+
+def _hosts() -> list[Check]:
+    """Each stand-in is imported, and says whether programs find it under the host's name."""
+    checks = []
+    for host in import_module("collide.adapters.hosts").HOSTS:
+        version = package_version(host.package)
+        beside = f"{host.package} {version}" if version else f"{host.package} is absent, and not needed"
+        try:
+            is_in = import_module(host.module).installed()
+        except ImportError as error:
+            checks.append(Check(host.name, f"{host.module} cannot be imported: {error}", False))
+        else:
+            state = f"import {host.replaces} finds it" if is_in else f"install() lets import {host.replaces} find it"
+            checks.append(Check(host.name, f"{host.module}: {state} ({beside})"))
+    return checks
 
 
 def _caches() -> list[Check]:
