@@ -64,15 +64,15 @@ def calls(n: int, seed: int):
 
 def answers(fcl, n: int, seed: int) -> list:
     """(hit, gap of pairs apart else None), call by call, and microseconds a call of collide."""
-    found, spent = [], 0.0
+    replies, spent = [], 0.0
     for pair in calls(n, seed):
         a, b = (fcl.CollisionObject(geometry(fcl, kind, s), fcl.Transform(R, t)) for kind, s, R, t in pair)
         fcl.collide(a, b)
         begin = time.perf_counter()
         hit = fcl.collide(a, b) > 0
         spent += time.perf_counter() - begin
-        found.append([hit, None if hit else float(fcl.distance(a, b))])
-    return [found, 1e6 * spent / max(n, 1)]
+        replies.append([hit, None if hit else float(fcl.distance(a, b))])
+    return [replies, 1e6 * spent / max(n, 1)]
 
 
 def judged(pair, hit: bool) -> str:
@@ -93,25 +93,25 @@ def main() -> None:
     parser.add_argument("--calls", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=22)
     parser.add_argument("--host", action="store_true", help="answer with python-fcl, as JSON (the child)")
-    given = parser.parse_args()
-    if given.host:
+    arguments = parser.parse_args()
+    if arguments.host:
         import fcl
 
-        print("ANSWERS", json.dumps(answers(fcl, given.calls, given.seed)))
+        print("ANSWERS", json.dumps(answers(fcl, arguments.calls, arguments.seed)))
         return
-    command = [sys.executable, __file__, "--host", "--calls", str(given.calls), "--seed", str(given.seed)]
+    command = [sys.executable, __file__, "--host", "--calls", str(arguments.calls), "--seed", str(arguments.seed)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     theirs, their_time = json.loads(done.stdout.split("ANSWERS")[1])
-    ours, our_time = answers(fcl_api, given.calls, given.seed)
+    ours, our_time = answers(fcl_api, arguments.calls, arguments.seed)
     counts: dict[tuple[str, str], int] = {}
     worst = 0.0
-    for pair, (hit, gap), (their_hit, their_gap) in zip(calls(given.calls, given.seed), ours, theirs):
+    for pair, (hit, gap), (their_hit, their_gap) in zip(calls(arguments.calls, arguments.seed), ours, theirs):
         if hit != their_hit:
             key = "–".join(sorted(body[0] for body in pair)), judged(pair, hit)
             counts[key] = counts.get(key, 0) + 1
         elif not hit:
             worst = max(worst, abs(gap - their_gap))
-    print(f"{given.calls} calls, {sum(hit for hit, _ in ours)} hits, {sum(counts.values())} booleans differ")
+    print(f"{arguments.calls} calls, {sum(hit for hit, _ in ours)} hits, {sum(counts.values())} booleans differ")
     for (kinds, verdict), count in sorted(counts.items()):
         print(f"  {kinds:24} {verdict:26} {count}")
     print(f"greatest difference of gaps: {worst:.2g} m")

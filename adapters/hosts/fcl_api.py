@@ -99,8 +99,8 @@ def install() -> _Installed:
         _before = {name: module for name, module in sys.modules.items() if name.split(".")[0] == "fcl"}
         for name in _before:
             del sys.modules[name]
-        own = sys.modules[__name__]
-        sys.modules.update({"fcl": own, "fcl.fcl": own, "fcl.collision_data": fcl_requests})
+        module = sys.modules[__name__]
+        sys.modules.update({"fcl": module, "fcl.fcl": module, "fcl.collision_data": fcl_requests})
         holders = _holders(_before.get("fcl"))
         if holders:
             warnings.warn(
@@ -129,9 +129,9 @@ def installed() -> bool:
 
 def _holders(former: ModuleType | None) -> list[str]:
     """Modules whose ``fcl`` is python-fcl, or nothing: trimesh's where the import failed."""
-    found = []
+    names = []
     for name, module in list(sys.modules.items()):
         held = vars(module).get("fcl", module) if isinstance(module, ModuleType) else module
         if held is not module and (held is former if former is not None else held is None):
-            found.append(name)
-    return sorted(found)
+            names.append(name)
+    return sorted(names)

@@ -16,12 +16,12 @@ def contact_rows(A, B, o1, o2, limit: int) -> list[tuple]:
         normal, pos = np.array(r.normal), 0.5 * (np.array(r.point_a) + np.array(r.point_b))
         return [(_number(o1, r.part_a), _number(o2, r.part_b), normal, pos, max(0.0, -float(r.distance)))]
     order = np.argsort(rows["distance"], kind="stable")[:limit]
-    found = []
+    contacts = []
     for row in rows[order]:
         pos = 0.5 * row["point_a"] + 0.5 * row["point_b"]
         b1, b2 = (_number(o, row[f"facet_{s}"], row[f"part_{s}"]) for o, s in ((o1, "a"), (o2, "b")))
-        found.append((b1, b2, row["normal"].copy(), pos, max(0.0, -float(row["distance"]))))
-    return found
+        contacts.append((b1, b2, row["normal"].copy(), pos, max(0.0, -float(row["distance"]))))
+    return contacts
 
 
 def _number(body, facet, part=None) -> int:
@@ -44,8 +44,8 @@ def facet_contacts(A, B, X_WA, X_WB, limit: int, with_geometry: bool) -> list[tu
     corners_a = (A.vertices[A.faces[pairs[:, 0]]] @ X_WA[:3, :3].T) + X_WA[:3, 3]
     corners_b = (B.vertices[B.faces[pairs[:, 1]]] @ X_WB[:3, :3].T) + X_WB[:3, 3]
     normals, positions, depths = _triangles_apart(corners_a, corners_b)
-    found = zip(pairs, normals, positions, depths)
-    return [(int(i), int(j), normal, pos, depth) for (i, j), normal, pos, depth in found]
+    contacts = zip(pairs, normals, positions, depths)
+    return [(int(i), int(j), normal, pos, depth) for (i, j), normal, pos, depth in contacts]
 
 
 def _triangles_apart(corners_a: np.ndarray, corners_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[float]]:

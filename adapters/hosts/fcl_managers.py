@@ -185,12 +185,12 @@ def _boxes(objects: list[CollisionObject]) -> np.ndarray:
     """Boxes (n, 6) around posed geometries, without end where these have none."""
     corners = np.array([obj._geometry._corners for obj in objects])
     X = np.array([obj._X for obj in objects])
-    endless = ~np.isfinite(corners).all(axis=(1, 2))
-    corners[endless] = 0.0
+    unbounded = ~np.isfinite(corners).all(axis=(1, 2))
+    corners[unbounded] = 0.0
     middle = np.einsum("nij,nj->ni", X[:, :3, :3], 0.5 * (corners[:, 0] + corners[:, 1])) + X[:, :3, 3]
     half = np.einsum("nij,nj->ni", np.abs(X[:, :3, :3]), 0.5 * (corners[:, 1] - corners[:, 0]))
     half += _SLACK * (np.abs(middle) + half)
-    half[endless] = np.inf
+    half[unbounded] = np.inf
     return np.concatenate([middle - half, middle + half], axis=1)
 
 

@@ -14,7 +14,7 @@ from collide.errors import InvalidArgument, UnsupportedQuery
 
 #: What python-fcl's model returns where calls come in a wrong order, and of none.
 _OUT_OF_SEQUENCE, _OK = -2, 0
-_EMPTY, _BEGUN, _PROCESSED = range(3)
+_EMPTY, _STARTED, _PROCESSED = range(3)
 
 
 class BVHModel(CollisionGeometry):
@@ -43,12 +43,12 @@ class BVHModel(CollisionGeometry):
         if self._state != _EMPTY:
             warnings.warn("beginModel: the triangles there were are dropped", stacklevel=2)
         self.__init__()
-        self._state = _BEGUN
+        self._state = _STARTED
         return _OK
 
     def endModel(self):
         """Triangles are complete. Returns 0, −2 before `beginModel`. Raises InvalidShape, InvalidArgument."""
-        if self._state != _BEGUN:
+        if self._state != _STARTED:
             warnings.warn("endModel: there is no beginModel before it; nothing done", stacklevel=2)
             return _OUT_OF_SEQUENCE
         if not self._triangles:
@@ -81,7 +81,7 @@ class BVHModel(CollisionGeometry):
         return True
 
     def _add(self, vertices: np.ndarray, facets: np.ndarray) -> None:
-        if self._state != _BEGUN:
+        if self._state != _STARTED:
             raise ValueError("BVH construction does not follow correct sequence: call beginModel() first")
         self._vertices.append(vertices)
         if len(facets):
@@ -92,7 +92,7 @@ class BVHModel(CollisionGeometry):
 class OcTree(CollisionGeometry):
     """The occupied boxes of an octomap, a solid; free and unknown space is empty.
 
-    r : edge of the smallest box [m].   data : the tree as octomap's ``writeBinaryData`` writes it: for every node two
+    r : edge of the smallest box [m].   data : the tree in octomap's binary form: for every node two
     bytes, two bits a child (nothing, free, occupied, or a node of its own), the first child lowest.
     """
 
@@ -103,9 +103,9 @@ class OcTree(CollisionGeometry):
         if not boxes:
             raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
         middles = np.array([middle for middle, _ in boxes])
-        halves = np.array([[0.5 * edge] for _, edge in boxes])
+        half_edges = np.array([[0.5 * edge] for _, edge in boxes])
         shapes = [(engine.Box(edge, edge, edge), engine.pose(middle)) for middle, edge in boxes]
-        self._become([(middles - halves).min(axis=0), (middles + halves).max(axis=0)], engine.Compound(shapes))
+        self._become([(middles - half_edges).min(axis=0), (middles + half_edges).max(axis=0)], engine.Compound(shapes))
 
 
 #: Levels of an octomap, and what two bits of a child say: bit 0, then bit 1.
@@ -115,7 +115,7 @@ _OCCUPIED, _INNER = 2, 3
 
 def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
     """(middle, edge) of the occupied leaves. Raises InvalidArgument where data ends too early."""
-    found: list[tuple[np.ndarray, float]] = []
+    boxes_read: list[tuple[np.ndarray, float]] = []
     at = 0
 
     def read(middle: np.ndarray, depth: int) -> None:
@@ -130,7 +130,7 @@ def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
             state = word >> 2 * child & 3
             corner = middle + 0.5 * edge * np.array([2 * (child >> k & 1) - 1 for k in range(3)])
             if state == _OCCUPIED:
-                found.append((corner, edge))
+                boxes_read.append((corner, edge))
             elif state == _INNER:
                 inner.append(corner)
         for corner in inner:
@@ -140,4 +140,4 @@ def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
         raise InvalidArgument(f"OcTree: r must be > 0 and finite [m], got {r}")
     if data:
         read(np.zeros(3), 0)
-    return found
+    return boxes_read

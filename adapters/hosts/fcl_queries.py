@@ -67,9 +67,9 @@ def collide(o1, o2, request=None, result=None):
     if result is None:
         return 1 if limit == 1 else len(_contacts(*_ordered(o1, o2), limit, with_geometry))
     result.is_collision = True
-    found = _contacts(*_ordered(o1, o2), limit, with_geometry)
-    result.contacts.extend(found)
-    return len(found)
+    contacts = _contacts(*_ordered(o1, o2), limit, with_geometry)
+    result.contacts.extend(contacts)
+    return len(contacts)
 
 
 def _checked(request: CollisionRequest) -> int:
@@ -107,15 +107,15 @@ def _contacts(o1: CollisionObject, o2: CollisionObject, limit: int, with_geometr
     g1, g2 = o1._geometry, o2._geometry
     both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
     if both_meshes:
-        found = facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
+        contacts = facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
     elif not with_geometry:
-        found = [(-1, -1, np.zeros(3), np.zeros(3), 0.0)]
+        contacts = [(-1, -1, np.zeros(3), np.zeros(3), 0.0)]
     elif g1._node_type in (_PLANE, _HALFSPACE) and g2._node_type in (_PLANE, _HALFSPACE):
-        found = [(-1, -1, np.zeros(3), np.zeros(3), math.inf)]  # no translation takes them apart
+        contacts = [(-1, -1, np.zeros(3), np.zeros(3), math.inf)]  # no translation takes them apart
     else:
         A, B = _nearest_sides(o1, o2)
-        found = contact_rows(A, B, o1, o2, limit)
-    return [_contact(g1, g2, *values) for values in found]
+        contacts = contact_rows(A, B, o1, o2, limit)
+    return [_contact(g1, g2, *values) for values in contacts]
 
 
 def _contact(g1, g2, b1, b2, normal, pos, depth) -> Contact:
