@@ -208,7 +208,7 @@ class MujocoWorld:
         self.mujoco, self.pits, self.at = mujoco, pits, 0
         assets, bodies = Assets(), []
         for k, (shape, X) in enumerate(zip(pits.shapes, pits.X[0])):
-            geom = f'<geom {assets.attributes(shape)} mass="1" margin="{MARGIN!r}"/>'
+            geom = f'<geom {assets.attributes(shape)} mass="1" margin="{0.5 * MARGIN!r}"/>'  # those of two geoms add up
             place = qpos_of(X)
             bodies.append(
                 f"<body><freejoint/>{geom}</body>" if k < pits.n_moving

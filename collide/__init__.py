@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         Cylinder,
         Ellipsoid,
         Halfspace,
+        HeightField,
         HPolytope,
         Mesh,
         Shape,
@@ -92,7 +93,7 @@ _HOMES = {
     "collide.robot": ("Robot",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-        "Halfspace", "Mesh", "Shape", "ShapeSet", "Sphere",
+        "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.transforms": ("pose",),
@@ -109,12 +110,12 @@ _RENAMED = {
 
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
-    "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "How", "InvalidArgument",
-    "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits", "Robot", "SceneError",
-    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact", "UnknownBody", "UnsupportedQuery",
-    "World", "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance", "facet_pairs",
-    "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion", "raycast", "self_collisions",
-    "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
+    "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
+    "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
+    "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact",
+    "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts",
+    "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose",
+    "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

@@ -212,7 +212,7 @@ class PairResult(Generic[Form]):
                 return values
             if name == "how":
                 return How(values[0])
-            return values[0].copy() if values.ndim > 1 else values[0].item()
+            return only_value(values)
 
     def __dir__(self):
         return [*super().__dir__(), *FIELDS]
@@ -228,6 +228,11 @@ class PairResult(Generic[Form]):
                 f"certified={bool(row['certified'])}, how={HOW[row['how']]!r})"
             )
         return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
+
+
+def only_value(column: np.ndarray):
+    """What a column of one row holds: a number of Python's, or a vector of its own."""
+    return column[0].copy() if column.ndim > 1 else column[0].item()
 
 
 def question_of_row(question: Question, k: int) -> Question:

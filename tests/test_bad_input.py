@@ -23,6 +23,7 @@ from collide import (
     Cylinder,
     Ellipsoid,
     Halfspace,
+    HeightField,
     HPolytope,
     InvalidArgument,
     InvalidPose,
@@ -238,6 +239,7 @@ NUMBER_TAKERS = {
     "Halfspace normal": lambda v: Halfspace((0, v, 1), 0), "ConvexHull": lambda v: ConvexHull([[0, 0, v]]),
     "ConvexHull radius": lambda v: ConvexHull([[0, 0, 0]], radius=v),
     "HPolytope": lambda v: HPolytope(CUBE, [1, 1, 1, 1, 1, v]),
+    "HeightField": lambda v: HeightField([[0, 0], [0, v]], 1), "HeightField cell": lambda v: HeightField(EYE, (v, 1)),
     "Mesh": lambda v: Mesh([[0, 0, 0], [1, 0, 0], [0, v, 0]], [[0, 1, 2]]),
     "Mesh.scaled": lambda v: triangle().scaled(v),
     "pose": lambda v: pose((0, 0, v)), "rpy": lambda v: pose(rpy=(0, v, 0)),
@@ -320,6 +322,7 @@ def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
     value, words = NO_ARRAYS[name]
     for take in (
         ConvexHull, lambda v: HPolytope(v, [1]), lambda v: Mesh(v, [[0, 1, 2]]), Box, Ellipsoid,
+        lambda v: HeightField(v, 1),
         lambda v: Halfspace(v, 0),
         lambda v: pose(R=v), lambda v: meets(Sphere(1), Sphere(1), v, EYE),
         lambda v: meets(Sphere(1), Sphere(1), EYE, (v, np.zeros(3))),

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.casts.directions import Directions
+from collide.results import only_value
 
 
 class RayHits(NamedTuple):
@@ -112,7 +113,7 @@ def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, e
     for into, values in zip(full, columns):
         if into is not None:
             into[ray] = values
-    return RayHits._make(None if values is None else values[0] for values in full) if single else full
+    return RayHits._make(None if values is None else only_value(values) for values in full) if single else full
 
 
 def _nothing(n: int) -> RayHits:

@@ -14,6 +14,7 @@ from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.errors import InvalidArgument
 from collide.pair_arguments import asked_poses
+from collide.results import only_value
 from collide.shapes.shape import Shape
 from collide.threads import check_threads, pieces_of, share
 from collide.transforms import as_poses
@@ -119,7 +120,7 @@ def shape_cast(
     refuse_unbounded("shape_cast: A", A)
     rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
-    return ShapeCasts._make(values[0] for values in casts) if single and single_direction else casts
+    return ShapeCasts._make(only_value(values) for values in casts) if single and single_direction else casts
 
 
 def _in_threads(A, B, X_WA, X_WB, directions: Directions, limit: float, threads: int) -> CastRows:

@@ -1,4 +1,4 @@
-"""Contacts of many pairs of bodies: compounds taken apart, convex pairs answered together, meshes one by one."""
+"""Contacts of many pairs of bodies: compounds taken apart, convex pairs answered together, meshes pair by pair."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from collide.batches import answer_batch, of_one_set
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
-from collide.contact.mesh_contacts import curved_contacts, facet_contacts, halfspace_contacts
+from collide.contact.curved_contacts import curved_contacts
+from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
@@ -23,9 +24,9 @@ from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.transforms import as_poses
 
-#: What makes the contacts of two bodies at one pose, by the method that answers the pair; other methods are of convex
-#: sets, which go together, or of compounds, which are taken apart.
-_OF_ONE_POSE = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
+#: What makes the contacts of two bodies, by the method that answers the pair; other methods are of convex sets, which
+#: go together, or of compounds, which are taken apart.
+_OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
@@ -70,6 +71,10 @@ def contact_batch(
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+    if isinstance(A, Shape) and isinstance(B, Shape) and (make := _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))):
+        rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
+        of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
+        return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
     shapes: tuple[Shape, ...] = (A, B)
     which = None
     if isinstance(A, Picked):
@@ -82,8 +87,16 @@ def contact_batch(
     rows["part_a"] = np.repeat(part_pairs.part_a, ends - starts)
     rows["part_b"] = np.repeat(part_pairs.part_b, ends - starts)
     _number_patches(rows, of_pair)
+    return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
+
+
+def _only_within_margin(
+    rows, of_pair, n: int, A, B, X_WA, X_WB, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of the pairs within the margin."""
     keep = _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin)
-    rows, of_pair = rows[keep], of_pair[keep]
+    if not keep.all():
+        rows, of_pair = rows[keep], of_pair[keep]
     return rows, np.cumsum(np.bincount(of_pair, minlength=n))
 
 
@@ -147,7 +160,7 @@ def _may_come_within(part_a: Part, part_b: Part, X_WA, X_WB, limit: np.ndarray) 
 def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of pairs of parts: the convex ones in one batch, each other at its pose."""
+    """(rows, ends) of pairs of parts: the convex ones in one batch, of meshes those of two shapes."""
     if not len(pairs):
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
     kinds = [kind_of(shape) for shape in singles]
@@ -166,15 +179,22 @@ def _rows_of_parts(
         counts[convex] = np.diff(ends, prepend=0)
         blocks.append(rows)
     owners = [np.repeat(convex, counts[convex])]
-    for k in np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B])).tolist():
-        A, B, slack = singles[pairs.A[k]], singles[pairs.B[k]], float(pairs.slack[k])
-        make = _OF_ONE_POSE[method_of(kinds[pairs.A[k]], kinds[pairs.B[k]])]
-        rows = make(A, B, pairs.X_WA[k], pairs.X_WB[k], margin + slack, max_contacts)
-        rows["lower"] -= slack
-        rows["upper"] += slack
-        counts[k] = len(rows)
+    meshed = np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B]))
+    keys = pairs.A[meshed] * len(singles) + pairs.B[meshed]
+    for key in np.unique(keys).tolist():
+        which = meshed[keys == key]
+        a, b = divmod(key, len(singles))
+        some = pairs.take(which)
+        make = _OF_MESHES[method_of(kinds[a], kinds[b])]
+        X_WA, X_WB = np.ascontiguousarray(some.X_WA), np.ascontiguousarray(some.X_WB)
+        slack = some.slack if some.slack.any() else None
+        rows, ends = make(singles[a], singles[b], X_WA, X_WB, margin, max_contacts, slack, threads)
+        counts[which] = np.diff(ends, prepend=0)
+        if slack is not None:
+            rows["lower"] -= np.repeat(slack, counts[which])
+            rows["upper"] += np.repeat(slack, counts[which])
         blocks.append(rows)
-        owners.append(np.full(len(rows), k))
+        owners.append(np.repeat(which, counts[which]))
     order = np.argsort(np.concatenate(owners), kind="stable")
     return np.concatenate([*blocks, np.zeros(0, dtype=CONTACT_DTYPE)])[order], np.cumsum(counts)
 
@@ -196,14 +216,30 @@ def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray
     Facets, and parts whose poses are rounded, are asked a little beyond it; where that matters, `distance` decides.
     """
     keep = np.ones(len(rows), dtype=bool)
-    for k in np.unique(of_pair).tolist():
-        of_k = slice(*np.searchsorted(of_pair, [k, k + 1]))
+    if not len(rows):
+        return keep
+    starts = np.flatnonzero(np.diff(of_pair, prepend=-1))
+    pairs, ends = of_pair[starts], np.append(starts[1:], len(rows))
+    across = np.abs(_some(X_WB, pairs)[:, :3, 3] - _some(X_WA, pairs)[:, :3, 3]).sum(axis=1)
+    size = 4.0 * (_reaches(A, pairs) + _reaches(B, pairs)) + across
+    near = np.minimum.reduceat(rows["upper"], starts) > margin - _ROUNDING * size
+    for i in np.flatnonzero(near).tolist():
+        k = int(pairs[i])
         shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])
         X_A, X_B = pose_at(X_WA, k), pose_at(X_WB, k)
-        size = 4.0 * (_reach(shape_a) + _reach(shape_b)) + float(np.abs(X_B[:3, 3] - X_A[:3, 3]).sum())
-        if rows["upper"][of_k].min() <= margin - _ROUNDING * size:
-            continue
         row = answer_batch(shape_a, shape_b, X_A[None], X_B[None], Question(False, math.inf))
         if row["lower"][0] > margin:
-            keep[of_k] = False
+            keep[starts[i] : ends[i]] = False
     return keep
+
+
+def _some(X: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Poses of some pairs."""
+    return X if len(X) == 1 else X[pairs]
+
+
+def _reaches(shapes, pairs: np.ndarray):
+    """How far the shapes of some pairs reach from their origins [m]: a number, or one a pair."""
+    if isinstance(shapes, Shape):
+        return _reach(shapes)
+    return np.array([_reach(shapes[k]) for k in pairs.tolist()])

@@ -1,35 +1,41 @@
-"""Facets of a body as contacts need them: which share corners, where they are in the world, which way they face."""
+"""Facets of a body as contacts need them: which share corners and edges, and where they are at a pose."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of, kernel, view_f64, view_i32, view_i64
 from collide.lowering.facet_bodies import Body
-from collide.mesh.bvh import REACH
-from collide.narrowphase.facets.facet_queries import NearPairs, facets_within
+from collide.lowering.parts import convex_set_of
+from collide.mesh.bvh import INTS, N_FACETS, TRIANGLES_AT
+from collide.narrowphase.facets.posed_surfaces import rotate_by_pose
+from collide.numerics.vec3 import Vec3, add, vec3_at
 from collide.shapes.mesh import Mesh
 
-_U = 2.0**-53
-#: Most pairs of facets looked at: they take a gigabyte.
-MAX_PAIRS = 1 << 18
+# Header of a body's topology, 64-bit words: addresses of its arrays, how many corners there are, whether the facets are
+# those of a convex hull.
+CORNERS_AT, PLACES_AT, FANS_AT, FAN_STARTS_AT, EDGES_AT, N_CORNERS, IS_CONVEX = range(7)
+TOPOLOGY = 7
 
 
 class Topology(NamedTuple):
-    """Which facets of a body of m share corners.
+    """Which of a body's m facets share corners, int32.
 
-    corners : (m, 3) ids, equal for equal points.   n_corners : ids are below this.
-    place : (m,) where facet k stands in the tree.   fans : (3 m,) facets around corner after corner.
-    starts : (n_corners + 1,) where the fan of a corner begins.   solid : facets have an outer side.
+    corners : (m, 3) numbers of points, equal for equal points: the first row of the shape's that is there.
+    places : (m,) where facet k stands in the tree.   fans : (3 m,) facets around corner after corner.
+    fan_starts : (n_corners + 1,) where the fan of a corner begins.
+    edges : (m, 3) numbers of the edges from corner to corner, equal for equal edges.
+    header : TOPOLOGY words for kernels.
     """
 
     corners: np.ndarray
-    n_corners: int
-    place: np.ndarray
+    places: np.ndarray
     fans: np.ndarray
-    starts: np.ndarray
-    solid: bool
+    fan_starts: np.ndarray
+    edges: np.ndarray
+    header: np.ndarray
 
 
 def topology_of(body: Body) -> Topology:
@@ -45,112 +51,71 @@ def topology_of(body: Body) -> Topology:
 
 def _topology(body: Body) -> Topology:
     tree = body.tree
-    place = np.empty(len(tree.ids), dtype=np.int64)
-    place[tree.ids] = np.arange(len(place))
-    if isinstance(body.shape, Mesh):
-        corners = body.shape.survey.corners
+    places = np.empty(len(tree.ids), dtype=np.int32)
+    places[tree.ids] = np.arange(len(places))
+    shape = body.shape
+    is_mesh = isinstance(shape, Mesh)
+    if isinstance(shape, Mesh):
+        corners = np.ascontiguousarray(shape.survey.corners, dtype=np.int32)
     else:
-        points = tree.triangles[place].reshape(-1, 3) + 0.0
-        corners = np.unique(points, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    corners = np.asarray(corners, dtype=np.int64)
+        corners = _rows_of_points(convex_set_of(shape).points, tree.triangles[places].reshape(-1, 3))
     n_corners = int(corners.max()) + 1
-    order = np.argsort(corners.ravel(), kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(corners.ravel(), minlength=n_corners))])
-    return Topology(corners, n_corners, place, order // 3, starts, body.solid)
+    fans = (np.argsort(corners.ravel(), kind="stable") // 3).astype(np.int32)
+    fan_starts = np.zeros(n_corners + 1, dtype=np.int32)
+    fan_starts[1:] = np.cumsum(np.bincount(corners.ravel(), minlength=n_corners))
+    ends = corners[:, [1, 2, 0]].astype(np.int64)
+    keys = np.minimum(corners, ends) * n_corners + np.maximum(corners, ends)
+    edges = np.unique(keys, return_inverse=True)[1].reshape(-1, 3).astype(np.int32)
+    arrays = corners, places, fans, fan_starts, edges
+    header = np.array([*(address_of(array) for array in arrays), n_corners, not is_mesh], dtype=np.int64)
+    return Topology(*arrays, header)
 
 
-class Side(NamedTuple):
-    """One body's facets of k pairs: numbers, corners (k, 3, 3) seen from A's origin, unit normals, ids of corners.
+def _rows_of_points(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(m, 3) the first row of ``points`` that is equal to each of 3 m corners."""
+    row_of: dict[bytes, int] = {}
+    for k, point in enumerate(points + 0.0):
+        row_of.setdefault(point.tobytes(), k)
+    return np.array([row_of[corner.tobytes()] for corner in corners + 0.0], dtype=np.int32).reshape(-1, 3)
 
-    Facets without area have the normal 0.
+
+class PosedFacets(NamedTuple):
+    """A body's facets at a pose X (view of 16 doubles), seen from the origin of A.
+
+    solid : facets have an outer side.   is_convex : what leaves all facets at a point leads outside.
+    radius : of the ball swept over them [m].   shift : of its origin from A's [m].
+    triangles : nine doubles a facet, in the order of the tree.   Other views are those of `Topology`.
     """
 
-    facets: np.ndarray
-    corners: np.ndarray
-    normals: np.ndarray
-    ids: np.ndarray
-
-    def take(self, which) -> Side:
-        return Side(*(array[which] for array in self))
-
-
-class Pairs(NamedTuple):
-    """k pairs of facets near each other: `NearPairs`, and both sides posed."""
-
-    near: NearPairs
-    a: Side
-    b: Side
-
-    def take(self, which) -> Pairs:
-        return Pairs(NearPairs(*(array[which] for array in self.near)), self.a.take(which), self.b.take(which))
-
-    def __len__(self) -> int:  # type: ignore[override]
-        return len(self.near.length)
+    solid: bool
+    is_convex: bool
+    radius: float
+    X: Any
+    shift: Vec3
+    triangles: Any
+    corners: Any
+    places: Any
+    fans: Any
+    fan_starts: Any
+    edges: Any
+    n_corners: int
 
 
-class ContactFrame(NamedTuple):
-    """Two bodies at a pair of poses (4, 4), seen from A's origin.   error : bound of a coordinate's rounding there
-    [m].
-    """
-
-    A: Body
-    B: Body
-    X_WA: np.ndarray
-    X_WB: np.ndarray
-    error: float
-
-    def pairs(self, reach: float) -> Pairs | None:
-        """All pairs of facets within ``reach``; None where they are too many to be looked at."""
-        near = facets_within(self.A.tree, self.B.tree, self.X_WA, self.X_WB, reach, MAX_PAIRS)
-        if near is None:
-            return None
-        shift = self.X_WB[:3, 3] - self.X_WA[:3, 3]
-        a = _side(self.A, near.facets[:, 0], self.X_WA[:3, :3], np.zeros(3))
-        return Pairs(near, a, _side(self.B, near.facets[:, 1], self.X_WB[:3, :3], shift))
+@kernel
+def open_facets(body, topology_at, X_at, shift):
+    """`PosedFacets` of a `FacetBody` whose topology's header stands at an address."""
+    words = view_i64(topology_at, TOPOLOGY)
+    tree = view_i64(body.tree_at, INTS)
+    m, n_corners = tree[N_FACETS], words[N_CORNERS]
+    return PosedFacets(
+        body.solid != 0, words[IS_CONVEX] != 0, body.radius, view_f64(X_at, 16), shift,
+        view_f64(tree[TRIANGLES_AT], 9 * m),
+        view_i32(words[CORNERS_AT], 3 * m), view_i32(words[PLACES_AT], m), view_i32(words[FANS_AT], 3 * m),
+        view_i32(words[FAN_STARTS_AT], n_corners + 1), view_i32(words[EDGES_AT], 3 * m), n_corners,
+    )  # fmt: skip
 
 
-def contact_frame(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> ContactFrame:
-    size = np.abs(X_WA[:3, 3]) + np.abs(X_WB[:3, 3])
-    for body, X in ((A, X_WA), (B, X_WB)):
-        size = size + (np.abs(X[:3, :3]) * body.tree.numbers[REACH : REACH + 3]).sum(axis=1)
-    return ContactFrame(A, B, X_WA, X_WB, 8.0 * _U * float(size.max()))
-
-
-def rotated(R: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """R p of points (…, 3), summed from x to z."""
-    return (R * points[..., None, :]).sum(axis=-1)
-
-
-def _side(body: Body, facets: np.ndarray, R: np.ndarray, shift: np.ndarray) -> Side:
-    topology = topology_of(body)
-    corners = rotated(R, body.tree.triangles[topology.place[facets]].reshape(-1, 3, 3)) + shift
-    return Side(facets, corners, normals_of(corners), topology.corners[facets])
-
-
-def normals_of(corners: np.ndarray) -> np.ndarray:
-    """(k, 3) unit normals of triangles (k, 3, 3); 0 of those without area, and of those that rounding may have made."""
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    n = cross(u, v)
-    lengths = lengths_of(n)
-    least = 2.0**-44 * lengths_of(u) * lengths_of(v)
-    return np.where((lengths > least)[:, None], n / np.where(lengths > 0.0, lengths, 1.0)[:, None], 0.0)
-
-
-def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (…, 3): what np.cross gives, in a third of its time for few of them."""
-    a, b, c = u[..., 0], u[..., 1], u[..., 2]
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
-
-
-def lengths_of(v: np.ndarray) -> np.ndarray:
-    """Lengths of vectors (…, 3)."""
-    return np.sqrt(np.square(v).sum(axis=-1))
-
-
-def facing(normals: np.ndarray, n: np.ndarray, solid: bool) -> np.ndarray:
-    """(k,) cosines of facets' normals (k, 3) with n; facets of a surface have two sides: the one that faces n
-    counts.
-    """
-    cosines = (normals * n).sum(axis=1)
-    return cosines if solid else np.abs(cosines)
+@kernel(inline=True)
+def posed_corner(facets, place, k):
+    """Corner k of the triangle at a place of the tree."""
+    return add(rotate_by_pose(facets.X, vec3_at(facets.triangles, 9 * place + 3 * k)), facets.shift)

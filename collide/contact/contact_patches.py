@@ -1,200 +1,374 @@
-"""Contacts of two bodies of facets: patches of facet pairs that meet, or come within the margin.
+"""Patches of facet pairs that meet, or come within the margin.
 
-Pairs that meet are grouped by the shortest translations that separate them (`shallow_overlaps.py`); a pair that is
-apart starts a patch where its nearest points are local minima of the distance (`internal_edges.py`). A patch grows over
-pairs that are connected with it and face along its normal; its points are the corners of the polygons in which the
+Pairs that meet are grouped by short translations that separate them (`shallow_overlaps.py`); a pair that is apart
+starts a patch where its nearest points are local minima of the distance (`internal_edges.py`). A patch grows over
+pairs that are linked with it and face along its normal; its points are the corners of the polygons in which the
 facets overlap, seen along that normal (`contact_points.py`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from collide.contact.contact_facets import MAX_PAIRS, ContactFrame, Pairs, lengths_of, topology_of
-from collide.contact.contact_points import Points, points_along
-from collide.contact.internal_edges import FLAT, Links, aligned, local_minima, snapped
-from collide.contact.shallow_overlaps import (
-    STEP_ERRORS,
-    SeparatingTranslation,
-    clearing_length,
-    separating_translations,
+from collide.contact.contact_facets import PosedFacets
+from collide.contact.contact_pairs import (
+    COVERED,
+    JUDGED,
+    LEAST,
+    N_REACHED,
+    REACHED,
+    SEARCH,
+    TOUCHING,
+    WANTED,
+    ContactPairs,
+    begin_search,
+    facing_a,
+    facing_b,
+    pair_meets,
 )
-from collide.errors import UnsupportedQuery
-from collide.narrowphase.facets.facet_kernel_calls import core_hits
+from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_points
+from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
+from collide.contact.manifold_points import GAP, HEIGHT, POINT, V
+from collide.contact.shallow_overlaps import STEP_ERRORS
+from collide.contact.support_face import FACE, axes_across, seen_along
+from collide.kernels import kernel
+from collide.narrowphase.facets.facets_within import (
+    FACET_A,
+    FACET_B,
+    INTS_OF_PAIR,
+    LENGTH,
+    LOWER,
+    NUMBERS_OF_PAIR,
+    POINT_A,
+    POINT_B,
+)
+from collide.numerics.vec3 import divide, norm, put_vec3, sub, vec3_at
 
 #: A pair belongs to a patch where the normal of one of its facets is this near to the patch's, as a cosine.
 _ALONG = 0.8
 #: Pairs nearer than so many errors of a coordinate are treated as if they met: their direction is rounding.
 _CLOSE = 2.0**12
 #: Points deeper than so many times the separating translation belong to other parts of the bodies.
-_DEEPEST = 2.5
+DEEPEST = 2.5
+#: Directions that differ by less than this and their rounding are the same.
+_SAME = 2.0**-20
+
+
+class ContactFrame(NamedTuple):
+    """Pairs of facets of two bodies, and what patches are made of.
+
+    error : of a coordinate [m].   reach : margin and radii, within which contacts are listed [m].
+    """
+
+    pairs: ContactPairs
+    A: PosedFacets
+    B: PosedFacets
+    error: float
+    reach: float
+    points: PatchPoints
 
 
 class Patch(NamedTuple):
-    """One patch of contacts, without radii.
+    """One patch, whose pairs are REACHED.
 
-    normal : (3,) unit vector from A to B.   points : seen from A's origin [m].   facets : (k, 2) of each point.
-    meets : whether a pair of it meets.
-    apart : [m], B moved so far along the normal clears A in all pairs of the patch, proven; 0 where they are apart.
+    axes : `ContactAxes`.   n : of points.   meets : whether a pair of it meets.
     """
 
-    normal: np.ndarray
-    points: Points
-    facets: np.ndarray
+    axes: Any
+    n: int
     meets: bool
-    apart: float
 
 
-def patches_of(frame: ContactFrame, margin: float) -> tuple[list[Patch], bool]:
-    """Patches of two bodies within ``margin`` [m], and whether the overlap takes a row of `distance` besides.
-
-    It does where an overlap is too deep for a patch, or where pairs within reach made none. Raises UnsupportedQuery.
-    """
-    A, B = frame.A, frame.B
-    reach = margin + A.radius + B.radius
-    pairs = frame.pairs(reach)
-    if pairs is None:
-        if reach > 0.0:
-            raise UnsupportedQuery(
-                f"contacts: more than {MAX_PAIRS} pairs of facets lie within {reach:g} m (margin and radii) of each "
-                "other: ask with a smaller margin, or take coarser meshes"
-            )
-        return [], bool(core_hits(A, B, frame.X_WA[None], frame.X_WB[None]).core[0])
-    close = pairs.near.meets | (pairs.near.length <= _CLOSE * frame.error)
-    if not pairs.near.meets.any() and core_hits(A, B, frame.X_WA[None], frame.X_WB[None]).core[0]:
-        return [], True
-    if not len(pairs) or (reach == 0.0 and not pairs.near.meets.any()):
-        return [], False  # apart, be it by less than rounding
-    translations: list[SeparatingTranslation] = []
-    deep = False
-    if close.any():
-        touching = pairs.take(close)
-        translations, unparted = separating_translations(frame, touching)
-        deep = bool((unparted & touching.near.meets).any())
-        farthest = _DEEPEST * max((translation.length for translation in translations), default=0.0)
-        if farthest > reach:
-            wider = frame.pairs(farthest)
-            if wider is None:
-                return [], True
-            pairs = wider
-            close = pairs.near.meets | (pairs.near.length <= _CLOSE * frame.error)
-    links = Links(pairs, topology_of(B).n_corners)
-    covered = close.copy()
-    overlapping: list[tuple[Patch, np.ndarray]] = []
-    for translation in translations:
-        grown, unexplained = _overlapping(frame, pairs, links, translation, touching, reach)
-        deep = deep or unexplained
-        overlapping += grown
-        for _, members in grown:
-            covered |= members
-    gaps = _gaps(frame, pairs, links, covered, overlapping, reach)
-    patches = [*(patch for patch, _ in overlapping), *gaps]
-    return patches, deep or not patches
-
-
-def _overlapping(
-    frame: ContactFrame, pairs: Pairs, links: Links, translation: SeparatingTranslation, touching: Pairs, reach: float
-) -> tuple[list[tuple[Patch, np.ndarray]], bool]:
-    """Patches of a separating translation, each with its pairs (mask); and whether pairs that meet are in none of
-    them.
-    """
-    n_facets_b = len(frame.B.tree.ids)
-    keys, wanted = (
-        facets[:, 0] * n_facets_b + facets[:, 1]
-        for facets in (pairs.near.facets, touching.near.facets[translation.pairs])
-    )
-    seeds = np.isin(keys, wanted)
-    deepest = _DEEPEST * translation.length + STEP_ERRORS * frame.error
-    whole, points = _grow_patch(frame, pairs, links, translation.normal, seeds, reach, deepest)
-    patches, unexplained = [], False
-    while seeds.any():  # one patch for each connected group
-        first = np.zeros(len(pairs), dtype=bool)
-        first[np.argmax(seeds)] = True
-        members = links.reached(first, whole)
-        meets = bool(pairs.near.meets[seeds & members].any())
-        seeds = seeds & ~members
-        patch_points = points.take(members[points.pair])
-        if not len(patch_points.gap):
-            unexplained = unexplained or meets
+@kernel
+def mark_touching(frame):
+    """Mark pairs that meet, or nearly, and are within the reach; how many, and how many of them meet."""
+    pairs = frame.pairs
+    n_touching, n_meeting = 0, 0
+    for k in range(pairs.n):
+        if pair_meets(pairs, k):
+            n_meeting += 1
+        elif not _is_close(frame, k) or pairs.near[NUMBERS_OF_PAIR * k + LOWER] > frame.reach:
             continue
-        depth = float(-patch_points.gap.min()) + frame.A.radius + frame.B.radius
-        apart = clearing_length(frame, pairs.take(members), translation.normal, depth)
-        facets = pairs.near.facets[patch_points.pair]
-        patches.append((Patch(translation.normal, patch_points, facets, meets, apart), members))
-    return patches, unexplained
+        pairs.states[k] |= TOUCHING
+        n_touching += 1
+    return n_touching, n_meeting
 
 
-def _gaps(
-    frame: ContactFrame, pairs: Pairs, links: Links, covered: np.ndarray, overlapping: list, reach: float
-) -> list[Patch]:
-    """Patches of pairs that are apart, the nearest first."""
-    A, B = frame.A, frame.B
-    has_direction = (pairs.near.point_a != pairs.near.point_b).any(axis=1)
-    asked = np.flatnonzero(~covered & (pairs.near.lower <= reach) & has_direction)
-    if not len(asked):
-        return []
-    u = np.zeros((len(pairs), 3))
-    length = pairs.near.length[asked]
-    across = (pairs.near.point_b - pairs.near.point_a)[asked]
-    u[asked] = across / lengths_of(across)[:, None]
-    slack = np.full(len(pairs), 1.0)
-    slack[asked] = FLAT + 32.0 * frame.error / length
-    poses = frame.X_WA[:3, :3], frame.X_WB[:3, :3], frame.X_WB[:3, 3] - frame.X_WA[:3, 3]
-    least = local_minima(pairs.take(asked), u[asked], slack[asked], A, B, (topology_of(A), topology_of(B)), poses)
-    starts = np.zeros(len(pairs), dtype=bool)
-    starts[asked[least]] = True
-    nearest = asked[int(np.argmin(length))]
-    rounding = STEP_ERRORS * frame.error
-    if not overlapping and pairs.near.lower[starts].min(initial=np.inf) > pairs.near.length[nearest] + rounding:
-        starts[nearest] = True  # nothing is nearer, whatever rounding makes of its neighbours
-    for patch, members in overlapping:  # gaps connected with an overlap, in its direction, are part of it
-        same = starts & (lengths_of(u - patch.normal) <= slack + 2.0**-20)
-        starts &= ~links.reached(members, same)
-    patches: list[Patch] = []
-    order = np.flatnonzero(starts)
-    order = order[np.argsort(np.round(pairs.near.length[order] / max(frame.error, 1e-300)), kind="stable")]
-    for k in order.tolist():
-        if not starts[k]:
+@kernel(inline=True)
+def _is_close(frame, k):
+    pairs = frame.pairs
+    return pair_meets(pairs, k) or pairs.near[NUMBERS_OF_PAIR * k + LENGTH] <= _CLOSE * frame.error
+
+
+@kernel
+def cover_close(frame):
+    """Pairs too close to have a direction start no patches."""
+    for k in range(frame.pairs.n):
+        if _is_close(frame, k):
+            frame.pairs.states[k] |= COVERED
+
+
+# --- growing ------------------------------------------------------------------------------------
+
+
+@kernel
+def grow_patch(frame, first, axes, deepest):
+    """Mark as REACHED the pairs linked with one that have points along a normal, −deepest ≤ gap ≤ reach; WANTED pairs
+    always belong to it. How many points.
+    """
+    pairs, A, B = frame.pairs, frame.A, frame.B
+    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False)
+    number = begin_search(pairs)
+    n = put_points(pairs, first, A, B, view, frame.points, 0)
+    pairs.states[first] |= REACHED
+    pairs.tried[first] = number
+    pairs.queue[0] = first
+    begin, end = 0, 1
+    while begin < end:
+        k = pairs.queue[begin]
+        begin += 1
+        for i in range(9 * k, 9 * k + 9):
+            key = pairs.keys[i]
+            if pairs.seen_keys[key] == number:
+                continue
+            pairs.seen_keys[key] = number
+            for at in range(pairs.key_starts[key], pairs.key_starts[key + 1]):
+                linked = pairs.by_key[at]
+                if pairs.tried[linked] == number:
+                    continue
+                pairs.tried[linked] = number
+                is_seed = pairs.states[linked] & WANTED != 0
+                if not is_seed and not _is_along(frame, linked, axes.nhat):
+                    continue
+                n_before = n
+                n = put_points(pairs, linked, A, B, view, frame.points, n)
+                if is_seed or n > n_before:
+                    pairs.states[linked] |= REACHED
+                    pairs.queue[end] = linked
+                    end += 1
+    pairs.search[N_REACHED] = end
+    return n
+
+
+@kernel(inline=True)
+def _is_along(frame, k, nhat):
+    """Whether one facet of a pair at least faces along a normal."""
+    pairs = frame.pairs
+    return facing_a(pairs, k, nhat, frame.A) >= _ALONG or facing_b(pairs, k, nhat, frame.B) >= _ALONG
+
+
+@kernel
+def least_gap_of(points, n):
+    """The least gap of n points [m]."""
+    gap = math.inf
+    for i in range(n):
+        gap = min(gap, points.manifold.points[POINT * i + GAP])
+    return gap
+
+
+# --- overlaps -----------------------------------------------------------------------------------
+
+
+@kernel
+def seed_group(frame, number):
+    """Make the pairs of one translation the WANTED pairs."""
+    pairs = frame.pairs
+    for k in range(pairs.n):
+        pairs.states[k] &= ~WANTED
+        if pairs.groups[k] == number:
+            pairs.states[k] |= WANTED
+
+
+@kernel
+def next_seed(frame, first):
+    """The next WANTED pair from ``first`` on; −1 where none is left."""
+    for k in range(first, frame.pairs.n):
+        if frame.pairs.states[k] & WANTED:
+            return k
+    return -1
+
+
+@kernel
+def grow_overlap(frame, first, axes, length):
+    """The patch around a WANTED pair, for a translation along ``axes`` of that length [m]."""
+    pairs = frame.pairs
+    n = grow_patch(frame, first, axes, DEEPEST * length)
+    meets = False
+    for i in range(pairs.search[N_REACHED]):
+        k = pairs.queue[i]
+        if pairs.states[k] & WANTED:
+            meets = meets or pair_meets(pairs, k)
+            pairs.states[k] &= ~WANTED
+    return Patch(axes, n, meets)
+
+
+@kernel
+def cover_patch(frame, nhat):
+    """The pairs of the patch, and local minima that are linked with them in the same direction, start no patches."""
+    pairs = frame.pairs
+    end = pairs.search[N_REACHED]
+    pairs.search[SEARCH] += 1
+    number = pairs.search[SEARCH]
+    begin = 0
+    while begin < end:
+        k = pairs.queue[begin]
+        begin += 1
+        pairs.states[k] |= COVERED
+        for i in range(9 * k, 9 * k + 9):
+            key = pairs.keys[i]
+            if pairs.seen_keys[key] == number:
+                continue
+            pairs.seen_keys[key] = number
+            for at in range(pairs.key_starts[key], pairs.key_starts[key + 1]):
+                linked = pairs.by_key[at]
+                if pairs.tried[linked] == number or pairs.states[linked] & (COVERED | REACHED):
+                    continue
+                pairs.tried[linked] = number
+                if _is_same_minimum(frame, linked, nhat):
+                    pairs.states[linked] |= REACHED
+                    pairs.queue[end] = linked
+                    end += 1
+    pairs.search[N_REACHED] = end
+
+
+@kernel
+def _is_same_minimum(frame, k, nhat):
+    """Whether a pair's nearest points are local minima in a direction."""
+    pairs = frame.pairs
+    if not pairs.gaps[k] < math.inf:
+        return False
+    off = norm(sub(vec3_at(pairs.directions, 3 * k), nhat))
+    return off <= pairs.slacks[k] + _SAME and _is_minimum(frame, k)
+
+
+# --- gaps ---------------------------------------------------------------------------------------
+
+
+@kernel
+def set_directions(frame):
+    """Set gaps and directions of the pairs within the reach that are not covered: local minima are among them."""
+    pairs, error = frame.pairs, frame.error
+    n = 0
+    for k in range(pairs.n):
+        near = NUMBERS_OF_PAIR * k
+        length = pairs.near[near + LENGTH]
+        pairs.gaps[k] = math.inf
+        if pairs.states[k] & COVERED or pairs.near[near + LOWER] > frame.reach:
             continue
-        n = snapped(pairs, k, u[k], float(slack[k]))
-        seeds = np.zeros(len(pairs), dtype=bool)
-        seeds[k] = True
-        members, points = _grow_patch(frame, pairs, links, n, seeds, reach, 0.0)
-        same = starts & (lengths_of(u - n) <= slack + 2.0**-20)
-        starts &= ~(links.reached(members, same) | members)
-        nearest = _nearest(frame, pairs, np.array([k]))
-        # Where corners of the face are as near, the nearest points of its first pair add nothing.
-        slackest = float(nearest.error[0]) + STEP_ERRORS * frame.error
-        if not len(points.gap) or points.gap.min() > nearest.gap[0] + slackest:
-            points = Points(*(np.concatenate(both) for both in zip(nearest, points)))
-        depth = A.radius + B.radius - float(points.gap.min())
-        meets = depth >= 0.0
-        apart = clearing_length(frame, pairs.take(members), n, depth) if meets else 0.0
-        patches.append(Patch(n, points, pairs.near.facets[points.pair], meets, apart))
-    return patches
+        across = sub(vec3_at(pairs.near, near + POINT_B), vec3_at(pairs.near, near + POINT_A))
+        size = norm(across)
+        if not size > 0.0:
+            continue
+        put_vec3(pairs.directions, 3 * k, divide(across, size))
+        pairs.slacks[k] = FLAT + 32.0 * error / length if length > 0.0 else math.inf
+        pairs.gaps[k] = float(math.floor(length / error + 0.5)) if length < 2.0**52 * error else length / error
+        pairs.order[n] = k
+        n += 1
+    return n
 
 
-def _grow_patch(frame: ContactFrame, pairs: Pairs, links: Links, n, seeds: np.ndarray, reach: float, deepest: float):
-    """(members of the patch that starts with the seeds, their points along n with −deepest ≤ gap ≤ reach)."""
-    A, B = frame.A, frame.B
-    along = seeds | aligned(pairs, n, A.solid, B.solid, _ALONG)
-    which = np.flatnonzero(along)
-    points = points_along(pairs.take(which), n, A.solid, B.solid, frame.error)
-    points = points._replace(pair=which[points.pair])
-    points = points.take((points.gap <= reach + points.error) & (points.gap >= -deepest - STEP_ERRORS * frame.error))
-    holds = np.zeros(len(pairs), dtype=bool)
-    holds[points.pair] = True
-    members = links.reached(seeds, holds)
-    return members, points.take(members[points.pair])
+@kernel
+def _is_minimum(frame, k):
+    """Whether a pair's nearest points are local minima; looked at when first asked."""
+    pairs = frame.pairs
+    if not pairs.states[k] & JUDGED:
+        pairs.states[k] |= JUDGED
+        if is_local_minimum(pairs, k, frame.A, frame.B):
+            pairs.states[k] |= LEAST
+    return pairs.states[k] & LEAST != 0
 
 
-def _nearest(frame: ContactFrame, pairs: Pairs, which: np.ndarray) -> Points:
-    """The nearest points of the nearest of these pairs."""
-    k = which[int(np.argmin(pairs.near.length[which]))]
-    near = pairs.near
-    error = max(float(near.length[k] - near.lower[k]), 4.0 * frame.error)
-    return Points(
-        np.array([k]), near.point_a[k : k + 1], near.point_b[k : k + 1], near.length[k : k + 1], np.array([error])
-    )
+@kernel
+def sort_by_gap(frame, n):
+    """Sort the first n of ``order`` that are not covered by gap; how many (heapsort: J. W. J. Williams, 1964)."""
+    pairs = frame.pairs
+    n_left = 0
+    for i in range(n):
+        if not pairs.states[pairs.order[i]] & COVERED:
+            pairs.order[n_left] = pairs.order[i]
+            n_left += 1
+    for root in range(n_left // 2 - 1, -1, -1):
+        _sift(pairs, root, n_left)
+    for end in range(n_left - 1, 0, -1):
+        first = pairs.order[0]
+        pairs.order[0] = pairs.order[end]
+        pairs.order[end] = first
+        _sift(pairs, 0, end)
+    return n_left
+
+
+@kernel
+def _sift(pairs, root, end):
+    order = pairs.order
+    k = order[root]
+    while 2 * root + 1 < end:
+        child = 2 * root + 1
+        if child + 1 < end and _is_nearer(pairs, order[child], order[child + 1]):
+            child += 1
+        if not _is_nearer(pairs, k, order[child]):
+            break
+        order[root] = order[child]
+        root = child
+    order[root] = k
+
+
+@kernel(inline=True)
+def _is_nearer(pairs, i, j):
+    return pairs.gaps[i] < pairs.gaps[j] or (pairs.gaps[i] == pairs.gaps[j] and i < j)
+
+
+@kernel
+def need_nearest(frame, n):
+    """The first pair in order is a minimum where none as near is: nothing is nearer, whatever rounding makes of its
+    neighbours.
+    """
+    pairs = frame.pairs
+    if n == 0:
+        return
+    nearest = pairs.order[0]
+    limit = pairs.near[NUMBERS_OF_PAIR * nearest + LENGTH] + STEP_ERRORS * frame.error
+    for i in range(n):
+        k = pairs.order[i]
+        if pairs.gaps[k] > pairs.gaps[nearest] + 2.0 * STEP_ERRORS:
+            break
+        if pairs.near[NUMBERS_OF_PAIR * k + LOWER] <= limit and _is_minimum(frame, k):
+            return
+    pairs.states[nearest] |= LEAST
+
+
+@kernel
+def next_minimum(frame, first, n):
+    """Where in the order, from ``first`` on, the next local minimum is that is in no patch; n where none is left."""
+    for i in range(first, n):
+        k = frame.pairs.order[i]
+        if not frame.pairs.states[k] & COVERED and _is_minimum(frame, k):
+            return i
+    return n
+
+
+@kernel
+def grow_gap(frame, first):
+    """The patch around a local minimum."""
+    pairs, points = frame.pairs, frame.points
+    axes = axes_across(snapped(pairs, first))
+    n = grow_patch(frame, first, axes, 0.0)
+    near = NUMBERS_OF_PAIR * first
+    length = pairs.near[near + LENGTH]
+    bound = max(length - pairs.near[near + LOWER], 4.0 * frame.error)
+    # Where corners of the face are as near, the nearest points of its first pair add nothing.
+    if least_gap_of(points, n) > length + bound + STEP_ERRORS * frame.error:
+        for i in range(n):
+            copy_of_points(points, n - 1 - i, points, n - i)
+        a = seen_along(axes, vec3_at(pairs.near, near + POINT_A))
+        b = seen_along(axes, vec3_at(pairs.near, near + POINT_B))
+        points.manifold.points[0] = b.x
+        points.manifold.points[V] = b.y
+        points.manifold.points[GAP] = length
+        points.manifold.points[HEIGHT] = 0.5 * (a.z + b.z)
+        points.errors[0] = bound
+        points.pairs[0] = first
+        points.manifold.features[0] = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_A] + FACE
+        points.manifold.features[1] = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_B] + FACE
+        n += 1
+    return Patch(axes, n, False)

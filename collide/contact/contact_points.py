@@ -1,117 +1,226 @@
-"""Points at which two sets of facets come nearest along a direction: corners over facets, and edges that cross.
+"""Points at which facets come nearest along a direction: corners over facets, and edges that cross.
 
 Seen along the unit vector n, the gap between two facets is linear over the polygon in which they overlap, so its
 least and largest values stand at the corners of that polygon: corners of one over the other, and crossings of edges.
+Places are (u, v) across n and the height h along it (`ContactAxes`), seen from A's origin.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from collide.contact.contact_facets import Pairs, facing
+from collide.contact.contact_pairs import facing_a, facing_b
+from collide.contact.manifold_points import GAP, HEIGHT, POINT, ManifoldPoints, V
+from collide.contact.support_face import EDGE, FACE, VERTEX, seen_along
+from collide.kernels import kernel
+from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
+from collide.numerics.vec3 import put_vec3, vec3_at
 
 #: A facet is looked at along n where its normal's cosine with it is above this.
 LEAST_COSINE = 2.0**-10
 #: Barycentric coordinates and edge parameters may be as far outside as rounding moves them, in so many errors of a
 #: coordinate: no corner may be lost. Never farther than this share.
 _ERRORS_OUTSIDE, _FARTHEST_OUTSIDE = 16.0, 2.0**-10
-#: Edges whose sine, seen along n, is below this are parallel: their ends tell. Edges and heights of facets that are
+#: Edges whose sine, seen along n, is below this are parallel: their ends show it. Edges and heights of facets that are
 #: shorter, seen so, than so many errors of a coordinate are none.
 _PARALLEL, _MIN_ERRORS = 2.0**-30, 256.0
 
 
-class Points(NamedTuple):
-    """k points: the pair each is of, the points of A's facet and of B's, gap along n and a bound of its error."""
+class PatchPoints(NamedTuple):
+    """Points of pairs of facets.
 
-    pair: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-    gap: np.ndarray
-    error: np.ndarray
+    manifold : views of points and features.   errors : of each gap, a bound [m].   pairs : of which pair each is.
+    seen : 18 doubles, corners of a pair of facets seen along the normal.
+    """
 
-    def take(self, which) -> Points:
-        return Points(*(array[which] for array in self))
-
-
-def across(n: np.ndarray) -> np.ndarray:
-    """(2, 3) unit vectors that make a right-handed frame with the unit vector n."""
-    x, y, z = n.tolist()
-    least = min(abs(x), abs(y), abs(z))
-    u = (0.0, z, -y) if abs(x) == least else (-z, 0.0, x) if abs(y) == least else (y, -x, 0.0)
-    length = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    p, q, r = u[0] / length, u[1] / length, u[2] / length
-    return np.array([(p, q, r), (y * r - z * q, z * p - x * r, x * q - y * p)])
+    manifold: ManifoldPoints
+    errors: Any
+    pairs: Any
+    seen: Any
 
 
-def points_along(pairs: Pairs, n: np.ndarray, solid_a: bool, solid_b: bool, error: float) -> Points:
-    """All corners of the overlaps of k pairs of facets seen along n; facets that look the other way have none."""
-    frame = np.concatenate([across(n), n[None]])
-    a, b = ((frame[None, None] * side.corners[:, :, None]).sum(axis=3) for side in (pairs.a, pairs.b))
-    toward_b, toward_a = facing(pairs.a.normals, n, solid_a), facing(pairs.b.normals, -n, solid_b)
-    may = (toward_b >= -LEAST_COSINE) & (toward_a >= -LEAST_COSINE)
-    parts = [
-        _corners_over(pairs, a, b, np.flatnonzero(may & (toward_b > LEAST_COSINE)), n, error, False),
-        _corners_over(pairs, b, a, np.flatnonzero(may & (toward_a > LEAST_COSINE)), n, error, True),
-        _crossings(pairs, a, b, np.flatnonzero(may & ((toward_b > LEAST_COSINE) | (toward_a > LEAST_COSINE))), error),
-    ]
-    return Points(*(np.concatenate(columns) for columns in zip(*parts)))
+class View(NamedTuple):
+    """Along what, and within which gaps, points are looked for.
+
+    axes : `ContactAxes`.   error : of a coordinate [m].   low, high : gaps [m], but for their errors.
+    any_side : facets count whichever way they face.
+    """
+
+    axes: Any
+    error: float
+    low: float
+    high: float
+    any_side: bool
 
 
-def _corners_over(pairs: Pairs, face, opposite, which, n, error: float, exchanged: bool) -> Points:
-    """Corners of one side over the facets of the other, in coordinates seen along n."""
-    T, corners = face[which], opposite[which]
-    edges = T[:, [1, 2, 0], :2] - T[:, :, :2]
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    longest = lengths.max(axis=1, initial=0.0)
-    well_conditioned = np.abs(area) > _MIN_ERRORS * error * longest
-    safe = np.where(well_conditioned, area, 1.0)
-    # Weight of corner k: what the edge opposite to it spans with the point, over the whole.
-    away = corners[:, :, None, :2] - T[:, None, :, :2]  # (pair, point, corner)
-    spans = edges[:, None, :, 0] * away[..., 1] - edges[:, None, :, 1] * away[..., 0]
-    weights = spans[:, :, [1, 2, 0]] / safe[:, None, None]
+@kernel
+def put_points(pairs, k, A, B, view, points, n):
+    """Append the corners of the overlap of a pair's facets seen along a normal to n points; how many there are then.
+
+    Facets that look the wrong way have none.
+    """
+    toward_b = facing_a(pairs, k, view.axes.nhat, A)
+    toward_a = facing_b(pairs, k, view.axes.nhat, B)
+    over_a, over_b = toward_b > LEAST_COSINE, toward_a > LEAST_COSINE
+    if view.any_side:
+        over_a = over_b = True
+    elif toward_b < -LEAST_COSINE or toward_a < -LEAST_COSINE or not (over_a or over_b):
+        return n
+    least, largest = see_pair(pairs, k, view.axes, points.seen)
+    if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
+        return n
+    if over_a:
+        n = _corners_over(pairs, k, A, view, points, n, False)
+    if over_b:
+        n = _corners_over(pairs, k, B, view, points, n, True)
+    return _crossings(pairs, k, A, B, view, points, n)
+
+
+@kernel
+def see_pair(pairs, k, axes, seen):
+    """Put the corners of a pair as seen; bounds of the gap between any two points of both: (least, largest)."""
+    high_a, low_b = -math.inf, math.inf
+    low_a, high_b = math.inf, -math.inf
+    for i in range(6):
+        p = seen_along(axes, vec3_at(pairs.corners, 18 * k + 3 * i))
+        put_vec3(seen, 3 * i, p)
+        if i < 3:
+            high_a, low_a = max(high_a, p.z), min(low_a, p.z)
+        else:
+            high_b, low_b = max(high_b, p.z), min(low_b, p.z)
+    return low_b - high_a, high_b - low_a
+
+
+@kernel(inline=True)
+def _append(points, n, k, u, v, h_a, h_b, bound):
+    manifold = points.manifold
+    manifold.points[POINT * n] = u
+    manifold.points[POINT * n + V] = v
+    manifold.points[POINT * n + GAP] = h_b - h_a
+    manifold.points[POINT * n + HEIGHT] = 0.5 * (h_a + h_b)
+    points.errors[n] = bound
+    points.pairs[n] = k
+
+
+@kernel(inline=True)
+def _within(view, gap, bound):
+    return gap <= view.high + bound and gap >= view.low
+
+
+@kernel
+def _corners_over(pairs, k, body, view, points, n, exchanged):
+    """Corners of one facet over the other, which is the body's: A's, or B's where ``exchanged``."""
+    seen, error = points.seen, view.error
+    face, corners = (9, 0) if exchanged else (0, 9)
+    u0, v0, h0 = seen[face], seen[face + 1], seen[face + 2]
+    eu, ev, eh = seen[face + 3] - u0, seen[face + 4] - v0, seen[face + 5] - h0
+    fu, fv, fh = seen[face + 6] - u0, seen[face + 7] - v0, seen[face + 8] - h0
+    area = eu * fv - ev * fu
+    length_e, length_f = math.sqrt(eu * eu + ev * ev), math.sqrt(fu * fu + fv * fv)
+    length_g = math.sqrt((fu - eu) * (fu - eu) + (fv - ev) * (fv - ev))
+    longest = max(length_e, length_f, length_g)
+    if not abs(area) > _MIN_ERRORS * error * longest:
+        return n
     # Off an edge by an error, whatever the shape of the facet: no more of a needle's length than of its width.
-    outside = np.minimum(_ERRORS_OUTSIDE * error * lengths[:, [1, 2, 0]] / np.abs(safe)[:, None], _FARTHEST_OUTSIDE)
-    inside = (weights >= -outside[:, None]).all(axis=2) & well_conditioned[:, None]
-    height = (weights * T[:, None, :, 2]).sum(axis=2)
-    gap = (height - corners[:, :, 2]) if exchanged else (corners[:, :, 2] - height)
-    spread = T[:, :, 2].max(axis=1, initial=-np.inf) - T[:, :, 2].min(axis=1, initial=np.inf)
-    bound = 32.0 * error + 64.0 * error * longest * spread / np.abs(safe)
-    row, corner = np.nonzero(inside)
-    gap = gap[row, corner]
-    at_corner = (pairs.a if exchanged else pairs.b).corners[which][row, corner]
-    if exchanged:
-        return Points(which[row], at_corner, at_corner + gap[:, None] * n, gap, bound[row])
-    return Points(which[row], at_corner - gap[:, None] * n, at_corner, gap, bound[row])
+    share = _ERRORS_OUTSIDE * error / abs(area)
+    outside_e, outside_f = min(share * length_f, _FARTHEST_OUTSIDE), min(share * length_e, _FARTHEST_OUTSIDE)
+    outside_p = min(share * length_g, _FARTHEST_OUTSIDE)
+    spread = max(0.0, eh, fh) - min(0.0, eh, fh)
+    bound = 32.0 * error + 64.0 * error * longest * spread / abs(area)
+    for j in range(3):
+        at = corners + 3 * j
+        u, v, h = seen[at] - u0, seen[at + 1] - v0, seen[at + 2]
+        of_e = (u * fv - v * fu) / area
+        of_f = (eu * v - ev * u) / area
+        if not (of_e >= -outside_e and of_f >= -outside_f and 1.0 - of_e - of_f >= -outside_p):
+            continue
+        height = h0 + of_e * eh + of_f * fh
+        gap = height - h if exchanged else h - height
+        if not _within(view, gap, bound):
+            continue
+        features = points.manifold.features
+        if exchanged:
+            _append(points, n, k, seen[at], seen[at + 1], h, height, bound)
+            features[2 * n] = 4 * pairs.ids[6 * k + j] + VERTEX
+            features[2 * n + 1] = 4 * pairs.facets[INTS_OF_PAIR * k + FACET_B] + FACE
+        else:
+            _append(points, n, k, seen[at], seen[at + 1], height, h, bound)
+            features[2 * n] = 4 * pairs.facets[INTS_OF_PAIR * k + FACET_A] + FACE
+            features[2 * n + 1] = 4 * pairs.ids[6 * k + 3 + j] + VERTEX
+        n += 1
+    return n
 
 
-def _crossings(pairs: Pairs, a, b, which, error: float) -> Points:
-    """Where edges of A's facets cross edges of B's, seen along n."""
-    start_p, start_q = a[which][:, :, None], b[which][:, None, :]
-    e = a[which][:, [1, 2, 0], None] - start_p
-    f = b[which][:, None, [1, 2, 0]] - start_q
-    w = start_q - start_p
-    span = e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
-    long_e, long_f = np.hypot(e[..., 0], e[..., 1]), np.hypot(f[..., 0], f[..., 1])
-    well_conditioned = np.abs(span) > _PARALLEL * long_e * long_f + _MIN_ERRORS * error * (long_e + long_f)
-    safe = np.where(well_conditioned, span, 1.0)
-    s = (w[..., 0] * f[..., 1] - w[..., 1] * f[..., 0]) / safe
-    t = (w[..., 0] * e[..., 1] - w[..., 1] * e[..., 0]) / safe
-    # Beyond the end of either edge by an error, across the other: no more of a long edge than of a short one.
-    outside_e, outside_f = (
-        np.minimum(_ERRORS_OUTSIDE * error * length / np.abs(safe), _FARTHEST_OUTSIDE) for length in (long_f, long_e)
-    )
-    hit = well_conditioned & (s >= -outside_e) & (s <= 1 + outside_e) & (t >= -outside_f) & (t <= 1 + outside_f)
-    row, i, j = np.nonzero(hit)
-    s, t = s[hit], t[hit]
-    gap = w[..., 2][hit] + t * f[row, 0, j, 2] - s * e[row, i, 0, 2]
-    slack = 64.0 * error * (long_e[row, i, 0] + long_f[row, 0, j]) / np.abs(span[hit])
-    bound = 32.0 * error + slack * (np.abs(e[row, i, 0, 2]) + np.abs(f[row, 0, j, 2]))
-    start_a, start_b = pairs.a.corners[which][row, i], pairs.b.corners[which][row, j]
-    end_a, end_b = pairs.a.corners[which][row, (i + 1) % 3], pairs.b.corners[which][row, (j + 1) % 3]
-    at_a = start_a + s[:, None] * (end_a - start_a)
-    at_b = start_b + t[:, None] * (end_b - start_b)
-    return Points(which[row], at_a, at_b, gap, bound)
+@kernel
+def _crossings(pairs, k, A, B, view, points, n):
+    """Where edges of A's facet cross edges of B's, seen along the normal."""
+    seen, error = points.seen, view.error
+    facet_a, facet_b = pairs.facets[INTS_OF_PAIR * k + FACET_A], pairs.facets[INTS_OF_PAIR * k + FACET_B]
+    for i in range(3):
+        p = 3 * i
+        q = 3 * i + 3 if i < 2 else 0
+        eu, ev, eh = seen[q] - seen[p], seen[q + 1] - seen[p + 1], seen[q + 2] - seen[p + 2]
+        long_e = math.sqrt(eu * eu + ev * ev)
+        for j in range(3):
+            r = 9 + 3 * j
+            s = r + 3 if j < 2 else 9
+            fu, fv, fh = seen[s] - seen[r], seen[s + 1] - seen[r + 1], seen[s + 2] - seen[r + 2]
+            wu, wv = seen[r] - seen[p], seen[r + 1] - seen[p + 1]
+            span = eu * fv - ev * fu
+            along_e, along_f = wu * fv - wv * fu, wu * ev - wv * eu
+            # What is clearly outside is the rule: no roots and no quotients for it.
+            size = abs(span) * (1.0 + _FARTHEST_OUTSIDE)
+            if abs(along_e) > size or abs(along_f) > size:
+                continue
+            long_f = math.sqrt(fu * fu + fv * fv)
+            if not abs(span) > _PARALLEL * long_e * long_f + _MIN_ERRORS * error * (long_e + long_f):
+                continue
+            of_e, of_f = along_e / span, along_f / span
+            # Beyond the end of either edge by an error, across the other: no more of a long edge than of a short one.
+            outside_e = min(_ERRORS_OUTSIDE * error * long_f / abs(span), _FARTHEST_OUTSIDE)
+            outside_f = min(_ERRORS_OUTSIDE * error * long_e / abs(span), _FARTHEST_OUTSIDE)
+            if of_e < -outside_e or of_e > 1.0 + outside_e or of_f < -outside_f or of_f > 1.0 + outside_f:
+                continue
+            h_a, h_b = seen[p + 2] + of_e * eh, seen[r + 2] + of_f * fh
+            slack = 64.0 * error * (long_e + long_f) / abs(span)
+            bound = 32.0 * error + slack * (abs(eh) + abs(fh))
+            if not _within(view, h_b - h_a, bound):
+                continue
+            _append(points, n, k, seen[p] + of_e * eu, seen[p + 1] + of_e * ev, h_a, h_b, bound)
+            points.manifold.features[2 * n] = 4 * int(A.edges[3 * facet_a + i]) + EDGE
+            points.manifold.features[2 * n + 1] = 4 * int(B.edges[3 * facet_b + j]) + EDGE
+            n += 1
+    return n
+
+
+@kernel
+def depth_along(pairs, k, A, B, view, points, enough):
+    """How far B has to move along the normal for a pair's facets to come apart, but for rounding; 0 where they are.
+
+    enough : what the slab between them shows to be no deeper is not measured: at most this is returned for it [m].
+    points : of one pair.   view : of any side, without bounds.
+    """
+    least, _ = see_pair(pairs, k, view.axes, points.seen)
+    if -least <= enough:
+        return max(-least, 0.0)
+    n = _corners_over(pairs, k, A, view, points, 0, False)
+    n = _corners_over(pairs, k, B, view, points, n, True)
+    n = _crossings(pairs, k, A, B, view, points, n)
+    if n == 0:
+        return max(-least, 0.0)
+    gap = math.inf
+    for i in range(n):
+        gap = min(gap, points.manifold.points[POINT * i + GAP])
+    return max(-gap, 0.0)
+
+
+@kernel(inline=True)
+def copy_of_points(points, source, target, k):
+    """Copy a point to place k of other points."""
+    for i in range(POINT):
+        target.manifold.points[POINT * k + i] = points.manifold.points[POINT * source + i]
+    target.manifold.features[2 * k] = points.manifold.features[2 * source]
+    target.manifold.features[2 * k + 1] = points.manifold.features[2 * source + 1]
+    target.errors[k] = points.errors[source]
+    target.pairs[k] = points.pairs[source]

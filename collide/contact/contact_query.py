@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Margins beyond this are no margins, and would overflow squared.
 _LARGEST_MARGIN = 1e50
+#: More contacts than a patch can have, and a number that kernels take.
+_ALL_CONTACTS = 2**31 - 1
 
 
 def contacts(
@@ -68,7 +70,7 @@ def contacts(
     meet come apart after a short way; a shorter one may be. With B at ``X_WB[:3, 3] + apart * normal`` no facet pair of
     the patch meets, proven (`inf`: no such length is known); of convex bodies the bodies are apart but for touching.
     Bodies that grip each other have several patches, none of which need separate the bodies. Where a body lies within a
-    solid, or facets meet too deeply for a patch (deeper than half the smaller body's radius), a row of kind
+    solid, or facets meet too deeply for a patch (deeper than the smaller body's diameter), a row of kind
     "translation" is the answer of `distance`. A part of a mesh that lies within the other body, without facets that
     meet, adds nothing while other facets meet.
 
@@ -78,7 +80,7 @@ def contacts(
     """
     if margin.__class__ is not float or not 0.0 <= margin <= _LARGEST_MARGIN:
         margin = check_margin("contacts", margin)
-    if max_contacts.__class__ is not int or max_contacts < 1:
+    if max_contacts.__class__ is not int or not 1 <= max_contacts <= _ALL_CONTACTS:
         max_contacts = check_max_contacts("contacts", max_contacts)
     if threads.__class__ is not int or threads != 1:
         threads = check_threads(threads)
@@ -104,5 +106,5 @@ def check_margin(name: str, value) -> float:
 
 
 def check_max_contacts(name: str, value) -> int:
-    """How many contacts a patch may have."""
-    return checks.integer(f"{name}: max_contacts", value, 1)
+    """How many contacts a patch may have; a number that no patch reaches stands for all of them."""
+    return min(checks.integer(f"{name}: max_contacts", value, 1), _ALL_CONTACTS)

@@ -23,7 +23,7 @@ Rows of a patch stand together, the deepest first.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
@@ -53,55 +53,18 @@ CONTACT_DTYPE = np.dtype(
 FIELDS: tuple[str, ...] = CONTACT_DTYPE.names or ()
 
 
+def field_at(field: str, unit: int) -> int:
+    """Where a field of a row begins, in units of so many bytes."""
+    assert CONTACT_DTYPE.fields is not None
+    return CONTACT_DTYPE.fields[field][1] // unit
+
+
 def no_rows() -> np.ndarray:
     return np.zeros(0, dtype=CONTACT_DTYPE)
 
 
-def flipped_contacts(rows: np.ndarray) -> np.ndarray:
-    """The same contacts with A and B exchanged."""
-    swapped = rows.copy()
-    pairs = [(f"{field}_a", f"{field}_b") for field in ("part", "point", "facet", "feature")]
-    for of_a, of_b in (("a", "b"), *pairs):
-        swapped[of_a], swapped[of_b] = rows[of_b], rows[of_a]
-    swapped["normal"] = 0.0 - rows["normal"]
-    return swapped
-
-
 def _middles(rows: np.ndarray) -> np.ndarray:
     return 0.5 * rows["point_a"] + 0.5 * rows["point_b"]
-
-
-class PatchContacts(NamedTuple):
-    """Contacts of one patch before they are rows.
-
-    normal : (3,).   point_a, point_b : (k, 3) in W [m].   distance, error : (k,), along the normal, and its bound [m].
-    facets : (k, 2) of A and of B.   kind : index into `KINDS`.   apart : as in the rows [m].
-    """
-
-    normal: np.ndarray
-    point_a: np.ndarray
-    point_b: np.ndarray
-    distance: np.ndarray
-    error: np.ndarray
-    facets: np.ndarray
-    kind: int
-    apart: float
-
-
-def rows_of(patches: list[PatchContacts]) -> np.ndarray:
-    """The rows of some patches, numbered in this order."""
-    out = np.zeros(sum(len(patch.distance) for patch in patches), dtype=CONTACT_DTYPE)
-    begin = 0
-    for number, patch in enumerate(patches):
-        rows = out[begin : begin + len(patch.distance)]
-        rows["normal"], rows["point_a"], rows["point_b"] = patch.normal + 0.0, patch.point_a, patch.point_b
-        rows["distance"] = patch.distance
-        rows["lower"], rows["upper"] = patch.distance - patch.error, patch.distance + patch.error
-        rows["facet_a"], rows["facet_b"] = patch.facets[:, 0], patch.facets[:, 1]
-        rows["feature_a"] = rows["feature_b"] = -1
-        rows["patch"], rows["kind"], rows["apart"], rows["b"] = number, patch.kind, patch.apart, 1
-        begin += len(rows)
-    return out
 
 
 class WorldContacts:

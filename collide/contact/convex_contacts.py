@@ -30,10 +30,11 @@ from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
-from collide.narrowphase.convex_batches import Question, shape_table
+from collide.narrowphase.convex_batches import Question, prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import SinglePair
-from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE, UNDECIDED
+from collide.shapes.primitives import Box
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
@@ -179,9 +180,13 @@ def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tu
 
 
 def prepare_contacts(A, B) -> None:
-    """Have two shapes that are prepared for single calls prepared for contacts as well."""
+    """Have two shapes that are prepared for single calls prepared for contacts as well; boxes, which `_rows` answers by
+    itself, for both."""
     if isinstance(A, Shape) and isinstance(B, Shape):
         pair = prepared_pair(A, B)
+        if pair is None and isinstance(A, Box) and isinstance(B, Box) and single_calls_are_safe():
+            pair = prepare_sets(A, B)
+            keep_prepared(A, B, pair)
         if isinstance(pair, SinglePair) and pair.of_contacts is None:
             pair.of_contacts = SingleContacts(pair)
 

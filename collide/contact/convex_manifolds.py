@@ -10,8 +10,10 @@ every gap measured is within a few of them (`_bound`).
 
 from __future__ import annotations
 
+import math
+
 from collide.contact.clip_polygons import Clipped
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import (
     GAP as POINT_GAP,
 )
@@ -40,6 +42,9 @@ from collide.numerics.vec3 import Vec3, add, norm1, put_vec3, scale, sub, vec3_a
 
 #: Lengths up to so many errors of a coordinate, or up to this part of the manifold's size, are rounding.
 _ERRORS, _SHARE = 64.0, 2.0**-30
+#: Nearest points nearer to a corner than this part of the manifold's size take its place: a rim is a little outside its
+#: octagon, and two contacts so near would be one too many.
+_NEAR = 2.0**-8
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
@@ -53,16 +58,11 @@ _U = 2.0**-53
 HEADER = 13
 
 
-def _at(field: str, unit: int) -> int:
-    assert CONTACT_DTYPE.fields is not None
-    return CONTACT_DTYPE.fields[field][1] // unit
-
-
 _CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_A, _B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_A, _B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 def workspace_doubles(largest: int) -> int:
@@ -165,16 +165,18 @@ def put_manifold(header, row, margin, max_contacts, out_at):
     core_distance = row.doubles[DISTANCE] + radius
     bracket = max(row.doubles[UPPER] - row.doubles[DISTANCE], row.doubles[DISTANCE] - row.doubles[LOWER])
     if least_gap(manifold, n) - bound > core_distance + bracket + _ERRORS * error:
-        # Put in front: the nearest points, where corners are farther apart.
-        for k in range(n):
-            copy_point(manifold, n - 1 - k, n - k)
-        manifold.points[0] = nearest.x
-        manifold.points[V] = nearest.y
-        manifold.points[POINT_GAP] = core_distance
-        manifold.points[HEIGHT] = nearest.z + 0.5 * core_distance
-        manifold.features[0] = of_a.feature
-        manifold.features[1] = of_b.feature
-        n += 1
+        k = _corner_near(manifold, n, nearest)
+        if k < 0:  # put in front: the nearest points, where corners are farther apart
+            for j in range(n):
+                copy_point(manifold, n - 1 - j, n - j)
+            k = 0
+            n += 1
+            manifold.features[0] = of_a.feature
+            manifold.features[1] = of_b.feature
+        manifold.points[POINT * k] = nearest.x
+        manifold.points[POINT * k + V] = nearest.y
+        manifold.points[POINT * k + POINT_GAP] = core_distance
+        manifold.points[POINT * k + HEIGHT] = nearest.z + 0.5 * core_distance
         bound = max(bound, bracket)
     tolerance = max(_ERRORS * error, _SHARE * _extent(manifold, n))
     n = drop_repeated(manifold, n, bound, tolerance)
@@ -244,6 +246,19 @@ def _points_on_plane(plane, face, manifold):
         manifold.features[2 * k] = -1
         manifold.features[2 * k + 1] = face.features[corner]
     return face.n
+
+
+@kernel(inline=True)
+def _corner_near(manifold, n, nearest):
+    """Which point the nearest points are so near to that they are to take its place, and its features; −1 for none."""
+    closest, square = -1, math.inf
+    for k in range(n):
+        du, dv = manifold.points[POINT * k] - nearest.x, manifold.points[POINT * k + V] - nearest.y
+        if du * du + dv * dv < square:
+            closest, square = k, du * du + dv * dv
+    if closest < 0 or square > (_NEAR * _extent(manifold, n)) ** 2:
+        return -1
+    return closest
 
 
 @kernel(inline=True)

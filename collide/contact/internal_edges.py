@@ -1,11 +1,13 @@
-"""Which pairs of facets are connected, and whose nearest points are local minima: no contacts at internal edges."""
+"""Whose nearest points are local minima of the distance: no contacts at internal edges."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from collide.contact.contact_facets import Pairs, Side, Topology, cross, facing, lengths_of, rotated
-from collide.lowering.facet_bodies import Body
+from collide.contact.contact_facets import posed_corner
+from collide.kernels import kernel
+from collide.narrowphase.facets.facets_within import FACET_A, INTS_OF_PAIR, NUMBERS_OF_PAIR, POINT_A, POINT_B
+from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, scale, sub, vec3_at
 
 #: Sines of angles that count as none.
 FLAT = 2.0**-30
@@ -13,121 +15,182 @@ FLAT = 2.0**-30
 _ON = 2.0**-30
 
 
-class Links:
-    """Connections of pairs of facets: two pairs share a corner on both bodies, or a facet on one, a corner on the
-    other.
-    """
-
-    def __init__(self, pairs: Pairs, n_corners_b: int):
-        keys = pairs.a.ids[:, :, None] * n_corners_b + pairs.b.ids[:, None, :]
-        _, self._keys = np.unique(keys.reshape(-1), return_inverse=True)
-        self._keys = self._keys.reshape(-1, 9)
-        self._n_keys = int(self._keys.max()) + 1 if len(keys) else 0
-
-    def reached(self, seeds: np.ndarray, among: np.ndarray) -> np.ndarray:
-        """(k,) bool: the seeds (k,), and the pairs of ``among`` (k,) that are connected with them by such pairs."""
-        pairs_reached = seeds.copy()
-        is_reached = np.zeros(self._n_keys, dtype=bool)
-        new_pairs = pairs_reached
-        while new_pairs.any():
-            is_reached[self._keys[new_pairs]] = True
-            new_pairs = among & ~pairs_reached & is_reached[self._keys].any(axis=1)
-            pairs_reached |= new_pairs
-        return pairs_reached
-
-
-def local_minima(pairs: Pairs, u: np.ndarray, slack: np.ndarray, A: Body, B: Body, topologies, poses) -> np.ndarray:
-    """(k,) bool: whether the line u (k, 3) between the nearest points leaves A, and enters B, at right angles.
+@kernel
+def is_local_minimum(pairs, k, A, B):
+    """Whether the line between a pair's nearest points leaves A, and enters B, at right angles.
 
     That is: no facet around either point comes nearer, and of solids the line lies outside. Elsewhere the points are
     nearest within these two facets only, and a neighbour has nearer ones.
     """
-    (top_a, top_b), (R_a, R_b, shift) = topologies, poses
-    out = _leaves(pairs.a, pairs.near.point_a, u, slack, top_a, A, R_a, np.zeros(3))
-    return out & _leaves(pairs.b, pairs.near.point_b, -u, slack, top_b, B, R_b, shift)
+    u = vec3_at(pairs.directions, 3 * k)
+    slack = pairs.slacks[k]
+    point_a = vec3_at(pairs.near, NUMBERS_OF_PAIR * k + POINT_A)
+    point_b = vec3_at(pairs.near, NUMBERS_OF_PAIR * k + POINT_B)
+    return _leaves(pairs, k, 0, A, point_a, u, slack) and _leaves(pairs, k, 1, B, point_b, neg(u), slack)
 
 
-def _leaves(side: Side, point, u, slack, topology: Topology, body: Body, R, shift) -> np.ndarray:
-    held = _feature(side.corners, point)
-    first = np.argmax(held, axis=1)
-    rows = np.arange(len(point))
-    corner = side.ids[rows, first]
-    begin, end = topology.starts[corner], topology.starts[corner + 1]
-    pair = np.repeat(rows, end - begin)
-    within = np.arange(len(pair)) - np.repeat(np.cumsum(end - begin) - (end - begin), end - begin)
-    facet = topology.fans[begin[pair] + within]
-    feature_ids = np.where(held, side.ids, -1)[pair]
-    has = (feature_ids[:, :, None] == topology.corners[facet][:, None, :]).any(axis=2) | (feature_ids < 0)
-    around = has.all(axis=1)
-    pair, facet = pair[around], facet[around]
-    corners = rotated(R, body.tree.triangles[topology.place[facet]].reshape(-1, 3, 3)) + shift
-    away = corners - point[pair][:, None]
-    rise = (away * u[pair][:, None]).sum(axis=2)
-    least = slack[pair][:, None] * lengths_of(away) + _ON * lengths_of(corners[:, 1] - corners[:, 0])[:, None]
-    steep = (rise > least).any(axis=1)
-    good = np.ones(len(point), dtype=bool)
-    good[pair[steep]] = False
-    if topology.solid:
-        outward = np.zeros((len(point), 3))
-        np.add.at(outward, pair, _weighted(corners, point[pair], held[pair].sum(axis=1)))
-        good &= (outward * u).sum(axis=1) >= -slack * np.maximum(lengths_of(outward), FLAT)
-    return good
+@kernel
+def _leaves(pairs, k, side, body, point, u, slack):
+    """Whether u leaves a body from a point of a pair's facet at right angles."""
+    corners_at = 18 * k + 9 * side
+    ids_at = 6 * k + 3 * side
+    first, second = _feature(pairs.corners, corners_at, point)
+    if first < 0:  # within the facet: no neighbour is as near
+        facet = pairs.facets[INTS_OF_PAIR * k + FACET_A + side]
+        rises, outward = _facet_at(body, facet, point, u, slack, False)
+        return not rises and _is_outside(body, outward, u, slack)
+    corner = pairs.ids[ids_at + first]
+    end = pairs.ids[ids_at + second] if second >= 0 else -1
+    return fan_allows(body, corner, end, point, u, slack)
 
 
-def _weighted(corners: np.ndarray, point: np.ndarray, n_held: np.ndarray) -> np.ndarray:
-    """Normals, times the angle at the point where that is a corner.
+@kernel
+def fan_allows(body, corner, end, point, u, slack):
+    """Whether u leaves a body at right angles from a point at a corner, or of the edge from there to the corner ``end``
+    (−1: none).
+    """
+    outward = Vec3(0.0, 0.0, 0.0)
+    for at in range(int(body.fan_starts[corner]), int(body.fan_starts[corner + 1])):
+        facet = int(body.fans[at])
+        if end >= 0 and not _has_corner(body, facet, end):
+            continue
+        rises, normal = _facet_at(body, facet, point, u, slack, end < 0)
+        if rises:
+            return False
+        outward = add(outward, normal)
+    return _is_outside(body, outward, u, slack)
 
+
+@kernel(inline=True)
+def _has_corner(body, facet, corner):
+    return (
+        int(body.corners[3 * facet]) == corner
+        or int(body.corners[3 * facet + 1]) == corner
+        or int(body.corners[3 * facet + 2]) == corner
+    )
+
+
+@kernel(inline=True)
+def _is_outside(body, outward, u, slack):
+    return not body.solid or body.is_convex or dot(outward, u) >= -slack * max(norm(outward), FLAT)
+
+
+@kernel
+def _facet_at(body, facet, point, u, slack, at_corner):
+    """(whether a facet around a point comes nearer along u, its normal).
+
+    at_corner : the normal is weighted with the facet's angle there.
     J. A. Bærentzen, H. Aanæs, "Signed distance computation using the angle weighted pseudonormal" (2005).
     """
-    n = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = lengths_of(n)
-    n = np.where((lengths > 0.0)[:, None], n / np.where(lengths > 0.0, lengths, 1.0)[:, None], 0.0)
-    away = corners - point[:, None]
-    at = np.argmin(lengths_of(away), axis=1)
-    rows = np.arange(len(at))
-    p, q = corners[rows, (at + 1) % 3] - corners[rows, at], corners[rows, (at + 2) % 3] - corners[rows, at]
-    angle = np.arctan2(lengths_of(cross(p, q)), (p * q).sum(axis=1))
-    return n * np.where(n_held == 1, angle, 1.0)[:, None]
+    place = int(body.places[facet])
+    p, q, r = posed_corner(body, place, 0), posed_corner(body, place, 1), posed_corner(body, place, 2)
+    least = _ON * norm(sub(q, p))
+    a, b, c = sub(p, point), sub(q, point), sub(r, point)
+    zero = Vec3(0.0, 0.0, 0.0)
+    if _rises(a, u, slack, least) or _rises(b, u, slack, least) or _rises(c, u, slack, least):
+        return True, zero
+    if not body.solid or body.is_convex:
+        return False, zero
+    n = cross(sub(q, p), sub(r, p))
+    length = norm(n)
+    if length == 0.0:
+        return False, zero
+    weight = 1.0 / length
+    if at_corner:
+        square_a, square_b, square_c = dot(a, a), dot(b, b), dot(c, c)
+        if square_a <= square_b and square_a <= square_c:
+            e, f = sub(q, p), sub(r, p)
+        elif square_b <= square_c:
+            e, f = sub(r, q), sub(p, q)
+        else:
+            e, f = sub(p, r), sub(q, r)
+        weight *= _angle(e, f)
+    return False, scale(weight, n)
 
 
-def _feature(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(k, 3) bool: the corners of the feature of each triangle that a point of it lies on: one, two or all three."""
-    edges = corners[:, [1, 2, 0]] - corners
-    away = point[:, None] - corners
-    square = np.square(edges).sum(axis=2)
-    size = np.sqrt(square.max(axis=1))[:, None]
-    at_corner = lengths_of(away) <= _ON * size
-    along = np.clip((away * edges).sum(axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    on_edge = lengths_of(away - along[..., None] * edges) <= _ON * size
-    held = np.ones((len(point), 3), dtype=bool)
-    row, k = np.nonzero(on_edge)
-    held[row] = False
-    for i, j in zip(row[::-1].tolist(), k[::-1].tolist()):  # the first edge stays
-        held[i] = False
-        held[i, [j, (j + 1) % 3]] = True
-    some = at_corner.any(axis=1)
-    held[some] = False
-    held[np.flatnonzero(some), np.argmax(at_corner[some], axis=1)] = True
-    return held
+@kernel(inline=True)
+def _rises(away, u, slack, least):
+    """Whether a corner is farther along u than what may be rounding."""
+    rise = dot(away, u)
+    return rise > least and rise > slack * norm(away) + least
 
 
-def snapped(pairs: Pairs, k: int, u: np.ndarray, slack: float) -> np.ndarray:
-    """The normal of a facet of pair k, or the cross product of two of its edges, where u is that but for rounding."""
-    normal_a, normal_b = pairs.a.normals[k], pairs.b.normals[k]
-    edges = [T[[1, 2, 0]] - T for T in (pairs.a.corners[k], pairs.b.corners[k])]
-    crosses = cross(edges[0][:, None], edges[1][None]).reshape(-1, 3)
-    lengths = lengths_of(crosses)
-    well_conditioned = lengths > FLAT * (lengths_of(edges[0])[:, None] * lengths_of(edges[1])[None]).ravel()
-    guesses = np.concatenate([[normal_a, normal_b], crosses[well_conditioned] / lengths[well_conditioned][:, None]])
-    off = lengths_of(cross(guesses, u))
-    off[~guesses.any(axis=1)] = np.inf
-    for group in (slice(0, 2), slice(2, None)):  # faces first
-        if len(off[group]) and off[group].min() <= slack:
-            best = guesses[group][int(np.argmin(off[group]))]
-            return best if (best * u).sum() > 0.0 else 0.0 - best
-    return u
+@kernel
+def _angle(e, f):
+    """The angle between two vectors, to 1e-5: kernels have roots, and no functions of angles."""
+    product = norm(e) * norm(f)
+    cosine = min(max(dot(e, f) / product, -1.0), 1.0) if product > 0.0 else 1.0
+    for _ in range(3):
+        cosine = math.sqrt(0.5 * (1.0 + cosine))  # of half the angle
+    sine = math.sqrt((1.0 - cosine) * (1.0 + cosine))
+    square = sine * sine
+    return 8.0 * sine * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
 
 
-def aligned(pairs: Pairs, n: np.ndarray, solid_a: bool, solid_b: bool, cosine: float) -> np.ndarray:
-    """(k,) bool: one facet of the pair at least faces along n."""
-    return (facing(pairs.a.normals, n, solid_a) >= cosine) | (facing(pairs.b.normals, -n, solid_b) >= cosine)
+@kernel
+def _feature(corners, at, point):
+    """Which corners of a triangle a point of it lies on: (a corner, −1), both ends of an edge, or (−1, −1)."""
+    p, q, r = vec3_at(corners, at), vec3_at(corners, at + 3), vec3_at(corners, at + 6)
+    limit = _ON * max(norm(sub(q, p)), norm(sub(r, q)), norm(sub(p, r)))
+    if norm(sub(point, p)) <= limit:
+        return 0, -1
+    if norm(sub(point, q)) <= limit:
+        return 1, -1
+    if norm(sub(point, r)) <= limit:
+        return 2, -1
+    if _off_segment(p, q, point) <= limit:
+        return 0, 1
+    if _off_segment(q, r, point) <= limit:
+        return 1, 2
+    if _off_segment(r, p, point) <= limit:
+        return 2, 0
+    return -1, -1
+
+
+@kernel(inline=True)
+def _off_segment(p, q, point):
+    """How far a point is from a segment."""
+    e, w = sub(q, p), sub(point, p)
+    square = dot(e, e)
+    t = min(max(dot(w, e) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return norm(sub(w, scale(t, e)))
+
+
+@kernel
+def snapped(pairs, k):
+    """The normal of a facet of pair k, or the cross product of two of its edges, where its direction is that but for
+    rounding; else the direction.
+    """
+    u = vec3_at(pairs.directions, 3 * k)
+    best, normal = pairs.slacks[k], u
+    is_face = False
+    for side in range(2):
+        n = vec3_at(pairs.normals, 6 * k + 3 * side)
+        off = norm(cross(n, u))
+        if dot(n, n) > 0.0 and off <= best:
+            best, normal, is_face = off, n, True
+    if not is_face:  # faces first
+        for i in range(9):
+            n = _cross_of_edges(pairs, k, i)
+            off = norm(cross(n, u))
+            if dot(n, n) > 0.0 and off <= best:
+                best, normal = off, n
+    return normal if dot(normal, u) > 0.0 else neg(normal)
+
+
+@kernel
+def _cross_of_edges(pairs, k, i):
+    """The unit vector across edge i // 3 of A's facet and edge i % 3 of B's; 0 where they are parallel."""
+    return cross_of_edges(pairs.corners, 18 * k, i // 3, i % 3)
+
+
+@kernel
+def cross_of_edges(corners, at, i, j):
+    """The unit vector across edge i of a triangle and edge j of the one behind it; 0 where they are parallel."""
+    e = sub(vec3_at(corners, at + 3 * ((i + 1) % 3)), vec3_at(corners, at + 3 * i))
+    f = sub(vec3_at(corners, at + 9 + 3 * ((j + 1) % 3)), vec3_at(corners, at + 9 + 3 * j))
+    n = cross(e, f)
+    length = norm(n)
+    if not length > FLAT * (norm(e) * norm(f)):
+        return Vec3(0.0, 0.0, 0.0)
+    return scale(1.0 / length, n)

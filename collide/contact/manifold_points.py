@@ -183,7 +183,7 @@ def least_gap(manifold, n):
 
 @kernel
 def drop_repeated(manifold, n, error, tolerance):
-    """Drop points nearer than the tolerance to the one before, or to the line through their neighbours; how many stay.
+    """Drop points nearer than the tolerance to the one before, or to the line between their neighbours; how many stay.
 
     Of points in one place the one of least gap stays, and so does one deeper than both its neighbours by more than the
     error of gaps.
@@ -206,7 +206,11 @@ def drop_repeated(manifold, n, error, tolerance):
     while n_kept > 2 and k < n_kept:
         before, after = (k - 1 if k > 0 else n_kept - 1), (k + 1 if k + 1 < n_kept else 0)
         shallowest = min(points[POINT * before + GAP], points[POINT * after + GAP])
-        if _height(points, before, after, k) > tolerance or points[POINT * k + GAP] < shallowest - error:
+        if (
+            _height(points, before, after, k) > tolerance
+            or points[POINT * k + GAP] < shallowest - error
+            or not _is_between(points, before, after, k)
+        ):
             k += 1
             continue
         for j in range(k, n_kept - 1):
@@ -228,6 +232,14 @@ def _height(points, i, j, k):
     wide = dv * (points[POINT * k] - points[POINT * i]) - du * (points[POINT * k + V] - points[POINT * i + V])
     length = math.sqrt(du * du + dv * dv)
     return wide / length if length > 0.0 else 0.0
+
+
+@kernel(inline=True)
+def _is_between(points, i, j, k):
+    """Whether point k is not before i, and not behind j, along the way from i to j; nearest points may be either."""
+    du, dv = points[POINT * j] - points[POINT * i], points[POINT * j + V] - points[POINT * i + V]
+    behind_i = du * (points[POINT * k] - points[POINT * i]) + dv * (points[POINT * k + V] - points[POINT * i + V])
+    return 0.0 <= behind_i <= du * du + dv * dv
 
 
 @kernel

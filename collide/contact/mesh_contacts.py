@@ -1,120 +1,191 @@
-"""Contacts of pairs with a mesh, as rows."""
+"""Contacts of pairs with a mesh, as rows, at many pairs of poses."""
 
 from __future__ import annotations
 
+from threading import local
+
 import numpy as np
 
-from collide.contact.contact_facets import ContactFrame, contact_frame
-from collide.contact.contact_patches import Patch, patches_of
-from collide.contact.contact_points import across
-from collide.contact.contact_rows import GAP, OVERLAP, TRANSLATION, PatchContacts, flipped_contacts, no_rows, rows_of
+from collide.contact.contact_facets import topology_of
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
-from collide.contact.reduce_manifold import reduce_manifold
-from collide.contact.shallow_overlaps import STEP_ERRORS
+from collide.contact.distance_contacts import with_distances
+from collide.contact.facet_manifolds import (
+    CONTACT_HEADER,
+    DONE,
+    IS_LARGEST,
+    LIMIT,
+    PAIRS_FULL,
+    POSES_DONE,
+    ROWS_DONE,
+    ROWS_FULL,
+    TOO_MANY,
+    WORDS_AT,
+    facet_manifolds,
+    workspace_words,
+)
 from collide.contact.support_face import VERTEX
-from collide.lowering.facet_bodies import Body, body_of, has_facets, hull_of, is_halfspace
+from collide.errors import UnsupportedQuery
+from collide.kernels import address_of, code_of
+from collide.lowering.facet_bodies import Body, body_of, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.mesh_methods import mesh_rows
+from collide.narrowphase.facets.collide_kernel import HEADER
+from collide.narrowphase.facets.facet_kernel_calls import pair_header, step_of
+from collide.narrowphase.facets.facet_queries import not_invertible, stack_of, workspace
+from collide.narrowphase.facets.facets_within import list_near_pairs
 from collide.shapes.shape import Shape
+from collide.threads import pieces_of, share
 
-#: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
-_ERRORS, _SHARE = 64.0, 2.0**-30
+#: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
+_FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
+#: Rows there is space for to begin with, and so many more a pose.
+_FIRST_ROWS, _ROWS_PER_POSE = 64, 8
+#: Poses that are worth a thread of their own.
+_FEWEST_POSES = 16
+
+Rows = tuple[np.ndarray, np.ndarray]
 
 
-def halfspace_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows of a mesh and a half-space at single poses (4, 4): those of the mesh's hull, with facets of the mesh."""
+def halfspace_contacts(
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+) -> Rows:
+    """Rows of a mesh and a half-space: those of the mesh's hull, with facets of the mesh. As `facet_contacts`."""
     hull_a, hull_b = (S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B))
-    rows, _ = convex_contacts(hull_a, hull_b, X_WA[None], X_WB[None], margin, max_contacts)
+    rows, ends = convex_contacts(hull_a, hull_b, X_WA, X_WB, margin, max_contacts, slack=slack, threads=threads)
     for side, shape, hull in (("a", A, hull_a), ("b", B, hull_b)):
         if hull is not shape:
-            facet_of = _facet_of_hull_points(shape, hull)
-            vertex = rows[f"feature_{side}"]
-            rows[f"facet_{side}"] = np.where(vertex % 4 == VERTEX, facet_of[np.maximum(vertex, 0) // 4], -1)
-    return rows
+            row_of, facet_of = _rows_of_hull_points(shape, hull)
+            feature = rows[f"feature_{side}"]
+            is_vertex = (feature >= 0) & (feature % 4 == VERTEX)
+            vertex = np.where(is_vertex, feature, 0) // 4
+            rows[f"facet_{side}"] = np.where(is_vertex, facet_of[vertex], -1)
+            rows[f"feature_{side}"] = np.where(is_vertex, 4 * row_of[vertex] + VERTEX, -1)
+    return rows, ends
 
 
-def _facet_of_hull_points(mesh: Shape, hull: Shape) -> np.ndarray:
-    """A facet of the mesh at each point of its hull."""
+def _rows_of_hull_points(mesh: Shape, hull: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """The mesh's row of each point of its hull, and a facet there."""
     faces, vertices = mesh.faces, mesh.vertices  # type: ignore[attr-defined]
     used, first = np.unique(faces, return_index=True)
-    facet_at = {point.tobytes(): facet for point, facet in zip(vertices[used] + 0.0, (first // 3).tolist())}
-    return np.array([facet_at[point.tobytes()] for point in convex_set_of(hull).points + 0.0])
+    at = {point.tobytes(): k for k, point in reversed(list(enumerate(vertices[used] + 0.0)))}
+    which = np.array([at[point.tobytes()] for point in convex_set_of(hull).points + 0.0])
+    return used[which], (first // 3)[which]
 
 
-def facet_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray:
-    """Rows of two bodies of facets at single poses (4, 4), on the same numbers when A and B are exchanged."""
-    body_a, body_b = body_of(A), body_of(B)
-    exchanged = body_b.key < body_a.key or (body_a.key == body_b.key and X_WA[:3].tolist() > X_WB[:3].tolist())
-    if exchanged:
-        return flipped_contacts(_ordered(body_b, body_a, B, A, X_WB, X_WA, margin, max_contacts))
-    return _ordered(body_a, body_b, A, B, X_WA, X_WB, margin, max_contacts)
+def facet_contacts(
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+) -> Rows:
+    """(rows, ends) of two bodies of facets: contacts pose after pose, and where those of each end.
 
+    X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's, checked.
+    slack : (n,) by how much rounding may have moved the bodies towards each other [m]: the margin is larger by that.
+    The same numbers come out when A and B are exchanged. Raises UnsupportedQuery, InvalidPose.
+    """
+    n = max(len(X_WA), len(X_WB))
+    pieces = pieces_of(n, threads, _FEWEST_POSES) if threads > 1 and n >= 2 * _FEWEST_POSES else [slice(0, n)]
+    of_piece: dict[int, Rows] = {}
+    topology_of(body_of(A)), topology_of(body_of(B))  # made once, before threads ask for them
 
-def curved_contacts(A: Shape, B: Shape, X_WA, X_WB, margin: float, _max_contacts: int) -> np.ndarray:
-    """One row for a mesh and a shape without exact facets: the answer of `distance`; none beyond the margin."""
-    row = mesh_rows(A, B, X_WA[None], X_WB[None], limit=margin)[0]
-    if row["beyond"] or row["lower"] > margin:
-        return no_rows()
-    rows = rows_of([_as_contact(A, B, row)])
-    rows["lower"], rows["upper"] = row["lower"], row["upper"]
-    return rows
+    def answer(piece: slice) -> None:
+        try:
+            of_piece[piece.start] = _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
+        finally:
+            _of_thread.shrink()
 
-
-def _ordered(
-    body_a: Body, body_b: Body, A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int
-) -> np.ndarray:
-    frame = contact_frame(body_a, body_b, X_WA, X_WB)
-    rounding = 0.0 if margin + body_a.radius + body_b.radius == 0.0 else STEP_ERRORS * frame.error
-    patches, deep = patches_of(frame, margin + rounding)
-    if not patches:
-        return curved_contacts(A, B, X_WA, X_WB, margin, max_contacts) if deep else no_rows()
-    of_patches = [patch_contacts(frame, patch, margin, max_contacts) for patch in patches]
-    if deep:
-        of_patches.append(_of_distance(A, B, X_WA, X_WB))
-    rows = rows_of([patch for patch in of_patches if len(patch.distance)])
-    last = rows["kind"] == TRANSLATION
-    rows["upper"][last] = 0.0  # how much shorter another translation might be is not known
-    return rows
-
-
-def patch_contacts(frame: ContactFrame, patch: Patch, margin: float, max_contacts: int) -> PatchContacts:
-    """At most ``max_contacts`` of the patch's points, radii added, in the world."""
-    n, points = patch.normal, patch.points
-    radius = frame.A.radius + frame.B.radius
-    is_nearest = points.gap == points.gap.min(initial=np.inf)
-    points = points.take((points.gap - radius <= margin + points.error) | is_nearest)
-    flat = (across(n)[None] * points.b[:, None]).sum(axis=2)
-    size = float((flat.max(axis=0) - flat.min(axis=0)).max())
-    tolerance = max(_ERRORS * frame.error, _SHARE * size)
-    selected = points.take(reduce_manifold(flat, points.gap, points.error, max_contacts, tolerance))
-    distance = selected.gap - radius
-    if len(patch.facets) == 1:
-        facets = patch.facets[np.searchsorted(patch.points.pair, selected.pair)]
+    if len(pieces) == 1:
+        answer(pieces[0])
     else:
-        facets = _facets(patch, selected)
-    kind = OVERLAP if patch.meets else GAP
-    error = selected.error + 8.0 * frame.error * (radius > 0.0)
-    if patch.meets:  # what touches is no gap, though it may come out as one
-        distance = np.where((distance > 0.0) & (distance <= error), 0.0, distance)
-    middle = 0.5 * (selected.a + selected.b) + 0.5 * (frame.A.radius - frame.B.radius) * n + frame.X_WA[:3, 3]
-    half = 0.5 * distance[:, None] * n
-    return PatchContacts(n, middle - half, middle + half, distance, error, facets, kind, patch.apart)
+        share(pieces, answer, threads)
+    answers = [of_piece[start] for start in sorted(of_piece)]
+    if len(answers) == 1:
+        return answers[0]
+    offsets = np.cumsum([0, *(len(rows) for rows, _ in answers)])
+    return np.concatenate([rows for rows, _ in answers]), np.concatenate(
+        [ends + offset for (_, ends), offset in zip(answers, offsets.tolist())]
+    )
 
 
-def _facets(patch: Patch, selected) -> np.ndarray:
-    by_pair = dict(zip(patch.points.pair.tolist(), patch.facets.tolist()))
-    return np.array([by_pair[k] for k in selected.pair.tolist()]).reshape(-1, 2)
+def _of_poses(
+    A: Shape, B: Shape, X_WA, X_WB, piece: slice, margin: float, max_contacts: int, slack: np.ndarray | None
+) -> Rows:
+    """The same of a piece of the poses, in one thread."""
+    n = piece.stop - piece.start
+    X_WA, X_WB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
+    slack = None if slack is None else slack[piece]
+    body_a, body_b = body_of(A), body_of(B)
+    exchanged = body_b.key < body_a.key
+    ordered = (body_b, body_a) if exchanged else (body_a, body_b)
+    space, work = _of_thread, workspace(stack_of(body_a.tree, body_b.tree))
+    topologies = [topology_of(body) for body in ordered]
+    header = np.zeros(CONTACT_HEADER, dtype=np.int64)
+    header[:HEADER] = pair_header(*ordered, exchanged, work)
+    header[HEADER:POSES_DONE] = (
+        *(address_of(topology.header) for topology in topologies), 0, code_of(list_near_pairs), *space.described,
+        min(max_contacts, 1 << 40),
+    )  # fmt: skip
+    header.view(np.float64)[LIMIT] = _longest_translation(*ordered)
+    ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.uint8)
+    out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
+    while True:
+        status = facet_manifolds(
+            address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
+            0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
+        )  # fmt: skip
+        if status == DONE:
+            break
+        if status == ROWS_FULL:
+            out[header[ROWS_DONE] :] = np.zeros((), dtype=CONTACT_DTYPE)
+            out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])
+        elif status == PAIRS_FULL:
+            space.grow()
+            header[WORDS_AT : IS_LARGEST + 1] = space.described
+        elif status == TOO_MANY:
+            raise _too_many(margin, body_a, body_b)
+        else:
+            raise not_invertible(piece.start + int(header[POSES_DONE]))
+    rows = out[: header[ROWS_DONE]]
+    if lacks.any():
+        limit = np.full(n, margin) if slack is None else margin + slack
+        return with_distances(A, B, X_WA, X_WB, limit, rows, ends, lacks)
+    return rows, ends
 
 
-def _of_distance(A: Shape, B: Shape, X_WA, X_WB) -> PatchContacts:
-    return _as_contact(A, B, mesh_rows(A, B, X_WA[None], X_WB[None], limit=np.inf)[0])
+def _longest_translation(A: Body, B: Body) -> float:
+    """How far bodies may overlap for patches to describe it [m]: the smaller body's diameter."""
+    smaller = min(A.reach, B.reach)
+    return 2.0 * (smaller if smaller > 0.0 else max(A.reach, B.reach))
 
 
-def _as_contact(A: Shape, B: Shape, row) -> PatchContacts:
-    """One contact from a row of `distance`."""
-    kind = TRANSLATION if row["hit"] else GAP
-    facets = np.array([[row[part] if has_facets(shape) else -1 for part, shape in (("part_a", A), ("part_b", B))]])
-    distance = np.array([row["distance"]])
-    apart = -float(row["lower"]) if kind == TRANSLATION else 0.0
-    point_a, point_b = row["point_a"][None], row["point_b"][None]
-    return PatchContacts(row["normal"], point_a, point_b, distance, distance - row["lower"], facets, kind, apart)
+def _too_many(margin: float, A: Body, B: Body) -> UnsupportedQuery:
+    reach = margin + A.radius + B.radius
+    return UnsupportedQuery(
+        f"contacts: more than {MAX_PAIRS} pairs of facets lie within {reach:g} m (margin and radii) of each "
+        "other: ask with a smaller margin, or take coarser meshes"
+    )
+
+
+class _OfThread(local):
+    """The workspace of one thread. Memory that nobody touches costs nothing."""
+
+    def __init__(self) -> None:
+        self._keep(_FEWEST_PAIRS)
+
+    def _keep(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._words = np.empty(workspace_words(capacity))
+
+    @property
+    def described(self) -> tuple[int, int, bool]:
+        """Its address, for how many pairs it is, and whether that is the most."""
+        return address_of(self._words), min(self._capacity, MAX_PAIRS), self._capacity >= MAX_PAIRS
+
+    def grow(self) -> None:
+        self._keep(min(4 * self._capacity, MAX_PAIRS))
+
+    def shrink(self) -> None:
+        """Give back what is more than a thread may keep."""
+        if self._capacity > _KEPT_PAIRS:
+            self._keep(_FEWEST_PAIRS)
+
+
+_of_thread = _OfThread()

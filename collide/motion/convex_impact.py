@@ -33,8 +33,8 @@ from collide.motion.moving_pair import omega_of, origin_of_b, place_pair
 from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
 from collide.narrowphase.pair_kernel import SIGNATURE
-from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, UPPER, VERTICES_A, VERTICES_B, view_row
-from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, norm, rotate, scale, sub, vec3_at
+from collide.narrowphase.rows import COUNT, HOW, LOWER, NORMAL, UPPER, VERTICES_A, VERTICES_B, blank_row, view_row
+from collide.numerics.vec3 import Vec3, add, column_at, cross, divide, dot, norm, put_vec3, rotate, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
 _answer_pairs_at = native_call(SIGNATURE)
@@ -89,16 +89,19 @@ CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIR_AT, DOUBLES_AT, INTEGERS_
 
 
 @kernel
-def ask_pair(asking, row_at):
-    """Ask about the pair at its poses: the gap without its last digits, or whether it meets."""
+def ask_pair(asking, row_at, boolean):
+    """Ask about the pair at its poses: the gap without its last digits, or whether it meets.
+
+    GJK begins where the row's last answer was; of a boolean, with its normal.
+    """
     row = view_row(row_at)
     row.flags[HOW] = UNDECIDED
     header = asking.header
-    # "stop at a hit" of one pair changes nothing but that the search by portals, eight pairs at once, is left out
+    # "stop at a hit" leaves out the search by portals, eight pairs at once, and has rows begin with what they name
     _answer_pairs_at(
         header[CORE],
         (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIR_AT], 1, False,
+            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIR_AT], 1, boolean,
             False, True, math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
     )  # fmt: skip
@@ -125,7 +128,8 @@ def search_contact(motion, asking, begin, end, tolerance):
     if begin > end:
         return Search(FREE, end, end, 0)
     place_pair(motion, begin)
-    row = ask_pair(asking, asking.row_at)
+    put_vec3(blank_row(asking.row_at).doubles, NORMAL, Vec3(0.0, 0.0, 0.0))
+    row = ask_pair(asking, asking.row_at, False)
     if row.flags[HOW] == REFUSED:
         return Search(TOO_SMALL, begin, begin, 1)
     if _is_contact(row) and begin == first:
@@ -168,7 +172,7 @@ def _search_from(motion, asking, row, span):
             return Search(FREE, last, last, n_queries)
         if not is_stuck:
             place_pair(motion, later)
-            row = ask_pair(asking, asking.row_at)
+            row = ask_pair(asking, asking.row_at, False)
             n_queries += 1
             axis = _next_axis(motion, row, axis.n, later - time)
             time = later
@@ -357,10 +361,11 @@ def _find_contact(motion, asking, time, gap, end, max_probes):
     if not passed < end - time:
         passed = 2.0**-44 * max(end, 2.0**-20)
     passed = max(passed, _LEAST_STEP * time)
+    put_vec3(view_row(asking.probe_at).doubles, NORMAL, vec3_at(view_row(asking.row_at).doubles, NORMAL))
     for k in range(max_probes):
         later = time + passed if passed < end - time else end
         place_pair(motion, later)
-        row = ask_pair(asking, asking.probe_at)
+        row = ask_pair(asking, asking.probe_at, True)
         if _is_contact(row):
             return later, k + 1
         if later == end:

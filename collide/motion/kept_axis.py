@@ -29,7 +29,7 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.motion.moving_body import ANGLE, AXIS, DRIFT_REACH, REACH_OF_CORE
+from collide.motion.moving_body import ANGLE, AXIS, DRIFT_REACH, REACH_OF_CORE, TURN_ERROR
 from collide.motion.moving_pair import omega_of, origin_of_b
 from collide.motion.rotations import apply, rotation_about
 from collide.narrowphase.bounds import ERROR
@@ -51,8 +51,6 @@ from collide.numerics.vec3 import (
 )
 from collide.support.support_mapping import settled_vertex, support
 
-#: How far rounding moves an axis that turns with a body, in units of 1 and the angle (`moving_body.py`).
-_AXIS_ERROR = 160.0 * 2.0**-53
 #: Sums of a dozen rounded terms, rounded up.
 _OUTWARD = 1.0 + 2.0**-40
 
@@ -115,7 +113,7 @@ def gap_along(motion, time, axis):
     x_b = add(_extreme(pair, B, rotate_back(poses, B.pose_at, neg(axis.n))), vec3_at(poses, B.pose_at + 9))
     error = motion.error
     if axis.speed != 0.0:
-        error += _AXIS_ERROR * (1.0 + axis.speed) * motion.size
+        error += TURN_ERROR * (1.0 + axis.speed) * motion.size
     gap = dot(sub(x_b, x_a), axis.n) - motion.radius - error
     return AxisGap(gap, _rate(motion, time, axis, x_a, x_b), axis)
 
@@ -131,7 +129,7 @@ def _gap_of_plane(motion, time):
     x_b = add(_extreme(pair, B, rotate_back(poses, B.pose_at, neg(n))), vec3_at(poses, B.pose_at + 9))
     height = dot(sub(x_b, vec3_at(poses, A.pose_at + 9)), n) - plane.offset / plane.length
     # by how much the axis as computed, and D of the plane's own matrix, miss one that turns evenly
-    turned = _AXIS_ERROR * (1.0 + motion.a[ANGLE]) + 16.0 * motion.off
+    turned = TURN_ERROR * (1.0 + motion.a[ANGLE]) + 16.0 * motion.off
     size = motion.size + offset
     gap = height - motion.radius - (motion.error + (ERROR * skew + turned) * size)
     axis = axis_with(n, motion.a)

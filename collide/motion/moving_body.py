@@ -33,15 +33,17 @@ from collide.numerics.vec3 import Vec3, add, divide, norm, put_vec3, rotate, sca
 
 # Doubles of a body: ω, û, |ω|; R0 and D of its core, row by row; where the core's frame is from the body's origin at
 # the start, and what D adds to that; bounds of how far a point of the core is from the origin but for D, and of what D
-# adds; slop of a pose.
-OMEGA, AXIS, ANGLE, START, DRIFT, ARM, ARM_DRIFT, REACH_OF_CORE, DRIFT_REACH, POSE_ERROR = (
-    0, 3, 6, 7, 16, 25, 28, 31, 32, 33,
+# adds; slop of a pose; 1 where it does not turn at all.
+OMEGA, AXIS, ANGLE, START, DRIFT, ARM, ARM_DRIFT, REACH_OF_CORE, DRIFT_REACH, POSE_ERROR, IS_STILL = (
+    0, 3, 6, 7, 16, 25, 28, 31, 32, 33, 34,
 )  # fmt: skip
-BODY = 34
+BODY = 35
 
 #: Bounds are rounded up by more than a dozen roundings.
 OUTWARD = 1.0 + 2.0**-45
 _UNIT = 2.0**-53
+#: How far rounding turns a body, in radians, times 1 + |ω|.
+TURN_ERROR = 160.0 * _UNIT
 
 
 @kernel
@@ -88,7 +90,8 @@ def set_body(body, X0, X1, omega_given, has_omega, part, at, reach):
     body[REACH_OF_CORE] = reach_of_core
     body[DRIFT_REACH] = drift_reach
     is_still = angle == 0.0 and off == 0.0 and not is_part
-    body[POSE_ERROR] = 0.0 if is_still else 160.0 * _UNIT * (1.0 + angle) * reach_of_core + _UNIT * drift_reach
+    body[IS_STILL] = 1.0 if is_still else 0.0
+    body[POSE_ERROR] = 0.0 if is_still else TURN_ERROR * (1.0 + angle) * reach_of_core + _UNIT * drift_reach
     return off
 
 
@@ -125,6 +128,14 @@ def place_body(body, time, poses, at, origin, slop):
 
     slop : of the origin, to be added to that of the rotation.
     """
+    if body[IS_STILL] != 0.0:
+        for k in range(9):
+            poses[at + k] = body[START + k]
+        put_vec3(poses, at + 9, origin)
+        poses[at + POSE_SLOP] = slop
+        poses[at + POSE_TERMS] = -1.0
+        poses[at + POSE_STRETCH] = -1.0
+        return
     if body[ANGLE] == 0.0:
         rotation = Matrix3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
     else:

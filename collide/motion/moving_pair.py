@@ -8,11 +8,14 @@ from collide.kernels import kernel
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import NUMBERS, POSE, RADIUS, REACH, SLOP
 from collide.motion.moving_body import (
+    ANGLE,
     DRIFT_REACH,
+    IS_STILL,
     OMEGA,
     OUTWARD,
     POSE_ERROR,
     REACH_OF_CORE,
+    TURN_ERROR,
     place_body,
     set_body,
 )
@@ -83,10 +86,12 @@ def moving_pair(ints, numbers, poses, sa, sb, motion_a, motion_b, a, b):
     size = (
         a[REACH_OF_CORE] + b[REACH_OF_CORE] + a[DRIFT_REACH] + b[DRIFT_REACH] + farthest + radius
     ) * OUTWARD  # fmt: skip
+    is_plane = pair.A.kind == HALFSPACE
+    if is_plane and a[IS_STILL] == 0.0:  # a turned plane is wrong by as much as B is far
+        a[POSE_ERROR] = TURN_ERROR * (1.0 + a[ANGLE]) * size
     # never 0: the numbers of a pose in between are not those of the problem
     slop = numbers[NUMBERS * sa + SLOP] + numbers[NUMBERS * sb + SLOP]
     error = ERROR * size + a[POSE_ERROR] + b[POSE_ERROR] + slop + origin_error(farthest)
-    is_plane = pair.A.kind == HALFSPACE
     return MovingPair(a, b, pair, d0, sub(d1, d0), farthest, radius, is_plane, size, error, max(off_a, off_b))
 
 

@@ -43,8 +43,8 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
     error = ERROR * size + ordered.slop
     curved = pair.A.kind != POINTS or pair.B.kind != POINTS
     exact_numbers = ordered.exact_numbers and not curved
-    # A boolean may begin with an axis that separated the bodies before; reported numbers never do.
-    sign = (-1.0 if flip else 1.0) if query.boolean else 0.0
+    # A boolean may begin with an axis that separated the bodies before; reported numbers do in motions alone.
+    sign = (-1.0 if flip else 1.0) if query.boolean or query.resumes else 0.0
     put_vec3(work.weights, AXIS, scale(sign, vec3_at(row.doubles, NORMAL)))
     work.request[1] = 0
     if is_closed_form:

@@ -44,13 +44,14 @@ def answer_pairs(
     pairs : two part numbers a pair.
     boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
         normal that is there is the axis to try first.
-    stop_at_hit : stop after the first hit.   limit : gaps larger than this [m] are not measured.
+    stop_at_hit : stop after the first hit; where rows are wanted, begin with the normal and the vertices they name,
+        those of the same pairs at poses before.   limit : gaps larger than this [m] are not measured.
     rows : PAIR_DTYPE, zeroed but for that.   doubles, integers : workspace, DOUBLES and INTEGERS of them.
 
     Fourteen arguments because it is called by address, with integers, doubles and booleans alone.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
-    query = Query(boolean, depths, limit, terms_at)
+    query = Query(boolean, depths, limit, terms_at, stop_at_hit and not boolean)
     work = workspace_at(doubles_at, integers_at)
     work.requests[0] = 0
     n_queued = view_i64(work.queue_integers_at, KINDS)
@@ -85,6 +86,8 @@ def _answer(ordered, query, row, row_number, has_portals, work):
     """Answer one pair; returns the kind of gap if the row is queued for its last digits, else −1."""
     A, B = ordered.pair.A, ordered.pair.B
     n_start = _take_portal(row, work.ids) if has_portals else 0
+    if query.resumes:
+        n_start = _take_vertices(row, work.ids, ordered)
     clear_vertices(row)
     if 0.0 < ordered.size < SMALLEST:
         row.flags[HOW] = REFUSED
@@ -110,3 +113,20 @@ def _take_portal(row, ids):
         ids[2 * k + 4] = row.words[VERTICES_A + k]
         ids[2 * k + 5] = row.words[VERTICES_B + k]
     return n_start
+
+
+@kernel(inline=True)
+def _take_vertices(row, ids, ordered):
+    """The same of the vertices that a row names, if they are three pairs or more of cores that are scanned."""
+    A, B = ordered.pair.A, ordered.pair.B
+    is_scanned = A.tree == 0 and B.tree == 0 and A.coarse_at == 0 and B.coarse_at == 0
+    if row.flags[COUNT] < 3 or not is_scanned:
+        return 0
+    at_a = VERTICES_B if ordered.flip else VERTICES_A
+    at_b = VERTICES_A if ordered.flip else VERTICES_B
+    for k in range(3):
+        if row.words[at_a + k] < 0 or row.words[at_b + k] < 0:  # a curved core has none
+            return 0
+        ids[2 * k + 4] = row.words[at_a + k]
+        ids[2 * k + 5] = row.words[at_b + k]
+    return 3

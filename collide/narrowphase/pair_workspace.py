@@ -37,12 +37,14 @@ class Query(NamedTuple):
 
     boolean : only whether it meets.   depths : how deep an overlap is, too.   limit : gaps larger than this [m] are not
     measured.   terms_at : address of the `PoseTable`'s exact terms.
+    resumes : rows name the normal and the vertices of the same pair at a pose before, to begin with.
     """
 
     boolean: bool
     depths: bool
     limit: float
     terms_at: int
+    resumes: bool
 
 
 class Workspace(NamedTuple):

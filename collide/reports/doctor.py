@@ -32,6 +32,7 @@ OPTIONAL = (
     ("numba", "jit", "changing kernels: COLLIDE_JIT=1"),
     ("coacd", "decompose", "meshes as unions of convex pieces"),
     ("matplotlib", "plots", "collide locality --plot"),
+    ("mujoco", "mujoco", "MuJoCo's steps with collide's contacts"),
     ("coal", "peers", "collide compare"),
     ("python-fcl", "peers", "collide compare"),
     ("pybullet", "peers", "collide compare (wheels up to Python 3.11)"),
@@ -148,18 +149,18 @@ def _optional() -> list[Check]:
 
 
 def _hosts() -> list[Check]:
-    """Each stand-in is imported, and says whether programs find it under the host's name."""
+    """Modules that stand in for other engines: whether they can be imported, and beside what version."""
     checks = []
     for host in import_module("collide.adapters.hosts").HOSTS:
         version = package_version(host.package)
-        beside = f"{host.package} {version}" if version else f"{host.package} is absent, and not needed"
         try:
-            is_in = import_module(host.module).installed()
-        except ImportError as error:
+            import_module(host.module)
+        except Exception as error:  # noqa: BLE001 - told, whatever broke
             checks.append(Check(host.name, f"{host.module} cannot be imported: {error}", False))
-        else:
-            state = f"import {host.replaces} finds it" if is_in else f"install() lets import {host.replaces} find it"
-            checks.append(Check(host.name, f"{host.module}: {state} ({beside})"))
+            continue
+        absent = "absent" if host.is_needed else "not installed, and not needed"
+        state = f"{host.package} {version or absent}"
+        checks.append(Check(host.name, f"{host.module}: {host.usage} ({state})", True if version else None))
     return checks
 
 

@@ -1,12 +1,13 @@
 """What a user hands in: immutable shapes, validated when made.
 
-One file per family: primitives (a few numbers), hull (points), hpolytope (half-spaces),
-mesh (triangles), compound (a union), shape_set (many, picked from by number). `collide.scenes` still turns the
-meshes of scene files into hulls or unions of hulls, and says so for every body.
+One file per family: primitives (a few numbers), hull (points), hpolytope (half-spaces), mesh (triangles),
+height_field (a mesh of heights over a grid), compound (a union), shape_set (many, picked from by number).
+`collide.scenes` still turns the meshes of scene files into hulls or unions of hulls, and says so for every body.
 """
 
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.height_field import HeightField
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
@@ -15,5 +16,5 @@ from collide.shapes.shape_set import ShapeSet
 
 __all__ = [
     "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
-    "HPolytope", "Halfspace", "Mesh", "Shape", "ShapeSet", "Sphere",
+    "HPolytope", "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
 ]

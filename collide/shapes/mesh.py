@@ -195,7 +195,7 @@ class Mesh(Shape):
             return self.base
         with np.errstate(over="ignore", under="ignore"):
             vertices = _check_vertices(self.base.vertices * factor)
-        made = type(self).__new__(type(self))
+        made = Mesh.__new__(Mesh)
         made._store(vertices=vertices, faces=self.faces, solid=self.solid, scale=factor, _copied=self.base)
         return made
 

@@ -21,6 +21,7 @@ from collide.shapes import (
     Cylinder,
     Ellipsoid,
     Halfspace,
+    HeightField,
     HPolytope,
     Shape,
     Sphere,
@@ -37,6 +38,7 @@ KINDS = {
     "halfspace": ("normal", "offset"),
     "hull": ("points", "radius"),
     "hpolytope": ("normals", "offsets"),
+    "heightfield": ("heights", "cell", "bottom"),
     "mesh": ("file", "scale", "as"),
     "compound": ("shape", "pose"),
 }
@@ -104,8 +106,18 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
         return Halfspace(fields.numbers("normal", (3,)), length("offset"))
     if kind == "hull":
         return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
+    if kind == "heightfield":
+        heights, sides = scaled(fields.numbers("heights", (None, None)), metres), _cell(fields, metres)
+        return HeightField(heights, sides, bottom=length("bottom") if "bottom" in fields else None)
     normals = fields.numbers("normals", (None, 3))
     return HPolytope(normals, scaled(fields.numbers("offsets", (None,)), metres))
+
+
+def _cell(fields: Fields, metres: float) -> np.ndarray | float:
+    """A number, or two of them."""
+    if isinstance(fields.get("cell"), list):
+        return scaled(fields.numbers("cell", (2,)), metres)
+    return scaled(fields.number("cell"), metres)
 
 
 def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:

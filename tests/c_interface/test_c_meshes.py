@@ -106,6 +106,21 @@ def test_cavities_are_what_python_takes_for_them():
     assert told[True] > 500 and told[False] > 100, told
 
 
+def test_height_fields_are_meshes_to_c():
+    random, asker, told = np.random.default_rng(80), c.Asker(), Counter()
+    for number in range(40):
+        field = collide.HeightField(random.normal(size=(7, 6)) * 0.2, (0.3, 0.25))
+        body = (collide.Box(0.2, 0.3, 0.1), collide.Sphere(0.2), collide.Capsule(0.1, 0.3))[number % 3]
+        A, B, X = c.CMesh(field), c.CMesh(body), c.identity_at(*random.uniform((-1, -1, -0.5), (1, 1, 1)))
+        hit = collide.collide(field, body, np.eye(4), X)
+        assert asker.meshes_meet(A, B, np.eye(4), X) == (c.OK, hit), number
+        status, row = asker.mesh_gap(A, B, np.eye(4), X)
+        if status == c.OK:
+            assert row.tobytes() == collide.distance(field, body, np.eye(4), X).rows.tobytes(), number
+        told[hit, status == c.OK] += 1
+    assert told[False, True] > 8 and sum(count for (hit, _), count in told.items() if hit) > 8, told
+
+
 def test_mesh_arguments_are_checked():
     vertices, faces = surfaces.box()
     assert c.raw_mesh(vertices, faces, 3) == (c.INVALID_ARGUMENT, None)

@@ -13,7 +13,6 @@ compared, so a feature number that changed its meaning would throw the bodies ab
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -126,15 +125,9 @@ class Stepper:
 
 
 def keys_of(contacts) -> list[Key]:
-    """What each contact is known by: the bodies, their parts, and what of each meets; where neither has a number of
-    its own, the how manieth of the pair it is."""
+    """What each contact is known by: the bodies, their parts, and what of each meets."""
     fields = ["a", "b", "part_a", "part_b", "feature_a", "feature_b"]
-    seen: Counter[Key] = Counter()
-    keys = []
-    for key in zip(*(contacts[field].tolist() for field in fields)):
-        keys.append((*key, seen[key] if key[4:] == (-1, -1) else 0))
-        seen[key] += 1
-    return keys
+    return list(zip(*(contacts[field].tolist() for field in fields)))
 
 
 def axes_of(n: np.ndarray) -> np.ndarray:

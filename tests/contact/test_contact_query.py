@@ -7,6 +7,7 @@ import pytest
 
 import collide
 from collide import Box, ConvexHull, InvalidArgument, InvalidPose, ShapeSet, Sphere, contacts, pose
+from collide.narrowphase.prepared_pairs import prepared_pair
 
 EYE = np.eye(4)
 SHAPES = [Box(1, 1, 1), Sphere(0.5), ConvexHull(np.eye(3)), Box(2, 1, 0.5)]
@@ -48,3 +49,20 @@ def test_counts_that_do_not_match():
             contacts(SHAPES[0], bad, EYE, EYE)
     with pytest.raises(InvalidPose, match=r"X_WB\[1\]"):
         collide.contacts(SHAPES[0], SHAPES[1], EYE, np.array([EYE, EYE * np.nan]))
+
+
+def test_boxes_are_prepared_for_single_calls_by_their_first_contacts():
+    """Though `distance`, which prepares other pairs, is not asked for their rows."""
+    A, B, X_WB = Box(1, 1, 1), Box(0.5, 0.6, 0.7), pose((0.1, 0.2, 0.849), rpy=(0, 0, 0.3))
+    first = contacts(A, B, EYE, X_WB)
+    assert prepared_pair(A, B).of_contacts is not None
+    assert len(first) > 2 and first.rows.tobytes() == contacts(A, B, EYE, X_WB).rows.tobytes()
+
+
+def test_any_number_of_contacts_may_be_asked_for():
+    """Numbers beyond what a patch can have stand for all: the long way (first call) and the prepared one agree."""
+    shapes = collide.Box((1, 1, 1)), collide.Box((1, 1, 1))
+    X_WB = collide.pose((0.1, 0.2, 1.0))
+    rows = [collide.contacts(*shapes, np.eye(4), X_WB, max_contacts=n) for n in (10**30, 10**30, 2**31, 2**63, 100)]
+    assert len(rows[0]) == 4
+    assert all(np.array_equal(r.rows, rows[0].rows) for r in rows)

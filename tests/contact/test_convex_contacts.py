@@ -104,6 +104,23 @@ def test_faces_over_each_other(height):
     near(ball.point_a, [(0, 0, 0.25)], 1e-6)
 
 
+@pytest.mark.parametrize("shape", [collide.Capsule(0.08, 0.4), collide.Cylinder(0.08, 0.4)])
+def test_a_line_over_the_end_of_a_cylinder_has_both_its_ends(shape):
+    """The nearest point is on the rim, beyond the octagon: the far end is no point between it and the near one."""
+    several = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        tilt, yaw, turned = 10 ** rng.uniform(-6, -3), *rng.uniform(-3, 3, 2)
+        X_WB = collide.pose((*rng.uniform(-0.02, 0.02, 2), 0.23), rpy=(0.5 * np.pi + tilt, 0, yaw))
+        ground, X_WA = collide.Cylinder(0.1, 0.3), collide.pose((0, 0, 0), rpy=(0, 0, turned))
+        X_WB[2, 3] -= collide.distance(ground, shape, X_WA, X_WB).distance - rng.choice([-1e-4, 0.0, 1e-4])
+        c = collide.contacts(ground, shape, X_WA, X_WB, margin=2e-3)
+        ends = c.point[:, :2]
+        assert len(c) == 2 and np.linalg.norm(ends[1] - ends[0]) > 0.15, (seed, tilt, c.point, c.distance)
+        several += abs(np.hypot(*ends[0]) - 0.1) < 1e-7
+    assert several > 10  # that begin on the rim
+
+
 def test_compounds_are_asked_part_by_part():
     legs = [(collide.Box((0.25, 0.25, 0.5)), collide.pose((x, y, 0))) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
     stool = collide.Compound(
@@ -234,7 +251,7 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
         collide.contacts(sheet, sheet, EYE, collide.pose((0, 0, 1e-3)), margin=5.0)
     flat = collide.contacts(sheet, sheet, EYE, EYE)
     near(flat.point_a, [(x, y, 0) for x in (-1, 1) for y in (-1, 1)])
-    monkeypatch.setattr("collide.contact.contact_facets.MAX_PAIRS", 100)
+    monkeypatch.setattr("collide.contact.mesh_contacts.MAX_PAIRS", 100)
     c = collide.contacts(sheet, sheet, EYE, EYE)
     assert (
         len(c) == 1 and c.kind[0] == TRANSLATION and c.distance[0] == collide.distance(sheet, sheet, EYE, EYE).distance
@@ -247,7 +264,7 @@ def test_too_many_pairs_are_refused_or_told_otherwise(monkeypatch):
     "shape", [collide.Cylinder(0.1, 0.2), collide.Cone(0.1, 0.2), collide.Ellipsoid((0.1, 0.2, 0.1))]
 )
 @pytest.mark.parametrize("height", [0.105, 0.25, -0.5])
-def test_curved_shapes_against_meshes_have_one_row(shape, height):
+def test_curved_shapes_against_meshes_agree_with_their_distance(shape, height):
     """Above the table, within it, and out of reach."""
     top, place = collide.Mesh(*table(6)), collide.pose((0.1, 0.2, height))
     r = collide.distance(top, shape, np.eye(4), place)
@@ -255,10 +272,10 @@ def test_curved_shapes_against_meshes_have_one_row(shape, height):
         collide.contacts(*asked, margin=0.1)
         for asked in ((top, shape, np.eye(4), place), (shape, top, place, np.eye(4)))
     )
-    assert len(c) == len(swapped) == (r.distance <= 0.1)
+    assert bool(len(c)) == bool(len(swapped)) == (r.distance <= 0.1)
     if len(c):
-        assert c.kind[0] == (TRANSLATION if r.hit else GAP) and c.distance[0] == r.distance and c.lower[0] == r.lower
-        assert (
-            c.upper[0] == r.upper and np.array_equal(c.normal[0], r.normal) and c.facet_b[0] == -1 and c.facet_a[0] >= 0
-        )
+        assert c.kind[0] == (TRANSLATION if r.hit else GAP) and abs(c.distance.min() - r.distance) < 1e-12
+        assert c.distance[0] < c.distance.min() + 1e-12 and np.abs(c.normal - r.normal).max() < 1e-6
+        assert c.lower[0] <= r.upper and r.lower <= c.upper[0]
+        assert c.facet_b[0] == -1 and c.facet_a[0] >= 0
         assert np.array_equal(swapped.normal[0], -c.normal[0]) and swapped.facet_a[0] == -1

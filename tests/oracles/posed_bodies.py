@@ -53,7 +53,7 @@ class PosedBodies:
         return workspace_at(*map(address_of, self._buffers))
 
     def query(self, *, boolean: bool = False, depths: bool = True, limit: float = math.inf) -> Query:
-        return Query(boolean, depths, limit, address_of(self.poses.terms))
+        return Query(boolean, depths, limit, address_of(self.poses.terms), False)
 
     def difference(self) -> dict[tuple[int, int], list[Fraction]]:
         """The points of A ⊖ B, exactly, by the vertices of the bodies as worked on."""

@@ -23,6 +23,7 @@ from collide.shapes import (
     Cylinder,
     Ellipsoid,
     Halfspace,
+    HeightField,
     HPolytope,
     Mesh,
     Sphere,
@@ -75,6 +76,11 @@ def body(shape=BALL, name="mug", **keys):
             {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}},
             HPolytope(np.vstack([np.eye(3), -np.eye(3)]), [1] * 6),
         ),
+        ({"heightfield": {"heights": [[0, 1, 0], [2, 0, 1]], "cell": 0.5}}, HeightField([[0, 1, 0], [2, 0, 1]], 0.5)),
+        (
+            {"heightfield": {"heights": [[0, 1], [2, 0]], "cell": [0.5, 2], "bottom": -3}},
+            HeightField([[0, 1], [2, 0]], (0.5, 2), bottom=-3),
+        ),
         (
             {"compound": [{"shape": BALL, "pose": {"xyz": [1, 0, 0]}}, {"shape": {"box": {"size": [1, 1, 1]}}}]},
             Compound([(Sphere(0.1), pose((1, 0, 0))), (Box((1, 1, 1)), np.eye(4))]),
@@ -119,10 +125,12 @@ def test_units(scene_of, unit, factor):
         bodies=[
             body({"box": {"size": [0.25 * factor, 0.5 * factor, factor]}}, pose={"xyz": [0.3 * factor, 0, 0]}),
             body({"halfspace": {"normal": [0, 0, 1], "offset": 2 * factor}}, "floor"),
+            body({"heightfield": {"heights": [[0, factor], [0, 0]], "cell": 0.3 * factor, "bottom": -factor}}, "hill"),
         ],
     )
     assert scene.bodies[0].shape == Box((0.25, 0.5, 1)) and scene.bodies[0].X_WB[0, 3] == 0.3
     assert scene.bodies[1].shape == Halfspace((0, 0, 1), 2)
+    assert scene.bodies[2].shape == HeightField([[0, 1], [0, 0]], 0.3, bottom=-1)
     assert (len(scene.notes) == 0) == (unit == "m")
 
 
@@ -237,6 +245,23 @@ BAD = {
     "empty polytope": (
         {"bodies": [body({"hpolytope": {"normals": [[1, 0, 0], [-1, 0, 0]], "offsets": [0, -1]}})]},
         "shape.hpolytope: HPolytope",
+    ),
+    "ragged heights": (
+        {"bodies": [body({"heightfield": {"heights": [[0, 1], [2]], "cell": 1}})]},
+        r"shape.heightfield.heights: must be N × N numbers, got \[\[0, 1\], \[2\]\]",
+    ),
+    "one row of heights": (
+        {"bodies": [body({"heightfield": {"heights": [[0, 1]], "cell": 1}})]},
+        r'"mug".shape.heightfield: HeightField: heights must have at least 2 rows and 2 columns',
+    ),
+    "cell": (
+        {"bodies": [body({"heightfield": {"heights": [[0, 1], [0, 1]], "cell": [1, 2, 3]}})]},
+        r"shape.heightfield.cell: must be 2 numbers, got \[1, 2, 3\]",
+    ),
+    "no cell": ({"bodies": [body({"heightfield": {"heights": [[0, 1], [0, 1]]}})]}, "heightfield: 'cell' is missing"),
+    "high bottom": (
+        {"bodies": [body({"heightfield": {"heights": [[0, 1], [0, 1]], "cell": 1, "bottom": 0.5}})]},
+        r"shape.heightfield: HeightField: bottom must lie below all heights, got 0.5, and heights\[0, 0\] is 0.0",
     ),
     "nested": (
         {"bodies": [body({"compound": [{"shape": {"sphere": {"radius": 0}}}]})]},

@@ -399,6 +399,7 @@ SCENE = {
         {"name": "m", "shape": {"mesh": {"file": "t.obj", "scale": [1, 1, 2], "as": "hull"}}},
         {"name": "c", "shape": {"compound": [{"shape": {"capsule": {"radius": 1, "length": 1}}, "pose": {"rpy_deg": [0, 90, 0]}}]}},
         {"name": "h", "shape": {"hull": {"points": [[0, 0, 0], [1, 0, 0]], "radius": 1}}},
+        {"name": "f", "shape": {"heightfield": {"heights": [[0, 1], [1, 0]], "cell": [1, 1], "bottom": -1}}},
         {"name": "p", "shape": {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}}},
     ],
     "allow": [["a", "m", "r"]], "states": {"st": {"l_j": 0.1}},

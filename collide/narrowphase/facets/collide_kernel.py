@@ -179,7 +179,7 @@ def _point_inside(space, body, X_at, points_at, n_points, Y_at):
 
 
 @kernel
-def _inside_state(space, A, XA_at, B, XB_at, inside_at):
+def inside_state(space, A, XA_at, B, XB_at, inside_at):
     """HIT where a point of a part of B lies in A; else APART or SINGULAR.
 
     inside : 0, or three doubles that become the point in the world.
@@ -217,9 +217,9 @@ def cores_state(space, pair, inside_at):
         return SINGULAR
     if words[1] > words[0]:
         return HIT
-    state = _inside_state(space, pair.A, pair.XA_at, pair.B, pair.XB_at, inside_at)
+    state = inside_state(space, pair.A, pair.XA_at, pair.B, pair.XB_at, inside_at)
     if state == APART:
-        state = _inside_state(space, pair.B, pair.XB_at, pair.A, pair.XA_at, inside_at)
+        state = inside_state(space, pair.B, pair.XB_at, pair.A, pair.XA_at, inside_at)
     return state
 
 

@@ -95,8 +95,8 @@ def balls_farther(
 
     def ask_from(first: int, check: bool) -> int:
         return cull_poses(
-            address_of(numbers_a), address_of(X_WA), _step(X_WA), address_of(numbers_b), address_of(X_WB), _step(X_WB),
-            first, len(out), check, margin, address_of(out),
+            address_of(numbers_a), address_of(X_WA), step_of(X_WA), address_of(numbers_b), address_of(X_WB),
+            step_of(X_WB), first, len(out), check, margin, address_of(out),
         )  # fmt: skip
 
     _ask_all(ask_from, len(out), X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
@@ -126,11 +126,11 @@ def _states(
     out = np.zeros(n, dtype=np.uint8)
     if A.radius + B.radius > 0.0 and inside is None:
         _make_slabs(A, B)
-    header = _header(A, B, exchanged, workspace(stack_of(A.tree, B.tree)))
+    header = pair_header(A, B, exchanged, workspace(stack_of(A.tree, B.tree)))
 
     def ask_from(first: int, check: bool) -> int:
         return meet_poses(
-            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, n, check,
+            address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, n, check,
             inside is not None, 0 if inside is None else address_of(inside), address_of(out),
         )  # fmt: skip
 
@@ -154,7 +154,7 @@ def _ask_all(
         done = ask_from(done, check)
 
 
-def _step(X: np.ndarray) -> int:
+def step_of(X: np.ndarray) -> int:
     """Doubles from one pose to the next: none for one that goes with all of the other's."""
     return 16 * (len(X) > 1)
 
@@ -165,7 +165,7 @@ def _make_slabs(A: Body, B: Body) -> None:
     B.tree.need_slabs(make_slabs)
 
 
-def _header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
+def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
     """What the kernels of `collide_kernel.py` read first; the caller keeps bodies and workspace alive."""
     same_tree = A.tree.content == B.tree.content
     header = np.array(
@@ -221,13 +221,13 @@ def _fill_rows(
     lacks = np.zeros(len(rows), dtype=np.uint8)
     exchanged = B.key < A.key
     _make_slabs(A, B)
-    header = _header(*((B, A) if exchanged else (A, B)), exchanged, workspace(stack_of(A.tree, B.tree)))
+    header = pair_header(*((B, A) if exchanged else (A, B)), exchanged, workspace(stack_of(A.tree, B.tree)))
     reach = _reach_of_search(A, B, limit)
 
     def ask_from(first: int, check: bool) -> int:
         return gap_poses(
-            address_of(header), address_of(X_WA), _step(X_WA), address_of(X_WB), _step(X_WB), first, len(rows), check,
-            limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+            address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, len(rows),
+            check, limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
         )  # fmt: skip
 
     _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
@@ -318,7 +318,7 @@ class SinglePair:
         self._has_slabs = A.radius + B.radius > 0.0
         if self._has_slabs:
             _make_slabs(A, B)
-        header = _header(A, B, exchanged, space)
+        header = pair_header(A, B, exchanged, space)
         self.collide, self._gap = prepared_boolean(meet_single, header), prepared_row(gap_single, header)
 
     @staticmethod

@@ -14,7 +14,8 @@ import numpy as np
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.mesh.box_overlap import FRAME, PROBE
-from collide.mesh.bvh import EXPONENT, REACH, open_tree
+from collide.mesh.bvh import EXPONENT, MAX_LEAF, REACH, open_tree
+from collide.mesh.triangle import put_triangle, triangle_at
 from collide.narrowphase.facets.exact_corners import CORNERS
 from collide.narrowphase.facets.posed_surfaces import (
     INVERSE_A,
@@ -44,10 +45,12 @@ FACET_A, FACET_B, MEETS = range(3)
 INTS_OF_PAIR = 3
 
 # Doubles of workspace besides a placing and corners: reaches along both frames' axes (6), two triangles (18), points
-# (6), and two integers, the facet pairs found and those decided exactly.
-_REACHES, _TRIANGLES, _POINTS, _COUNTERS = 0, 6, 24, 30
+# (6), two integers, the facet pairs found and those decided exactly, and a leaf's triangles with their boxes.
+_REACHES, _TRIANGLES, _POINTS, _COUNTERS, _LEAF = 0, 6, 24, 30, 32
 _N_PAIRS, _EXACT = range(2)
-DOUBLES = PLACING + CORNERS + 32
+#: Doubles of a triangle with the box around it: nine, then least and largest x, y, z.
+_BOXED = 15
+DOUBLES = PLACING + CORNERS + 32 + _BOXED * (MAX_LEAF + 1)
 FLOATS = 2 * FRAME + PROBE
 
 #: Reaches beyond this, in units of boxes, would leave the floats: nothing is culled there.
@@ -58,7 +61,9 @@ _U = 2.0**-53
 class _Query(NamedTuple):
     """reach : distance that pairs are listed within [m].   error : bound of the error of a coordinate in the world.
 
-    shift : t_B − t_A.   out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
+    shift : t_B − t_A.
+    leaf : triangles of a leaf of A, and one of B, with boxes.
+    out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
     """
 
     trees: PosedTrees
@@ -69,6 +74,7 @@ class _Query(NamedTuple):
     triangles: np.ndarray
     points: np.ndarray
     counters: np.ndarray
+    leaf: np.ndarray
     out: np.ndarray
     facets: np.ndarray
     capacity: int
@@ -109,7 +115,7 @@ def _widen_probe(query, which, probe):
 
 
 @kernel
-def _world_error(A, XA, B, XB):
+def world_error(A, XA, B, XB):
     """Bound of the error of a coordinate in the world's axes."""
     size = 0.0
     for i in range(3):
@@ -131,14 +137,50 @@ def _visit_leaves(query, pair):
     trees, T = query.trees, query.triangles
     run_a = ~pair.link_a
     run_b = ~pair.link_b
+    first_a, n_a = run_a >> 3, run_a & 7
+    of_b = _BOXED * MAX_LEAF
+    leaf = query.leaf
+    bound = query.reach + 8.0 * query.error
+    for i in range(n_a):
+        put_in_world(trees.XA, Vec3(0.0, 0.0, 0.0), trees.A.triangles, 9 * (first_a + i), leaf, _BOXED * i)
+        _put_box(leaf, _BOXED * i)
     for b in range(run_b >> 3, (run_b >> 3) + (run_b & 7)):
-        put_in_world(trees.XB, query.shift, trees.B.triangles, 9 * b, T, 9)
-        put_in_frame_of_a(trees.placing, trees.B.triangles, 9 * b, trees.corners, 9)
-        for a in range(run_a >> 3, (run_a >> 3) + (run_a & 7)):
-            put_in_world(trees.XA, Vec3(0.0, 0.0, 0.0), trees.A.triangles, 9 * a, T, 0)
-            if not separated_by(T, query.reach + 8.0 * query.error):
-                _measure(query, a, b)
+        put_in_world(trees.XB, query.shift, trees.B.triangles, 9 * b, leaf, of_b)
+        _put_box(leaf, of_b)
+        is_placed = False
+        for i in range(n_a):
+            if _boxes_apart(leaf, _BOXED * i, of_b, bound):
+                continue
+            if not is_placed:
+                put_in_frame_of_a(trees.placing, trees.B.triangles, 9 * b, trees.corners, 9)
+                put_triangle(T, 9, triangle_at(leaf, of_b))
+                is_placed = True
+            put_triangle(T, 0, triangle_at(leaf, _BOXED * i))
+            if not separated_by(T, bound):
+                _measure(query, first_a + i, b)
     return False
+
+
+@kernel(inline=True)
+def _put_box(leaf, at):
+    """Behind a triangle: the least and largest of its coordinates."""
+    for j in range(3):
+        p, q, r = leaf[at + j], leaf[at + 3 + j], leaf[at + 6 + j]
+        leaf[at + 9 + j] = min(p, q, r)
+        leaf[at + 12 + j] = max(p, q, r)
+
+
+@kernel(inline=True)
+def _boxes_apart(leaf, i, j, bound):
+    """Whether two triangles' boxes are farther apart along an axis than the bound."""
+    return (
+        leaf[j + 9] - leaf[i + 12] > bound
+        or leaf[i + 9] - leaf[j + 12] > bound
+        or leaf[j + 10] - leaf[i + 13] > bound
+        or leaf[i + 10] - leaf[j + 13] > bound
+        or leaf[j + 11] - leaf[i + 14] > bound
+        or leaf[i + 11] - leaf[j + 14] > bound
+    )
 
 
 @kernel(inline=True)
@@ -173,7 +215,11 @@ def _measure(query, a, b):
 _traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open_larger(_widen_probe))
 
 
-@entry("int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)")
+#: Of `list_near_pairs`.
+SIGNATURE = "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
     integers_at, exact_at,
@@ -192,11 +238,11 @@ def list_near_pairs(
     if not invertible:
         return -SINGULAR
     numbers_at = doubles_at + 8 * (PLACING + CORNERS)
-    error = _world_error(A, trees.XA, B, trees.XB)
+    error = world_error(A, trees.XA, B, trees.XB)
     query = _Query(
         trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(numbers_at + 8 * _REACHES, 6),
         view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),
-        view_i64(numbers_at + 8 * _COUNTERS, 2),
+        view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(numbers_at + 8 * _LEAF, _BOXED * (MAX_LEAF + 1)),
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
     )  # fmt: skip
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)

@@ -69,7 +69,7 @@ class Pairs:
         """The kind of gap that pair k is queued as."""
         ordered = ordered_pair(*self.tables, address_of(self.shape_of), 2 * k, 2 * k + 1)
         A, B = ordered.pair.A, ordered.pair.B
-        query = Query(False, True, np.inf, address_of(self.poses.terms))
+        query = Query(False, True, np.inf, address_of(self.poses.terms), False)
         row = blank_row(address_of(rows) + ROW * k)
         return convex_convex(ordered, method(A.kind, A.n, B.kind, B.n) == CAPSULES, query, row, k, 0, self.work)
 

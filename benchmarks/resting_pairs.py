@@ -89,7 +89,7 @@ def resting_pairs(n: int, seed: int) -> list[Pair]:
     level with the surface, half sunk by 1e-6 to 1e-3 m, a quarter as much above; then turned and shifted together."""
     rng = np.random.default_rng(seed)
     kinds = [(top, bottom) for top in TOPS for bottom in BOTTOMS]
-    shapes = {kind: [shape_of(kind, rng, k) for k in range(SHAPES)] for kind in {*TOPS, *BOTTOMS}}
+    shapes = {kind: [shape_of(kind, rng, k) for k in range(SHAPES)] for kind in sorted({*TOPS, *BOTTOMS})}
     pairs = []
     for k in range(n):
         top, bottom = kinds[k % len(kinds)]

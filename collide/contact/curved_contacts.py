@@ -1,0 +1,222 @@
+"""Contacts of a mesh and a curved convex set (a cylinder, cone, ellipsoid, polytope of rounded corners) from Python.
+
+Facets near the set are found for all poses together, and answered one by one by the convex engine; a kernel makes
+patches of those of each pose (`curved_manifolds.py`). How far the set has to be moved along a patch's normal is proven
+by slabs there, and tried here by asking the facets again.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.contact.contact_facets import topology_of
+from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP
+from collide.contact.curved_manifolds import (
+    HEADER,
+    POSE_A,
+    ROWS_DONE,
+    curved_manifolds,
+    workspace_words,
+)
+from collide.contact.curved_patches import LAST_BIT
+from collide.contact.distance_contacts import with_distances
+from collide.contact.support_face import ROUND
+from collide.errors import UnsupportedQuery
+from collide.kernels import address_of
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, body_of
+from collide.lowering.hull_faces import face_table_of
+from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.shape_table import ShapeTable
+from collide.narrowphase.facets.facet_kernel_calls import step_of
+from collide.narrowphase.facets.facets_against_curved import facet_rows
+from collide.narrowphase.facets.near_facets import near_facets
+from collide.results import PAIR_DTYPE
+from collide.shapes.shape import Shape
+from collide.threads import pieces_of, share
+
+#: Facets near a set that are looked at, in all poses of a piece and at most at one; poses of a piece.
+_FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256
+#: Rows there is space for to begin with, and so many more a pose.
+_FIRST_ROWS, _ROWS_PER_POSE = 64, 8
+#: Lengths tried where slabs prove one longer than the depth, in depths.
+_LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
+#: A length that is longer than the depth by no more than this part is as good as one can be.
+_AS_GOOD = 1.0 + 2.0**-10
+
+Rows = tuple[np.ndarray, np.ndarray]
+
+
+class _Near(NamedTuple):
+    """Facets near the set at n poses, those that meet it first, the deepest first, then the nearest first.
+
+    facets, places : (k,) numbers in the mesh and in its tree.   rows : (k,) PAIR_DTYPE.   starts : (n + 1,).
+    patches : (k,) bits of the patches that each is in, once these are made.
+    """
+
+    facets: np.ndarray
+    places: np.ndarray
+    rows: np.ndarray
+    starts: np.ndarray
+    patches: np.ndarray
+
+
+def curved_contacts(
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+) -> Rows:
+    """(rows, ends) of a mesh and a curved convex set; as `mesh_contacts.facet_contacts`."""
+    exchanged = kind_of(A) is not Kind.MESH
+    if exchanged:
+        A, B, X_WA, X_WB = B, A, X_WB, X_WA
+    n = max(len(X_WA), len(X_WB))
+    size = max(1, min(_POSES_OF_PIECE, -(-n // max(threads, 1))))
+    pieces = pieces_of(n, -(-n // size), 1)
+    topology_of(body_of(A)), enclosure_of(B)  # made once, before threads ask for them
+    of_piece: dict[int, Rows] = {}
+
+    def answer(piece: slice) -> None:
+        XA, XB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
+        some = None if slack is None else slack[piece]
+        of_piece[piece.start] = _of_poses(A, B, XA, XB, piece.stop - piece.start, margin, max_contacts, some)
+
+    if threads > 1 and len(pieces) > 1:
+        share(pieces, answer, threads)
+    else:
+        for piece in pieces:
+            answer(piece)
+    answers = [of_piece[start] for start in sorted(of_piece)]
+    rows = np.concatenate([rows for rows, _ in answers])
+    counts = np.concatenate([np.diff(ends, prepend=0) for _, ends in answers])
+    return exchanged_rows(rows) if exchanged else rows, np.cumsum(counts)
+
+
+def exchanged_rows(rows: np.ndarray) -> np.ndarray:
+    """The same contacts with A and B exchanged."""
+    out = rows.copy()
+    for field in ("point", "facet", "feature"):
+        out[f"{field}_a"], out[f"{field}_b"] = rows[f"{field}_b"], rows[f"{field}_a"]
+    out["normal"] = 0.0 - rows["normal"]
+    return out
+
+
+def _of_poses(
+    A: Shape, B: Shape, X_WA, X_WB, n: int, margin: float, max_contacts: int, slack: np.ndarray | None
+) -> Rows:
+    """The same of a piece of the poses, the mesh being A."""
+    body, packed = body_of(A), enclosure_of(B).packed
+    PA, PB = (as_given(np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4)))) for X in (X_WA, X_WB))
+    limit = np.full(n, margin) if slack is None else margin + slack
+    near = _near(body, packed, PA, PB, limit)
+    rows, ends, lacks = _patches(body, packed, PA.X, PB.X, near, margin, max_contacts, slack)
+    rows = _shortened(body, packed, PA, PB, near, rows, ends)
+    if lacks.any():
+        return with_distances(A, B, PA.X, PB.X, limit, rows, ends, lacks, reach=float(limit.max()))
+    return rows, ends
+
+
+def _near(body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, limit: np.ndarray) -> _Near:
+    """Facets no farther than a limit a pose [m]. Raises UnsupportedQuery."""
+    across = PB.X[:, :3, 3] - PA.X[:, :3, 3]
+    candidates = near_facets(body.tree, packed, PA, PB, across, limit)
+    counts = np.bincount(candidates.pose, minlength=len(limit))
+    if counts.max(initial=0) > MAX_FACETS:
+        raise UnsupportedQuery(
+            f"contacts: more than {MAX_FACETS} facets lie within {limit.max():g} m of a curved shape: ask with a "
+            "smaller margin, or take a coarser mesh"
+        )
+    blocks = [np.zeros(0, dtype=PAIR_DTYPE)]
+    for begin in range(0, len(candidates.pose), _FACETS_OF_PIECE):
+        some = slice(begin, begin + _FACETS_OF_PIECE)
+        pose, place = candidates.pose[some], candidates.place[some]
+        blocks.append(facet_rows(body.tree, packed, PA, PB, pose, place, boolean=False, limit=np.inf))
+    rows = np.concatenate(blocks)
+    keep = rows["lower"] <= limit[candidates.pose]
+    rows, pose, place = rows[keep], candidates.pose[keep], candidates.place[keep]
+    facets = body.tree.ids[place].astype(np.int64)
+    order = np.lexsort((facets, rows["distance"], ~rows["hit"], pose))
+    starts = np.concatenate([[0], np.cumsum(np.bincount(pose, minlength=len(limit)))])
+    return _Near(facets[order], place[order], rows[order], starts, np.zeros(len(order), dtype=np.int64))
+
+
+def _patches(
+    body: Body, packed: PackedConvex, X_WA, X_WB, near: _Near, margin: float, max_contacts: int, slack
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(rows, ends, (n,) whether no patch tells) of poses (n, 4, 4)."""
+    n = len(X_WA)
+    table = ShapeTable([packed])
+    faces = face_table_of(table, ROUND)
+    topology = topology_of(body)
+    capacity = int(np.diff(near.starts).max(initial=0))
+    work = np.empty(workspace_words(capacity, faces.largest))
+    slots, seen = np.zeros(len(body.tree.ids), dtype=np.int64), np.zeros(len(topology.fan_starts), dtype=np.int64)
+    header = np.zeros(HEADER, dtype=np.int64)
+    buffers = (near.facets, near.rows, near.starts, near.patches, slots, seen, work)
+    header[:POSE_A] = (
+        body.tree.address, address_of(topology.header), body.solid, len(slots), *table.addresses,
+        address_of(faces.ints), faces.largest, *map(address_of, buffers), capacity, min(max_contacts, 1 << 40),
+    )  # fmt: skip
+    ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
+    while curved_manifolds(
+        address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
+        0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
+    ):  # fmt: skip
+        out[header[ROWS_DONE] :] = np.zeros((), dtype=CONTACT_DTYPE)
+        out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])
+    return out[: header[ROWS_DONE]], ends, lacks
+
+
+def _shortened(
+    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
+    ends: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Rows whose ``apart`` is no longer than what facets, asked again, prove: B moved by it clears them, and A."""
+    pose = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
+    begins = np.flatnonzero((np.diff(pose, prepend=-1) != 0) | (np.diff(rows["patch"], prepend=-1) != 0))
+    sizes = np.diff(np.append(begins, len(rows)))
+    depth = np.maximum(-rows["lower"][begins], 0.0)
+    is_long = (rows["kind"][begins] == OVERLAP) & (rows["apart"][begins] > _AS_GOOD * depth)
+    begins, sizes, depth = begins[is_long], sizes[is_long], depth[is_long]
+    if not len(begins):
+        return rows
+    of_facet = np.repeat(np.arange(len(ends)), np.diff(near.starts))
+    for factor in _LENGTHS:
+        length = factor * depth
+        trying = np.flatnonzero((length < rows["apart"][begins]) & (length > 0.0))
+        if not len(trying):
+            continue
+        some = begins[trying]
+        parted = _parted(body, packed, PA, PB, near, of_facet, rows[some], pose[some], length[trying])
+        for i in trying[parted].tolist():
+            rows["apart"][begins[i] : begins[i] + sizes[i]] = length[i]
+    return rows
+
+
+def _parted(
+    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, of_facet: np.ndarray,
+    rows: np.ndarray, pose: np.ndarray, length: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(m,) bool: whether the set moved by a length along the normal of a patch is proven clear of the patch's facets,
+    and so is the mesh moved against it.
+    """
+    parted = np.ones(len(rows), dtype=bool)
+    steps = length[:, None] * rows["normal"]
+    bits = 1 << np.minimum(rows["patch"].astype(np.int64), LAST_BIT)
+    members = [np.flatnonzero((of_facet == p) & (near.patches & bit != 0)) for p, bit in zip(pose, bits)]
+    which = np.repeat(np.arange(len(rows)), [len(m) for m in members])
+    places = near.places[np.concatenate(members)]
+    for X_A, X_B in ((PA.X[pose], _moved(PB.X[pose], steps)), (_moved(PA.X[pose], -steps), PB.X[pose])):
+        asked = facet_rows(
+            body.tree, packed, as_given(X_A), as_given(X_B), which, places, boolean=True, limit=0.0
+        )
+        parted[which[asked["hit"]]] = False
+    return parted
+
+
+def _moved(X: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    moved = X.copy()
+    moved[:, :3, 3] += steps
+    return moved

@@ -1,0 +1,281 @@
+"""Reduction of a patch: of its points the deepest, and those that span the greatest area."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from collide.contact.contact_points import copy_of_points
+from collide.contact.manifold_points import GAP, POINT, V
+from collide.kernels import kernel
+
+#: Points are on a wall where they lie so many times as far above another as aside of it.
+_STEEP = 2.0
+#: Directions in which extreme points are looked for before others are compared with them.
+_EXTREME = 8
+
+
+class HullSpace(NamedTuple):
+    """Views of numbers of points: those that are compared, a hull's corners, and whether a point is on no wall."""
+
+    order: Any
+    corners: Any
+    remaining: Any
+
+
+@kernel
+def hull_of_patch(points, n, tolerance, space):
+    """Put the corners of the convex hull of n points that are on no wall into ``space.corners``, counter-clockwise; how
+    many.
+
+    A wall is what rises steeply from a lower point. tolerance : lengths below it are rounding [m].
+    """
+    p = points.manifold.points
+    for i in range(n):
+        space.remaining[i] = 1
+    n_order = _outer_points(p, n, tolerance, space)
+    n_corners = _hull(p, n_order, tolerance, space)
+    while _drop_walls(p, n, n_corners, tolerance, space):
+        n_order = 0
+        for i in range(n):
+            if space.remaining[i] != 0:
+                space.order[n_order] = i
+                n_order += 1
+        n_corners = _hull(p, n_order, tolerance, space)
+    return n_corners
+
+
+@kernel
+def _drop_walls(p, n, n_corners, tolerance, space):
+    """Take corners that rise steeply from other points from what remains; whether there are any."""
+    lowest = math.inf
+    for i in range(n):
+        lowest = min(lowest, p[POINT * i + GAP])
+    dropped = False
+    for j in range(n_corners):
+        k = POINT * space.corners[j]
+        if p[k + GAP] - lowest <= tolerance:
+            continue
+        for i in range(n):
+            rise = p[k + GAP] - p[POINT * i + GAP] - tolerance
+            if rise <= 0.0:
+                continue
+            du, dv = p[k] - p[POINT * i], p[k + V] - p[POINT * i + V]
+            if rise * rise > _STEEP * _STEEP * (du * du + dv * dv):
+                space.remaining[space.corners[j]] = 0
+                dropped = True
+                break
+    return dropped
+
+
+@kernel
+def _extreme_points(p, n, extreme):
+    """Put the numbers of points farthest in eight directions, counter-clockwise, none twice in a row; how many."""
+    for d in range(_EXTREME):
+        extreme[d] = 0
+    for i in range(1, n):
+        u, v = p[POINT * i], p[POINT * i + V]
+        _farther(p, extreme, 0, 4, i, u, p[POINT * extreme[0]], p[POINT * extreme[4]])
+        a, b = POINT * extreme[2], POINT * extreme[6]
+        _farther(p, extreme, 2, 6, i, v, p[a + V], p[b + V])
+        a, b = POINT * extreme[1], POINT * extreme[5]
+        _farther(p, extreme, 1, 5, i, u + v, p[a] + p[a + V], p[b] + p[b + V])
+        a, b = POINT * extreme[3], POINT * extreme[7]
+        _farther(p, extreme, 3, 7, i, v - u, p[a + V] - p[a], p[b + V] - p[b])
+    n_extreme = 1
+    for d in range(1, _EXTREME):
+        if extreme[d] != extreme[n_extreme - 1]:
+            extreme[n_extreme] = extreme[d]
+            n_extreme += 1
+    return n_extreme - 1 if n_extreme > 1 and extreme[n_extreme - 1] == extreme[0] else n_extreme
+
+
+@kernel(inline=True)
+def _farther(p, extreme, d, opposite, i, value, largest, least):
+    """Make point i extreme in a direction, or the opposite one, where it is; of equal ones the deeper counts."""
+    if value > largest or (value == largest and p[POINT * i + GAP] < p[POINT * extreme[d] + GAP]):
+        extreme[d] = i
+    if value < least or (value == least and p[POINT * i + GAP] < p[POINT * extreme[opposite] + GAP]):
+        extreme[opposite] = i
+
+
+@kernel
+def _outer_points(p, n, tolerance, space):
+    """Put what may be corners of the hull into ``space.order``; how many.
+
+    Points within the polygon of eight extreme ones, or on its sides, are none (S. G. Akl, G. T. Toussaint, "A fast
+    convex hull algorithm", 1978); in the place of an extreme point the one of least gap counts.
+    """
+    extreme = space.corners
+    n_extreme = _extreme_points(p, n, extreme)
+    n_order = 0
+    for i in range(n):
+        if _is_outer(p, i, extreme, n_extreme, tolerance):
+            space.order[n_order] = i
+            n_order += 1
+    return n_order
+
+
+@kernel(inline=True)
+def _is_outer(p, i, extreme, n_extreme, tolerance):
+    u, v = p[POINT * i], p[POINT * i + V]
+    beyond = False
+    for d in range(n_extreme):
+        at = POINT * extreme[d]
+        du, dv = u - p[at], v - p[at + V]
+        if abs(du) <= tolerance and abs(dv) <= tolerance:
+            return extreme[d] == i or p[POINT * i + GAP] < p[at + GAP]
+        to = POINT * extreme[d + 1 if d + 1 < n_extreme else 0]
+        eu, ev = p[to] - p[at], p[to + V] - p[at + V]
+        wide = eu * dv - ev * du
+        if wide < 0.0 and wide * wide > tolerance * tolerance * (eu * eu + ev * ev):
+            beyond = True
+    return beyond
+
+
+@kernel
+def _hull(p, n, tolerance, space):
+    """Corners of the hull of the n points of ``space.order``, none nearer than the tolerance to the line through its
+    neighbours; how many.
+
+    A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Of points in one place
+    the one of least gap is taken.
+    """
+    step = max(tolerance, 1e-300)
+    _sort(p, space.order, n, step)
+    n_distinct = 0
+    for i in range(n):
+        k = space.order[i]
+        last = space.order[n_distinct - 1] if n_distinct > 0 else -1
+        if last < 0 or max(abs(p[POINT * k] - p[POINT * last]), abs(p[POINT * k + V] - p[POINT * last + V])) > step:
+            space.order[n_distinct] = k
+            n_distinct += 1
+        elif p[POINT * k + GAP] < p[POINT * last + GAP]:
+            space.order[n_distinct - 1] = k
+    if n_distinct < 3:
+        for i in range(n_distinct):
+            space.corners[i] = space.order[i]
+        return n_distinct
+    n_corners = 0
+    for i in range(n_distinct):
+        n_corners = _push(p, space, n_corners, 0, space.order[i], step)
+    n_lower = n_corners
+    for i in range(n_distinct - 2, -1, -1):
+        n_corners = _push(p, space, n_corners, n_lower - 1, space.order[i], step)
+    n_corners -= 1  # the first once more
+    if n_corners > 2:
+        return n_corners
+    space.corners[0], space.corners[1] = space.order[0], space.order[n_distinct - 1]
+    return 2
+
+
+@kernel(inline=True)
+def _push(p, space, n, base, k, step):
+    """Put point k behind the chain of corners from ``base`` on, having dropped those that are none now; how many."""
+    corners = space.corners
+    while n >= base + 2:
+        i, j = POINT * corners[n - 2], POINT * corners[n - 1]
+        eu, ev = p[POINT * k] - p[i], p[POINT * k + V] - p[i + V]
+        wide = ev * (p[j] - p[i]) - eu * (p[j + V] - p[i + V])
+        if wide > 0.0 and wide > step * math.sqrt(eu * eu + ev * ev):
+            break
+        n -= 1
+    corners[n] = k
+    return n + 1
+
+
+@kernel(inline=True)
+def _cell(x, step):
+    """A coordinate in steps, so far as these can be counted."""
+    return float(math.floor(x / step + 0.5)) if abs(x) < 2.0**50 * step else x
+
+
+@kernel(inline=True)
+def _precedes(p, i, j, step):
+    """Whether point i comes before j: by place, in steps, then by gap."""
+    a, b = POINT * i, POINT * j
+    cell_a, cell_b = _cell(p[a], step), _cell(p[b], step)
+    if cell_a != cell_b:
+        return cell_a < cell_b
+    cell_a, cell_b = _cell(p[a + V], step), _cell(p[b + V], step)
+    if cell_a != cell_b:
+        return cell_a < cell_b
+    if p[a + GAP] != p[b + GAP]:
+        return p[a + GAP] < p[b + GAP]
+    return i < j
+
+
+@kernel
+def _sort(p, order, n, step):
+    """Sort numbers of points by place (heapsort: J. W. J. Williams, 1964)."""
+    for root in range(n // 2 - 1, -1, -1):
+        _sift(p, order, root, n, step)
+    for end in range(n - 1, 0, -1):
+        order[0], order[end] = order[end], order[0]
+        _sift(p, order, 0, end, step)
+
+
+@kernel
+def _sift(p, order, root, end, step):
+    k = order[root]
+    while 2 * root + 1 < end:
+        child = 2 * root + 1
+        if child + 1 < end and _precedes(p, order[child], order[child + 1], step):
+            child += 1
+        if not _precedes(p, k, order[child], step):
+            break
+        order[root] = order[child]
+        root = child
+    order[root] = k
+
+
+@kernel
+def reduce_patch(points, n, tolerance, target, space):
+    """Put what contacts are chosen from into ``target``, the first of n points' least gap first, then around the patch;
+    how many.
+
+    Corners of the convex hull, and the point of least gap where no corner is as deep.
+    """
+    p, errors = points.manifold.points, points.errors
+    n_corners = hull_of_patch(points, n, tolerance, space)
+    deepest = 0
+    for i in range(1, n):
+        if _is_deeper(p, i, deepest):
+            deepest = i
+    known = p[POINT * deepest + GAP] + errors[deepest] + tolerance
+    step = max(tolerance, 1e-300)
+    first = -1
+    for j in range(n_corners):
+        k = space.corners[j]
+        if p[POINT * k + GAP] - errors[k] > known:
+            continue
+        if first < 0:
+            first = j
+            continue
+        gap = _cell(p[POINT * k + GAP], step)
+        least = _cell(p[POINT * space.corners[first] + GAP], step)
+        if gap < least or (gap == least and _is_lower(p, k, space.corners[first])):
+            first = j
+    n_target = 0
+    if first < 0:
+        copy_of_points(points, deepest, target, 0)
+        n_target = 1
+        first = 0
+    for j in range(n_corners):
+        k = first + j if first + j < n_corners else first + j - n_corners
+        copy_of_points(points, space.corners[k], target, n_target)
+        n_target += 1
+    return n_target
+
+
+@kernel(inline=True)
+def _is_lower(p, i, j):
+    """By place: u, then v."""
+    a, b = POINT * i, POINT * j
+    return p[a] < p[b] or (p[a] == p[b] and p[a + V] < p[b + V])
+
+
+@kernel(inline=True)
+def _is_deeper(p, i, j):
+    gap_i, gap_j = p[POINT * i + GAP], p[POINT * j + GAP]
+    return gap_i < gap_j or (gap_i == gap_j and _is_lower(p, i, j))
