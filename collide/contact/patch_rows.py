@@ -134,10 +134,10 @@ def _name_faces(frame, patch, target, k, tolerance):
     for i in range(patch.n):
         du, dv = abs(p[POINT * i] - q[POINT * k]), abs(p[POINT * i + V] - q[POINT * k + V])
         rise = abs(p[POINT * i + POINT_GAP] - q[POINT * k + POINT_GAP])
-        if max(du, dv) <= tolerance and rise <= points.errors[i] + target.errors[k]:
-            if _faces_both(frame, points.pairs[i], nhat):
-                copy_of_points(points, i, target, k)
-                return
+        is_same = max(du, dv) <= tolerance and rise <= points.errors[i] + target.errors[k]
+        if is_same and _faces_both(frame, points.pairs[i], nhat):
+            copy_of_points(points, i, target, k)
+            return
 
 
 @kernel
