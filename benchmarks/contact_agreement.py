@@ -4,7 +4,7 @@
     python benchmarks/contact_agreement.py --pairs 900 --judge 40 --no-csv
 
 Boxes, hulls, cylinders standing and lying, capsules and spheres rest on boxes, hulls and cylinders, level or tilted by
-up to a hundredth, sunk or above by up to a millimetre (`contact_scenes.py`); all are asked with a margin of 2 mm. Of
+up to a hundredth, sunk or above by up to a millimetre (`resting_pairs.py`); all are asked with a margin of 2 mm. Of
 every manifold:
 
 found     shares of pairs within the margin that have contacts at all
@@ -32,9 +32,9 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[1] / "tests" / "oracles")]
 from contact_peers import BulletContacts, Manifold, MujocoContacts, installed, manifold_of
-from contact_scenes import Pair, interval, off_surface, resting_pairs, separation, support
 from convex import aligned, log, say, write
 from curved_oracle import bracket
+from resting_pairs import Pair, interval, off_surface, resting_pairs, separation, support
 from scipy.spatial import ConvexHull, QhullError
 from startup import machine
 
@@ -236,7 +236,8 @@ def main() -> int:
     for k in worst[:10]:
         log(f"ours is wrong: resting_pairs({k + 1}, {options.seed})[-1], {pairs[k].kind}, {errors['collide', k]}")
     if not options.no_csv:
-        log(f"written: {write('contact-agreement', rows, machine()).name}")
+        texts = [{key: f"{v:.4g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows]
+        log(f"written: {write('contact-agreement', texts, machine()).name}")
     return 0
 
 

@@ -31,7 +31,7 @@ C_SOURCES = [
     "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c", "capi_hull.c",
     "capi_mesh.c", "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_rings.c", "capi_settle.c",
     "capi_shapes.c", "capi_nested_subsets.c", "capi_status.c",
-    "capi_surface.c", "capi_tree.c", "capi_bigint.c",
+    "capi_surface.c", "capi_tree.c", "capi_bigint.c", "capi_contacts.c", "host_mujoco.c",
 ]
 WINDOWS, MACOS = sys.platform == "win32", sys.platform == "darwin"
 LIBRARY = "collide.dll" if WINDOWS else "libcollide.dylib" if MACOS else "libcollide.so"
@@ -217,7 +217,8 @@ def _exported() -> list[str]:
     """Names of what leaves the library, for linkers that want a list."""
     import re
 
-    text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in ("collide.h", "kernels_of_level.h"))
+    headers = ("collide.h", "kernels_of_level.h", "host_mujoco.h")
+    text = "".join((NATIVE / name).read_text(encoding="utf-8") for name in headers)
     return re.findall(r"^COLLIDE_(?:API|EXPORT)\b[^;(]*?(\w+)\(", text, re.MULTILINE)
 
 

@@ -1,5 +1,5 @@
 /* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/query.py. */
-#include "capi_internal.h"
+#include "capi_contacts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -244,6 +244,17 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     }
     round_as_before(given);
     return status;
+}
+
+collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, collide_pair *row)
+{
+    struct question asked = single(space, X_WA, X_WB, 0, 0);
+    collide_status status;
+    size_t failed;
+    asked.limit = limit;
+    memset(row, 0, sizeof *row);
+    status = answer(space, &asked, NULL, row, &failed);
+    return status == COLLIDE_OK ? close_pairs(space, &asked, row, &failed) : status;
 }
 
 /* --- batches ------------------------------------------------------------------------------------------------------- */

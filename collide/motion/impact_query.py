@@ -200,8 +200,7 @@ def _checked_poses(X, name: str, check: bool) -> tuple[np.ndarray, bool]:
 
 
 def _checked_tolerance(tolerance) -> float:
-    least, largest = _TOLERANCES
-    read = checks.number(tolerance)
+    read, (least, largest) = checks.number(tolerance), _TOLERANCES
     if read is None or not least <= read <= largest:
         raise InvalidArgument(
             f"tolerance must be a width of the bracket within {least:g} … {largest:g}, in units of the motion's time, "
@@ -280,16 +279,17 @@ def _answer(question: _Question) -> np.ndarray:
     """Rows of `IMPACT_DTYPE`."""
     shapes, a, b, motions, tolerance, threads = question
     rows = free_rows(len(a))
-    kinds = np.array([kind_of(shape) for shape in shapes], dtype=np.int64)
-    meshed = (kinds == Kind.MESH) | (kinds == Kind.MESH_COMPOUND)
-    of_facets = (meshed[a] | meshed[b]) if len(a) else np.zeros(0, dtype=bool)
+    meshed = np.array([kind_of(shape) in (Kind.MESH, Kind.MESH_COMPOUND) for shape in shapes], dtype=bool)
+    of_facets = meshed[a] | meshed[b]
     unbounded = np.array([_has_halfspace(shape) for shape in shapes], dtype=bool)
-    to_ask_first = of_facets | (unbounded[a] & unbounded[b]) if len(a) else of_facets
+    to_ask_first = of_facets | (unbounded[a] & unbounded[b])
     _ask_start(question, rows, np.flatnonzero(to_ask_first))
     apart = rows["status"] == FREE
     _refuse_planes(question, np.flatnonzero(to_ask_first & apart & unbounded[a] & unbounded[b]))
     convex = np.flatnonzero(apart & ~of_facets)
-    if len(convex):
+    if 0 < len(convex) == len(rows):
+        rows = convex_impacts(shapes, a, b, motions, tolerance, threads)
+    elif len(convex):
         rows[convex] = convex_impacts(shapes, a[convex], b[convex], motions.picked(convex), tolerance, threads)
     _surfaces(question, rows, np.flatnonzero(apart & of_facets))
     _refuse(question, rows)

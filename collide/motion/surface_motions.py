@@ -185,6 +185,8 @@ def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
 def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, tolerance: float, rows, is_part) -> None:
     """`_search` for all motions at once, by all pairs of facets."""
     near = np.flatnonzero(_come_near(motions, [(a, b)]))
+    if not len(near):
+        return
     table, jobs, ids = _jobs(a, b, pairs)
     parts, numbers = _parts(a, b), [np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)]
     before = _clear_parts(rows)

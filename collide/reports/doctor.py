@@ -32,6 +32,7 @@ OPTIONAL = (
     ("numba", "jit", "changing kernels: COLLIDE_JIT=1"),
     ("coacd", "decompose", "meshes as unions of convex pieces"),
     ("matplotlib", "plots", "collide locality --plot"),
+    ("mujoco", "mujoco", "MuJoCo's steps with collide's contacts"),
     ("coal", "peers", "collide compare"),
     ("python-fcl", "peers", "collide compare"),
     ("pybullet", "peers", "collide compare (wheels up to Python 3.11)"),

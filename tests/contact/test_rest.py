@@ -177,6 +177,19 @@ def test_a_cylinder_stands(ground, tilt):
     assert abs(stepper.X[body, 2, 3] - 0.25) < 1e-4
 
 
+def test_a_prism_of_twelve_sides_rests_on_all_its_corners():
+    """Dropped, tilted; with fewer contacts than corners it would never rest: the deepest are others in every step."""
+    angles = 2 * np.pi * np.arange(12) / 12
+    ring = 0.15 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    prism = collide.ConvexHull(np.concatenate([np.column_stack([ring, np.full(12, z)]) for z in (-0.1, 0.1)]))
+    stepper = Stepper(margin=0.01, max_contacts=12)
+    stepper.add(FLOOR, X_FLOOR)
+    stepper.add(prism, collide.pose((0, 0, 0.103), rpy=(0.02, 0.01, 0.3)), 1.0, rod_inertia(1, 0.15, 0.2))
+    steps = run(stepper, 10.0)
+    check_steady(steps[-480:], speed=1e-6, moved=1e-6, places=1e-6)
+    assert len(steps[-1].keys) == 12
+
+
 @pytest.mark.parametrize("cells", [1, 5])
 @pytest.mark.parametrize("is_mesh", [False, True])
 def test_a_body_rests_on_a_mesh(cells, is_mesh):

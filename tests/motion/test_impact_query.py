@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from functools import partial
 
 import motions
 import numpy as np
@@ -142,6 +144,32 @@ def test_batches_singles_and_threads_give_the_same_bits():
     for k in range(0, 900, 60):
         one = collide.time_of_impact(group.A, group.B, *(X[k] for X in group.poses))
         assert same(one, [column[k] for column in r])
+
+
+def test_single_calls_of_one_pair_from_many_threads():
+    """Each thread has its own memory: what one asks does not reach another's answer."""
+    group = _random(400, 7)
+    r = collide.time_of_impact(group.A, group.B, *group.poses)
+    collide.time_of_impact(group.A, group.B, *(X[0] for X in group.poses))
+    with ThreadPoolExecutor(4) as threads:
+        single = partial(collide.time_of_impact, group.A, group.B)
+        ones = list(threads.map(lambda k: single(*(X[k] for X in group.poses)), range(400)))
+    for k, one in enumerate(ones):
+        assert same(one, [column[k] for column in r])
+
+
+def test_a_prepared_pair_refuses_what_any_refuses():
+    """The short way of single calls leaves bad poses, other types and turns to the long one."""
+    collide.time_of_impact(BOX, BALL, HERE, HERE, at(3, 0, 0), at(-3, 0, 0))
+    with pytest.raises(InvalidPose, match="X_WB1"):
+        collide.time_of_impact(BOX, BALL, HERE, HERE, at(3, 0, 0), np.diag([1.0, 1, 1.1, 1]))
+    with pytest.raises(InvalidPose, match="X_WA1"):
+        collide.time_of_impact(BOX, BALL, HERE, np.full((4, 4), np.nan), at(3, 0, 0), at(-3, 0, 0))
+    plain = collide.time_of_impact(BOX, BALL, HERE, HERE, at(3, 0, 0), at(-3, 0, 0))
+    for X in (HERE.tolist(), np.eye(4, dtype=np.float32), np.asfortranarray(HERE), np.eye(8)[::2, ::2]):
+        assert same(plain, collide.time_of_impact(BOX, BALL, X, HERE, at(3, 0, 0), at(-3, 0, 0)))
+    turned = collide.time_of_impact(BOX, BALL, HERE, HERE, at(3, 0, 0), at(-3, 0, 0), omega_WA=(0, 0, 2 * math.pi))
+    assert turned.hit and turned.time < plain.time
 
 
 def test_swapping_swaps_points_and_negates_the_normal_exactly():

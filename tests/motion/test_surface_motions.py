@@ -177,6 +177,38 @@ def test_finely_cut_faces_come_together_at_once():
     assert flush.hit and flush.certified and flush.lower <= 2 / 3 <= flush.upper
 
 
+def test_a_ball_drops_on_a_height_field():
+    rng = np.random.default_rng(14)
+    field, ball, n = collide.HeightField(rng.uniform(0.0, 0.5, (12, 12)), 0.25), collide.Sphere(0.2), 60
+    X0, X1 = np.tile(np.eye(4), (2, n, 1, 1))
+    X0[:, :3, 3] = rng.uniform((-1, -1, 1), (1, 1, 3), (n, 3))
+    X1[:, :3, 3] = rng.uniform((-1, -1, -1), (1, 1, 1), (n, 3))
+    r = collide.time_of_impact(field, ball, np.eye(4), np.eye(4), X0, X1)
+    twin = collide.time_of_impact(collide.Mesh(field.vertices, field.faces), ball, np.eye(4), np.eye(4), X0, X1)
+    assert (r.hit == twin.hit).all() and r.hit.sum() >= 40 and (~r.hit).sum() >= 3
+    assert (r.lower <= twin.upper).all() and (twin.lower <= r.upper).all()
+    for share, is_apart in ((0.999, True), (1.0, False)):
+        X = collide.poses_in_motion(X0, X1, share * r.lower)
+        gaps = collide.distance(field, ball, np.eye(4), X).distance[r.hit]
+        assert (gaps > 0.0).all() if is_apart else (np.abs(gaps) < 1e-8).all()
+
+
+def test_few_facets_and_many_say_the_same():
+    """The L facet by facet, and one so finely cut that its motions are looked at span by span."""
+    coarse, box = l_mesh(), collide.Box((0.5, 0.4, 0.3))
+    corners = np.asarray(coarse.vertices)[np.asarray(coarse.faces)]
+    for _ in range(2):  # every facet into four
+        a, b, c = corners.transpose(1, 0, 2)
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        corners = np.concatenate([np.stack(of, 1) for of in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    fine = collide.Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    assert len(coarse.faces) <= 96 < len(fine.faces) and fine.solid
+    g = motions.random_group("cut", np.random.default_rng(15), 60, (None, box, None, 4.0), spread=2.0)
+    r, s = (collide.time_of_impact(mesh, box, *g.poses) for mesh in (coarse, fine))
+    assert (r.hit == s.hit).all() and (r.hit & (r.lower > 0.0)).sum() >= 8
+    assert (r.lower <= s.upper + 1e-14).all() and (s.lower <= r.upper + 1e-14).all()
+
+
 def test_swapped_meshes_and_unions_of_one_shape():
     """Equal shapes are told apart by their poses: the answer is mirrored exactly."""
     mesh = l_mesh()

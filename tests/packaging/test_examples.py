@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 #: The package that an example cannot do without, beyond the engine.
-NEEDS = {"06_compare_with_fcl": "fcl", "11_meshes_in_scenes": "trimesh"}
+NEEDS = {"06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh"}
 #: What each example's output must hold.
 SHOWS = {
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
@@ -45,6 +45,9 @@ SHOWS = {
         "a ball 1.00 mm above",
         "jaw 1 pushes along [-1.  0.  0.], 4 points",
         "box and ball",
+    ],
+    "13_mujoco_pit": [
+        "culled steps have MuJoCo's bits: True", "a World of 41 bodies", "with collide all are seen: True",
     ],
     "12_margins_and_names": [
         "within 5 mm: [True, True, False]",

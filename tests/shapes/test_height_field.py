@@ -238,6 +238,9 @@ def test_every_query_answers_as_for_its_mesh():
         away[2, 3] += 3.0
         fall, landed = (collide.time_of_impact(A, B, EYE, EYE, away, X[k]) for A in (field, mesh))
         assert (fall.hit, fall.time, fall.lower, fall.upper) == (landed.hit, landed.time, landed.lower, landed.upper), B
+        if not isinstance(B, collide.Halfspace):
+            one, other = (collide.shape_cast(B, away, (0, 0, -1), A, EYE) for A in (field, mesh))
+            assert one.hit and all(np.array_equal(x, y) for x, y in zip(one, other)), B
     assert 2 < sum(hits) < len(hits)
     worlds = [collide.World(), collide.World()]
     for world, ground in zip(worlds, (field, mesh)):
@@ -247,6 +250,11 @@ def test_every_query_answers_as_for_its_mesh():
     near = [world.distances(max_distance=0.5) for world in worlds]
     assert near[0].names == near[1].names and any("ground" in pair for pair in near[0].names)
     assert near[0].rows.tobytes() == near[1].rows.tobytes()
+    rays = [
+        world.raycast(rng_of("rays").normal(size=(20, 3)) * (0.3, 0.3, 0) + (0, 0, 9), (0, 0, -1)) for world in worlds
+    ]
+    assert rays[0].names == rays[1].names and rays[0].rows.tobytes() == rays[1].rows.tobytes()
+    assert "ground" in rays[0].names
 
 
 def test_scaled_copies_pickles_and_files_are_the_same(tmp_path):

@@ -1,0 +1,281 @@
+/* Functions of MuJoCo's collision table: a pair of geoms to contacts, in whatever thread MuJoCo asks.
+
+   A model is found by its address, a copy of one by its signature and by what its geoms are made of. Geoms of no model that was
+   added are left to the function that stood in the table before. */
+#include "host_mujoco.h"
+
+#include "capi_contacts.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(_MSC_VER)
+#include <intrin.h>
+typedef volatile long lock;
+#define TAKEN(place) (_InterlockedExchange((place), 1) != 0)
+#define GIVE_BACK(place) _InterlockedExchange((place), 0)
+#define PUBLISH() _ReadWriteBarrier()
+#else
+typedef volatile int lock;
+#define TAKEN(place) (__sync_lock_test_and_set((place), 1) != 0)
+#define GIVE_BACK(place) __sync_lock_release(place)
+#define PUBLISH() __sync_synchronize()
+#endif
+
+enum { KINDS = COLLIDE_MUJOCO_KINDS, PAIRS = KINDS * KINDS, MAX_MODELS = 256, SLOTS = 128, MAX_CONTACTS = 50, MESH = 7 };
+
+typedef int collision_function(const void *, void *, void *, int, int, double);
+
+static struct {
+    struct collide_mujoco_layout layout;
+    void **table;
+    void *before[PAIRS];
+    uint8_t replaced[PAIRS];
+    void (*error)(const char *, ...);
+} hook;
+
+static struct {
+    const void *volatile model; /* NULL of a free place */
+    struct collide_mujoco_model made;
+} models[MAX_MODELS];
+static volatile int n_models; /* places used so far */
+
+/* Workspaces: a thread takes one that is free for the length of a call. */
+static struct slot {
+    lock taken;
+    collide_workspace *space;
+    struct manifold_space manifold;
+    struct contact_row rows[MAX_CONTACTS];
+} slots[SLOTS];
+
+/* --- memory of MuJoCo's -------------------------------------------------------------------------------------------- */
+
+static const void *pointer_at(const void *structure, int64_t offset)
+{
+    const void *found;
+    memcpy(&found, (const char *)structure + offset, sizeof found);
+    return found;
+}
+
+static int type_of(const void *model, int geom)
+{
+    return ((const int32_t *)pointer_at(model, hook.layout.geom_type))[geom];
+}
+
+/* Whether a geom is still what its row of the tables was made from; its mesh is looked at where that may be another one. */
+static int is_as_it_was(const struct collide_mujoco_model *made, const void *model, int geom, int look_at_mesh)
+{
+    const double *size = (const double *)pointer_at(model, hook.layout.geom_size) + 3 * geom, *was = made->sizes + 3 * geom;
+    int32_t dataid = ((const int32_t *)pointer_at(model, hook.layout.geom_dataid))[geom];
+    const float *vertices;
+    if (type_of(model, geom) != made->types[geom] || dataid != made->dataids[geom]) return 0;
+    if (size[0] != was[0] || size[1] != was[1] || size[2] != was[2]) return 0;
+    if (!look_at_mesh || made->types[geom] != MESH || dataid < 0) return 1;
+    vertices = (const float *)pointer_at(model, hook.layout.mesh_vert) + 3 * (size_t)made->vertex_starts[dataid];
+    return memcmp(vertices, made->vertices + 3 * (size_t)made->vertex_starts[dataid],
+                  3 * sizeof(float) * (size_t)made->vertex_counts[dataid]) == 0;
+}
+
+/* What answers for two geoms; NULL where nothing does. *changed : 1 where the model is ours, and was changed since. */
+static const struct collide_mujoco_model *model_of(const void *model, int g1, int g2, int *changed)
+{
+    uint64_t signature;
+    int k;
+    *changed = 0;
+    for (k = n_models - 1; k >= 0; k--) /* of two that stand for one model the later */
+        if (models[k].model == model) {
+            const struct collide_mujoco_model *made = &models[k].made;
+            *changed = !is_as_it_was(made, model, g1, 0) || !is_as_it_was(made, model, g2, 0);
+            return made;
+        }
+    memcpy(&signature, (const char *)model + hook.layout.signature, sizeof signature);
+    for (k = n_models - 1; k >= 0; k--) {
+        const struct collide_mujoco_model *made = &models[k].made;
+        if (models[k].model != NULL && made->signature == signature && g1 < made->n_geoms && g2 < made->n_geoms &&
+            is_as_it_was(made, model, g1, 1) && is_as_it_was(made, model, g2, 1))
+            return made;
+    }
+    return NULL;
+}
+
+/* --- workspaces ---------------------------------------------------------------------------------------------------- */
+
+/* A workspace nobody else has; NULL where there is no memory. Threads begin looking at different places. */
+static struct slot *take_slot(int64_t largest)
+{
+    int local;
+    size_t k = ((uintptr_t)&local >> 16) % SLOTS;
+    struct slot *slot;
+    while (TAKEN(&slots[k].taken)) k = (k + 1) % SLOTS;
+    slot = &slots[k];
+    if (slot->space == NULL && collide_workspace_create(&slot->space) == COLLIDE_OK) begin_manifolds(&slot->manifold, slot->space);
+    if (slot->space != NULL && fit_manifolds(&slot->manifold, largest)) return slot;
+    GIVE_BACK(&slot->taken);
+    return NULL;
+}
+
+static void free_slots(void)
+{
+    int k;
+    for (k = 0; k < SLOTS; k++) {
+        if (TAKEN(&slots[k].taken)) continue; /* a thread is still at work: its memory stays */
+        collide_workspace_free(slots[k].space);
+        slots[k].space = NULL;
+        free_manifolds(&slots[k].manifold);
+        GIVE_BACK(&slots[k].taken);
+    }
+}
+
+/* --- a pair -------------------------------------------------------------------------------------------------------- */
+
+/* Matrix of a geom. */
+static void put_pose(const void *data, int geom, double *X)
+{
+    const double *p = (const double *)pointer_at(data, hook.layout.geom_xpos) + 3 * (size_t)geom;
+    const double *R = (const double *)pointer_at(data, hook.layout.geom_xmat) + 9 * (size_t)geom;
+    int i;
+    for (i = 0; i < 3; i++) {
+        memcpy(X + 4 * i, R + 3 * i, 3 * sizeof *R);
+        X[4 * i + 3] = p[i];
+    }
+    X[12] = X[13] = X[14] = 0.0;
+    X[15] = 1.0;
+}
+
+/* Distance, place, normal from the first geom to the second, and a tangent, which MuJoCo works out where it is 0. */
+static void put_contact(const struct contact_row *row, void *contact)
+{
+    double *out = contact;
+    int k;
+    out[0] = row->distance;
+    for (k = 0; k < 3; k++) {
+        out[1 + k] = 0.5 * (row->point_a[k] + row->point_b[k]);
+        out[4 + k] = row->normal[k];
+        out[7 + k] = 0.0;
+    }
+}
+
+static int left_to_mujoco(const void *model, void *data, void *contacts, int g1, int g2, double margin)
+{
+    void *before = hook.before[KINDS * type_of(model, g1) + type_of(model, g2)];
+    collision_function *call;
+    memcpy(&call, &before, sizeof call);
+    return call(model, data, contacts, g1, g2, margin);
+}
+
+/* Contacts into `out`; how many, or -1 where MuJoCo is to be asked; *status where neither will do. */
+static int answer(const struct collide_mujoco_model *made, const void *data, char *out, int g1, int g2, double margin,
+                  collide_status *status)
+{
+    int64_t a = made->rows[g1], b = made->rows[g2], max_contacts = made->max_contacts[KINDS * made->types[g1] + made->types[g2]], n = 0, k;
+    struct slot *slot;
+    double X_WA[16], X_WB[16], asked = margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0;
+    int count = 0;
+    if ((slot = take_slot(made->largest)) == NULL) {
+        *status = COLLIDE_NO_MEMORY;
+        return -1;
+    }
+    put_pose(data, g1, X_WA);
+    put_pose(data, g2, X_WB);
+    take_table_pair(slot->space, &slot->manifold, made->ints, made->numbers, made->faces, a, b, made->boxes[a] && made->boxes[b]);
+    if (made->is_cull) {
+        /* MuJoCo finds contacts of bodies that are a little farther apart than it allows: those are left to it. */
+        double slack = 1e-3 * (made->reaches[g1] + made->reaches[g2]) + 1e-5;
+        count = is_farther_apart(slot->space, X_WA, X_WB, asked + slack) ? 0 : -1;
+    } else {
+        *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, max_contacts, slot->rows, &n);
+        if (*status == COLLIDE_INVALID_POSE) { /* a state that diverged: MuJoCo notices, and resets it */
+            *status = COLLIDE_OK;
+            count = -1;
+        }
+        for (k = 0; k < n; k++)
+            if (slot->rows[k].distance <= margin) put_contact(&slot->rows[k], out + hook.layout.contact_size * count++);
+    }
+    GIVE_BACK(&slot->taken);
+    return count;
+}
+
+static int contacts_of_geoms(const void *model, void *data, void *contacts, int g1, int g2, double margin)
+{
+    collide_status status = COLLIDE_OK;
+    int changed, count;
+    const struct collide_mujoco_model *made = model_of(model, g1, g2, &changed);
+    if (changed) {
+        hook.error("collide: geom %d or %d is not what it was when install() looked at the model (kind, size or mesh): call "
+                   "refresh() of what install() returned", g1, g2);
+        return 0;
+    }
+    if (made == NULL || made->rows[g1] < 0 || made->rows[g2] < 0) return left_to_mujoco(model, data, contacts, g1, g2, margin);
+    count = answer(made, data, contacts, g1, g2, margin, &status);
+    if (status != COLLIDE_OK) {
+        hook.error("collide: contacts of geoms %d and %d: %s", g1, g2, collide_status_text(status));
+        return 0;
+    }
+    return count < 0 ? left_to_mujoco(model, data, contacts, g1, g2, margin) : count;
+}
+
+/* --- the table ----------------------------------------------------------------------------------------------------- */
+
+static void *ours(void)
+{
+    collision_function *function = contacts_of_geoms;
+    void *address;
+    memcpy(&address, &function, sizeof address);
+    return address;
+}
+
+int collide_mujoco_hook(const struct collide_mujoco_layout *layout, void **table, const uint8_t *replaced,
+                        void (*error)(const char *, ...))
+{
+    int k;
+    if (hook.table != NULL) return -1;
+    hook.layout = *layout;
+    hook.table = table;
+    hook.error = error;
+    memcpy(hook.before, table, sizeof hook.before);
+    for (k = 0; k < PAIRS; k++) hook.replaced[k] = replaced[k] && table[k] != NULL;
+    PUBLISH();
+    for (k = 0; k < PAIRS; k++)
+        if (hook.replaced[k]) table[k] = ours();
+    return 0;
+}
+
+int collide_mujoco_hooked(void)
+{
+    int k, n = 0;
+    for (k = 0; hook.table != NULL && k < PAIRS; k++) n += hook.replaced[k] && hook.table[k] == ours();
+    return n;
+}
+
+void collide_mujoco_unhook(void)
+{
+    int k;
+    if (hook.table == NULL) return;
+    for (k = 0; k < PAIRS; k++)
+        if (hook.replaced[k] && hook.table[k] == ours()) hook.table[k] = hook.before[k];
+    hook.table = NULL;
+    free_slots();
+}
+
+int collide_mujoco_add(const struct collide_mujoco_model *model)
+{
+    int k;
+    if (model->face_ints != FACE_INTS || model->manifold_header != MANIFOLD_HEADER ||
+        model->contact_bytes != (int64_t)sizeof(struct contact_row))
+        return -2;
+    for (k = 0; k < MAX_MODELS && models[k].model != NULL; k++) {}
+    if (k == MAX_MODELS) return -1;
+    models[k].made = *model;
+    PUBLISH();
+    models[k].model = model->model;
+    if (k >= n_models) n_models = k + 1;
+    return k;
+}
+
+void collide_mujoco_remove(int number)
+{
+    if (number < 0 || number >= MAX_MODELS) return;
+    models[number].model = NULL;
+    while (n_models > 0 && models[n_models - 1].model == NULL) n_models--;
+}
