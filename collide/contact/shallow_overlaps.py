@@ -128,9 +128,9 @@ def _part_all(pairs, A, B, error, limit, translations, points):
     """
     best, best_length, best_faces_all, deepest = -1, math.inf, False, -1
     for i in range(translations.counts[N_CANDIDATES]):
-        most = min(limit, best_length * (1.0 + 2.0**-20) + STEP_ERRORS * error)
+        max_length = min(limit, best_length * (1.0 + 2.0**-20) + STEP_ERRORS * error)
         n = vec3_at(translations.normals, 3 * i)
-        length, faces_all, k = _length_for_all(pairs, A, B, error, most, n, deepest, points)
+        length, faces_all, k = _length_for_all(pairs, A, B, error, max_length, n, deepest, points)
         if not length < math.inf:
             continue
         shorter = length < best_length * (1.0 - 2.0**-20) - STEP_ERRORS * error
@@ -152,9 +152,9 @@ def _part_all(pairs, A, B, error, limit, translations, points):
 
 
 @kernel
-def _length_for_all(pairs, A, B, error, most, n, first, points):
+def _length_for_all(pairs, A, B, error, max_length, n, first, points):
     """(the length along n that parts all touching pairs, whether all face along it, which needs it); infinite beyond
-    ``most`` [m] and where fewer than half face along it.
+    ``max_length`` [m] and where fewer than half face along it.
 
     first : a pair to begin with, −1 for none.
     """
@@ -162,7 +162,7 @@ def _length_for_all(pairs, A, B, error, most, n, first, points):
     depth, deepest = 0.0, max(first, 0)
     if first >= 0:
         depth = depth_along(pairs, first, A, B, view, points, 0.0)
-        if _length_for(depth, error) > most:
+        if _length_for(depth, error) > max_length:
             return math.inf, False, first
     n_touching, n_before = 0, 0
     for k in range(pairs.n):
@@ -173,7 +173,7 @@ def _length_for_all(pairs, A, B, error, most, n, first, points):
             of_k = depth_along(pairs, k, A, B, view, points, depth)
             if of_k > depth or (n_touching == 1 and first < 0):
                 depth, deepest = of_k, k
-                if _length_for(depth, error) > most:
+                if _length_for(depth, error) > max_length:
                     return math.inf, False, deepest
     if n_before == 0 or 2 * n_before < n_touching:
         return math.inf, False, deepest
