@@ -96,7 +96,7 @@ collide_status contacts_of_pair(collide_workspace *space, struct manifold_space 
     return status;
 }
 
-int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap)
+int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap, double direction[3])
 {
     collide_pair row;
     rounding given = round_as_kernels_do();
@@ -105,5 +105,6 @@ int is_farther_apart(collide_workspace *space, const double *X_WA, const double 
     result = space->kernels->answer_poses(address_of(space->header), 0, address_of(X_WA), 0, address_of(X_WB), 0, 0, 1, 0, 0, gap,
                                           1, 0, address_of(&row));
     round_as_before(given);
+    memcpy(direction, row.normal, sizeof row.normal);
     return result == 0 && row.how != COLLIDE_HOW_UNDECIDED && row.lower > gap;
 }

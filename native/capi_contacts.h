@@ -43,8 +43,13 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
                                 double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n);
 
-/* Whether the pair taken is proven to be farther apart than `gap`. */
-int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap);
+/* Whether the pair taken is proven to be farther apart than `gap`, and the direction that parts them. */
+int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap, double direction[3]);
+
+/* capi_axis.c: by how much two rows of a table of shapes are apart at least, along a direction of length about 1; of a half-space
+   along its normal, which must be its z axis. Proven; negative, or infinitely so, where that tells nothing. */
+double gap_along(const int64_t *ints_a, const double *numbers_a, const double *X_WA, const int64_t *ints_b,
+                 const double *numbers_b, const double *X_WB, const double direction[3]);
 
 /* capi_pairs.c: the row of `collide_distance` of the pair taken, with a proven bound where it is beyond the limit. */
 collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, collide_pair *row);

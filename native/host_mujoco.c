@@ -49,6 +49,28 @@ static struct slot {
     struct contact_row rows[MAX_CONTACTS];
 } slots[SLOTS];
 
+/* Directions that parted two geoms when they were last asked about, under a hash. Threads write them as they come: any direction
+   proves what it proves, so that one of other geoms, or half of one, costs time alone. */
+enum { AXES = 1 << 15, PAUSE = 7 };
+static volatile struct kept_axis {
+    float direction[3]; /* 0 where none is known */
+    int32_t pause;      /* of culling: so many calls go to MuJoCo at once, whose bodies met when last asked about */
+} kept_axes[AXES];
+
+static volatile struct kept_axis *kept_axis_of(const void *data, int g1, int g2)
+{
+    uint64_t key = (uint64_t)(uintptr_t)data + 0x9e3779b97f4a7c15u * ((uint64_t)(uint32_t)g1 << 32 | (uint32_t)g2);
+    key ^= key >> 29;
+    key *= 0xbf58476d1ce4e5b9u;
+    return &kept_axes[key >> 40 & (AXES - 1)];
+}
+
+static void keep_axis(volatile struct kept_axis *kept, const double *direction)
+{
+    int k;
+    for (k = 0; k < 3; k++) kept->direction[k] = direction != NULL ? (float)direction[k] : 0.0f;
+}
+
 /* --- memory of MuJoCo's -------------------------------------------------------------------------------------------- */
 
 static const void *pointer_at(const void *structure, int64_t offset)
@@ -170,25 +192,37 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
 {
     int64_t a = made->rows[g1], b = made->rows[g2], max_contacts = made->max_contacts[KINDS * made->types[g1] + made->types[g2]], n = 0, k;
     struct slot *slot;
-    double X_WA[16], X_WB[16], asked = margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0;
+    volatile struct kept_axis *kept = kept_axis_of(data, g1, g2);
+    double X_WA[16], X_WB[16], axis[3], asked = margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0;
+    /* MuJoCo finds contacts of bodies that are a little farther apart than it allows: those are left to it. */
+    double slack = made->is_cull ? 1e-3 * (made->reaches[g1] + made->reaches[g2]) + 1e-5 : 0.0;
     int count = 0;
-    if ((slot = take_slot(made->largest)) == NULL) {
-        *status = COLLIDE_NO_MEMORY;
+    if (made->is_cull && kept->pause > 0) {
+        kept->pause--;
         return -1;
     }
     put_pose(data, g1, X_WA);
     put_pose(data, g2, X_WB);
+    for (k = 0; k < 3; k++) axis[k] = kept->direction[k];
+    if (gap_along(made->ints + INTS * a, made->numbers + NUMBERS * a, X_WA, made->ints + INTS * b, made->numbers + NUMBERS * b,
+                  X_WB, axis) > asked + slack)
+        return 0;
+    if ((slot = take_slot(made->largest)) == NULL) {
+        *status = COLLIDE_NO_MEMORY;
+        return -1;
+    }
     take_table_pair(slot->space, &slot->manifold, made->ints, made->numbers, made->faces, a, b, made->boxes[a] && made->boxes[b]);
     if (made->is_cull) {
-        /* MuJoCo finds contacts of bodies that are a little farther apart than it allows: those are left to it. */
-        double slack = 1e-3 * (made->reaches[g1] + made->reaches[g2]) + 1e-5;
-        count = is_farther_apart(slot->space, X_WA, X_WB, asked + slack) ? 0 : -1;
+        count = is_farther_apart(slot->space, X_WA, X_WB, asked + slack, axis) ? 0 : -1;
+        keep_axis(kept, count == 0 ? axis : NULL);
+        if (count < 0) kept->pause = PAUSE;
     } else {
         *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, max_contacts, slot->rows, &n);
         if (*status == COLLIDE_INVALID_POSE) { /* a state that diverged: MuJoCo notices, and resets it */
             *status = COLLIDE_OK;
             count = -1;
         }
+        keep_axis(kept, n == 0 && *status == COLLIDE_OK ? slot->space->rows->normal : NULL);
         for (k = 0; k < n; k++)
             if (slot->rows[k].distance <= margin) put_contact(&slot->rows[k], out + hook.layout.contact_size * count++);
     }

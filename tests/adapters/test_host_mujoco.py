@@ -7,6 +7,7 @@ matrices here, not by the adapter. Skipped where MuJoCo is not installed.
 from __future__ import annotations
 
 import copy
+import functools
 import subprocess
 import sys
 import threading
@@ -115,7 +116,7 @@ def test_contacts_are_those_of_collide(a):
                 data.qpos[-7:-4] = direction if a != "plane" else (0.0, 0.0, abs(direction).sum() / 2)
                 data.qpos[-4:] = random.normal(size=4)
                 mujoco.mj_forward(model, data)
-                margin = data.contact[0].includemargin if data.ncon else margin_of(model)
+                margin = data.contact[0].includemargin if data.ncon else margin_of_two()
                 X_WA, X_WB = matrix(data, 0), matrix(data, 1)
                 expected = collide.contacts(A, B, X_WA, X_WB, margin=margin, max_contacts=most)
                 said = f"{a} {b} qpos = {data.qpos.tolist()}"
@@ -135,13 +136,43 @@ def test_contacts_are_those_of_collide(a):
     assert n_touching >= 10 and n_gaps >= 2 and n_empty >= 5, (n_touching, n_gaps, n_empty)
 
 
-def margin_of(model) -> float:
+@functools.cache
+def margin_of_two() -> float:
     """The margin of a pair: versions add those of the geoms, or take the larger. Two balls, 15 mm apart, tell."""
     ball = geom("sphere", more='margin="0.01"')
     two = model_of(body(ball), body(ball, (0.175, 0, 0)))
     data = mujoco.MjData(two)
     mujoco.mj_forward(two, data)
     return 0.02 if data.ncon else 0.01
+
+
+@pytest.mark.parametrize("a", KINDS)
+def test_bodies_that_creep_up(a):
+    """Pairs that come nearer step by step, through the margin, turning a little: directions that parted them before are
+    tried first, and leave nothing out."""
+    random = np.random.default_rng(10 + KINDS.index(a))
+    margin, n_apart, n_met = 0.01, 0, 0
+    for b in KINDS[max(1, KINDS.index(a)) :]:
+        model = pair_of(a, b)
+        model.geom_margin[1] = margin
+        shapes, rows, _ = geom_shapes(model)
+        A, B = (shapes[row] for row in rows)
+        data = mujoco.MjData(model)
+        q, direction = random.normal(size=4), random.normal(size=3)
+        direction = np.array([0.0, 0.0, 1.0]) if a == "plane" else direction / np.linalg.norm(direction)
+        with install(model):
+            for length in np.geomspace(0.5, 0.05, 60):
+                data.qpos[-7:-4], data.qpos[-4:] = length * direction, q + 1e-3 * random.normal(size=4)
+                mujoco.mj_forward(model, data)
+                expected = collide.distance(A, B, matrix(data, 0), matrix(data, 1))
+                said = f"{a} {b} qpos = {data.qpos.tolist()}"
+                if expected.lower > margin:
+                    assert data.ncon == 0, said
+                    n_apart += 1
+                elif expected.upper <= margin:
+                    assert data.ncon > 0 and min(c.dist for c in data.contact) <= expected.upper + 1e-12, said
+                    n_met += 1
+    assert n_apart >= 15 and n_met >= 10, (n_apart, n_met)
 
 
 def test_directions_and_signs():

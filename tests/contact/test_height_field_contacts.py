@@ -135,7 +135,7 @@ def stepped(stepper: Stepper, seconds: float) -> list[Step]:
 def test_bodies_that_fall_on_bumps_stay_there(seed):
     """A box and a tetrahedron, from above and askew. They may rock between peaks: a patch has the corners of what is
     near and its deepest point, and a peak between them is known when it is the deepest. But they stay within a
-    centimetre for two seconds, sink less than the margin, and gain no energy."""
+    centimetre for two seconds, sink less than half of one, as into a peak that is no row yet, and gain no energy."""
     stepper, size = Stepper(friction=0.6), np.array([0.3, 0.2, 0.1])
     stepper.add(bumpy_bowl(seed), EYE)
     inertia = (np.square(size).sum() - np.square(size)) / 12
@@ -146,7 +146,7 @@ def test_bodies_that_fall_on_bumps_stay_there(seed):
     places = np.array([step.X[1:, :3, 3] for step in last])
     assert np.ptp(places, axis=0).max() < 0.01, np.ptp(places, axis=0)
     assert {key[:2] for step in last for key in step.keys} == {(0, 1), (0, 2)}
-    assert min(step.contacts["distance"].min() for step in last) > -stepper.margin
+    assert min(step.contacts["distance"].min() for step in last) > -0.005
     assert all(len(step.keys) >= 6 and step.contacts["normal"][:, 2].min() > 0.8 for step in last)
 
 
