@@ -128,7 +128,9 @@ def _contact(g1, g2, b1, b2, normal, pos, depth) -> Contact:
 def _nearest_sides(o1: CollisionObject, o2: CollisionObject):
     """The shapes, of a plane that half-space out of which the way is shorter."""
     pairs = [(A, B) for A in o1._geometry._shapes for B in o2._geometry._shapes]
-    return max(pairs, key=lambda pair: engine.distance(*pair, o1._X, o2._X).distance) if len(pairs) > 1 else pairs[0]
+    if len(pairs) == 1:
+        return pairs[0]
+    return max(pairs, key=lambda pair: engine.distance(pair[0], pair[1], o1._X, o2._X).distance)
 
 
 def distance(o1, o2, request=None, result=None):
