@@ -112,14 +112,19 @@ def _mean_normal(pairs):
 
 
 @kernel
-def _worth(n, n_looked_at, translations):
-    """Mean over the pairs of how far A stays behind, and B before, the plane through their common point: 0 … −1."""
-    total = 0.0
+def _worth(n, n_looked_at, translations, floor):
+    """Mean over the pairs of how far A stays behind, and B before, the plane through their common point: 0 … −1.
+
+    floor : what is surely worth less is not worked out: something below it is returned.
+    """
+    total, least = 0.0, (floor - 2.0**-40) * n_looked_at
     for i in range(n_looked_at):
         lowest = 0.0
         for j in range(18 * i, 18 * i + 18, 3):
             lowest = min(lowest, -dot(n, vec3_at(translations.looked_at, j)))
         total += lowest
+        if total < least:
+            break
     return total / n_looked_at
 
 
@@ -135,7 +140,7 @@ def _add_candidate(v, n_looked_at, translations):
         if _are_same(v, vec3_at(translations.normals, 3 * i)):
             return
     put_vec3(translations.normals, 3 * n, v)
-    translations.worths[n] = _worth(v, n_looked_at, translations)
+    translations.worths[n] = _worth(v, n_looked_at, translations, -math.inf)
     translations.counts[N_CANDIDATES] = n + 1
 
 
@@ -217,8 +222,9 @@ def _replace_worst(n, first, n_looked_at, translations):
             worst = i
     if first == MAX_NORMALS:
         return
-    worth = _worth(n, n_looked_at, translations)
-    if worth <= translations.worths[worst] + AS_GOOD:
+    floor = translations.worths[worst] + AS_GOOD
+    worth = _worth(n, n_looked_at, translations, floor)
+    if worth <= floor:
         return
     for i in range(MAX_NORMALS):
         if _are_same(n, vec3_at(translations.normals, 3 * i)):

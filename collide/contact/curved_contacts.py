@@ -182,22 +182,21 @@ def _shortened(
     begins, sizes, depth = begins[is_long], sizes[is_long], depth[is_long]
     if not len(begins):
         return rows
-    of_facet = np.repeat(np.arange(len(ends)), np.diff(near.starts))
     for factor in _LENGTHS:
         length = factor * depth
         trying = np.flatnonzero((length < rows["apart"][begins]) & (length > 0.0))
         if not len(trying):
             continue
         some = begins[trying]
-        parted = _parted(body, packed, PA, PB, near, of_facet, rows[some], pose[some], length[trying])
+        parted = _parted(body, packed, PA, PB, near, rows[some], pose[some], length[trying])
         for i in trying[parted].tolist():
             rows["apart"][begins[i] : begins[i] + sizes[i]] = length[i]
     return rows
 
 
 def _parted(
-    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, of_facet: np.ndarray,
-    rows: np.ndarray, pose: np.ndarray, length: np.ndarray,
+    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
+    pose: np.ndarray, length: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """(m,) bool: whether the set moved by a length along the normal of a patch is proven clear of the patch's facets,
     and so is the mesh moved against it.
@@ -205,7 +204,8 @@ def _parted(
     parted = np.ones(len(rows), dtype=bool)
     steps = length[:, None] * rows["normal"]
     bits = 1 << np.minimum(rows["patch"].astype(np.int64), LAST_BIT)
-    members = [np.flatnonzero((of_facet == p) & (near.patches & bit != 0)) for p, bit in zip(pose, bits)]
+    begins, ends = near.starts[pose].tolist(), near.starts[pose + 1].tolist()
+    members = [i + np.flatnonzero(near.patches[i:j] & bit) for i, j, bit in zip(begins, ends, bits)]
     which = np.repeat(np.arange(len(rows)), [len(m) for m in members])
     places = near.places[np.concatenate(members)]
     for X_A, X_B in ((PA.X[pose], _moved(PB.X[pose], steps)), (_moved(PA.X[pose], -steps), PB.X[pose])):

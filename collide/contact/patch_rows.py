@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from collide.contact.contact_points import PatchPoints, copy_of_points
+from collide.contact.contact_pairs import facing_a, facing_b
+from collide.contact.contact_points import LEAST_COSINE, PatchPoints, copy_of_points
 from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
 from collide.contact.manifold_points import GAP as POINT_GAP
 from collide.contact.manifold_points import HEIGHT, POINT, V
 from collide.contact.reduce_patch import HullSpace, reduce_patch
-from collide.contact.reduce_points import select_points
 from collide.kernels import kernel, view_f64, view_i32
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
 from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
@@ -102,12 +102,41 @@ def put_patch(frame, patch, apart, number, space, n_rows):
         return -1
     error = 8.0 * frame.error if radius_a + radius_b > 0.0 else 0.0
     rows = RowsOf(patch.axes, space.origin, radius_a, radius_b, error, patch.meets, apart, number)
+    tolerance = _ERRORS * frame.error
     for i in range(n):
         k = space.hull.order[i]
+        _name_faces(frame, patch, target, k, tolerance)
         pair = INTS_OF_PAIR * target.pairs[k]
         facet_a, facet_b = frame.pairs.facets[pair + FACET_A], frame.pairs.facets[pair + FACET_B]
         put_row(space.out + CONTACT * (n_rows + i), target, k, facet_a, facet_b, rows)
     return n_rows + n
+
+
+@kernel(inline=True)
+def _faces_both(frame, pair, nhat):
+    """Whether both facets of a pair face along the normal, and none is a wall."""
+    pairs = frame.pairs
+    return min(facing_a(pairs, pair, nhat, frame.A), facing_b(pairs, pair, nhat, frame.B)) > LEAST_COSINE
+
+
+@kernel
+def _name_faces(frame, patch, target, k, tolerance):
+    """Where a contact is at the rim of a facet that stands along the normal, have it named by the facets that face it,
+    which share the point.
+
+    tolerance : points nearer than this are one [m].
+    """
+    points, nhat = frame.points, patch.axes.nhat
+    if _faces_both(frame, target.pairs[k], nhat):
+        return
+    p, q = points.manifold.points, target.manifold.points
+    for i in range(patch.n):
+        du, dv = abs(p[POINT * i] - q[POINT * k]), abs(p[POINT * i + V] - q[POINT * k + V])
+        rise = abs(p[POINT * i + POINT_GAP] - q[POINT * k + POINT_GAP])
+        is_same = max(du, dv) <= tolerance and rise <= points.errors[i] + target.errors[k]
+        if is_same and _faces_both(frame, points.pairs[i], nhat):
+            copy_of_points(points, i, target, k)
+            return
 
 
 @kernel
@@ -118,8 +147,7 @@ def choose_points(points, n, error, limit, space):
     """
     n = _keep_near(points, n, limit)
     tolerance = max(_ERRORS * error, _SHARE * _extent(points, n))
-    n = reduce_patch(points, n, tolerance, space.target, space.hull)
-    return select_points(space.target.manifold, n, 0, space.max_contacts, space.hull.order)
+    return reduce_patch(points, n, tolerance, space.max_contacts, space.target, space.hull)
 
 
 @kernel

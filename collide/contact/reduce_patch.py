@@ -1,12 +1,14 @@
-"""Reduction of a patch: of its points the deepest, and those that span the greatest area."""
+"""Reduction of a patch: of its points the deepest, the corners of their hull, and those among them that may carry."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
+from collide.contact.carrying_points import STEEP, choose_carrying, mark_carrying
 from collide.contact.contact_points import copy_of_points
 from collide.contact.manifold_points import GAP, POINT, V
+from collide.contact.reduce_points import select_points
 from collide.kernels import kernel
 
 #: Points are on a wall where they lie so many times as far above another as aside of it.
@@ -230,14 +232,32 @@ def _sift(p, order, root, end, step):
 
 
 @kernel
-def reduce_patch(points, n, tolerance, target, space):
-    """Put what contacts are chosen from into ``target``, the first of n points' least gap first, then around the patch;
-    how many.
+def reduce_patch(points, n, tolerance, max_contacts, target, space):
+    """Put the contacts of a patch of n points into ``target``, in the order of ``space.order``; how many.
 
-    Corners of the convex hull, and the point of least gap where no corner is as deep.
+    Corners of the convex hull, the point of least gap where no corner is as deep, and points among them that may carry.
+    The one of least gap comes first, then what is around the patch, then what is among it. Of more than
+    ``max_contacts``: where all are around it those that span the greatest area, else first those that a slight tilt
+    lets carry.
+    """
+    n_corners = hull_of_patch(points, n, tolerance, space)
+    n_ring = _put_ring(points, n, n_corners, tolerance, target, space)
+    mark_carrying(points.manifold.points, n, n_corners, tolerance, space)
+    n_target = _put_inner(points, n, n_ring, tolerance, target, space)
+    if n_target == n_ring or n_target <= max_contacts:
+        return select_points(target.manifold, n_target, 0, max_contacts, space.order)
+    for k in range(n_target):
+        space.corners[k] = space.remaining[space.order[k]]
+    return choose_carrying(target.manifold.points, n_target, max_contacts, space.corners, space.order)
+
+
+@kernel
+def _put_ring(points, n, n_corners, tolerance, target, space):
+    """Put the corners of the hull into ``target``, from the deepest on, which comes first though it be none; how many.
+
+    space.order : becomes the points' numbers.
     """
     p, errors = points.manifold.points, points.errors
-    n_corners = hull_of_patch(points, n, tolerance, space)
     deepest = 0
     for i in range(1, n):
         if _is_deeper(p, i, deepest):
@@ -258,13 +278,33 @@ def reduce_patch(points, n, tolerance, target, space):
             first = j
     n_target = 0
     if first < 0:
-        copy_of_points(points, deepest, target, 0)
+        space.order[0] = deepest
         n_target = 1
         first = 0
     for j in range(n_corners):
-        k = first + j if first + j < n_corners else first + j - n_corners
-        copy_of_points(points, space.corners[k], target, n_target)
+        space.order[n_target] = space.corners[first + j if first + j < n_corners else first + j - n_corners]
         n_target += 1
+    for k in range(n_target):
+        copy_of_points(points, space.order[k], target, k)
+    return n_target
+
+
+@kernel
+def _put_inner(points, n, n_ring, tolerance, target, space):
+    """Append points that may carry to ``target``, where none of those around the patch is; how many there are then."""
+    p = points.manifold.points
+    n_target = n_ring
+    for i in range(n):
+        if space.remaining[i] < STEEP:
+            continue
+        is_new = True
+        for k in range(n_ring):
+            at = POINT * space.order[k]
+            is_new = is_new and max(abs(p[POINT * i] - p[at]), abs(p[POINT * i + V] - p[at + V])) > 2.0 * tolerance
+        if is_new:
+            space.order[n_target] = i
+            copy_of_points(points, i, target, n_target)
+            n_target += 1
     return n_target
 
 

@@ -60,6 +60,8 @@ def separate_pairs(pairs, A, B, error, limit, translations, points):
             return False
         if attempt == 0:
             add_guesses(pairs, A, B, n_looked_at, translations)
+    if _part_all(pairs, A, B, error, limit, translations, points):
+        return False
     if translations.counts[N_CANDIDATES] > 0:
         _measure_depths(pairs, A, B, error, limit, translations, points)
         _group_pairs(pairs, A, B, error, translations)
@@ -101,11 +103,81 @@ def _part_at_once(pairs, A, B, error, limit, n, translations, points):
     length = _length_for(deepest, error)
     if length > limit:
         return False
+    _take_all(pairs, n, length, translations)
+    return True
+
+
+@kernel
+def _take_all(pairs, n, length, translations):
+    """Make one translation that of all touching pairs."""
     _add_translation(n, length, translations)
     for k in range(pairs.n):
         if pairs.states[k] & TOUCHING:
             pairs.groups[k] = 0
+
+
+# --- one translation for all --------------------------------------------------------------------
+
+
+@kernel
+def _part_all(pairs, A, B, error, limit, translations, points):
+    """Whether `_group_pairs` would take one translation for all touching pairs; it is the only one then.
+
+    That is the shortest that parts all, at least half of which face along it, where it is not too long for what the
+    deepest pair needs. Most candidates are given up at the pair that was the deepest for the last.
+    """
+    best, best_length, best_faces_all, deepest = -1, math.inf, False, -1
+    for i in range(translations.counts[N_CANDIDATES]):
+        max_length = min(limit, best_length * (1.0 + 2.0**-20) + STEP_ERRORS * error)
+        n = vec3_at(translations.normals, 3 * i)
+        length, faces_all, k = _length_for_all(pairs, A, B, error, max_length, n, deepest, points)
+        if not length < math.inf:
+            continue
+        shorter = length < best_length * (1.0 - 2.0**-20) - STEP_ERRORS * error
+        if shorter or translations.worths[i] > translations.worths[best] + AS_GOOD:
+            best, best_length, best_faces_all, deepest = i, length, faces_all, k
+    if best < 0 or not best_faces_all:
+        return False
+    shortest = math.inf
+    for i in range(translations.counts[N_CANDIDATES]):
+        n = vec3_at(translations.normals, 3 * i)
+        if _is_before(pairs, deepest, n, A, B):
+            view = any_side_view(axes_across(n), error)
+            length = _length_for(depth_along(pairs, deepest, A, B, view, points, 0.0), error)
+            shortest = min(shortest, length)
+    if best_length > _LONGER * shortest:
+        return False
+    _take_all(pairs, vec3_at(translations.normals, 3 * best), best_length, translations)
     return True
+
+
+@kernel
+def _length_for_all(pairs, A, B, error, max_length, n, first, points):
+    """(the length along n that parts all touching pairs, whether all face along it, which needs it); infinite beyond
+    ``max_length`` [m] and where fewer than half face along it.
+
+    first : a pair to begin with, −1 for none.
+    """
+    view = any_side_view(axes_across(n), error)
+    depth, deepest = 0.0, max(first, 0)
+    if first >= 0:
+        depth = depth_along(pairs, first, A, B, view, points, 0.0)
+        if _length_for(depth, error) > max_length:
+            return math.inf, False, first
+    n_touching, n_before = 0, 0
+    for k in range(pairs.n):
+        if pairs.states[k] & TOUCHING:
+            n_touching += 1
+            if _is_before(pairs, k, n, A, B):
+                n_before += 1
+            of_k = depth_along(pairs, k, A, B, view, points, depth)
+            if of_k > depth or (n_touching == 1 and first < 0):
+                depth, deepest = of_k, k
+                if _length_for(depth, error) > max_length:
+                    return math.inf, False, deepest
+    if n_before == 0 or 2 * n_before < n_touching:
+        return math.inf, False, deepest
+    return _length_for(depth, error), n_before == n_touching, deepest
 
 
 @kernel(inline=True)

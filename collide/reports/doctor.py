@@ -10,7 +10,7 @@ import platform
 import sys
 import tempfile
 from dataclasses import dataclass, field
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import collide
@@ -54,6 +54,7 @@ class Examination:
 
     installed: list[Check] = field(default_factory=list)
     optional: list[Check] = field(default_factory=list)
+    hosts: list[Check] = field(default_factory=list)
     caches: list[Check] = field(default_factory=list)
     answers: list[Check] = field(default_factory=list)
 
@@ -63,7 +64,7 @@ class Examination:
         return all(check.passed is not False for check in self._all())
 
     def _all(self) -> list[Check]:
-        return [*self.installed, *self.optional, *self.caches, *self.answers]
+        return [*self.installed, *self.optional, *self.hosts, *self.caches, *self.answers]
 
     def verdict(self) -> str:
         """The examination in one line."""
@@ -76,6 +77,7 @@ class Examination:
         return [
             _table("INSTALLED", self.installed),
             _table("OPTIONAL  pip install 'collide-robotics[EXTRA]'", self.optional),
+            _table("HOSTS  programs of other engines that run on collide", self.hosts),
             _table("KEPT BETWEEN RUNS", self.caches),
             _table("SELF-CHECK  pairs with known answers", self.answers),
         ]
@@ -96,7 +98,7 @@ def examine(progress=None) -> Examination:
     """
     with (progress or silent)("asking pairs with known answers"):
         answers = _answers()
-    return Examination(_installed(), _optional(), _caches(), answers)
+    return Examination(_installed(), _optional(), _hosts(), _caches(), answers)
 
 
 def _installed() -> list[Check]:
@@ -144,6 +146,22 @@ def _optional() -> list[Check]:
         for name, extra, purpose in OPTIONAL
         for version in [package_version(name)]
     ]
+
+
+def _hosts() -> list[Check]:
+    """Modules that stand in for other engines: whether they can be imported, and beside what version."""
+    checks = []
+    for host in import_module("collide.adapters.hosts").HOSTS:
+        version = package_version(host.package)
+        try:
+            import_module(host.module)
+        except Exception as error:  # noqa: BLE001 - told, whatever broke
+            checks.append(Check(host.name, f"{host.module} cannot be imported: {error}", False))
+            continue
+        absent = "absent" if host.is_needed else "not installed, and not needed"
+        state = f"{host.package} {version or absent}"
+        checks.append(Check(host.name, f"{host.module}: {host.usage} ({state})", True if version else None))
+    return checks
 
 
 def _caches() -> list[Check]:

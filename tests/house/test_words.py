@@ -82,6 +82,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         (f"collide/hierarchies/{name}.py", "P"): "the polyhedra P and Q of Barba and Langerman"
         for name in ("hierarchy_queries", "matrix_game", "validate_walk", "walk_steps")
     },
+    ("adapters/hosts/fcl_managers.py", "clear"): "python-fcl's name",
     ("collide/narrowphase/dispatch.py", "P"): "a cell of the table: Method.PLANES",
     ("scenes/families/case.py", "P"): "the same: the arguments of the exact oracle, field by field",
     ("scenes/worst_cases.py", "left"): "beside right: two vertices of one roof",

@@ -16,7 +16,10 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 #: The package that an example cannot do without, beyond the engine.
-NEEDS = {"06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh"}
+NEEDS = {
+    "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
+    "14_programs_for_python_fcl": "trimesh",
+}
 #: What each example's output must hold.
 SHOWS = {
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
@@ -45,6 +48,14 @@ SHOWS = {
         "a ball 1.00 mm above",
         "jaw 1 pushes along [-1.  0.  0.], 4 points",
         "box and ball",
+    ],
+    "14_programs_for_python_fcl": [
+        "import fcl is collide.adapters.hosts.fcl_api",
+        "4 contacts, each 0.100 m deep",
+        "concentric balls: -1.0 m",
+        "above a half-space: 1.50 m",
+        "touch at 0.250000",
+        "trimesh asks collide.adapters.hosts.fcl_api: [('cube 0', 'cube 1'), ('cube 1', 'cube 2')]",
     ],
     "13_mujoco_pit": [
         "culled steps have MuJoCo's bits: True", "a World of 41 bodies", "with collide all are seen: True",

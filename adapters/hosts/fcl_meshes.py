@@ -1,0 +1,143 @@
+"""python-fcl's `BVHModel` and `OcTree`: triangles as a surface without an inside, and boxes of a binary octomap."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+import collide as engine
+from collide.adapters.hosts.fcl_geometry import CollisionGeometry
+from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
+from collide.adapters.hosts.fcl_transform import shaped
+from collide.errors import InvalidArgument, UnsupportedQuery
+
+#: What python-fcl's model returns where calls come in a wrong order, and of none.
+_OUT_OF_SEQUENCE, _OK = -2, 0
+_EMPTY, _STARTED, _PROCESSED = range(3)
+
+
+class BVHModel(CollisionGeometry):
+    """Triangles, a surface: nothing is inside of it, as in FCL. `Convex` is the solid.
+
+    ``beginModel``, then ``addSubModel``, ``addTriangle`` or ``addVertex``, then ``endModel``.
+    """
+
+    _node_type, _object_type = NODE_TYPE.BV_OBBRSS, OBJECT_TYPE.OT_BVH
+
+    def __init__(self):
+        self._state, self._n_vertices = _EMPTY, 0
+        self._vertices, self._triangles = [], []
+        self._become(np.zeros((2, 3)))
+
+    def num_tries_(self):
+        """How many triangles there are."""
+        return sum(len(triangles) for triangles in self._triangles)
+
+    def buildState(self):
+        """0 empty, 1 begun, 2 finished."""
+        return self._state
+
+    def beginModel(self, num_tris_=0, num_vertices_=0):
+        """Start anew; the numbers are hints. Returns 0."""
+        if self._state != _EMPTY:
+            warnings.warn("beginModel: the triangles there were are dropped", stacklevel=2)
+        self.__init__()
+        self._state = _STARTED
+        return _OK
+
+    def endModel(self):
+        """Triangles are complete. Returns 0, −2 before `beginModel`. Raises InvalidShape, InvalidArgument."""
+        if self._state != _STARTED:
+            warnings.warn("endModel: there is no beginModel before it; nothing done", stacklevel=2)
+            return _OUT_OF_SEQUENCE
+        if not self._triangles:
+            raise InvalidArgument("endModel: there are no triangles; addSubModel(verts, triangles) adds them")
+        vertices = np.concatenate(self._vertices)
+        surface = engine.Mesh(vertices, np.concatenate(self._triangles), solid=False)
+        self._become([vertices.min(axis=0), vertices.max(axis=0)], surface)
+        self._state = _PROCESSED
+        return _OK
+
+    def addVertex(self, x, y, z):
+        """Coordinates [m] of a vertex. Returns True."""
+        self._add(np.array([[x, y, z]], dtype=np.float64), np.zeros((0, 3), dtype=np.int64))
+        return True
+
+    def addTriangle(self, v1, v2, v3):
+        """Corners (3,) [m]. Returns True."""
+        corners = np.array([shaped(name, v, (3,)) for name, v in zip(("v1", "v2", "v3"), (v1, v2, v3))])
+        self._add(corners, np.array([[0, 1, 2]]))
+        return True
+
+    def addSubModel(self, verts, triangles):
+        """verts : (n, 3) [m].   triangles : (m, 3) rows of verts.   Returns True."""
+        vertices, facets = np.array(verts, dtype=np.float64), np.array(triangles)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or facets.ndim != 2 or facets.shape[1] != 3:
+            raise ValueError(f"verts must be (n, 3) and triangles (m, 3), got {vertices.shape} and {facets.shape}")
+        if facets.dtype.kind not in "iu" or (facets.size and not 0 <= facets.min() <= facets.max() < len(vertices)):
+            raise ValueError(f"triangles must be integers within 0 … {len(vertices) - 1}")
+        self._add(vertices, facets.astype(np.int64))
+        return True
+
+    def _add(self, vertices: np.ndarray, facets: np.ndarray) -> None:
+        if self._state != _STARTED:
+            raise ValueError("BVH construction does not follow correct sequence: call beginModel() first")
+        self._vertices.append(vertices)
+        if len(facets):
+            self._triangles.append(facets + self._n_vertices)
+        self._n_vertices += len(vertices)
+
+
+class OcTree(CollisionGeometry):
+    """The occupied boxes of an octomap, a solid; free and unknown space is empty.
+
+    r : edge of the smallest box [m].   data : the tree in octomap's binary form: for every node two
+    bytes, two bits a child (nothing, free, occupied, or a node of its own), the first child lowest.
+    """
+
+    _node_type, _object_type = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE
+
+    def __init__(self, r, data):
+        boxes = occupied_boxes(float(r), bytes(data))
+        if not boxes:
+            raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
+        middles = np.array([middle for middle, _ in boxes])
+        half_edges = np.array([[0.5 * edge] for _, edge in boxes])
+        shapes = [(engine.Box(edge, edge, edge), engine.pose(middle)) for middle, edge in boxes]
+        self._become([(middles - half_edges).min(axis=0), (middles + half_edges).max(axis=0)], engine.Compound(shapes))
+
+
+#: Levels of an octomap, and what two bits of a child say: bit 0, then bit 1.
+_DEPTH = 16
+_OCCUPIED, _INNER = 2, 3
+
+
+def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
+    """(middle, edge) of the occupied leaves. Raises InvalidArgument where data ends too early."""
+    boxes_read: list[tuple[np.ndarray, float]] = []
+    at = 0
+
+    def read(middle: np.ndarray, depth: int) -> None:
+        nonlocal at
+        if at + 2 > len(data) or depth >= _DEPTH:
+            raise InvalidArgument(f"OcTree: data is no binary octomap: a node at byte {at} of {len(data)} is not there")
+        word = data[at] | data[at + 1] << 8
+        at += 2
+        edge = r * 2.0 ** (_DEPTH - depth - 1)
+        inner = []
+        for child in range(8):
+            state = word >> 2 * child & 3
+            corner = middle + 0.5 * edge * np.array([2 * (child >> k & 1) - 1 for k in range(3)])
+            if state == _OCCUPIED:
+                boxes_read.append((corner, edge))
+            elif state == _INNER:
+                inner.append(corner)
+        for corner in inner:
+            read(corner, depth + 1)
+
+    if not 0.0 < r < np.inf:
+        raise InvalidArgument(f"OcTree: r must be > 0 and finite [m], got {r}")
+    if data:
+        read(np.zeros(3), 0)
+    return boxes_read

@@ -1,0 +1,252 @@
+"""python-fcl's `collide`, `distance`, `continuousCollide` and default callbacks, answered by collide.
+
+As there, where a mesh or an octree is asked with a plain geometry, the mesh is o1 of contacts and results, whichever
+came first; results collect over calls.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import collide as engine
+from collide.adapters.hosts.fcl_contacts import contact_rows, facet_contacts
+from collide.adapters.hosts.fcl_geometry import CollisionObject
+from collide.adapters.hosts.fcl_requests import (
+    NODE_TYPE,
+    OBJECT_TYPE,
+    CCDMotionType,
+    CollisionRequest,
+    Contact,
+    ContinuousCollisionRequest,
+)
+from collide.adapters.hosts.fcl_transform import Transform
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.query import collide as hits
+
+_PLANE, _HALFSPACE = NODE_TYPE.GEOM_PLANE, NODE_TYPE.GEOM_HALFSPACE
+
+
+def collide(o1, o2, request=None, result=None):
+    """Whether two objects meet, and their contacts.
+
+    Parameters
+    ----------
+    o1, o2 : CollisionObject
+    request : CollisionRequest, optional
+    result : CollisionResult, optional
+        ``is_collision`` and ``contacts`` of this call are added to what it holds.
+
+    Returns
+    -------
+    int
+        How many contacts were added: 0 where the objects are apart, at most ``num_max_contacts``.
+
+    Raises
+    ------
+    UnsupportedQuery
+        Where cost sources are wanted.
+    TypeError
+        Where arguments are no collision objects.
+    """
+    if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
+        raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
+    limit, with_geometry = 1, False
+    if request is not None:
+        limit, with_geometry = _checked(request), request.enable_contact
+        if limit == 0:
+            return 0
+    g1, g2 = o1._geometry, o2._geometry
+    if len(g1._shapes) == len(g2._shapes) == 1:
+        hit = hits(g1._shapes[0], g2._shapes[0], o1._X, o2._X)
+    else:
+        hit = _meet(o1, o2)
+    if not hit:
+        return 0
+    if result is None:
+        return 1 if limit == 1 else len(_contacts(*_ordered(o1, o2), limit, with_geometry))
+    result.is_collision = True
+    contacts = _contacts(*_ordered(o1, o2), limit, with_geometry)
+    result.contacts.extend(contacts)
+    return len(contacts)
+
+
+def _checked(request: CollisionRequest) -> int:
+    limit = int(request.num_max_contacts)
+    if limit < 0:
+        raise OverflowError("num_max_contacts must not be negative")
+    if request.enable_cost:
+        raise UnsupportedQuery("enable_cost: there are no cost sources here; ask for contacts (enable_contact)")
+    return limit
+
+
+def _ordered(o1: CollisionObject, o2: CollisionObject) -> tuple[CollisionObject, CollisionObject]:
+    """The pair as results name it: a mesh or an octree before a plain geometry."""
+    plain = OBJECT_TYPE.OT_GEOM
+    swaps = o1._geometry._object_type == plain and o2._geometry._object_type != plain
+    return (o2, o1) if swaps else (o1, o2)
+
+
+def _meet(o1: CollisionObject, o2: CollisionObject) -> bool:
+    """Of planes: a connected set meets one where it meets both of its half-spaces."""
+    g1, g2 = o1._geometry, o2._geometry
+    for geometry in (g1, g2):
+        geometry._shape  # noqa: B018 - raises where a mesh is not finished
+    if _in_pieces(g1) or _in_pieces(g2):
+        raise UnsupportedQuery("Plane with an octree or a mesh: use Halfspace, or a thin Box")
+    return all(hits(A, B, o1._X, o2._X) for A in g1._shapes for B in g2._shapes)
+
+
+def _in_pieces(geometry) -> bool:
+    return geometry._object_type != OBJECT_TYPE.OT_GEOM
+
+
+def _contacts(o1: CollisionObject, o2: CollisionObject, limit: int, with_geometry: bool) -> list[Contact]:
+    """Contacts of objects that meet, the deepest first, at least one."""
+    g1, g2 = o1._geometry, o2._geometry
+    both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
+    if both_meshes:
+        contacts = facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
+    elif not with_geometry:
+        contacts = [(-1, -1, np.zeros(3), np.zeros(3), 0.0)]
+    elif g1._node_type in (_PLANE, _HALFSPACE) and g2._node_type in (_PLANE, _HALFSPACE):
+        contacts = [(-1, -1, np.zeros(3), np.zeros(3), math.inf)]  # no translation takes them apart
+    else:
+        A, B = _nearest_sides(o1, o2)
+        contacts = contact_rows(A, B, o1, o2, limit)
+    return [_contact(g1, g2, *values) for values in contacts]
+
+
+def _contact(g1, g2, b1, b2, normal, pos, depth) -> Contact:
+    contact = Contact()
+    contact.o1, contact.o2, contact.b1, contact.b2 = g1, g2, b1, b2
+    contact.normal, contact.pos, contact.penetration_depth = normal, pos, depth
+    return contact
+
+
+def _nearest_sides(o1: CollisionObject, o2: CollisionObject):
+    """The shapes, of a plane that half-space out of which the way is shorter."""
+    pairs = [(A, B) for A in o1._geometry._shapes for B in o2._geometry._shapes]
+    if len(pairs) == 1:
+        return pairs[0]
+    return max(pairs, key=lambda pair: engine.distance(pair[0], pair[1], o1._X, o2._X).distance)
+
+
+def distance(o1, o2, request=None, result=None):
+    """The distance of two objects.
+
+    Parameters
+    ----------
+    o1, o2 : CollisionObject
+    request : DistanceRequest, optional
+    result : DistanceResult, optional
+        Takes this pair, where it is nearer than what it holds.
+
+    Returns
+    -------
+    float
+        [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it; 0 of two meshes,
+        which have no inside.
+    """
+    if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
+        raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
+    o1, o2 = _ordered(o1, o2)
+    g1, g2 = o1._geometry, o2._geometry
+    both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
+    signed = request is not None and request.enable_signed_distance and not both_meshes
+    for geometry in (g1, g2):
+        geometry._shape  # noqa: B018 - raises where a mesh is not finished
+    if len(g1._shapes) == len(g2._shapes) == 1:
+        r = engine.distance(g1._shapes[0], g2._shapes[0], o1._X, o2._X, signed=bool(signed))
+    elif _in_pieces(g1) or _in_pieces(g2):
+        raise UnsupportedQuery("Plane with an octree or a mesh: use Halfspace, or a thin Box")
+    else:
+        r = engine.distance(*_nearest_sides(o1, o2), o1._X, o2._X, signed=bool(signed))
+    value = float(r.distance)
+    if r.hit and not signed:
+        value = 0.0 if both_meshes else -1.0
+    if result is not None and result.min_distance > value:
+        result.min_distance = value
+        result.nearest_points = [np.array(r.point_a), np.array(r.point_b)]
+        result.o1, result.o2 = g1, g2
+        result.b1 = -1 if g1._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_a)
+        result.b2 = -1 if g2._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_b)
+    return value
+
+
+def continuousCollide(o1, tf1_end, o2, tf2_end, request=None, result=None):
+    """When two moving objects first touch, in units of the motion.
+
+    Parameters
+    ----------
+    o1, o2 : CollisionObject
+        At the poses where their motions begin.
+    tf1_end, tf2_end : Transform
+        Where they end. ``CCDM_TRANS``, the default, leaves rotations as they are at the start; ``CCDM_LINEAR`` turns
+        them the shortest way.
+    request : ContinuousCollisionRequest, optional
+    result : ContinuousCollisionResult, optional
+        Takes the earlier of its time and this.
+
+    Returns
+    -------
+    float
+        Up to this time the objects are proven apart; 1 where they do not touch, 0 where they do at the start.
+
+    Raises
+    ------
+    UnsupportedQuery
+        For motions along screws and splines.
+    """
+    motion = ContinuousCollisionRequest().ccd_motion_type if request is None else request.ccd_motion_type
+    for name, tf in (("tf1_end", tf1_end), ("tf2_end", tf2_end)):
+        if not isinstance(tf, Transform):
+            raise TypeError(f"{name} must be a Transform, got {type(tf).__name__}")
+    ends = []
+    for moving, tf in ((o1, tf1_end), (o2, tf2_end)):
+        X = tf._X.copy()
+        if motion == CCDMotionType.CCDM_TRANS:
+            X[:3, :3] = moving._X[:3, :3]
+        elif motion != CCDMotionType.CCDM_LINEAR and not np.array_equal(X[:3, :3], moving._X[:3, :3]):
+            raise UnsupportedQuery("continuousCollide: screws and splines are not known; CCDM_LINEAR turns on a line")
+        ends.append(X)
+    hit, time = _first_contact(o1, ends[0], o2, ends[1])
+    if result is not None:
+        result.is_collide = bool(result.is_collide or hit)
+        result.time_of_contact = min(time, result.time_of_contact)
+    return time
+
+
+def _first_contact(o1, X1, o2, X2) -> tuple[bool, float]:
+    g1, g2 = o1._geometry, o2._geometry
+    pairs = [(A, B) for A in g1._shapes for B in g2._shapes]
+    if not pairs:
+        raise InvalidArgument("continuousCollide: a mesh has no facets yet: beginModel, addSubModel, endModel")
+    if len(pairs) > 1:
+        if _meet(o1, o2):
+            return True, 0.0
+        pairs = [pair for pair in pairs if not hits(*pair, o1._X, o2._X)][:1]
+    t = engine.time_of_impact(*pairs[0], o1._X, X1, o2._X, X2)
+    return bool(t.hit), float(t.time)
+
+
+def defaultCollisionCallback(o1, o2, cdata):
+    """Ask one pair into ``cdata`` (`CollisionData`); True, which ends the traversal, once enough contacts are there."""
+    request, result = cdata.request, cdata.result
+    if cdata.done:
+        return True
+    collide(o1, o2, request, result)
+    if not request.enable_cost and result.is_collision and len(result.contacts) > request.num_max_contacts:
+        cdata.done = True
+    return cdata.done
+
+
+def defaultDistanceCallback(o1, o2, cdata):
+    """Ask one pair into ``cdata`` (`DistanceData`); (whether that is all, the least distance so far)."""
+    request, result = cdata.request, cdata.result
+    if cdata.done:
+        return True, result.min_distance
+    distance(o1, o2, request, result)
+    return (True, result.min_distance) if result.min_distance <= 0 else (cdata.done, result.min_distance)
+

@@ -1,0 +1,122 @@
+"""The same calls answered by python-fcl and by its stand-in: which differ, judged; and what a call costs.
+
+python benchmarks/host_agreement.py [--calls 10000] [--seed 22]
+
+python-fcl is asked in a child process, which it may end. Of differing booleans of polytopes rationals say who is right;
+of other pairs, the proven bracket of the distance.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+import collide
+from collide.adapters.hosts import fcl_api
+from collide.adapters.peers import exact
+
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+FACETS = [
+    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+    [1, 5, 7], [1, 7, 3],
+]  # fmt: skip
+KINDS = ("Box", "Sphere", "Capsule", "Cylinder", "Ellipsoid", "Convex", "Cone", "BVHModel")
+
+
+def geometry(fcl, kind: str, s: np.ndarray):
+    """A geometry of a kind and three lengths."""
+    if kind == "Box":
+        return fcl.Box(*s)
+    if kind == "Sphere":
+        return fcl.Sphere(s[0] / 2)
+    if kind in ("Capsule", "Cylinder", "Cone"):
+        return getattr(fcl, kind)(s[0] / 2, s[1])
+    if kind == "Ellipsoid":
+        return fcl.Ellipsoid(*(s / 2))
+    if kind == "Convex":
+        return fcl.Convex(CORNERS * s, 12, np.concatenate([[3, *facet] for facet in FACETS]))
+    model = fcl.BVHModel()
+    model.beginModel(12, 8)
+    model.addSubModel(CORNERS * s, np.array(FACETS))
+    model.endModel()
+    return model
+
+
+def calls(n: int, seed: int):
+    """(kind, lengths, rotation, translation) of both bodies, a quarter of them on a grid, where bodies touch."""
+    rng = np.random.default_rng(seed)
+    for k in range(n):
+        pair = []
+        for _ in range(2):
+            kind = KINDS[rng.integers(len(KINDS))]
+            R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            s, t = rng.uniform(0.2, 1.0, 3), rng.uniform(-0.6, 0.6, 3)
+            if k % 4 == 0:
+                R, s, t = np.eye(3), np.round(4 * s + 0.5) / 4, np.round(4 * t) / 4
+            pair.append((kind, s, R * np.sign(np.linalg.det(R)), t))
+        yield pair
+
+
+def answers(fcl, n: int, seed: int) -> list:
+    """(hit, gap of pairs apart else None), call by call, and microseconds a call of collide."""
+    replies, spent = [], 0.0
+    for pair in calls(n, seed):
+        a, b = (fcl.CollisionObject(geometry(fcl, kind, s), fcl.Transform(R, t)) for kind, s, R, t in pair)
+        fcl.collide(a, b)
+        begin = time.perf_counter()
+        hit = fcl.collide(a, b) > 0
+        spent += time.perf_counter() - begin
+        replies.append([hit, None if hit else float(fcl.distance(a, b))])
+    return [replies, 1e6 * spent / max(n, 1)]
+
+
+def judged(pair, hit: bool) -> str:
+    """Who is right about a pair whose booleans differ; hit : what the stand-in says."""
+    (kind_a, s_a, R_a, t_a), (kind_b, s_b, R_b, t_b) = pair
+    if {kind_a, kind_b} <= {"Box", "Convex"}:
+        truth = exact.hit(CORNERS * s_a, R_a, t_a, CORNERS * s_b, R_b, t_b)
+        return "python-fcl wrong" if truth == hit else "OURS WRONG"
+    a, b = (fcl_api.CollisionObject(geometry(fcl_api, k, s), fcl_api.Transform(R, t)) for k, s, R, t in pair)
+    r = collide.distance(a._geometry._shape, b._geometry._shape, a._X, b._X)
+    if r.lower > 0.0 or r.upper < 0.0:
+        return "python-fcl wrong" if hit == (r.upper < 0.0) else "OURS WRONG"
+    return "touching within rounding"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--calls", type=int, default=10000)
+    parser.add_argument("--seed", type=int, default=22)
+    parser.add_argument("--host", action="store_true", help="answer with python-fcl, as JSON (the child)")
+    arguments = parser.parse_args()
+    if arguments.host:
+        import fcl
+
+        print("ANSWERS", json.dumps(answers(fcl, arguments.calls, arguments.seed)))
+        return
+    command = [sys.executable, __file__, "--host", "--calls", str(arguments.calls), "--seed", str(arguments.seed)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    theirs, their_time = json.loads(done.stdout.split("ANSWERS")[1])
+    ours, our_time = answers(fcl_api, arguments.calls, arguments.seed)
+    counts: dict[tuple[str, str], int] = {}
+    worst = 0.0
+    for pair, (hit, gap), (their_hit, their_gap) in zip(calls(arguments.calls, arguments.seed), ours, theirs):
+        if hit != their_hit:
+            key = "–".join(sorted(body[0] for body in pair)), judged(pair, hit)
+            counts[key] = counts.get(key, 0) + 1
+        elif not hit:
+            worst = max(worst, abs(gap - their_gap))
+    print(f"{arguments.calls} calls, {sum(hit for hit, _ in ours)} hits, {sum(counts.values())} booleans differ")
+    for (kinds, verdict), count in sorted(counts.items()):
+        print(f"  {kinds:24} {verdict:26} {count}")
+    print(f"greatest difference of gaps: {worst:.2g} m")
+    print(f"the second call of collide with two new geometries: {our_time:.2f} µs, python-fcl {their_time:.2f} µs")
+
+
+if __name__ == "__main__":
+    main()
