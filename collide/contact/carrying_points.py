@@ -48,7 +48,7 @@ def _slope_below(p, i, n, n_corners, tolerance, space):
     at_i = POINT * i
     u = v = 0.0
     for k in range(n_corners + n):
-        j = _other(space, k, n_corners)
+        j = _compared(space, k, n_corners)
         at = POINT * j
         du, dv, rise = p[at] - p[at_i], p[at + V] - p[at_i + V], p[at + GAP] - p[at_i + GAP]
         if abs(du) <= tolerance and abs(dv) <= tolerance:
@@ -70,7 +70,7 @@ def _slope_below(p, i, n, n_corners, tolerance, space):
 
 
 @kernel(inline=True)
-def _other(space, k, n_corners):
+def _compared(space, k, n_corners):
     """The k-th of the points that one is compared with."""
     return space.corners[k] if k < n_corners else k - n_corners
 
@@ -80,18 +80,18 @@ def _span_on_border(p, at_i, n_before, n_corners, tolerance, space, base_u, base
     """(low, high): for which t the slope base + t · along is left by the points before; low > high for none."""
     low, high = -math.inf, math.inf
     for k in range(n_before):
-        j = _other(space, k, n_corners)
+        j = _compared(space, k, n_corners)
         at = POINT * j
         du, dv = p[at] - p[at_i], p[at + V] - p[at_i + V]
         if space.remaining[j] == ON_WALL or (abs(du) <= tolerance and abs(dv) <= tolerance):
             continue
-        left = p[at + GAP] - p[at_i + GAP] - tolerance - (base_u * du + base_v * dv)
+        clearance = p[at + GAP] - p[at_i + GAP] - tolerance - (base_u * du + base_v * dv)
         speed = along_u * du + along_v * dv
         if speed > 0.0:
-            high = min(high, left / speed)
+            high = min(high, clearance / speed)
         elif speed < 0.0:
-            low = max(low, left / speed)
-        elif left < -0.5 * tolerance:
+            low = max(low, clearance / speed)
+        elif clearance < -0.5 * tolerance:
             return 1.0, -1.0
     return low, high
 

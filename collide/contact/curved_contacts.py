@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.contact_facets import topology_of
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP
 from collide.contact.curved_manifolds import (
     HEADER,
@@ -22,6 +21,7 @@ from collide.contact.curved_manifolds import (
 )
 from collide.contact.curved_patches import LAST_BIT
 from collide.contact.distance_contacts import with_distances
+from collide.contact.facet_topology import topology_of
 from collide.contact.support_face import ROUND
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of

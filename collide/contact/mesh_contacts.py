@@ -6,7 +6,6 @@ from threading import local
 
 import numpy as np
 
-from collide.contact.contact_facets import topology_of
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.distance_contacts import with_distances
@@ -24,6 +23,7 @@ from collide.contact.facet_manifolds import (
     facet_manifolds,
     workspace_words,
 )
+from collide.contact.facet_topology import topology_of
 from collide.contact.support_face import VERTEX
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of

@@ -359,6 +359,7 @@ def test_polytopes_are_judged_in_rationals():
 # --- programs that import fcl -------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:these modules hold")  # in a process where trimesh has been imported
 def test_install_and_uninstall():
     former = sys.modules.get("fcl")
     with fcl.install() as module:

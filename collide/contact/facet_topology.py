@@ -1,0 +1,71 @@
+"""Which facets of a body share corners and edges: what contacts grow patches along."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.facet_bodies import Body
+from collide.lowering.parts import convex_set_of
+from collide.shapes.mesh import Mesh
+
+
+class Topology(NamedTuple):
+    """Which of a body's m facets share corners, int32.
+
+    corners : (m, 3) numbers of points, equal for equal points: the first row of the shape's that is there.
+    places : (m,) where facet k stands in the tree.   fans : (3 m,) facets around corner after corner.
+    fan_starts : (n_corners + 1,) where the fan of a corner begins.
+    edges : (m, 3) numbers of the edges from corner to corner, equal for equal edges.
+    header : words for kernels, as `contact_facets.py` numbers them.
+    """
+
+    corners: np.ndarray
+    places: np.ndarray
+    fans: np.ndarray
+    fan_starts: np.ndarray
+    edges: np.ndarray
+    header: np.ndarray
+
+
+def topology_of(body: Body) -> Topology:
+    """Made when first asked for, and kept with the shape. O(m log m)."""
+    shape = body.shape
+    try:
+        return shape._topology
+    except AttributeError:
+        made = _topology(body)
+        shape._store(_topology=made)
+        return made
+
+
+def _topology(body: Body) -> Topology:
+    tree = body.tree
+    places = np.empty(len(tree.ids), dtype=np.int32)
+    places[tree.ids] = np.arange(len(places))
+    shape = body.shape
+    is_mesh = isinstance(shape, Mesh)
+    if isinstance(shape, Mesh):
+        corners = np.ascontiguousarray(shape.survey.corners, dtype=np.int32)
+    else:
+        corners = _rows_of_points(convex_set_of(shape).points, tree.triangles[places].reshape(-1, 3))
+    n_corners = int(corners.max()) + 1
+    fans = (np.argsort(corners.ravel(), kind="stable") // 3).astype(np.int32)
+    fan_starts = np.zeros(n_corners + 1, dtype=np.int32)
+    fan_starts[1:] = np.cumsum(np.bincount(corners.ravel(), minlength=n_corners))
+    ends = corners[:, [1, 2, 0]].astype(np.int64)
+    keys = np.minimum(corners, ends) * n_corners + np.maximum(corners, ends)
+    edges = np.unique(keys, return_inverse=True)[1].reshape(-1, 3).astype(np.int32)
+    arrays = corners, places, fans, fan_starts, edges
+    header = np.array([*(address_of(array) for array in arrays), n_corners, not is_mesh], dtype=np.int64)
+    return Topology(*arrays, header)
+
+
+def _rows_of_points(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(m, 3) the first row of ``points`` that is equal to each of 3 m corners."""
+    row_of: dict[bytes, int] = {}
+    for k, point in enumerate(points + 0.0):
+        row_of.setdefault(point.tobytes(), k)
+    return np.array([row_of[corner.tobytes()] for corner in corners + 0.0], dtype=np.int32).reshape(-1, 3)
