@@ -39,8 +39,10 @@ from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
 
-#: Pairs that go through together: their rows stay in the cache.
-_BLOCK = 512
+#: Pairs that go through together: their rows stay in the cache, and what Python does between blocks is little.
+_BLOCK = 2048
+#: The least that a thread is handed.
+_PIECE = 512
 #: Contacts that there is room for, a pair, before more is asked for.
 _USUAL = 8
 
@@ -59,11 +61,11 @@ def convex_contacts(
     limit = margin if slack is None else margin + float(slack.max(initial=0.0))
     asked = _Asked(A, B, X_WA, X_WB, slack, margin, max_contacts, Question(False, limit, check=check))
     n = length_of(A, B, X_WA, X_WB)
-    threads = min(threads, n // _BLOCK)
+    threads = min(threads, n // _PIECE)
     try:
         if threads < 2:
             return _contacts_of(asked, slice(0, n))
-        pieces = pieces_of(n, threads, _BLOCK)
+        pieces = pieces_of(n, threads, _PIECE)
         answered: list = [None] * len(pieces)
 
         def work(number: int) -> None:
