@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
+from collide.narrowphase.touching import touching_is_a_hit
 from collide.numerics.vec3 import put_vec3
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 
@@ -91,13 +92,6 @@ def write_vertices(row, ids, n, flip):
     for k in range(n):
         row.words[at_a + k] = ids[2 * k]
         row.words[at_b + k] = ids[2 * k + 1]
-
-
-@kernel(inline=True)
-def touching_is_a_hit(lower):
-    """1 unless bodies are proven to be apart, by a lower bound of their distance: closed sets that touch share a point,
-    and an open sign counts as a hit."""
-    return 0 if lower > 0.0 else 1
 
 
 @kernel(inline=True)
