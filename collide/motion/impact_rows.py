@@ -9,6 +9,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN
 from collide.motion.impact_jobs import DOUBLES_OF_ROW, clear_impacts
+from collide.results import only_value
 
 #: One row a motion: bracket of the first contact, normal and points in W [m]; which parts meet; questions to GJK; how
 #: the search ended (`convex_impact.py`).
@@ -77,7 +78,7 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
         ~free, lower, lower.copy(), upper, certified, *(rows[name].copy() for name in (
             "normal", "point_a", "point_b", "part_a", "part_b", "queries")),
     )  # fmt: skip
-    return TimeOfImpact(*(_scalar(column[0]) if single else column for column in columns))
+    return TimeOfImpact(*(only_value(column) if single else column for column in columns))
 
 
 def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:
@@ -93,7 +94,3 @@ def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:
     certified = upper - lower <= tolerance
     queries = int(row["queries"][0])
     return TimeOfImpact(status != FREE, lower, lower, upper, certified, normal, point_a, point_b, 0, 0, queries)  # type: ignore[arg-type]
-
-
-def _scalar(value):
-    return value.item() if np.ndim(value) == 0 else value
