@@ -20,7 +20,8 @@ from collide.mesh.bvh import CENTRE, EXPONENT, WIDTH, box_at, link_of, open_tree
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, difference_point
-from collide.narrowphase.posed_pair import PosedBody, PosedPair, posed_body, stretch_of
+from collide.narrowphase.posed_pair import PosedBody, PosedPair, posed_body, stretch_of_pose
+from collide.numerics.matrix3 import Matrix3, apply
 from collide.numerics.vec3 import (
     Vec3,
     absolute,
@@ -57,14 +58,6 @@ HEADER = 11
 _LOW = 0xFFFFFFFF
 
 
-class _Matrix(NamedTuple):
-    """Three rows."""
-
-    x: Vec3
-    y: Vec3
-    z: Vec3
-
-
 class _Sweep(NamedTuple):
     """One question.
 
@@ -82,7 +75,7 @@ class _Sweep(NamedTuple):
     middle: Vec3
     half: Vec3
     inverse: Vec3
-    rotation: _Matrix
+    rotation: Matrix3
     shift: Vec3
     pad: float
 
@@ -98,31 +91,14 @@ class _Work(NamedTuple):
 
 
 @kernel(inline=True)
-def _times(m, v):
-    return Vec3(dot(m.x, v), dot(m.y, v), dot(m.z, v))
-
-
-@kernel(inline=True)
 def _inverse_rows(R, at):
     """Rows of R⁻¹."""
     a, b, c = vec3_at(R, at), vec3_at(R, at + 3), vec3_at(R, at + 6)
     p, q, r = cross(b, c), cross(c, a), cross(a, b)
     share = 1.0 / dot(a, p)
-    return _Matrix(
+    return Matrix3(
         scale(share, Vec3(p.x, q.x, r.x)), scale(share, Vec3(p.y, q.y, r.y)), scale(share, Vec3(p.z, q.z, r.z))
     )  # fmt: skip
-
-
-@kernel(inline=True)
-def _stretch(R, p):
-    return stretch_of(
-        R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
-        R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
-        R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
-        R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
-        R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
-        R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
-    )
 
 
 @kernel(inline=True)
@@ -170,15 +146,15 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     is_convex = header[TREE_A] == 0
     reach_a = numbers[REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
     radius = numbers[RADIUS] if is_convex else 0.0
-    reach_a = reach_a * _stretch(poses, 0) + radius
-    reach_b = norm(vec3_at(b.numbers, TREE_REACH)) * _stretch(poses, POSE)
+    reach_a = reach_a * stretch_of_pose(poses, 0) + radius
+    reach_b = norm(vec3_at(b.numbers, TREE_REACH)) * stretch_of_pose(poses, POSE)
     size = reach_a + reach_b + norm(pair.t)
     error = ERROR * size + poses[POSE_SLOP] + poses[POSE + POSE_SLOP]
     unit = math.ldexp(1.0, int(-b.header[EXPONENT]))
     inverse = _inverse_rows(poses, POSE)
-    rows = _Matrix(scale(unit, inverse.x), scale(unit, inverse.y), scale(unit, inverse.z))
+    rows = Matrix3(scale(unit, inverse.x), scale(unit, inverse.y), scale(unit, inverse.z))
     centre = scale(unit, vec3_at(b.numbers, CENTRE))
-    origin = sub(_times(rows, neg(pair.t)), centre)
+    origin = sub(apply(rows, neg(pair.t)), centre)
     d = vec3_at(view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION), 0)
     zero = Vec3(0.0, 0.0, 0.0)
     middle, half, shift, rotation = origin, zero, zero, rows
@@ -197,18 +173,18 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
         half = scale(0.5, sub(high, low))
     else:
         # x ↦ rows R_A (centre + 2^e x): coordinates of A's tree in those of B's.
-        columns = _Matrix(
+        columns = Matrix3(
             Vec3(poses[0], poses[3], poses[6]), Vec3(poses[1], poses[4], poses[7]), Vec3(poses[2], poses[5], poses[8])
         )
-        x, y, z = _times(rows, columns.x), _times(rows, columns.y), _times(rows, columns.z)
+        x, y, z = apply(rows, columns.x), apply(rows, columns.y), apply(rows, columns.z)
         of_a = math.ldexp(1.0, int(a.header[EXPONENT]))
-        rotation = _Matrix(
+        rotation = Matrix3(
             scale(of_a, Vec3(x.x, y.x, z.x)), scale(of_a, Vec3(x.y, y.y, z.y)), scale(of_a, Vec3(x.z, y.z, z.z))
         )
-        shift = add(origin, _times(rows, rotate(poses, 0, vec3_at(a.numbers, CENTRE))))
+        shift = add(origin, apply(rows, rotate(poses, 0, vec3_at(a.numbers, CENTRE))))
     widest = max(norm(rows.x), norm(rows.y), norm(rows.z))
     pad = 4.0 * widest * (error + 2.0**-44 * size) + 2.0**-44 * (norm(origin) + norm(centre) + 1.0)
-    step = _times(rows, d)
+    step = apply(rows, d)
     inverse = Vec3(_inverted(step.x, step), _inverted(step.y, step), _inverted(step.z, step))
     return _Sweep(pair, d, error, size, middle, half, inverse, rotation, shift, pad)
 
@@ -227,7 +203,7 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
     if has_tree_a:
         of_a = box_at(a.boxes, ref_a)
         rotation = sweep.rotation
-        middle = add(sweep.shift, _times(rotation, of_a.centre))
+        middle = add(sweep.shift, apply(rotation, of_a.centre))
         half = Vec3(
             dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
             dot(absolute(rotation.z), of_a.half),

@@ -30,7 +30,7 @@ from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH, SLOP
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.posed_pair import PosedBody, PosedPair, Tables, posed_body, stretch_of
+from collide.narrowphase.posed_pair import PosedBody, PosedPair, Tables, posed_body, stretch_of_pose
 from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, neg, norm, put_vec3, rotate, scale, sub, vec3_at
 
 #: Doubles of a ray: origin, direction.
@@ -276,23 +276,10 @@ def cut_part(tables, part, ray, both, row, doubles_at, integers_at):
         _cut_curved(body, numbers, poses, ray, slop, row)
         return
     away = norm(sub(vec3_at(ray, 0), vec3_at(poses, body.pose_at + 9)))
-    size = numbers[NUMBERS * shape + REACH] * _stretch_of_pose(poses, body.pose_at) + radius + away
+    size = numbers[NUMBERS * shape + REACH] * stretch_of_pose(poses, body.pose_at) + radius + away
     if body.n == 8 and radius == 0.0 and _is_box(body):
         _cut_box(body, numbers, poses, ray, slop, row)
     elif radius > 0.0 and body.n <= 2:
         _cut_rounded(body, poses, ray, radius, size, slop, row)
     else:
         _cut_hull(body, numbers, poses, ray, radius, size, slop, both, row, doubles_at, integers_at)
-
-
-@kernel(inline=True)
-def _stretch_of_pose(R, p):
-    """`posed_pair.stretch_of`, without keeping it: other threads may read the row."""
-    return stretch_of(
-        R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
-        R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
-        R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
-        R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
-        R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
-        R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
-    )

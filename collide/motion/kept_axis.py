@@ -31,9 +31,10 @@ from typing import NamedTuple
 from collide.kernels import kernel
 from collide.motion.moving_body import ANGLE, AXIS, DRIFT_REACH, REACH_OF_CORE, TURN_ERROR
 from collide.motion.moving_pair import omega_of, origin_of_b
-from collide.motion.rotations import apply, rotation_about
+from collide.motion.rotations import rotation_about
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.halfspace_convex import plane_in_world, reach_of_plane
+from collide.numerics.matrix3 import apply
 from collide.numerics.vec3 import (
     Vec3,
     add,

@@ -27,8 +27,9 @@ import math
 from collide.kernels import kernel
 from collide.lowering.compound_table import TURNED
 from collide.lowering.shape_table import POSE_SLOP, POSE_STRETCH, POSE_TERMS
-from collide.motion.rotations import Matrix3, apply, rotation_about, rotation_between
+from collide.motion.rotations import rotation_about, rotation_between
 from collide.narrowphase.posed_pair import stretch_of
+from collide.numerics.matrix3 import Matrix3, apply
 from collide.numerics.vec3 import Vec3, add, divide, norm, put_vec3, rotate, scale, vec3_at
 
 # Doubles of a body: ω, û, |ω|; R0 and D of its core, row by row; where the core's frame is from the body's origin at

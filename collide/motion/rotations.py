@@ -8,28 +8,14 @@ A rotation vector ω [rad] points along the axis; its length is the angle. Rotat
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from collide.kernels import kernel
+from collide.numerics.matrix3 import Matrix3
 from collide.numerics.sine_cosine import angle_of, sine_cosine
 from collide.numerics.vec3 import Vec3, dot, norm, scale
 
 #: Below this length of a quaternion's vector part, half the angle is its own sine.
 _SMALL = 1e-9
-
-
-class Matrix3(NamedTuple):
-    """A (3, 3) matrix by its rows."""
-
-    x: Vec3
-    y: Vec3
-    z: Vec3
-
-
-@kernel(inline=True)
-def apply(M, a):
-    """M a."""
-    return Vec3(dot(M.x, a), dot(M.y, a), dot(M.z, a))
 
 
 @kernel(inline=True)

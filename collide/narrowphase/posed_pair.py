@@ -235,3 +235,16 @@ def stretch_of(xx, yy, zz, xy, yz, zx):
     yz = abs(yz)
     zx = abs(zx)
     return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx, _LEAST_SQUARE))
+
+
+@kernel(inline=True)
+def stretch_of_pose(R, p):
+    """`stretch_of` the matrix at p of a row of poses, which is not written to: other threads may read it."""
+    return stretch_of(
+        R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
+        R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
+        R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
+        R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
+        R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
+        R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
+    )

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from collide.motion.rotations import apply, rotation_about, rotation_between
+from collide.motion.rotations import rotation_about, rotation_between
+from collide.numerics.matrix3 import apply
 from collide.numerics.vec3 import Vec3
 
 #: Kernels are called as the Python they are written in.
