@@ -142,15 +142,14 @@ class ObjectTree:
             there.
         """
         tree = self.refresh()
-        guests: _Guests | None = None
-        if isinstance(against, ObjectTree):
-            theirs = against.refresh()
-            if theirs is None:
-                return iter(())
-            guests = theirs.as_guests()
-        elif against is not None:
-            guests = _guests_of(box_of(against)[None])
-        return iter(()) if tree is None else _near_first(tree, guests, least)
+        if tree is None:
+            return iter(())
+        if isinstance(against, HostObject):
+            return _near_one(tree, box_of(against), least)
+        theirs = None if against is None else against.refresh()
+        if against is not None and theirs is None:
+            return iter(())
+        return _near_first(tree, None if theirs is None else theirs.as_guests(), least)
 
     # --- batches --------------------------------------------------------------------------------
 
@@ -265,10 +264,14 @@ class _Tree(BoxTree):
         bounded = guests.boxes[guests.is_bounded]
         if not len(bounded) or not len(self.order):
             return np.inf
+        return float(_gaps(self.boxes[self.nearest_to(0.5 * (bounded[0, :3] + bounded[0, 3:]))], bounded[0]))
+
+    def nearest_to(self, point: np.ndarray) -> int:
+        """The row of a bounded box, of which there is one, that is nearest to a point (3,)."""
         question = np.zeros((1, SWEEP))
-        question[0, :3], question[0, 9] = 0.5 * (bounded[0, :3] + bounded[0, 3:]), np.inf
+        question[0, :3], question[0, 9] = point, np.inf
         rows = bodies_ahead(self, question, of_points=True)[0][:, 1]
-        return float(_gaps(self.boxes[rows[self._bounded[rows]][0]], bounded[0]))
+        return int(rows[self._bounded[rows]][0])
 
 
 class _Guests(NamedTuple):
@@ -280,18 +283,37 @@ class _Guests(NamedTuple):
     high: np.ndarray
 
 
-def _guests_of(boxes: np.ndarray) -> _Guests:
-    """One box (1, 6)."""
-    is_bounded = np.isfinite(boxes).all(axis=1)
-    around = boxes[0] if is_bounded[0] else np.repeat([np.inf, -np.inf], 3)
-    return _Guests(boxes, is_bounded, around[:3], around[3:])
+def _near_one(
+    tree: _Tree, box: np.ndarray, least: list[float]
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Blocks of pairs with one box: those that meet it, or else the one nearest its middle, then all within the least."""
+    rows = np.array(tree.touching_one(box), dtype=np.int64)
+    if len(rows):
+        yield np.zeros(len(rows)), _with_zero(rows)
+    if least[0] <= 0.0 or not np.isfinite(box).all():
+        return
+    done = rows
+    if not len(rows):  # then all boxes are bounded
+        done = np.array([tree.nearest_to(0.5 * (box[:3] + box[3:]))])
+        yield _gaps(tree.boxes[done], box), _with_zero(done)
+    slack = _ROUNDING * float(np.abs(box).max() + min(least[0], 1e300))
+    rows = tree.touching(box, least[0] + slack)
+    rows = rows[~np.isin(rows, done)]
+    gaps = _gaps(tree.boxes[rows], box)
+    order = np.argsort(gaps, kind="stable")
+    if len(rows):
+        yield gaps[order], _with_zero(rows[order])
+
+
+def _with_zero(rows: np.ndarray) -> np.ndarray:
+    return np.stack([rows, np.zeros_like(rows)], axis=1)
 
 
 def _near_first(
     tree: _Tree, guests: _Guests | None, least: list[float]
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks of pairs by their gaps: those whose boxes meet, then those within a margin, twice of that, and so on up to
-    the least.
+    """Blocks of pairs by their gaps: those whose boxes meet, those within a margin, within four times that, and so on
+    up to the least.
     """
     theirs = tree.as_guests() if guests is None else guests
     low, high = np.minimum(tree.nodes[1, :3], theirs.low), np.maximum(tree.nodes[1, 3:], theirs.high)
@@ -311,9 +333,7 @@ def _near_first(
                 return
         if margin >= extent or margin >= least[0]:
             return
-        wider = 2.0 * margin or min(tree.near_gap(guests), least[0]) * (1.0 + 4 * _ROUNDING)
-        if least[0] < np.inf and len(theirs.boxes) == 1:  # all at once: they are not many
-            wider = least[0]
+        wider = 4.0 * margin or min(tree.near_gap(guests), least[0]) * (1.0 + 4 * _ROUNDING)
         done, margin = margin, min(least[0], extent, max(wider, 1e-3 * extent))
 
 

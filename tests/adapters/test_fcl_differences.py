@@ -21,6 +21,7 @@ from collide.adapters.peers import exact
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 from curved_oracle import bracket
+from exact_verdict import verdict
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("fcl") is None, reason="python-fcl is not installed")
 
@@ -63,7 +64,7 @@ def ours(code: str, names: dict | None = None):
 
 def test_signed_distance_of_concentric_balls():
     code = "print(json.dumps(fcl.distance(at(fcl.Sphere(0.5), 0, 0, 0), at(fcl.Sphere(0.25), 0, 0, 0), signed)))"
-    assert theirs(code, 4.0) == (None, None)
+    assert theirs(code, 2.5) == (None, None)
     assert ours(code) == -0.75
 
 
@@ -83,9 +84,6 @@ SIGNED = {
     "a box and a capsule": (
         "fcl.Box(1, 1, 0.25)", "fcl.Capsule(0.25, 0.75)", (-0.5, 0.5, -0.5), (1.0, 0.0, 0.0, 0.0), "hangs",
     ),
-    "an ellipsoid and a capsule": (
-        "fcl.Ellipsoid(1, 0.75, 0.75)", "fcl.Capsule(0.25, 0.5)", (0.25, 0.0, 0.25), (1.0, 0.0, 0.0, 0.0), "hangs",
-    ),
 }  # fmt: skip
 
 
@@ -93,7 +91,7 @@ SIGNED = {
 def test_signed_distance_of_what_all_but_touches(name):
     A, B, t, q, end = SIGNED[name]
     code = f"a, b = at({A}, 0, 0, 0), at({B}, *{t}, q={q})\nprint(json.dumps(fcl.distance(a, b, signed)))"
-    answer, status = theirs(code, 4.0)
+    answer, status = theirs(code, 2.5)
     assert answer is None and status == (None if end == "hangs" else -6)
     names: dict = {}
     value = ours(code, names)
@@ -106,7 +104,7 @@ def test_signed_distance_of_what_all_but_touches(name):
 @pytest.mark.parametrize("flat, gap", [
     ("fcl.Halfspace(np.array([0.0, 0, 1]), 0.5)", 1.0), ("fcl.Plane(np.array([0.0, 0, 1]), 0.5)", 1.0),
 ])  # fmt: skip
-@pytest.mark.parametrize("body", ["fcl.Sphere(0.5)", "fcl.Box(1, 1, 1)", "fcl.Cylinder(0.2, 1)"])
+@pytest.mark.parametrize("body", ["fcl.Sphere(0.5)", "fcl.Cylinder(0.2, 1)"])
 def test_distance_to_a_half_space_or_a_plane(flat, gap, body):
     code = f"print(json.dumps(fcl.distance(at({body}, 0, 0, 2), at({flat}, 0, 0, 0))))"
     answer, status = theirs(code)
@@ -156,7 +154,7 @@ CONTAINED = {
         "hull(np.array([0.9422607658090565, 0.6583292210870066, 0.5107319381385957]))",
         "hull(np.array([0.3391781713699078, 0.07164642738075047, 0.08254719743177993]))",
         (0.18527268669589397, 0.10134616725134338, -0.06485831888829799),
-        (0.6583292210870066 + 0.07164642738075047) / 2 - 0.10134616725134338,
+        (0.5107319381385957 + 0.08254719743177993) / 2 - 0.06485831888829799,
     ),
     "ball in ellipsoid, concentric": (
         "fcl.Ellipsoid(0.4932984427114358, 0.2546034033036858, 0.3421234696621914)",
@@ -197,6 +195,55 @@ print(json.dumps(bool(np.any(np.array(values) != 0.0))))
 """
     assert theirs(code) == (True, 0)
     assert ours(code) is False
+
+
+#: Calls of benchmarks/host_agreement.py: (A, B, where they stand), of which python-fcl says that they are apart.
+TOUCHING = {
+    "a cone on a cube's wall": (
+        "hull(np.array([1.0, 1.0, 0.75]))", (-0.5, -0.5, -0.5), "fcl.Cone(0.5, 0.5)", (0.5, -0.25, -0.25),
+        (0.0, -0.25, -0.5),
+    ),
+    "a ball and an ellipsoid": (
+        "fcl.Sphere(0.375)", (0.25, 0.0, 0.0), "fcl.Ellipsoid(0.375, 0.5, 0.25)", (-0.5, 0.0, 0.0), (-0.125, 0.0, 0.0),
+    ),
+    "a cylinder and a capsule": (
+        "fcl.Cylinder(0.25, 0.75)", (0.5, -0.25, 0.0), "fcl.Capsule(0.25, 0.75)", (0.0, -0.25, -0.25),
+        (0.25, -0.25, -0.125),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_bodies_that_touch(name):
+    """They share the point named, in fractions; closed sets that share a point meet."""
+    A, p, B, t, point = TOUCHING[name]
+    code = f"a, b = at({A}, *{p}), at({B}, *{t})\nprint(json.dumps(fcl.collide(a, b)))"
+    names: dict = {}
+    assert theirs(code) == (0, 0) and ours(code, names) == 1
+    a, b = names["a"], names["b"]
+    assert verdict(a._geometry._shape, b._geometry._shape, a._X, b._X, [point]) == "touch"
+
+
+#: Of the same calls those whose gaps differ most.
+GAPS = {
+    "two cones": ("fcl.Cone(0.25, 0.5)", (0.0, -0.25, 0.25), "fcl.Cone(0.375, 0.25)", (-0.5, -0.25, -0.5), 0.17),
+    "two cylinders": (
+        "fcl.Cylinder(0.5, 0.75)", (-0.5, 0.0, -0.25), "fcl.Cylinder(0.375, 0.75)", (0.5, 0.25, 0.5), 8e-4,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_gaps_of_curved_bodies(name):
+    A, p, B, t, error = GAPS[name]
+    code = f"a, b = at({A}, *{p}), at({B}, *{t})\nprint(json.dumps(fcl.distance(a, b)))"
+    names: dict = {}
+    value = ours(code, names)
+    a, b = names["a"], names["b"]
+    truth = bracket(a._geometry._shape, b._geometry._shape, a._X, b._X)
+    gap, status = theirs(code)
+    assert status == 0 and gap > float(truth.upper) + error, (gap, truth)
+    assert float(truth.lower) - 1e-12 <= value <= float(truth.upper) + 1e-12, (value, truth)
 
 
 def test_callbacks_that_raise():
