@@ -286,7 +286,7 @@ class _Guests(NamedTuple):
 def _near_one(
     tree: _Tree, box: np.ndarray, least: list[float]
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks of pairs with one box: those that meet it, or else the one nearest its middle, then all within the least."""
+    """Blocks of pairs with one box: those that meet it, else the one nearest its middle; then all within the least."""
     rows = np.array(tree.touching_one(box), dtype=np.int64)
     if len(rows):
         yield np.zeros(len(rows)), _with_zero(rows)

@@ -224,8 +224,9 @@ def test_bodies_that_touch(name):
     assert verdict(a._geometry._shape, b._geometry._shape, a._X, b._X, [point]) == "touch"
 
 
-#: Of the same calls those whose gaps differ most.
+#: Two cubes 2 m apart, face to face; and of the same calls those whose gaps differ most.
 GAPS = {
+    "two cubes given as hulls": ("hull(np.ones(3))", (0.0, 0.0, 0.0), "hull(np.ones(3))", (0.0, -3.0, 0.0), 0.2),
     "two cones": ("fcl.Cone(0.25, 0.5)", (0.0, -0.25, 0.25), "fcl.Cone(0.375, 0.25)", (-0.5, -0.25, -0.5), 0.17),
     "two cylinders": (
         "fcl.Cylinder(0.5, 0.75)", (-0.5, 0.0, -0.25), "fcl.Cylinder(0.375, 0.75)", (0.5, 0.25, 0.5), 8e-4,
@@ -234,7 +235,7 @@ GAPS = {
 
 
 @pytest.mark.parametrize("name", GAPS)
-def test_gaps_of_curved_bodies(name):
+def test_gaps(name):
     A, p, B, t, error = GAPS[name]
     code = f"a, b = at({A}, *{p}), at({B}, *{t})\nprint(json.dumps(fcl.distance(a, b)))"
     names: dict = {}
