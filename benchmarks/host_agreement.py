@@ -81,7 +81,7 @@ def answers(fcl, n: int, seed: int) -> list:
     return [replies, 1e6 * spent / max(n, 1)]
 
 
-def posed(pair) -> tuple:
+def question_of(pair) -> tuple:
     """(A, B, X_WA, X_WB) of a call, as collide has them."""
     a, b = (fcl_api.CollisionObject(geometry(fcl_api, k, s), fcl_api.Transform(R, t)) for k, s, R, t in pair)
     return a._geometry._shape, b._geometry._shape, a._X, b._X
@@ -89,7 +89,7 @@ def posed(pair) -> tuple:
 
 def judged(pair, hit: bool) -> str:
     """Who is right about a pair whose booleans differ; hit : what the stand-in says."""
-    question = posed(pair)
+    question = question_of(pair)
     r = collide.distance(*question)  # proposes points that both may hold
     truth = verdict(*question, [0.5 * (r.point_a + r.point_b), r.point_a, r.point_b])
     if truth == "open":
@@ -104,7 +104,7 @@ _GAP = 1e-6
 
 def judged_gap(pair, gap: float, their_gap: float) -> str:
     """Whose gap is within 50 nm of the bracket: collide promises 2⁻²⁶ of the size of curved pairs."""
-    truth = bracket(*posed(pair))
+    truth = bracket(*question_of(pair))
     low, high = float(truth.lower) - 5e-8, float(truth.upper) + 5e-8
     if high - low > 2e-7:
         return "open"

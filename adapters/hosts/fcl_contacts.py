@@ -60,7 +60,9 @@ def contacts_of_pairs(pairs: list, limit: int, with_geometry: bool) -> list[list
     if not with_geometry:
         return [contacts_of(o1, o2, limit, False) for o1, o2 in pairs]
     answers: list[list[Contact] | None] = [None] * len(pairs)
-    plain = [k for k, pair in enumerate(pairs) if _is_plain_question(*pair) and not _is_one_facet(*pair, limit)]
+    plain = [
+        k for k, (o1, o2) in enumerate(pairs) if _is_plain_question(o1, o2) and not _is_one_facet(o1, o2, limit)
+    ]
     if len(plain) > 1:
         for k, contacts in zip(plain, _batch([pairs[k] for k in plain], limit)):
             answers[k] = contacts

@@ -271,8 +271,10 @@ class CollisionObject(HostObject):
 
     def setTranslation(self, vec):
         """vec : (3,) [m]."""
-        self._X[:3, 3] = shaped("vec", vec, (3,))
-        self._moved()
+        is_vector = vec.__class__ is np.ndarray and vec.shape == (3,)
+        self._X[:3, 3] = vec if is_vector else shaped("vec", vec, (3,))
+        for moved in self._watchers:
+            moved.add(self)
 
     def getRotation(self):
         """A copy (3, 3)."""

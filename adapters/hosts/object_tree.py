@@ -20,6 +20,8 @@ from collide.shapes.shape_set import Picked, ShapeSet
 
 #: The pairs of so many leaves are looked for first, before those of all.
 _FIRST_LEAVES = 32
+#: Up to so many pairs are sorted by their gaps all at once.
+_MAX_SORTED = 2048
 #: A tree is built anew once its objects have moved so often, on average.
 _MOVES_TO_REBUILD = 8
 #: Gaps of boxes are less than this part below what they are in doubles.
@@ -287,6 +289,9 @@ def _near_one(
     tree: _Tree, box: np.ndarray, least: list[float]
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Blocks of pairs with one box: those that meet it, else the one nearest its middle; then all within the least."""
+    if len(tree.boxes) <= _MAX_SORTED // 8:
+        yield from _all_by_gap(tree.boxes, box[None])
+        return
     rows = np.array(tree.touching_one(box), dtype=np.int64)
     if len(rows):
         yield np.zeros(len(rows)), _with_zero(rows)
@@ -305,6 +310,18 @@ def _near_one(
         yield gaps[order], _with_zero(rows[order])
 
 
+def _all_by_gap(boxes: np.ndarray, guests: np.ndarray | None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """All pairs in one block, of boxes with guests or among themselves: sooner than a tree where they are few."""
+    gaps = _gaps(boxes[:, None], (boxes if guests is None else guests)[None])
+    if guests is None:
+        gaps[np.tri(len(boxes), dtype=bool)] = np.inf
+    flat = gaps.ravel()
+    order = np.argsort(flat, kind="stable")
+    order = order[: int(np.isfinite(flat).sum())]
+    if len(order):
+        yield flat[order], np.stack(np.divmod(order, gaps.shape[1]), axis=1)
+
+
 def _with_zero(rows: np.ndarray) -> np.ndarray:
     return np.stack([rows, np.zeros_like(rows)], axis=1)
 
@@ -316,6 +333,9 @@ def _near_first(
     up to the least.
     """
     theirs = tree.as_guests() if guests is None else guests
+    if len(tree.boxes) * len(theirs.boxes) <= _MAX_SORTED:
+        yield from _all_by_gap(tree.boxes, None if guests is None else guests.boxes)
+        return
     low, high = np.minimum(tree.nodes[1, :3], theirs.low), np.maximum(tree.nodes[1, 3:], theirs.high)
     extent = float(np.linalg.norm(high - low)) if (low <= high).all() else 0.0
     slack = _ROUNDING * float(np.abs([low, high]).max()) if extent else 0.0
