@@ -13,7 +13,7 @@ EYE = np.eye(4)
 
 
 def stack_of_bodies(rng, n: int):
-    """(shapes, poses): boxes, hulls and round shapes on a grid so narrow that neighbours touch, some of them exactly."""
+    """(shapes, poses): boxes, hulls and round shapes on a narrow grid: neighbours touch, some of them exactly."""
     some = [
         collide.Box((0.5, 0.5, 0.5)), collide.Box((0.6, 0.4, 0.5)), collide.ConvexHull(rng.normal(size=(12, 3)) * 0.3),
         collide.Sphere(0.3), collide.Cylinder(0.25, 0.5), collide.Capsule(0.2, 0.3),
@@ -86,7 +86,8 @@ def test_a_world_has_the_bytes_of_its_pairs(asked, with_mesh):
         of_mesh = (found["a"] == mesh) | (found["b"] == mesh)
         assert of_mesh.sum() > 16 and (np.diff(found["a"].astype(np.int64) * 1000 + found["b"]) >= 0).all()
         k = int(np.argmax(found["b"] == mesh))
-        own = collide.contacts(shapes[found["a"][k] - 1], world.body(mesh).shape, X[found["a"][k] - 1], EYE, margin=0.01)
+        body = found["a"][k] - 1
+        own = collide.contacts(shapes[body], world.body(mesh).shape, X[body], EYE, margin=0.01)
         assert np.array_equal(found["point_a"][k : k + len(own)], own.point_a)
     wanted = one_by_one(A, B, X_WA, X_WB, margin=0.01)
     for rows, (i, j) in zip(wanted, pairs):
