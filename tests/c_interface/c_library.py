@@ -220,7 +220,8 @@ class Asker:
             which = np.ascontiguousarray(other, dtype=np.int64)
             n, first, name = len(which), [one.handle, which.ctypes.data, len(which)], "each"
         else:
-            n, first, name = min(len(X_WA), len(X_WB)) and max(len(X_WA), len(X_WB)), [one.handle, other.handle], "batch"
+            n, first, name = max(len(X_WA), len(X_WB)), [one.handle, other.handle], "batch"
+            n = n if len(X_WA) and len(X_WB) else 0
         rows, starts = np.full(capacity, 7, dtype=CONTACT_DTYPE), np.zeros(n + 1, dtype=np.uint64)
         status = getattr(library(), f"collide_contacts_{name}")(
             self.handle, *first, Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB)), margin,

@@ -144,7 +144,8 @@ def test_batches_of_a_pair_have_pythons_bits(still):
         if answers()[k] is None:
             continue
         moved = np.stack([X_WB] * 50)
-        moved[:, int(random.integers(3)), 3] += np.append(0.0, random.normal(size=49) * 10.0 ** random.uniform(-9, 0, 49))
+        steps = random.normal(size=50) * 10.0 ** random.uniform(-9, 0, 50)
+        moved[:, int(random.integers(3)), 3] += steps
         poses = {"A": (X_WA, moved), "B": (moved, X_WA), "neither": (np.stack([X_WA] * 50), moved)}[still]
         status, rows, starts, _ = asker.contact_batch(made()[k], *poses, margin, most, capacity=50 * 99)
         wanted = collide.contacts(A, B, *poses, margin=margin, max_contacts=most)
@@ -166,7 +167,7 @@ def clouds() -> dict[str, np.ndarray]:
     found = {name: hull_families.HULLS[name]()[0] for name in hull_families.HULLS}
     found = {name: points for name, points in found.items() if len(points) <= 3000}
     found |= {
-        "grid": grid, "disc": disc, "drum": np.concatenate([disc, disc + [0, 0, 1]]), "flat grid": grid * [1, 1, 0],
+        "grid": grid, "disc": disc, "drum": np.concatenate([disc, disc + np.array([0, 0, 1])]), "flat grid": grid * [1, 1, 0],
         "segment": np.outer(np.arange(9.0) - 3.0, [1.0, 2.0, -3.0]), "point": np.ones((4, 3)), "alone": np.zeros((1, 3)),
         "triangle": np.eye(3), "pancake": random.normal(size=(80, 3)) * [1, 1, 1e-13],
     }  # fmt: skip
