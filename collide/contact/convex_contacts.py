@@ -53,8 +53,8 @@ from collide.transforms import as_poses
 
 #: The least that a thread is handed.
 _PIECE = 512
-#: Contacts a pair that there is room for at first.
-_USUAL = 2
+#: Contacts a pair that there is room for at first, and of so many pairs: how many they have tells about the others.
+_USUAL, _FIRST = 8, 256
 
 
 class ConvexPairs(NamedTuple):
@@ -149,7 +149,7 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
     faces = face_table_of(table, ROUND)
     space, block = _of_thread.space.fit(faces.largest), block_workspace()
     max_rows = min(asked.max_contacts, max_corners(faces.largest))
-    ends, out = np.empty(n, dtype=np.int64), np.empty(_USUAL * n + max_rows, dtype=CONTACT_DTYPE)
+    ends, out = np.empty(n, dtype=np.int64), np.empty(_USUAL * min(n, _FIRST) + max_rows, dtype=CONTACT_DTYPE)
     places = np.empty(BLOCK, dtype=np.int64)
     header = np.zeros(BLOCK_HEADER, dtype=np.int64)
     header[:HEADER_OF_POSES] = block.header_of(table)
@@ -164,7 +164,7 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
         address_of(out), len(out), address_of(ends),
     )  # fmt: skip
     header[CHECK], header[PLACES_AT] = asked.check, address_of(places)
-    n_rows = HEADER_OF_POSES + ROWS_DONE
+    n_done, n_rows = HEADER_OF_POSES + PAIRS_DONE, HEADER_OF_POSES + ROWS_DONE
     while status := contacts_of_pairs(address_of(header), n):
         if status == BAD_POSE:
             raise InvalidPose("a matrix is no pose")
@@ -174,7 +174,7 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
                 "collide() still answers"
             )
         if status == ROWS_FULL:
-            out = _with_space(out, int(header[n_rows]), len(out) + max_rows)
+            out = _with_space(out, int(header[n_rows]), int(header[n_done]), n, max_rows)
             header[OUT_AT], header[CAPACITY] = address_of(out), len(out)
         else:
             assert status == OPEN
@@ -187,12 +187,12 @@ def _address_or_0(array: np.ndarray | None) -> int:
     return 0 if array is None else address_of(array)
 
 
-def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
-    """The first rows, and space for so many more behind them, in the same memory where that is large enough."""
-    if n_rows + n_more <= len(rows):
-        return rows
-    larger = np.empty(n_rows + n_more, dtype=CONTACT_DTYPE)
-    larger[:n_rows] = rows[:n_rows]
+def _with_space(rows: np.ndarray, n_rows: int, n_done: int, n: int, max_rows: int) -> np.ndarray:
+    """The first rows, those of so many of n pairs, with space for those of all others if they have as many."""
+    share = 1.125 * n / max(n_done, 1)
+    larger = np.empty(int(max(share, 1.5) * n_rows) + 2 * max_rows, dtype=CONTACT_DTYPE)
+    words = CONTACT_DTYPE.itemsize // 8  # numpy copies records field by field
+    larger.view(np.int64)[: words * n_rows] = rows.view(np.int64)[: words * n_rows]
     return larger
 
 
