@@ -167,8 +167,9 @@ def clouds() -> dict[str, np.ndarray]:
     found = {name: hull_families.HULLS[name]()[0] for name in hull_families.HULLS}
     found = {name: points for name, points in found.items() if len(points) <= 3000}
     found |= {
-        "grid": grid, "disc": disc, "drum": np.concatenate([disc, disc + np.array([0, 0, 1])]), "flat grid": grid * [1, 1, 0],
-        "segment": np.outer(np.arange(9.0) - 3.0, [1.0, 2.0, -3.0]), "point": np.ones((4, 3)), "alone": np.zeros((1, 3)),
+        "grid": grid, "disc": disc, "drum": np.concatenate([disc, disc + np.array([0, 0, 1])]),
+        "flat grid": grid * [1, 1, 0], "segment": np.outer(np.arange(9.0) - 3.0, [1.0, 2.0, -3.0]),
+        "point": np.ones((4, 3)), "alone": np.zeros((1, 3)),
         "triangle": np.eye(3), "pancake": random.normal(size=(80, 3)) * [1, 1, 1e-13],
     }  # fmt: skip
     for number in range(60):
