@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.fcl_contacts import contacts_of, nearest_sides, ordered
+from collide.adapters.hosts.fcl_contacts import FLAT, contacts_of, nearest_sides, ordered
 from collide.adapters.hosts.fcl_geometry import CollisionObject
 from collide.adapters.hosts.fcl_planes import is_plane_with_pieces, plane_gap, plane_meets, sides_to_move
 from collide.adapters.hosts.fcl_requests import (
@@ -108,15 +108,16 @@ def distance(o1, o2, request=None, result=None):
     Returns
     -------
     float
-        [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it; 0 of two meshes,
-        which have no inside.
+        [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it. Meshes have no
+        inside: −1 in any case, but with planes and half-spaces, and 0 of two of them.
     """
     if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
         raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
     o1, o2 = ordered(o1, o2)
     g1, g2 = o1._geometry, o2._geometry
-    both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
-    signed = request is not None and not both_meshes and bool(request.enable_signed_distance)
+    is_mesh = g1._object_type == OBJECT_TYPE.OT_BVH  # which stands first
+    both_meshes = is_mesh and g2._object_type == OBJECT_TYPE.OT_BVH
+    signed = request is not None and bool(request.enable_signed_distance) and (not is_mesh or g2._node_type in FLAT)
     if not (g1._shapes and g2._shapes):
         _refuse_unfinished(g1, g2)
     if len(g1._shapes) == len(g2._shapes) == 1:

@@ -247,6 +247,20 @@ def test_gaps(name):
     assert float(truth.lower) - 1e-12 <= value <= float(truth.upper) + 1e-12, (value, truth)
 
 
+def test_distance_of_a_mesh_and_a_ball_that_meet():
+    """The ball's middle is 0.4 m from a facet, its radius 0.5 m."""
+    code = """
+mesh = fcl.BVHModel()
+mesh.beginModel(12, 8)
+mesh.addSubModel(CORNERS, FACETS)
+mesh.endModel()
+print(json.dumps(fcl.distance(at(mesh, 0, 0, 0), at(fcl.Sphere(0.5), 0.9, 0.2, 0.1), signed)))
+"""
+    distance, status = theirs(code)
+    assert status == 0 and distance > 0.0
+    assert ours(code) == -1.0
+
+
 def test_callbacks_that_raise():
     code = """
 manager = fcl.DynamicAABBTreeCollisionManager()
