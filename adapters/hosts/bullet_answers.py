@@ -166,11 +166,11 @@ def overlapping(world: World, tables: Tables, low: np.ndarray, high: np.ndarray)
 
 
 def ray_hits(
-    world: World, tables: Tables, origins: np.ndarray, ends: np.ndarray, mask: int, number: int, epsilon: float
+    world: World, tables: Tables, origins: np.ndarray, ends: np.ndarray, passed: np.ndarray, number: int, epsilon: float
 ) -> tuple:
     """pybullet's tuples of rays from origins to ends (n, 3): the first hit, or the hit of a number, nearest first.
 
-    mask : groups that count.   number : which hit, from 0; below 0 the first.
+    passed : (n,) bool: bodies that rays pass through.   number : which hit, from 0; below 0 the first.
     epsilon : hits of one link whose fractions differ by at most so much are one; below 0 none are.
 
     Walls on the way out of a solid do not count, as in Bullet; surfaces and half-spaces have two sides.
@@ -183,28 +183,28 @@ def ray_hits(
         return tuple(out)
     open_rays = which
     if number < 0:
-        hits = world.raycast(origins[which], directions[which], max_distance=1.0, mask=mask).rows
+        hits = world.raycast(origins[which], directions[which], max_distance=1.0).rows
         met = hits["hit"]
-        leaving = met & _leaving(hits, directions[which], tables)
+        leaving = met & _leaving(hits, directions[which], tables, passed)
         for k in np.flatnonzero(met & ~leaving).tolist():
             out[which[k]] = _hit(hits[k], directions[which[k]], tables)
         open_rays = which[leaving]
     if len(open_rays):
-        every = world.raycast(origins[open_rays], directions[open_rays], max_distance=1.0, all_hits=True, mask=mask)
+        every = world.raycast(origins[open_rays], directions[open_rays], max_distance=1.0, all_hits=True)
         assert every.starts is not None
         for k, ray in enumerate(open_rays.tolist()):
             hits = every.rows[every.starts[k] : every.starts[k + 1]]
-            hits = hits[~_leaving(hits, np.repeat(directions[ray][None], len(hits), axis=0), tables)]
+            hits = hits[~_leaving(hits, np.repeat(directions[ray][None], len(hits), axis=0), tables, passed)]
             hit = _numbered(hits, max(number, 0), epsilon)
             if hit is not None:
                 out[ray] = _hit(hit, directions[ray], tables)
     return tuple(out)
 
 
-def _leaving(hits: np.ndarray, directions: np.ndarray, tables: Tables) -> np.ndarray:
-    """(k,) bool: rows that are walls on the way out of a solid."""
+def _leaving(hits: np.ndarray, directions: np.ndarray, tables: Tables, passed: np.ndarray) -> np.ndarray:
+    """(k,) bool: rows that are walls on the way out of a solid, or of bodies that rays pass through."""
     outward = np.einsum("ki,ki->k", hits["normal"], directions) > 0.0
-    return outward & ~tables.two_sided[hits["body"]]
+    return (outward & ~tables.two_sided[hits["body"]]) | passed[hits["body"]]
 
 
 def _numbered(hits: np.ndarray, number: int, epsilon: float) -> np.void | None:

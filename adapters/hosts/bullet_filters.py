@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from collide.adapters.hosts.bullet_bodies import Geom
 
 #: Bullet's groups and masks of bodies that move, and of bases without mass, as 32 bits.
@@ -20,6 +22,8 @@ class CollisionFilters:
         self._group_masks: dict[tuple[int, int], tuple[int, int]] = {}
         self._pairs: dict[frozenset[tuple[int, int]], bool] = {}
         self._self_flags: dict[int, int] = {}
+        #: Whether A's group must be in B's mask and B's in A's; by default one of them is enough.
+        self.needs_both = False
 
     def set_group_mask(self, body: int, link: int, group: int, mask: int) -> None:
         self._group_masks[body, link] = group & _ALL, mask & _ALL
@@ -44,9 +48,10 @@ class CollisionFilters:
         """Group and mask of a link."""
         return self._group_masks.get((geom.body, geom.link), FIXED if geom.fixed else MOVING)
 
-    def changed(self, geom: Geom) -> bool:
-        """Whether its group and mask were set."""
-        return (geom.body, geom.link) in self._group_masks
+    @property
+    def are_bullets_own(self) -> bool:
+        """Whether a World's rule for groups and masks gives what Bullet's gives: nothing was set."""
+        return not self._group_masks and not any(self._pairs.values())
 
     def never_tested(self, geoms: Sequence[Geom]) -> list[tuple[int, int, str]]:
         """(row, row, reason) of pairs that are left out, besides those that groups and masks exclude."""
@@ -67,23 +72,17 @@ class CollisionFilters:
                 left_out.append((min(places), max(places), "switched off by setCollisionFilterPair"))
         return left_out
 
-    def switched_on(self, geoms: Sequence[Geom]) -> bool:
-        """Whether some pair is switched on that groups and masks exclude."""
-        rows = {(geom.body, geom.link): geom for geom in geoms}
-        for pair, enable in self._pairs.items():
-            both = [rows[place] for place in pair if place in rows]
-            if enable and len(both) == 2 and both[0].body != both[1].body and not self.compatible(*both):
-                return True
-        return False
+    def incompatible(self, geoms: Sequence[Geom]) -> np.ndarray:
+        """(k, 2) rows of pairs that groups and masks exclude, i < j, but for those that are switched on."""
+        bits = np.array([self.bits(geom) for geom in geoms], dtype=np.int64).reshape(-1, 2)
+        group, mask = bits.T
+        forth, back = (group[:, None] & mask[None, :]) != 0, (mask[:, None] & group[None, :]) != 0
+        pairs = np.argwhere(np.triu(~(forth & back if self.needs_both else forth | back), 1))
+        is_on = [self._is_on(geoms[i], geoms[j]) for i, j in pairs.tolist()] if self._pairs else [False] * len(pairs)
+        return pairs[~np.array(is_on, dtype=bool)]
 
-    def is_on(self, A: Geom, B: Geom) -> bool:
-        """Whether setCollisionFilterPair switched a pair on."""
+    def _is_on(self, A: Geom, B: Geom) -> bool:
         return self._pairs.get(frozenset(((A.body, A.link), (B.body, B.link))), False)
-
-    def compatible(self, A: Geom, B: Geom) -> bool:
-        """Whether groups and masks let two links meet."""
-        (group_a, mask_a), (group_b, mask_b) = self.bits(A), self.bits(B)
-        return bool(group_a & mask_b) and bool(group_b & mask_a)
 
 
 def _links_meet(A: Geom, B: Geom, flags: int) -> bool:

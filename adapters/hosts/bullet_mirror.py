@@ -18,7 +18,7 @@ from collide.adapters.hosts.bullet_answers import (
     ray_hits,
 )
 from collide.adapters.hosts.bullet_bodies import ClientBodies, Geom
-from collide.adapters.hosts.bullet_filters import MOVING, CollisionFilters
+from collide.adapters.hosts.bullet_filters import CollisionFilters
 from collide.adapters.hosts.bullet_shapes import Collider, pose_of, poses_of
 from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery
 from collide.shapes import Shape
@@ -149,6 +149,11 @@ class Mirror:
         self.filters.set_self_collision(body, flags)
         self._stale_filters = True
 
+    def set_filter_mode(self, mode: int) -> None:
+        """Say what ``collisionFilterMode`` is: 1, as Bullet begins, or 0 where groups must be in masks both ways."""
+        self.filters.needs_both = mode == 0
+        self._stale_filters = True
+
     def setCollisionFilterGroupMask(
         self, bodyUniqueId, linkIndexA, collisionFilterGroup, collisionFilterMask, physicsClientId=None
     ):
@@ -233,8 +238,9 @@ class Mirror:
         if parentObjectUniqueId >= 0:
             X = self._pose(parentObjectUniqueId, parentLinkIndex)
             origins, ends = (points @ X[:3, :3].T + X[:3, 3] for points in (origins, ends))
-        mask = collisionFilterMask & _ALL_GROUPS
-        return ray_hits(self.world, self._tables, origins, ends, mask, reportHitNumber, float(fractionEpsilon))
+        groups = np.array([self.filters.bits(geom)[0] for geom in self._tables.geoms], dtype=np.int64)
+        passed = (groups & collisionFilterMask) == 0
+        return ray_hits(self.world, self._tables, origins, ends, passed, reportHitNumber, float(fractionEpsilon))
 
     # --- how they are answered ------------------------------------------------------------------
 
@@ -252,19 +258,16 @@ class Mirror:
     def _fill_world(self) -> None:
         """Another World of the same geoms, with the filters as they are."""
         tables, filters = self._tables, self.filters
-        one_by_one = filters.switched_on(tables.geoms)  # a World has no pair that meets in spite of its groups
+        own = filters.are_bullets_own
         self.world = World()
         for geom, shape, X in zip(tables.geoms, tables.shapes, tables.X_WS):
-            static = geom.fixed and not filters.changed(geom) and not one_by_one
-            group, mask = MOVING if one_by_one else filters.bits(geom)
-            self.world.add(shape, X, name=geom.name, static=static, group=group, mask=mask)
+            group, mask = filters.bits(geom) if own else (_ALL_GROUPS, _ALL_GROUPS)
+            self.world.add(shape, X, name=geom.name, static=own and geom.fixed, group=group, mask=mask)
         for a, b, reason in filters.never_tested(tables.geoms):
             self.world.allow(a, b, reason=reason)
-        if one_by_one:
-            for a, A in enumerate(tables.geoms):
-                for b, B in enumerate(tables.geoms[:a]):
-                    if not filters.compatible(A, B) and not filters.is_on(A, B):
-                        self.world.allow(b, a, reason="groups and masks")
+        if not own:
+            for a, b in filters.incompatible(tables.geoms).tolist():
+                self.world.allow(a, b, reason="groups and masks")
         self._contacts, self._stale_filters = None, False
 
     def _move(self, rows: np.ndarray, coordinates: np.ndarray) -> None:
@@ -312,9 +315,7 @@ def genuine_pybullet() -> Any:
     try:
         module = importlib.import_module("pybullet")
     except ImportError as error:
-        raise MissingExtra(
-            "pybullet is not installed: pip install 'collide-robotics[pybullet]' (it has wheels up to Python 3.11)"
-        ) from error
+        raise MissingExtra("pybullet", extra="pybullet", purpose="follow its bodies (wheels up to Python 3.11)") from error
     return getattr(module, "__wrapped__", module)
 
 

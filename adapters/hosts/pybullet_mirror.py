@@ -39,7 +39,7 @@ QUESTIONS = ("getClosestPoints", "getContactPoints", "getOverlappingObjects", "r
 _CLIENT_AT = {
     "createCollisionShape": SHAPE_ARGUMENTS.index("physicsClientId"), "createMultiBody": len(BODY_ARGUMENTS) - 1,
     "loadURDF": 7, "loadSDF": 3, "loadMJCF": 3, "resetSimulation": 1, "disconnect": 0, "setCollisionFilterPair": 5,
-    "setCollisionFilterGroupMask": 4, "changeDynamics": 24,
+    "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99,
 }  # fmt: skip
 _CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
 #: Where flags stand among those of what loads bodies.
@@ -272,3 +272,7 @@ class _StandIn(ModuleType):
     def _note_changeDynamics(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
         if "collisionMargin" in keywords or len(values) > 19:
             self._mirror(client).note_margin(keywords.get("bodyUniqueId", values[0] if values else -1))
+
+    def _note_setPhysicsEngineParameter(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
+        if "collisionFilterMode" in keywords:
+            self._mirror(client).set_filter_mode(keywords["collisionFilterMode"])

@@ -273,14 +273,16 @@ def test_a_body_that_takes_over_the_last_number_is_noticed(client):
     assert len(mirror.world) == 1 and mirror.world.body(0).shape == collide.Sphere(0.5)
 
 
-def test_bodies_that_rest_are_not_moved(client):
+def test_bodies_that_rest_are_not_moved(client, monkeypatch):
     bodies = [sphere_of(client, 0.1, (k, 0, 0)) for k in range(4)]
     mirror = Mirror(client)
-    before = mirror.world.body(1)
+    moved, set_poses = [], mirror.world.set_poses
+    monkeypatch.setattr(mirror.world, "set_poses", lambda ids, X: (moved.append(list(ids)), set_poses(ids, X)))
+    mirror.update()
     p.resetBasePositionAndOrientation(bodies[3], [3, 1, 0], [0, 0, 0, 1], client)
     mirror.update()
-    assert mirror.world.body(1) is before
-    assert mirror.world.body(3).X_WB[1, 3] == 1.0
+    mirror.update()
+    assert moved == [[3]] and mirror.world.body(3).X_WB[1, 3] == 1.0
 
 
 # --- contacts and filters -----------------------------------------------------------------------
@@ -318,9 +320,12 @@ def pairs_of(rows) -> set:
     return {frozenset([(row[1], row[3]), (row[2], row[4])]) for row in rows}
 
 
-def test_pairs_that_filters_leave_out_are_those_of_bullet(client):
+@pytest.mark.parametrize("mode", [None, 0, 1])
+def test_pairs_that_filters_leave_out_are_those_of_bullet(client, mode):
     random = np.random.default_rng(4)
     stand_in = attach(p, client, contact_margin=0.0)
+    if mode is not None:
+        stand_in.setPhysicsEngineParameter(collisionFilterMode=mode)
     bodies = []
     for k in range(24):
         stand_in.createMultiBody(
@@ -358,7 +363,7 @@ def test_self_collision_is_that_of_the_flags(client, flags):
         theirs, ours = p.getContactPoints(physicsClientId=client), stand_in.getContactPoints()
         assert pairs_of(row for row in theirs if row[8] < -1e-5) == pairs_of(row for row in ours if row[8] < -1e-5)
         n += len(pairs_of(theirs))
-    assert (n > 0) == (flags != 0)
+    assert (n > 0) == (flags not in (0, 8 | 32))  # each link hangs on all links before it
 
 
 # --- rays and boxes -----------------------------------------------------------------------------
@@ -369,7 +374,7 @@ def test_rays_meet_spheres_and_boxes_where_closed_forms_say(client):
     ball = sphere_of(client, 0.4, (0.1, 0.2, 0.3))
     box = body(client, position=(2, 0, 0), shapeType=p.GEOM_BOX, halfExtents=[0.3, 0.2, 0.5])
     mirror = Mirror(client)
-    origins, ends = random.uniform(-3, 3, (2, 600, 3))
+    origins, ends = random.uniform(-3, 3, (2, 1500, 3))
     rows = mirror.rayTestBatch(origins, ends)
     hits = {ball: 0, box: 0, -1: 0}
     for origin, end, (who, link, fraction, place, normal) in zip(origins, ends, rows):
@@ -388,7 +393,7 @@ def test_rays_meet_spheres_and_boxes_where_closed_forms_say(client):
             assert (fraction, place, normal) == (1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         else:
             assert np.allclose(place, origin + fraction * d, atol=1e-12) and np.array(normal) @ d < 0
-    assert min(hits.values()) > 15
+    assert min(hits.values()) > 25
     assert rows[0] == mirror.rayTest(origins[0].tolist(), ends[0].tolist())[0]
 
 
@@ -402,7 +407,7 @@ def test_rays_begin_inside_come_from_behind_and_pass_filters_as_in_bullet(client
     mirror = Mirror(client)
     assert len(made) == len(mirror.world)
     rays = [
-        ((0.1, 0.1, 0.1), (5, 0.1, 0.1)), ((0.1, 0.1, 0.1), (1.2, 0.1, 0.1)), ((2, 0, 0.1), (6, 0.1, 0)),
+        ((0.1, 0.1, 0.1), (5, 0.1, 0.1)), ((0.1, 0.1, 0.1), (1.2, 0.1, 0.1)), ((2.1, 0.1, 0.1), (6, 0.1, 0.1)),
         ((10, 0, 0), (4, 0, 0)), ((4, 0.3, 0), (12, 0, 0)), ((-3, 0.2, 0.1), (9, 0.1, 0.1)), ((0, 0, 5), (0, 0, 5)),
     ]  # fmt: skip
     p.performCollisionDetection(client)
@@ -438,7 +443,7 @@ def test_boxes_that_overlap_are_those_of_the_bodies(client):
         theirs = p.getOverlappingObjects(low.tolist(), high.tolist(), physicsClientId=client) or ()
         assert set(want) <= set(theirs)
         n, empty = n + len(want), empty + (ours is None)
-    assert n > 60 and empty > 3
+    assert n > 25 and empty > 3
 
 
 # --- programs as they are -----------------------------------------------------------------------
@@ -558,7 +563,7 @@ def test_the_extra_is_named_where_pybullet_is_missing():
         "import sys; sys.modules['pybullet'] = None\n"
         "from collide.adapters.hosts.pybullet_mirror import Mirror\n"
         "from collide.errors import MissingExtra\n"
-        "try: Mirror(0)\nexcept MissingExtra as error: print(error)\n"
+        "try:\n  Mirror(0)\nexcept MissingExtra as error: print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "pip install 'collide-robotics[pybullet]'" in done.stdout
