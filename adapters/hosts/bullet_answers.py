@@ -136,8 +136,10 @@ def contact_points(world: World, tables: Tables, contact_margin: float | None) -
     a, b = rows["a"], rows["b"]
     margin_a, margin_b = tables.margins[a] * ~tables.spheres[b], tables.margins[b] * ~tables.spheres[a]
     distances = rows["distance"] - margin_a - margin_b
-    limits = np.minimum(tables.thresholds[a], tables.thresholds[b]) if contact_margin is None else contact_margin
-    if contact_margin is None:
+    limits = np.minimum(tables.thresholds[a], tables.thresholds[b])
+    if contact_margin is not None:
+        limits[:] = contact_margin
+    else:
         limits[(tables.boxes[a] & tables.boxes[b]) | (tables.spheres[a] & tables.spheres[b])] = 0.0
     near = np.flatnonzero(distances <= limits)
     normals = rows["normal"][near]

@@ -52,7 +52,9 @@ def shape_of_arguments(pybullet: Any, arguments: dict[str, Any]) -> Shape | None
         shape = _terrain(arguments)
     if shape is None or isinstance(shape, Halfspace):
         return shape
-    X = pose_of(arguments.get("collisionFramePosition", (0, 0, 0)), arguments.get("collisionFrameOrientation", _UPRIGHT))
+    X = pose_of(
+        arguments.get("collisionFramePosition", (0, 0, 0)), arguments.get("collisionFrameOrientation", _UPRIGHT)
+    )
     return moved(shape, X)
 
 
@@ -62,9 +64,12 @@ def moved(shape: Shape, X: np.ndarray) -> Shape:
 
 
 def inertial_frames(arguments: dict[str, Any]) -> dict[int, tuple[int, np.ndarray]]:
-    """{link: (number of its shape, (4, 4) pose of the link's frame in that of its centre of mass)} of createMultiBody."""
+    """{link: (number of its shape, (4, 4) pose of the link's frame in its centre of mass's)} of createMultiBody."""
     shapes = [arguments.get("baseCollisionShapeIndex", -1), *(arguments.get("linkCollisionShapeIndices") or ())]
-    positions = [arguments.get("baseInertialFramePosition", (0, 0, 0)), *(arguments.get("linkInertialFramePositions") or ())]
+    positions = [
+        arguments.get("baseInertialFramePosition", (0, 0, 0)),
+        *(arguments.get("linkInertialFramePositions") or ()),
+    ]
     orientations = [
         arguments.get("baseInertialFrameOrientation", _UPRIGHT), *(arguments.get("linkInertialFrameOrientations") or ())
     ]  # fmt: skip

@@ -94,7 +94,7 @@ class ClientBodies:
         """Read a body, or all of them, anew the next time."""
         for place in [place for place in self.remaining if body is None or place[0] == body]:
             del self.remaining[place]
-        self._marks = [-2 if body is None or body == other else mark for other, mark in zip(self._bodies, self._marks)]
+        self._marks = [-2 if body in (None, b) else mark for b, mark in zip(self._bodies, self._marks)]
 
     def replace(self, body: int, link: int, shape: Shape) -> None:
         """Take a shape for a link, whatever pybullet says."""
@@ -139,7 +139,9 @@ class ClientBodies:
 
     def _marks_of(self, bodies: list[int]) -> list[int]:
         every = itertools.repeat
-        return list(map(self._pybullet.getUserDataId, bodies, every(self._key), every(-1), every(-1), every(self._client)))
+        return list(
+            map(self._pybullet.getUserDataId, bodies, every(self._key), every(-1), every(-1), every(self._client))
+        )
 
     def _read(self, body: int) -> list[Geom]:
         p, client = self._pybullet, self._client

@@ -37,8 +37,8 @@ class Mirror:
     client : physicsClientId, as ``pybullet.connect`` returned it.
     margins : "none" for shapes as they are; "bullet" for hulls and triangles grown by what Bullet adds to them, a
         millimetre unless changed.
-    shapes : {(body, link): shape} for links whose shapes pybullet does not give back (height fields, meshes of triangles
-        made from arrays); in the frame of the link's centre of mass.
+    shapes : {(body, link): shape} for links whose shapes pybullet does not give back (height fields, meshes of
+        triangles made from arrays); in the frame of the link's centre of mass.
     contact_margin : [m] gap up to which `getContactPoints` lists contacts; None for Bullet's own rule.
 
     Attributes
@@ -145,7 +145,7 @@ class Mirror:
         self._stale_filters = True
 
     def set_self_collision(self, body: int, flags: int) -> None:
-        """Say with which flags a body was loaded: ``URDF_USE_SELF_COLLISION`` and those that go with it."""
+        """Say with which flags a body was loaded: pybullet's for self-collision, and those that go with it."""
         self.filters.set_self_collision(body, flags)
         self._stale_filters = True
 
@@ -258,14 +258,14 @@ class Mirror:
     def _fill_world(self) -> None:
         """Another World of the same geoms, with the filters as they are."""
         tables, filters = self._tables, self.filters
-        own = filters.are_bullets_own
+        untouched = filters.are_bullets_own
         self.world = World()
         for geom, shape, X in zip(tables.geoms, tables.shapes, tables.X_WS):
-            group, mask = filters.bits(geom) if own else (_ALL_GROUPS, _ALL_GROUPS)
-            self.world.add(shape, X, name=geom.name, static=own and geom.fixed, group=group, mask=mask)
+            group, mask = filters.bits(geom) if untouched else (_ALL_GROUPS, _ALL_GROUPS)
+            self.world.add(shape, X, name=geom.name, static=untouched and geom.fixed, group=group, mask=mask)
         for a, b, reason in filters.never_tested(tables.geoms):
             self.world.allow(a, b, reason=reason)
-        if not own:
+        if not untouched:
             for a, b in filters.incompatible(tables.geoms).tolist():
                 self.world.allow(a, b, reason="groups and masks")
         self._contacts, self._stale_filters = None, False
@@ -287,8 +287,8 @@ class Mirror:
             return self._tables, self._rows(body, link)
         if number not in self.collision_shapes:
             raise InvalidArgument(
-                f"getClosestPoints: shape {number} is not known; pybullet does not give shapes without bodies back: make "
-                "it through attach(), or put it into Mirror.collision_shapes"
+                f"getClosestPoints: shape {number} is not known; pybullet does not give shapes without bodies back: "
+                "make it through attach(), or put it into Mirror.collision_shapes"
             )
         geom = Geom(-1, EVERY_LINK, "shape", Collider(self.collision_shapes[number], None, 0.0, ""), (), False)
         return Tables([geom], pose_of(position, orientation)[None]), [0]
@@ -299,7 +299,9 @@ class Mirror:
             raise UnknownBody(f"pybullet has no body {body}, or it came after the last update()")
         for (unread, place), why in self._bodies.remaining.items():
             if unread == body and link in (EVERY_LINK, place):
-                raise UnsupportedQuery(f"body {body}, link {place}: {why}; set_shape(body, link, shape) gives its shape")
+                raise UnsupportedQuery(
+                    f"body {body}, link {place}: {why}; set_shape(body, link, shape) gives its shape"
+                )
         rows = self._tables.rows_of.get(body, [])
         return rows if link == EVERY_LINK else [row for row in rows if self._tables.geoms[row].link == link]
 
@@ -315,7 +317,9 @@ def genuine_pybullet() -> Any:
     try:
         module = importlib.import_module("pybullet")
     except ImportError as error:
-        raise MissingExtra("pybullet", extra="pybullet", purpose="follow its bodies (wheels up to Python 3.11)") from error
+        raise MissingExtra(
+            "pybullet", extra="pybullet", purpose="follow its bodies (wheels up to Python 3.11)"
+        ) from error
     return getattr(module, "__wrapped__", module)
 
 

@@ -6,8 +6,8 @@
     mirror.update()
     mirror.getClosestPoints(robot, table, 0.1)
 
-Tuples and conventions are pybullet's: the normal stands on B and points to A, distances below 0 are overlaps, link −1 is
-the base. What only a solver knows (forces, directions of friction) is 0. docs/hosts.md says what is different, and why.
+Tuples and conventions are pybullet's: the normal stands on B and points to A, distances below 0 are overlaps, link −1
+is the base. What only a solver knows (forces, directions of friction) is 0. docs/hosts.md says what is different.
 """
 
 from __future__ import annotations

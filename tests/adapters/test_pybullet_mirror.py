@@ -32,7 +32,9 @@ def client():
         p.disconnect(number)
 
 
-def body(client: int, mass: float = 1.0, position=(0, 0, 0), turned=(0, 0, 0, 1), *, frame=None, inertial=None, **shape):
+def body(
+    client: int, mass: float = 1.0, position=(0, 0, 0), turned=(0, 0, 0, 1), *, frame=None, inertial=None, **shape
+):
     """A body of one shape.   frame, inertial : position and quaternion of its shape and of its centre of mass."""
     if frame:
         shape |= {"collisionFramePosition": list(frame[0]), "collisionFrameOrientation": list(frame[1])}
@@ -113,7 +115,8 @@ def test_shapes_stand_where_frames_of_shape_and_mass_put_them(client, kind):
         assert np.allclose(np.array(on_a) - np.array(on_b), np.array(normal) * distance, atol=1e-9)
         assert np.isclose(np.linalg.norm(np.array(on_b) - probe), 0.1)
         apart += want > 0
-        p.removeBody(b, client), p.removeBody(s, client)
+        p.removeBody(b, client)
+        p.removeBody(s, client)
     assert apart >= 8
 
 
@@ -224,7 +227,9 @@ def places(mirror: Mirror) -> dict:
 def test_bodies_that_come_go_move_and_take_over_numbers_are_followed(client):
     random = np.random.default_rng(8)
     mirror = Mirror(client)
-    assert len(mirror.world) == 0 and mirror.getContactPoints() == () and mirror.rayTest([0, 0, 1], [0, 0, -1])[0][0] == -1
+    assert (
+        len(mirror.world) == 0 and mirror.getContactPoints() == () and mirror.rayTest([0, 0, 1], [0, 0, -1])[0][0] == -1
+    )
     kinds = [
         {"shapeType": p.GEOM_SPHERE, "radius": 0.2},
         {"shapeType": p.GEOM_BOX, "halfExtents": [0.1, 0.2, 0.3]},
@@ -298,7 +303,7 @@ def test_contacts_of_a_box_on_a_plane_have_pybullets_conventions(client):
         theirs = p.getContactPoints(*arguments, physicsClientId=client)
         assert len(ours) == 4
         assert len({row[1:5] for row in ours}) == 1
-        first, second = (arguments + (-1,))[:2]
+        first, second, *_ = (*arguments, -1)
         assert first in (-1, ours[0][1]) and second in (-1, ours[0][2])
         down = 1.0 if ours[0][1] == box else -1.0
         for row in ours:
@@ -384,7 +389,9 @@ def test_rays_meet_spheres_and_boxes_where_closed_forms_say(client):
         a, b, c = d @ d, m @ d, m @ m - 0.16
         if c > 0 and b * b - a * c > 0 and 0 <= (t := (-b - np.sqrt(b * b - a * c)) / a) <= 1:
             best = min(best, (t, ball))
-        enter, leave = np.sort(np.array([-1, 1])[:, None] * [0.3, 0.2, 0.5] / d + (np.array([2, 0, 0]) - origin) / d, axis=0)
+        enter, leave = np.sort(
+            np.array([-1, 1])[:, None] * [0.3, 0.2, 0.5] / d + (np.array([2, 0, 0]) - origin) / d, axis=0
+        )
         if 0 <= enter.max() <= min(leave.min(), 1):
             best = min(best, (enter.max(), box))
         assert (who, link) == (best[1], -1) and abs(fraction - best[0]) < 1e-12
@@ -460,10 +467,14 @@ def test_what_pybullet_does_not_give_back_is_noted_as_it_passes(client):
     ground = stand_in.createMultiBody(0.0, field, basePosition=[1, 2, 0])
     crate = stand_in.createMultiBody(
         0.0,
-        stand_in.createCollisionShape(p.GEOM_MESH, vertices=CORNERS, indices=FACETS, collisionFramePosition=[0.1, 0, 0]),
+        stand_in.createCollisionShape(
+            p.GEOM_MESH, vertices=CORNERS, indices=FACETS, collisionFramePosition=[0.1, 0, 0]
+        ),
         basePosition=[6, 0, 1], baseInertialFramePosition=[0.3, 0.2, 0.1], baseInertialFrameOrientation=[0.5] * 4,
     )  # fmt: skip
-    ball = stand_in.createMultiBody(1.0, stand_in.createCollisionShape(p.GEOM_SPHERE, radius=0.2), useMaximalCoordinates=1)
+    ball = stand_in.createMultiBody(
+        1.0, stand_in.createCollisionShape(p.GEOM_SPHERE, radius=0.2), useMaximalCoordinates=1
+    )
     assert stand_in.mirror_of(client).remaining == {}
     p.performCollisionDetection(client)
     n = 0
@@ -476,12 +487,17 @@ def test_what_pybullet_does_not_give_back_is_noted_as_it_passes(client):
             if ours[0] == theirs[0] == target:
                 assert abs(ours[2] - theirs[2]) < 1e-5
                 n += 1
-            p.resetBasePositionAndOrientation(ball, (end + [0, 0, 2.0]).tolist(), [0, 0, 0, 1], client)
+            p.resetBasePositionAndOrientation(ball, np.add(end, [0, 0, 2.0]).tolist(), [0, 0, 0, 1], client)
             least = min(row[8] for row in p.getClosestPoints(target, ball, 9.0, physicsClientId=client))
             assert abs(stand_in.getClosestPoints(target, ball, 9.0)[0][8] - least) < 1e-6
     assert n > 50
     rows = stand_in.getClosestPoints(
-        -1, ball, 99.0, collisionShapeA=field, collisionShapePositionA=[1, 2, 0], collisionShapeOrientationA=[0, 0, 0, 1]
+        -1,
+        ball,
+        99.0,
+        collisionShapeA=field,
+        collisionShapePositionA=[1, 2, 0],
+        collisionShapeOrientationA=[0, 0, 0, 1],
     )
     assert rows[0][1:5] == (-1, ball, -2, -1)
     assert abs(rows[0][8] - stand_in.getClosestPoints(ground, ball, 99.0)[0][8]) < 1e-12
@@ -539,7 +555,11 @@ def test_bad_arguments_are_named(client):
     mirror = Mirror(client)
     for make, error, text in (
         (lambda: Mirror(77), InvalidArgument, "client must be what pybullet.connect returned.*77"),
-        (lambda: Mirror(client, margins="thick"), InvalidArgument, "margins must be one of 'none', 'bullet', got 'thick'"),
+        (
+            lambda: Mirror(client, margins="thick"),
+            InvalidArgument,
+            "margins must be one of 'none', 'bullet', got 'thick'",
+        ),
         (lambda: Mirror(client, shapes={(0, -1): 3}), InvalidArgument, "must be a shape, got int"),
         (lambda: mirror.getClosestPoints(ball, 9, 1.0), UnknownBody, "no body 9"),
         (lambda: mirror.getContactPoints(9), UnknownBody, "no body 9"),
