@@ -1,6 +1,11 @@
 """Programs written for other engines, run on collide: one module a host.
 
-Nothing of a host is imported before it is asked for. `HOSTS` is what `collide doctor` lists, one line a host.
+Nothing of a host is imported before it is asked for. `HOSTS` is what `collide doctor` lists, one line a host. A new
+host is a line there, and a function ``check() -> str`` in its module: it does what users do (install, ask one pair
+whose answer is known, uninstall), returns one line that says what held, and raises where something did not:
+`MissingExtra` and `UnsupportedQuery` where the host is refused politely, anything else where it is broken. The doctor
+calls it in a child process with a time limit (`host_checks.py`), so that it may import the host, and the host may
+abort. Nothing is written to a host's files, and no server or window is opened.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ class Host(NamedTuple):
     """One engine whose programs run on collide.
 
     name : as its users call it.   package : its distribution.   is_needed : whether that must be installed.
-    module : ours.   usage : how a program comes to use it.
+    module : ours, whose ``check()`` says whether hooks hold.   usage : how a program comes to use it.
     """
 
     name: str

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from importlib import import_module
 from types import ModuleType
 
 from collide.adapters.hosts import fcl_requests
@@ -125,6 +126,26 @@ def uninstall() -> None:
 def installed() -> bool:
     """Whether ``import fcl`` finds this module."""
     return _before is not None
+
+
+def check() -> str:
+    """Install, ask one pair of what ``import fcl`` finds, uninstall: one line for `collide doctor`.
+
+    Raises
+    ------
+    RuntimeError : what does not hold.
+    """
+    before = sys.modules.get("fcl")
+    with install() as module:
+        fcl = import_module("fcl")
+        ball, box = fcl.CollisionObject(fcl.Sphere(0.5)), fcl.CollisionObject(fcl.Box(1, 1, 1))
+        box.setTranslation([2.0, 0.0, 0.0])
+        gap = fcl.distance(ball, box)
+    if fcl is not module or gap != 1.0:
+        raise RuntimeError(f"import fcl finds {fcl.__name__}; a ball and a box 1 m apart: {gap!r} m")
+    if sys.modules.get("fcl") is not before:
+        raise RuntimeError("uninstall() did not put back what import fcl found before")
+    return "import fcl finds it, a pair was answered, uninstalled cleanly"
 
 
 def _holders(former: ModuleType | None) -> list[str]:

@@ -28,6 +28,8 @@ from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
 
 MODES = ("contacts", "cull")
+_FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+<body pos="0 0 .08"><freejoint/><geom type="sphere" size=".1"/></body></worldbody></mujoco>"""
 _lock = RLock()
 _installed: list[Installed] = []
 
@@ -176,6 +178,27 @@ def _hook() -> None:
         # All our functions were overwritten by somebody since: begin again on what stands there now.
         _library().collide_mujoco_unhook()
         _library().collide_mujoco_hook(ctypes.byref(loaded.layout), loaded.table, replaced.ctypes.data, error)
+
+
+def check() -> str:
+    """Install on a ball in a floor, look at its contact, uninstall: one line for `collide doctor`.
+
+    Raises
+    ------
+    RuntimeError : what does not hold.   MissingExtra, UnsupportedQuery : as of `install`.
+    """
+    mujoco = host().mujoco
+    model = mujoco.MjModel.from_xml_string(_FLOOR)
+    data = mujoco.MjData(model)
+    with install(model):
+        mujoco.mj_forward(model, data)
+        depths = [contact.dist for contact in data.contact]
+        hooked = is_hooked()
+    if not hooked or len(depths) != 1 or abs(depths[0] + 0.02) > 1e-12:
+        raise RuntimeError(f"a ball 0.02 m deep in a floor, hooked {hooked}: contacts of distance {depths}")
+    if is_hooked():
+        raise RuntimeError("functions of MuJoCo's table are still collide's after uninstalling")
+    return f"the layout of MuJoCo {mujoco.__version__} is understood, a step had our contact, uninstalled cleanly"
 
 
 def _uninstall_all() -> None:

@@ -98,7 +98,9 @@ def examine(progress=None) -> Examination:
     """
     with (progress or silent)("asking pairs with known answers"):
         answers = _answers()
-    return Examination(_installed(), _optional(), _hosts(), _caches(), answers)
+    with (progress or silent)("asking hosts whether their hooks hold"):
+        hosts = _hosts()
+    return Examination(_installed(), _optional(), hosts, _caches(), answers)
 
 
 def _installed() -> list[Check]:
@@ -149,18 +151,13 @@ def _optional() -> list[Check]:
 
 
 def _hosts() -> list[Check]:
-    """Modules that stand in for other engines: whether they can be imported, and beside what version."""
+    """Modules that stand in for other engines: beside what version, and whether their hooks hold."""
+    hosts, host_checks = (import_module(f"collide.adapters.{name}") for name in ("hosts", "hosts.host_checks"))
     checks = []
-    for host in import_module("collide.adapters.hosts").HOSTS:
-        version = package_version(host.package)
-        try:
-            import_module(host.module)
-        except Exception as error:  # noqa: BLE001 - told, whatever broke
-            checks.append(Check(host.name, f"{host.module} cannot be imported: {error}", False))
-            continue
+    for host, finding in zip(hosts.HOSTS, host_checks.check_hosts(hosts.HOSTS)):
         absent = "absent" if host.is_needed else "not installed, and not needed"
-        state = f"{host.package} {version or absent}"
-        checks.append(Check(host.name, f"{host.module}: {host.usage} ({state})", True if version else None))
+        state = f"{host.package} {finding.version or absent}"
+        checks.append(Check(host.name, f"{host.module}: {finding.answer}; {host.usage} ({state})", finding.passed))
     return checks
 
 
