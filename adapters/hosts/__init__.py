@@ -30,4 +30,5 @@ class Host(NamedTuple):
 HOSTS = (
     Host("MuJoCo", "mujoco", True, "collide.adapters.hosts.mujoco", "with install(model): steps have our contacts"),
     Host("python-fcl", "python-fcl", False, "collide.adapters.hosts.fcl_api", "after install(), import fcl finds it"),
+    Host("pybullet", "pybullet", True, "collide.adapters.hosts.pybullet_mirror", "attach(pybullet): questions are ours"),
 )
