@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from collide.adapters.hosts.bullet_shapes import obj_groups, pose_of
+from collide.adapters.hosts.bullet_shapes import obj_groups
+from collide.adapters.hosts.quaternion_poses import pose_of
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
 

@@ -19,7 +19,8 @@ from collide.adapters.hosts.bullet_answers import (
 )
 from collide.adapters.hosts.bullet_bodies import ClientBodies, Geom
 from collide.adapters.hosts.bullet_filters import CollisionFilters
-from collide.adapters.hosts.bullet_shapes import Collider, pose_of, poses_of
+from collide.adapters.hosts.bullet_shapes import Collider
+from collide.adapters.hosts.quaternion_poses import pose_of, poses_of
 from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery
 from collide.shapes import Shape
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.adapters.hosts.quaternion_poses import pose_of
 from collide.errors import CollideError, UnsupportedQuery
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
@@ -209,24 +210,6 @@ class ShapeReader:
         except self._pybullet.error:
             return np.empty((0, 3))
         return np.array(points, dtype=np.float64).reshape(-1, 3)
-
-
-def pose_of(position, quaternion) -> np.ndarray:
-    """(4, 4) pose of a position and a quaternion x, y, z, w."""
-    return poses_of(np.array([[*position, *quaternion]], dtype=np.float64))[0]
-
-
-def poses_of(coordinates: np.ndarray) -> np.ndarray:
-    """(n, 4, 4) poses of rows (n, 7): position, then a quaternion x, y, z, w of any length but 0."""
-    q = coordinates[:, 3:].T
-    x, y, z, w = q * np.sqrt(2.0 / (q * q).sum(axis=0))
-    X = np.empty((len(coordinates), 4, 4))
-    X[:, 0, 0], X[:, 0, 1], X[:, 0, 2] = 1.0 - (y * y + z * z), x * y - z * w, x * z + y * w
-    X[:, 1, 0], X[:, 1, 1], X[:, 1, 2] = x * y + z * w, 1.0 - (x * x + z * z), y * z - x * w
-    X[:, 2, 0], X[:, 2, 1], X[:, 2, 2] = x * z - y * w, y * z + x * w, 1.0 - (x * x + y * y)
-    X[:, :3, 3] = coordinates[:, :3]
-    X[:, 3] = (0.0, 0.0, 0.0, 1.0)
-    return X
 
 
 def obj_groups(path: Path) -> list[np.ndarray]:

@@ -18,10 +18,11 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 #: The package that an example cannot do without, beyond the engine.
 NEEDS = {
     "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
-    "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet",
+    "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
 }
 #: What each example's output must hold.
 SHOWS = {
+    "17_newton_solver": ["newton: ", "collide: ", "contacts, fastest body 0.0"],
     "16_pybullet_arm": ["Bullet says otherwise in", "finger over the table: +0.800 mm, Bullet -0.200 mm", "a World of"],
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
     "02_batch_of_poses": ["beyond 2 cm: 2 of 7", "hits:"],
