@@ -55,19 +55,13 @@ def model_of(random: np.random.Generator):
     return builder.finalize(device="cpu"), kinds
 
 
-def least_separations(contacts, X_WB: np.ndarray) -> np.ndarray:
-    """(pairs,) normal · (point 1 − point 0) less both margins, the least of each pair; infinite where there is none."""
+def least_separations(model, state, contacts) -> np.ndarray:
+    """(pairs,) the least of each pair, as Newton works separations out of contacts; infinite where there is none."""
     n = int(contacts.rigid_contact_count.numpy()[0])
-    shape_0 = contacts.rigid_contact_shape0.numpy()[:n]
-    places = []
-    for side in "01":
-        shapes = getattr(contacts, f"rigid_contact_shape{side}").numpy()[:n]
-        points = getattr(contacts, f"rigid_contact_point{side}").numpy()[:n].astype(np.float64)
-        places.append(np.einsum("nij,nj->ni", X_WB[shapes, :3, :3], points) + X_WB[shapes, :3, 3])
-    gaps = np.einsum("ni,ni->n", contacts.rigid_contact_normal.numpy()[:n], places[1] - places[0])
-    gaps -= contacts.rigid_contact_margin0.numpy()[:n] + contacts.rigid_contact_margin1.numpy()[:n]
+    gaps = wp.zeros(len(contacts.rigid_contact_shape0), dtype=float, device="cpu")
+    newton.eval_rigid_contact_kinematics(model, state, contacts, out_distance=gaps)
     out = np.full(N_PAIRS, np.inf)
-    np.minimum.at(out, shape_0 // 2, gaps)
+    np.minimum.at(out, contacts.rigid_contact_shape0.numpy()[:n] // 2, gaps.numpy()[:n])
     return out
 
 
@@ -109,7 +103,7 @@ def main() -> None:
             pipeline.collide(state, contacts)
             spent[k] += time.perf_counter() - begin
         X_WB = np.array([world.body(k).X_WB for k in range(2 * N_PAIRS)])
-        gaps = [least_separations(contacts, X_WB) for contacts in buffers]
+        gaps = [least_separations(model, state, contacts) for contacts in buffers]
         for pair in range(N_PAIRS):
             shapes = [world.body(2 * pair + k).shape for k in (0, 1)]
             poses = [X_WB[2 * pair], X_WB[2 * pair + 1]]

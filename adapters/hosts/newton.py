@@ -96,7 +96,7 @@ class Pipeline:
 
         Parameters
         ----------
-        state : ``newton.State`` of the model.
+        state : of the model.
         contacts : ``newton.Contacts``, of `contacts` or of Newton's own pipeline; cleared first.
 
         Raises
@@ -116,10 +116,11 @@ class Pipeline:
         a, b = rows["a"], rows["b"]
         thickness = self._margins[a] + self._margins[b]
         rows = rows[rows["distance"] - thickness <= self._gaps[a] + self._gaps[b]]
-        room = len(contacts.rigid_contact_shape0)
-        if len(rows) > room:
+        capacity = len(contacts.rigid_contact_shape0)
+        if len(rows) > capacity:
             raise UnsupportedQuery(
-                f"Pipeline.collide: {len(rows)} contacts, but there is room for {room}: make it with rigid_contact_max"
+                f"Pipeline.collide: {len(rows)} contacts, but there is room for {capacity}; "
+                "make the Pipeline with rigid_contact_max"
             )
         contacts.clear()
         self._write(contacts, rows, X_WB)
@@ -218,3 +219,32 @@ def _check_fields(newton: Any, owner: Any, fields: tuple[str, ...]) -> None:
         raise UnsupportedQuery(
             f"Newton {newton.__version__} has no {type(owner).__name__}.{missing[0]}; this is known to work with 1.8"
         )
+
+
+def check() -> str:
+    """For `collide doctor`: a ball over the ground, whose contact is read back.
+
+    Returns
+    -------
+    One line that says what held.
+
+    Raises
+    ------
+    RuntimeError : where the contact is not the one that is known.
+    MissingExtra : newton is not installed.   UnsupportedQuery : its fields are others.
+    """
+    newton = _newton()
+    builder = newton.ModelBuilder()
+    builder.add_ground_plane()
+    body = builder.add_body()
+    builder.add_shape_sphere(body, radius=0.5)
+    model = builder.finalize(device="cpu")
+    state = model.state()
+    state.body_q.numpy()[0, 2] = 0.49
+    pipeline = Pipeline(model)
+    contacts = pipeline.contacts()
+    pipeline.collide(state, contacts)
+    n, point = int(contacts.rigid_contact_count.numpy()[0]), contacts.rigid_contact_point1.numpy()[0]
+    if n != 1 or not np.allclose(point, [0.0, 0.0, -0.5], atol=1e-6):
+        raise RuntimeError(f"a ball in the ground: {n} contacts, the first at {point}")
+    return "a ball on the ground has the contact it should"

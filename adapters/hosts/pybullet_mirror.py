@@ -31,7 +31,7 @@ from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybull
 from collide.errors import CollideError, InvalidArgument
 from collide.shapes import Shape
 
-__all__ = ["MARGINS", "QUESTIONS", "Mirror", "attach", "install", "installed", "uninstall"]
+__all__ = ["MARGINS", "QUESTIONS", "Mirror", "attach", "check", "install", "installed", "uninstall"]
 
 #: What collide answers in place of pybullet.
 QUESTIONS = ("getClosestPoints", "getContactPoints", "getOverlappingObjects", "rayTest", "rayTestBatch")
@@ -276,3 +276,31 @@ class _StandIn(ModuleType):
     def _note_setPhysicsEngineParameter(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
         if "collisionFilterMode" in keywords:
             self._mirror(client).set_filter_mode(keywords["collisionFilterMode"])
+
+
+def check() -> str:
+    """For `collide doctor`: two hulls in a client of their own, asked through `attach`.
+
+    Returns
+    -------
+    One line that says what held.
+
+    Raises
+    ------
+    RuntimeError : where the answer is not the one that is known.   MissingExtra : pybullet is not installed.
+    """
+    genuine = genuine_pybullet()
+    corners = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+    client = genuine.connect(genuine.DIRECT)
+    try:
+        p = attach(genuine, client)
+        hull = p.createCollisionShape(genuine.GEOM_MESH, vertices=corners, physicsClientId=client)
+        A, B = (p.createMultiBody(1.0, hull, basePosition=[x, 0, 0], physicsClientId=client) for x in (0.0, 3.0))
+        for x in (3.0, 4.0):
+            genuine.resetBasePositionAndOrientation(B, [x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], client)
+            ((*_, gap, _, _, _, _, _),) = p.getClosestPoints(A, B, 9.0, physicsClientId=client)
+            if abs(gap - (x - 1.0)) > 1e-12:
+                raise RuntimeError(f"two cubes of 1 m whose middles are {x} m apart: {gap!r} m")
+    finally:
+        genuine.disconnect(client)
+    return "two hulls followed, apart as they stand"

@@ -70,24 +70,11 @@ def lowest(kind: str, place: np.ndarray, q: np.ndarray) -> float:
     return t[2] - np.abs(R[2]) @ HALF
 
 
-def separations(contacts, state) -> np.ndarray:
-    """As Newton's solvers work them out: normal · (point 1 − point 0) less both margins."""
-    n = int(contacts.rigid_contact_count.numpy()[0])
-    bodies = state.body_q.numpy().astype(np.float64)
-    model_bodies = separations.shape_body
-
-    def in_world(side: str) -> np.ndarray:
-        points = getattr(contacts, f"rigid_contact_point{side}").numpy()[:n].astype(np.float64)
-        shapes = getattr(contacts, f"rigid_contact_shape{side}").numpy()[:n]
-        out = points.copy()
-        for k, shape in enumerate(shapes):
-            if model_bodies[shape] >= 0:
-                coordinates = bodies[model_bodies[shape]]
-                out[k] = rotation(coordinates[3:]) @ points[k] + coordinates[:3]
-        return out
-
-    between = np.einsum("ni,ni->n", contacts.rigid_contact_normal.numpy()[:n], in_world("1") - in_world("0"))
-    return between - contacts.rigid_contact_margin0.numpy()[:n] - contacts.rigid_contact_margin1.numpy()[:n]
+def separations(model, contacts, state) -> np.ndarray:
+    """As Newton works them out."""
+    out = wp.zeros(len(contacts.rigid_contact_shape0), dtype=float, device="cpu")
+    newton.eval_rigid_contact_kinematics(model, state, contacts, out_distance=out)
+    return out.numpy()[: int(contacts.rigid_contact_count.numpy()[0])].astype(np.float64)
 
 
 @pytest.mark.parametrize("kind", ["box", "sphere", "capsule", "mesh", "convex"])
@@ -101,7 +88,6 @@ def test_separations_from_the_ground_are_those_of_closed_forms(kind, margin):
         builder.add_ground_plane()
         add(builder, kind, place, q, margin=margin, gap=0.05)
         model = builder.finalize(device="cpu")
-        separations.shape_body = model.shape_body.numpy()
         pipeline, state = Pipeline(model), model.state()
         contacts = pipeline.contacts()
         pipeline.collide(state, contacts)
@@ -110,7 +96,7 @@ def test_separations_from_the_ground_are_those_of_closed_forms(kind, margin):
         n = int(contacts.rigid_contact_count.numpy()[0])
         assert (n > 0) == (height <= room), (height, room)
         if n:
-            found = separations(contacts, state)
+            found = separations(model, contacts, state)
             assert abs(found.min() - height) < 1e-6 and found.max() <= room + 1e-6
             assert set(contacts.rigid_contact_shape0.numpy()[:n]) == {0}
             assert np.allclose(contacts.rigid_contact_normal.numpy()[:n], [0, 0, 1])
@@ -125,7 +111,6 @@ def test_balls_have_the_separations_of_newtons_own_pipeline():
     for _ in range(40):
         add(builder, "sphere", random.uniform(0, 1, 3), quaternion(random))
     model = builder.finalize(device="cpu")
-    separations.shape_body = model.shape_body.numpy()
     state, answers = model.state(), []
     for pipeline in (Pipeline(model), newton.CollisionPipeline(model)):
         contacts = pipeline.contacts()
@@ -134,7 +119,9 @@ def test_balls_have_the_separations_of_newtons_own_pipeline():
         pairs = zip(
             contacts.rigid_contact_shape0.numpy()[:n].tolist(), contacts.rigid_contact_shape1.numpy()[:n].tolist()
         )
-        answers.append({tuple(sorted(pair)): gap for pair, gap in zip(pairs, separations(contacts, state).tolist())})
+        answers.append(
+            {tuple(sorted(pair)): gap for pair, gap in zip(pairs, separations(model, contacts, state).tolist())}
+        )
     assert answers[0].keys() == answers[1].keys() and len(answers[0]) > 60
     assert max(abs(answers[0][pair] - answers[1][pair]) for pair in answers[0]) < 1e-6
 
@@ -156,11 +143,10 @@ def test_bodies_fall_and_rest_on_our_contacts():
             solver.step(before, after, control, contacts, 1 / 200)
             before, after = after, before
         heights[type(pipeline)] = before.body_q.numpy()[:, 2]
-        separations.shape_body = model.shape_body.numpy()
         if isinstance(pipeline, Pipeline):
             pipeline.collide(before, contacts)
             assert np.abs(before.body_qd.numpy()[[0, 1, 3]]).max() < 0.02  # what lies on a face
-            assert separations(contacts, before).min() > -2e-3
+            assert separations(model, contacts, before).min() > -2e-3
     ours, theirs = heights.values()
     assert np.abs(ours - theirs)[[0, 1, 4]].max() < 2e-3
 
