@@ -29,7 +29,7 @@ for pipeline in (newton.CollisionPipeline(model), Pipeline(model)):  # the line 
     speed = np.abs(before.body_qd.numpy()).max()
     print(f"{name}: {n} contacts, fastest body {speed:.3f} after 2 s, {1e6 * spent / 480:.0f} µs a step")
 
-# A cone and an ellipsoid in random poses: where does Newton see an overlap, or none, that is proven not to be so?
+# A cone and an ellipsoid in random poses: overlaps that Newton takes for touching, or for none, push nobody.
 builder, config = newton.ModelBuilder(), newton.ModelBuilder.ShapeConfig(gap=0.0)
 builder.add_shape_ellipsoid(builder.add_body(), rx=0.1, ry=0.25, rz=0.45, cfg=config)
 builder.add_shape_cone(builder.add_body(), radius=0.3, half_height=0.3, cfg=config)
