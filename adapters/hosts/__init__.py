@@ -30,4 +30,6 @@ class Host(NamedTuple):
 HOSTS = (
     Host("MuJoCo", "mujoco", True, "collide.adapters.hosts.mujoco", "with install(model): steps have our contacts"),
     Host("python-fcl", "python-fcl", False, "collide.adapters.hosts.fcl_api", "after install(), import fcl finds it"),
+    Host("pybullet", "pybullet", True, "collide.adapters.hosts.pybullet_mirror", "attach(pybullet): answers are ours"),
+    Host("Newton", "newton", True, "collide.adapters.hosts.newton", "Pipeline(model): contacts for solver.step"),
 )
