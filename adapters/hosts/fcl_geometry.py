@@ -21,6 +21,11 @@ _changes = itertools.count(1)
 latest_change = [0]
 
 
+def note_change() -> None:
+    """A geometry is not what it was."""
+    latest_change[0] = next(_changes)
+
+
 class CollisionGeometry:
     """Base of all geometries; of itself it has no points."""
 
@@ -64,7 +69,7 @@ class CollisionGeometry:
     def _become(self, corners, *shapes: Shape) -> None:
         self._corners = np.array(corners, dtype=np.float64)
         self._shapes = shapes
-        latest_change[0] = next(_changes)
+        note_change()
 
 
 class TriangleP(CollisionGeometry):
