@@ -51,8 +51,8 @@ class CollisionGeometry(fcl_geometry.CollisionGeometry):
 
     @property
     def aabb_center(self):
-        """Middle (3,) of that box."""
-        return self.aabb_local.center()
+        """Middle (3,) of that box; of planes and half-spaces the point nearest to the origin."""
+        return self.aabb_local.center() if self._center is None else self._center.copy()
 
     @property
     def aabb_radius(self):
@@ -186,6 +186,11 @@ class Sphere(ShapeBase, fcl_geometry.Sphere):
     def __init__(self, radius):
         fcl_geometry.Sphere.__init__(self, radius.radius if isinstance(radius, Sphere) else radius)
 
+    @property
+    def aabb_radius(self):
+        """Its radius [m]."""
+        return self.radius + self._radius_swept
+
     def _mass(self):
         return coal_inertia.ellipsoid([self.radius] * 3)
 
@@ -301,8 +306,8 @@ class CollisionObject(fcl_geometry.CollisionObject):
 
     def setCollisionGeometry(self, collision_geometry, compute_local_aabb=True):
         """Put another geometry in its place."""
-        self._geometry = checked_geometry("collision_geometry", collision_geometry)
-        fcl_geometry.note_change()
+        g = self._geometry = checked_geometry("collision_geometry", collision_geometry)
+        fcl_geometry.CollisionGeometry._become(g, g._bounds(), *g._shapes)  # so that managers look at boxes anew
 
     def getTransform(self):
         """A `Transform3s` of its own."""

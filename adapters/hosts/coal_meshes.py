@@ -290,6 +290,10 @@ class BVHModelBase(CollisionGeometry):
         """How many boxes a binary tree over the triangles has."""
         return max(0, 2 * len(self._triangles) - 1)
 
+    def memUsage(self, msg=False):
+        """Bytes of the vertices and triangles."""
+        return self._vertices.nbytes + self._triangles.nbytes
+
     def makeParentRelative(self):
         """Nothing to do."""
 

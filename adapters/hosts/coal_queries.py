@@ -96,11 +96,11 @@ def _add_facet_contacts(g1, X1, g2, X2, margin: float, n_wanted: int, with_geome
     is_filtered = margin < 0.0
     limit = _ALL if is_filtered else n_wanted
     pairs = facet_contacts(g1._shape, g2._shape, X1, X2, limit, with_geometry or is_filtered)
-    pairs = [pair for pair in pairs if not is_filtered or -pair[4] <= margin][:n_wanted]
-    for b1, b2, normal, pos, depth in pairs:
+    deepest = max((depth for *_, depth in pairs), default=0.0)
+    result.distance_lower_bound = min(result.distance_lower_bound, -float(deepest) - margin)
+    for b1, b2, normal, pos, depth in [pair for pair in pairs if not is_filtered or -pair[4] <= margin][:n_wanted]:
         half = 0.5 * depth * normal
         result.addContact(contact_of(g1, g2, b1, b2, normal, pos + half, pos - half, -depth))
-        result.distance_lower_bound = min(result.distance_lower_bound, -float(depth) - margin)
 
 
 def _rows(g1, X1, g2, X2, answer: Nearest, margin: float, limit: int) -> list[tuple]:

@@ -11,12 +11,14 @@ from collide.adapters.hosts.coal_containers import AABB
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
-from collide.adapters.hosts.fcl_meshes import OCTREE_DEPTH, occupied_boxes
+from collide.adapters.hosts.fcl_meshes import occupied_boxes
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.scenes.loaders.mesh_file import read_mesh
 
 #: How far below the lowest height a bottom lies that is not below it, in parts of the field's size.
 _THIN = 2.0**-40
+#: Levels of an octomap.
+OCTREE_DEPTH = 16
 
 
 class _HeightField(CollisionGeometry):

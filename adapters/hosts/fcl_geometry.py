@@ -21,11 +21,6 @@ _changes = itertools.count(1)
 latest_change = [0]
 
 
-def note_change() -> None:
-    """A geometry is not what it was."""
-    latest_change[0] = next(_changes)
-
-
 class CollisionGeometry:
     """Base of all geometries; of itself it has no points."""
 
@@ -69,7 +64,7 @@ class CollisionGeometry:
     def _become(self, corners, *shapes: Shape) -> None:
         self._corners = np.array(corners, dtype=np.float64)
         self._shapes = shapes
-        note_change()
+        latest_change[0] = next(_changes)
 
 
 class TriangleP(CollisionGeometry):

@@ -109,7 +109,7 @@ class OcTree(CollisionGeometry):
 
 
 #: Levels of an octomap, and what two bits of a child say: bit 0, then bit 1.
-OCTREE_DEPTH = 16
+_DEPTH = 16
 _OCCUPIED, _INNER = 2, 3
 
 
@@ -120,11 +120,11 @@ def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
 
     def read(middle: np.ndarray, depth: int) -> None:
         nonlocal at
-        if at + 2 > len(data) or depth >= OCTREE_DEPTH:
+        if at + 2 > len(data) or depth >= _DEPTH:
             raise InvalidArgument(f"OcTree: data is no binary octomap: a node at byte {at} of {len(data)} is not there")
         word = data[at] | data[at + 1] << 8
         at += 2
-        edge = r * 2.0 ** (OCTREE_DEPTH - depth - 1)
+        edge = r * 2.0 ** (_DEPTH - depth - 1)
         inner = []
         for child in range(8):
             state = word >> 2 * child & 3
