@@ -85,32 +85,30 @@ def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: b
     swept_1, swept_2 = g1._radius_swept, g2._radius_swept
     swept = swept_1 + swept_2
     total = margin + swept
-    max_distance = max(limit, margin, 0.0) + swept
     try:
-        r = engine.distance(
-            A, B, X1, X2, max_distance=max_distance if max_distance < _FAR else math.inf, signed=is_signed
-        )
+        if g1._has_parts or g2._has_parts:  # others are answered sooner without a limit
+            largest = max(limit, margin, 0.0) + swept
+            largest = largest if largest < _FAR else math.inf
+            row = engine.distance(A, B, X1, X2, max_distance=largest, signed=is_signed).rows[0]
+        else:
+            row = engine.distance(A, B, X1, X2, signed=is_signed).rows[0]
     except UnsupportedQuery:
         if not (isinstance(g1, (Plane, Halfspace)) and isinstance(g2, (Plane, Halfspace))):
             raise
         return _without_end(shapes, g1, X1, g2, X2)
+    distance, lower, is_hit = float(row["distance"]), float(row["lower"]), bool(row["hit"])
     if total > 0.0:
-        lower = r.lower
-        is_within = lower <= total and (r.upper <= total or hits(A, B, X1, X2, security_margin=total))
+        is_within = lower <= total and (row["upper"] <= total or hits(A, B, X1, X2, security_margin=total))
     else:
-        is_within = r.hit if total == 0.0 else r.lower <= total
-    part_1 = r.part_a if g1._has_parts else -1
-    part_2 = r.part_b if g2._has_parts else -1
-    if swept == 0.0:
-        return Nearest(
-            r.distance, r.lower, r.normal, r.point_a, r.point_b, part_1, part_2, is_within, shapes
-        )
-    is_deep = r.hit and not is_signed
-    normal = r.normal
-    return Nearest(
-        0.0 if is_deep else r.distance - swept, 0.0 if is_deep else r.lower - swept, normal,
-        r.point_a + swept_1 * normal, r.point_b - swept_2 * normal, part_1, part_2, is_within, shapes,
-    )  # fmt: skip
+        is_within = is_hit if total == 0.0 else lower <= total
+    part_1 = int(row["part_a"]) if g1._has_parts else -1
+    part_2 = int(row["part_b"]) if g2._has_parts else -1
+    normal, point_1, point_2 = row["normal"], row["point_a"], row["point_b"]
+    if swept:
+        point_1, point_2 = point_1 + swept_1 * normal, point_2 - swept_2 * normal
+        if is_signed or not is_hit:
+            distance, lower = distance - swept, lower - swept
+    return Nearest(distance, lower, normal, point_1, point_2, part_1, part_2, bool(is_within), shapes)
 
 
 def _of_flats(g1, X1, g2, X2, margin: float) -> Nearest:

@@ -58,21 +58,25 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
     n_wanted = limit - result.numContacts()
     if n_wanted < 1:
         return result.numContacts()
+    has_parts = g1._has_parts or g2._has_parts
     are_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
-    is_signed = (bool(request.enable_contact) or margin < 0.0) and not are_meshes
-    answer = nearest(g1, X1, g2, X2, margin if not are_meshes else max(margin, 0.0),
-                     request.distance_upper_bound, is_signed)  # fmt: skip
-    if not answer.is_within:
-        result.distance_lower_bound = min(result.distance_lower_bound, float(answer.lower) - margin)
-        return result.numContacts()
-    if are_meshes and answer.distance <= 0.0:
-        _add_facet_contacts(g1, X1, g2, X2, margin, n_wanted, bool(request.enable_contact), result)
-        if margin < 0.0 or result.numContacts() > limit - n_wanted:
-            return result.numContacts()
-    result.distance_lower_bound = min(result.distance_lower_bound, float(answer.lower) - margin)
-    rows = []
-    if n_wanted > 1 and (g1._has_parts or g2._has_parts):
+    is_deep = margin < 0.0 and not are_meshes
+    is_signed = is_deep or bool(request.enable_contact and not has_parts)
+    least = max(margin, 0.0) if are_meshes else margin
+    answer = nearest(g1, X1, g2, X2, least, request.distance_upper_bound, is_signed)
+    lower = float(answer.lower)
+    rows: list[tuple] = []
+    if answer.is_within and are_meshes and answer.distance <= 0.0:
+        with_geometry = bool(request.enable_contact) or margin < 0.0
+        rows, lower = _facet_rows(g1, X1, g2, X2, margin, n_wanted, with_geometry)
+        if not rows and margin < 0.0:
+            answer = answer._replace(is_within=False)
+    elif answer.is_within and has_parts and request.enable_contact and (n_wanted > 1 or answer.distance <= 0.0):
         rows = _rows(g1, X1, g2, X2, answer, margin, n_wanted)
+        lower = min([lower, *(row[5] for row in rows)])
+    result.distance_lower_bound = min(result.distance_lower_bound, lower - margin)
+    if not answer.is_within:
+        return result.numContacts()
     if not rows:
         rows = [(answer.part_1, answer.part_2, answer.normal, answer.point_1, answer.point_2, answer.distance)]
     for b1, b2, normal, point_1, point_2, depth in rows:
@@ -84,23 +88,27 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
 
 def contact_of(g1, g2, b1, b2, normal, point_1, point_2, depth) -> Contact:
     """A contact of surfaces' points (3,), signed ``depth`` [m] apart along the normal (3,)."""
-    contact = Contact(g1, g2, b1, b2)
+    contact = object.__new__(Contact)  # the constructor's defaults would be thrown away
+    contact.o1, contact.o2, contact.b1, contact.b2 = g1, g2, int(b1), int(b2)
     contact.normal, contact.penetration_depth = np.array(normal), float(depth)
     contact.nearest_points = [np.array(point_1), np.array(point_2)]
     contact.pos = 0.5 * contact.nearest_points[0] + 0.5 * contact.nearest_points[1]
     return contact
 
 
-def _add_facet_contacts(g1, X1, g2, X2, margin: float, n_wanted: int, with_geometry: bool, result) -> None:
-    """One for each pair of facets of two meshes that meet, deep enough where the margin is below 0."""
-    is_filtered = margin < 0.0
-    limit = _ALL if is_filtered else n_wanted
-    pairs = facet_contacts(g1._shape, g2._shape, X1, X2, limit, with_geometry or is_filtered)
-    deepest = max((depth for *_, depth in pairs), default=0.0)
-    result.distance_lower_bound = min(result.distance_lower_bound, -float(deepest) - margin)
-    for b1, b2, normal, pos, depth in [pair for pair in pairs if not is_filtered or -pair[4] <= margin][:n_wanted]:
+def _facet_rows(
+    g1, X1, g2, X2, margin: float, n_wanted: int, with_geometry: bool
+) -> tuple[list[tuple], float]:  # fmt: skip
+    """One for each pair of facets of two meshes that meet, deep enough where the margin is below 0; and minus the
+    greatest depth among those looked at [m].
+    """
+    pairs = facet_contacts(g1._shape, g2._shape, X1, X2, _ALL if margin < 0.0 else n_wanted, with_geometry)
+    deepest = max((float(depth) for *_, depth in pairs), default=0.0)
+    rows = []
+    for b1, b2, normal, pos, depth in [pair for pair in pairs if margin >= 0.0 or -pair[4] <= margin][:n_wanted]:
         half = 0.5 * depth * normal
-        result.addContact(contact_of(g1, g2, b1, b2, normal, pos + half, pos - half, -depth))
+        rows.append((b1, b2, normal, pos + half, pos - half, -depth))
+    return rows, -deepest
 
 
 def _rows(g1, X1, g2, X2, answer: Nearest, margin: float, limit: int) -> list[tuple]:
@@ -112,7 +120,7 @@ def _rows(g1, X1, g2, X2, answer: Nearest, margin: float, limit: int) -> list[tu
     contacts = []
     for row in rows[np.argsort(rows["distance"], kind="stable")[:limit]]:
         normal = row["normal"]
-        b1, b2 = (_part(g, row[f"facet_{s}"], row[f"part_{s}"]) for g, s in ((g1, "a"), (g2, "b")))
+        b1, b2 = (_part(g, row["facet_" + side], row["part_" + side]) for g, side in ((g1, "a"), (g2, "b")))
         points = row["point_a"] + swept_1 * normal, row["point_b"] - swept_2 * normal
         contacts.append((b1, b2, normal, *points, row["distance"] - swept_1 - swept_2))
     return contacts
@@ -156,8 +164,7 @@ def distance_posed(g1, X1, g2, X2, request, result) -> float:
     are_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
     is_signed = bool(request.enable_signed_distance) and not are_meshes
     answer = nearest(g1, X1, g2, X2, 0.0, math.inf, is_signed)
-    result.clear()
-    result.min_distance, result.normal = float(answer.distance), np.array(answer.normal)
+    result.min_distance, result.normal = answer.distance, np.array(answer.normal)
     result.nearest_points = [np.array(answer.point_1), np.array(answer.point_2)]
     result.o1, result.o2 = g1, g2
     b1, b2 = answer.part_1, answer.part_2
