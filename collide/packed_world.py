@@ -16,14 +16,14 @@ from collide.casts.posed_parts import PosedParts
 from collide.errors import UnsupportedQuery
 from collide.lazy_modules import lazy_module
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import bounding_parts_of
+from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
-from collide.world_bodies import Roster
+from collide.world_bodies import BodiesAsTheyStood, Roster
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
@@ -49,6 +49,7 @@ class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
     roster : the bodies.   X_WBs : (n, 4, 4) their poses, copied.   allowed : {(i, j): reason}, i < j, positions.
+    single_convex : (n,) bool: bodies that are one convex set in their own frame.
     """
 
     def __init__(self, roster: Roster, X_WBs: np.ndarray, allowed: dict[tuple[int, int], str]):
@@ -59,6 +60,7 @@ class PackedWorld:
         is_meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
         self._meshed = is_meshed[self._shape_of]
         self._any_meshed = bool(is_meshed.any())
+        self.single_convex = np.array([is_single_convex(shape) for shape in self._shapes], dtype=bool)[self._shape_of]
         self._shape_set: ShapeSet | None = None
         self._lay_out_parts()
         self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
@@ -135,6 +137,18 @@ class PackedWorld:
         a, b = pairs.T
         X_WA, X_WB = self.X_WBs[a], self.X_WBs[b]
         return self._shape_set[self._shape_of[a]], self._shape_set[self._shape_of[b]], X_WA, X_WB
+
+    def convex_sets_of(self, pairs: np.ndarray) -> tuple[ShapeTable, np.ndarray]:
+        """(table, (k, 2) rows of it) of pairs (k, 2) of positions of bodies that are single convex sets."""
+        return self._table, self._row_of[self._first[pairs]]
+
+    def bodies_named(self, *positions: np.ndarray) -> BodiesAsTheyStood:
+        """The bodies at positions that results name, with their poses now."""
+        is_named = np.zeros(len(self.roster.ids), dtype=bool)
+        for some in positions:
+            is_named[some] = True
+        named = np.flatnonzero(is_named)
+        return BodiesAsTheyStood(self.roster, named, self.X_WBs[named])
 
     def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
         """Rows of candidates (k, 2).

@@ -11,9 +11,9 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.certificates.make_certificate import certify
 from collide.contact.contact_rows import WorldContacts, no_rows
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import InvalidArgument
 from collide.lazy_modules import lazy_module
-from collide.packed_world import PackedWorld, QueryRecord
+from collide.packed_world import QueryRecord
 from collide.results import WorldResult
 from collide.security_margin import checked_margin, within
 from collide.shapes.shape import Shape
@@ -28,6 +28,7 @@ __all__ = ["Body", "World"]
 contact_query = lazy_module("collide.contact.contact_query")
 #: And so do casts.
 casts = lazy_module("collide.world_casts")
+world_contacts = lazy_module("collide.world_contacts")
 cast_arguments = lazy_module("collide.casts.cast_arguments")
 
 
@@ -143,24 +144,9 @@ class World(WorldScene):
         packed = self._pack()
         pairs = packed.candidates(margin)
         if not len(pairs):
-            return WorldContacts(no_rows(), self._to_ids(no_rows()))
-        try:
-            rows, ends = contact_query.contact_batch(*packed.posed_shapes(pairs), len(pairs), margin, max_contacts)
-        except UnsupportedQuery:
-            self._name_refused(packed, pairs, margin, max_contacts)
-            raise
-        which = np.repeat(pairs, np.diff(ends, prepend=0), axis=0)
-        rows["a"], rows["b"] = which[:, 0], which[:, 1]
-        return WorldContacts(rows, self._to_ids(rows))
-
-    def _name_refused(self, packed: PackedWorld, pairs: np.ndarray, margin: float, max_contacts: int) -> None:
-        """Raise for the first pair (of positions) whose contacts are refused, with the bodies' names."""
-        names = packed.roster.names
-        for i, j in pairs.tolist():
-            try:
-                contact_query.contact_batch(*packed.posed_shapes(np.array([[i, j]])), 1, margin, max_contacts)
-            except UnsupportedQuery as error:
-                raise UnsupportedQuery(f'"{names[i]}" and "{names[j]}": {error}') from None
+            return WorldContacts(no_rows(), packed.bodies_named(pairs))
+        rows, counts = world_contacts.contacts_of_bodies(packed, pairs, margin, max_contacts)
+        return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
         """Pairs for which `distances` raises UnsupportedQuery.

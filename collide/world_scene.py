@@ -186,8 +186,6 @@ class WorldScene:
     def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
         """The bodies at the positions that rows name; in the rows, in place, their ids."""
         packed = self._pack()
-        is_named = np.zeros(len(packed.roster.ids), dtype=bool)
-        is_named[rows["a"]] = is_named[rows["b"]] = True
-        positions = np.flatnonzero(is_named)
+        bodies = packed.bodies_named(rows["a"], rows["b"])
         rows["a"], rows["b"] = packed.roster.ids[rows["a"]], packed.roster.ids[rows["b"]]
-        return BodiesAsTheyStood(packed.roster, positions, packed.X_WBs[positions])
+        return bodies

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef char contacts_are_rows[sizeof(struct contact_row) == 144 ? 1 : -1];
+typedef char contacts_are_rows[sizeof(collide_contact) == 144 ? 1 : -1];
 
 void begin_manifolds(struct manifold_space *manifold, collide_workspace *space)
 {
@@ -63,12 +63,13 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
 
 /* What the single call leaves: the row by all means there are, then the same manifold. */
 static collide_status contacts_by_rows(collide_workspace *space, struct manifold_space *manifold, const double *X_WA,
-                                       const double *X_WB, double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n)
+                                       const double *X_WB, double margin, int64_t max_contacts, unsigned flags,
+                                       collide_contact *rows, int64_t *n)
 {
     int64_t *header = manifold->header + HEADER, end = 0;
     int64_t corners = 2 * header[F_LARGEST] + 8;
     collide_pair row;
-    collide_status status = row_of_pair(space, X_WA, X_WB, margin, &row);
+    collide_status status = row_of_pair(space, X_WA, X_WB, margin, flags, &row);
     if (status != COLLIDE_OK) return status;
     header[F_PAIRS_DONE] = header[F_ROWS_DONE] = 0;
     manifold->shape_of[0] = 0;
@@ -80,7 +81,7 @@ static collide_status contacts_by_rows(collide_workspace *space, struct manifold
 }
 
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
-                                double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n)
+                                double margin, int64_t max_contacts, unsigned flags, collide_contact *rows, int64_t *n)
 {
     int64_t *header = manifold->header + HEADER;
     collide_status status = COLLIDE_OK;
@@ -89,7 +90,7 @@ collide_status contacts_of_pair(collide_workspace *space, struct manifold_space 
     memcpy(&header[F_MARGIN], &margin, sizeof margin);
     header[F_MAX_CONTACTS] = max_contacts;
     if (space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows), 0) < 0)
-        status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, max_contacts, rows, n);
+        status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, max_contacts, flags, rows, n);
     else
         *n = header[F_ROWS_DONE];
     round_as_before(given);

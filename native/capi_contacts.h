@@ -2,20 +2,13 @@
 #ifndef COLLIDE_CAPI_CONTACTS_H
 #define COLLIDE_CAPI_CONTACTS_H
 
-#include "capi_internal.h"
+#include "capi_faces.h"
 
-/* Header of manifolds, and a shape's row of faces, as collide/contact/convex_manifolds.py and collide/lowering/hull_faces.py
-   have them. Before it stands that of queries (collide/contact/single_contact_call.py). */
+/* Header of manifolds, as collide/contact/convex_manifolds.py has it. Before it stands that of queries
+   (collide/contact/single_contact_call.py). */
 enum {
     F_INTS_AT, F_NUMBERS_AT, F_FACES_AT, F_POSES_AT, F_SHAPE_OF_AT, F_DOUBLES_AT, F_INTEGERS_AT, F_LARGEST, F_PAIRS_DONE,
     F_ROWS_DONE, F_MARGIN, F_MAX_CONTACTS, F_ARE_BOXES, MANIFOLD_HEADER
-};
-enum { FACE_INTS = 14 };
-
-/* A row of Python's CONTACT_DTYPE. */
-struct contact_row {
-    double distance, lower, upper, apart, normal[3], point_a[3], point_b[3];
-    int32_t a, b, part_a, part_b, facet_a, facet_b, feature_a, feature_b, patch, kind;
 };
 
 /* What contacts take beside a workspace, with which it goes. */
@@ -39,9 +32,10 @@ int fit_manifolds(struct manifold_space *manifold, int64_t largest);
 void take_table_pair(collide_workspace *space, struct manifold_space *manifold, const int64_t *ints, const double *numbers,
                      const int64_t *faces, int64_t a, int64_t b, int are_boxes);
 
-/* Contacts of the pair taken, at most `max_contacts`, into `rows`, which has room for as many; *n : how many. */
+/* Contacts of the pair taken, at most `max_contacts`, into `rows`, which has room for as many; *n : how many. flags : as of
+   `collide_contacts`. */
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
-                                double margin, int64_t max_contacts, struct contact_row *rows, int64_t *n);
+                                double margin, int64_t max_contacts, unsigned flags, collide_contact *rows, int64_t *n);
 
 /* Whether the pair taken is proven to be farther apart than `gap`, and the direction that parts them. */
 int is_farther_apart(collide_workspace *space, const double *X_WA, const double *X_WB, double gap, double direction[3]);
@@ -52,6 +46,7 @@ double gap_along(const int64_t *ints_a, const double *numbers_a, const double *X
                  const double *numbers_b, const double *X_WB, const double direction[3]);
 
 /* capi_pairs.c: the row of `collide_distance` of the pair taken, with a proven bound where it is beyond the limit. */
-collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, collide_pair *row);
+collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
+                           collide_pair *row);
 
 #endif

@@ -55,6 +55,8 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 
 struct support_tree;
 struct mesh_workspace;
+struct hull_faces;
+struct manifold_space;
 
 struct collide_shape {
     int64_t ints[INTS];
@@ -63,6 +65,7 @@ struct collide_shape {
     double *points;            /* (n, 3), of hulls; else NULL */
     void *block;               /* holds coordinates and coarse points */
     struct support_tree *tree; /* NULL where there is none */
+    struct hull_faces *volatile faces; /* NULL until contacts are asked for (capi_faces.h) */
 };
 
 struct collide_shape_set {
@@ -118,6 +121,7 @@ struct collide_workspace {
     int64_t *undecided; /* BLOCK */
     void *halfspaces;   /* HALFSPACES_BYTES */
     struct mesh_workspace *mesh;
+    struct manifold_space *manifold; /* of contacts; NULL until some are asked for */
     void *held[2];
 };
 
@@ -125,6 +129,14 @@ struct collide_workspace {
    is to be set in them, which are zeros. */
 size_t mesh_workspace_bytes(const int64_t *measures);
 void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t *measures);
+
+/* capi_pairs.c: the pair that is asked about next. */
+void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B);
+
+/* Poses of one body in a question of n pairs: whether they fit. */
+int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *step);
+/* How many pairs two batches of poses make; 0 where one is empty. */
+size_t longer(collide_poses A, collide_poses B);
 
 /* A question about poses: as `answer_poses` takes it. */
 struct question {

@@ -96,6 +96,8 @@ collide_status collide_workspace_create(collide_workspace **workspace)
 void collide_workspace_free(collide_workspace *workspace)
 {
     if (workspace == NULL) return;
+    if (workspace->manifold != NULL) free_manifolds(workspace->manifold);
+    free(workspace->manifold);
     free(workspace->held[0]);
     free(workspace->held[1]);
     free(workspace);
@@ -104,7 +106,7 @@ void collide_workspace_free(collide_workspace *workspace)
 /* --- questions ----------------------------------------------------------------------------------------------------- */
 
 /* The table of a single pair. */
-static void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B)
+void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B)
 {
     int order = A == B ? 0 : memcmp(A->content, B->content, sizeof A->content);
     memcpy(space->ints, A->ints, sizeof A->ints);
@@ -246,9 +248,10 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     return status;
 }
 
-collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, collide_pair *row)
+collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
+                           collide_pair *row)
 {
-    struct question asked = single(space, X_WA, X_WB, 0, 0);
+    struct question asked = single(space, X_WA, X_WB, flags, 0);
     collide_status status;
     size_t failed;
     asked.limit = limit;
@@ -259,8 +262,7 @@ collide_status row_of_pair(collide_workspace *space, const double *X_WA, const d
 
 /* --- batches ------------------------------------------------------------------------------------------------------- */
 
-/* Poses of one body in a question of n pairs: whether they fit. */
-static int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *step)
+int take_poses(collide_poses poses, size_t n, const double **matrices, int64_t *step)
 {
     *matrices = poses.matrices;
     *step = poses.count == 1 ? 0 : 16;
@@ -299,8 +301,7 @@ static collide_status ask(collide_workspace *space, struct question *asked, coll
     return status;
 }
 
-/* How many pairs two batches of poses make; 0 where one is empty. */
-static size_t longer(collide_poses A, collide_poses B)
+size_t longer(collide_poses A, collide_poses B)
 {
     if (A.count == 0 || B.count == 0) return 0;
     return A.count > B.count ? A.count : B.count;

@@ -1,5 +1,6 @@
 /* Shapes from numbers: what collide/shapes checks and collide/lowering/packed_convex.py lays out. */
 #include "capi_blake2b.h"
+#include "capi_faces.h"
 #include "capi_mesh.h"
 
 #include <math.h>
@@ -142,6 +143,7 @@ void collide_shape_free(collide_shape *shape)
 {
     if (shape == NULL) return;
     free_tree(shape->tree);
+    free_faces(shape->faces);
     free(shape->points);
     free(shape->block);
     free(shape);
@@ -159,13 +161,16 @@ collide_status collide_sphere(double radius, collide_shape **shape)
 collide_status collide_box(const double size[3], collide_shape **shape)
 {
     double corners[24];
+    collide_status status;
     int k;
     if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
     *shape = NULL;
     if (size == NULL) return COLLIDE_INVALID_ARGUMENT;
     if (!is_length(size[0]) || !is_length(size[1]) || !is_length(size[2])) return COLLIDE_INVALID_SHAPE;
     for (k = 0; k < 24; k++) corners[k] = (k / 3 >> (2 - k % 3) & 1 ? 0.5 : -0.5) * size[k % 3];
-    return shape_of_points(corners, 8, 0.0, 0.0, 0, shape);
+    status = shape_of_points(corners, 8, 0.0, 0.0, 0, shape);
+    for (k = 0; status == COLLIDE_OK && k < 3; k++) (*shape)->numbers[PARAMS + k] = 0.5 * size[k]; /* no part of the digest */
+    return status;
 }
 
 collide_status collide_capsule(double radius, double length, collide_shape **shape)

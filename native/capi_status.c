@@ -18,6 +18,7 @@ const char *collide_status_text(collide_status status)
     case COLLIDE_ENDLESS_DEPTH: return "the overlap has no end: no translation of finite length separates the bodies";
     case COLLIDE_UNSUPPORTED: return "not supported by the C interface";
     case COLLIDE_NO_KERNELS: return "no kernels for this processor, or COLLIDE_CPU names a level that is not to be had";
+    case COLLIDE_TOO_MANY: return "more contacts than there is room for";
     }
     return "unknown status";
 }

@@ -12,7 +12,8 @@
    was to make NULL. Nothing prints, nothing ends the process, nothing jumps.
 
    Memory. Shapes, sets of shapes and workspaces are made by functions of this header and freed by the caller with
-   collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing.
+   collide_..._free, which take NULL. Numbers handed in are copied. Queries allocate nothing, but for contacts: the first ones of a
+   hull work out its faces, which are kept with it, and the first ones of a workspace what manifolds are made in.
 
    Threads. A shape or a set never changes: any number of threads may use one at once. A workspace is for one thread at a
    time: give each thread its own. Nothing else is shared. The answers do not depend on the caller's rounding mode, nor on
@@ -54,7 +55,8 @@ typedef enum collide_status {
     COLLIDE_OUT_OF_RANGE = 5,     /* shapes and distance of a pair together measure less than 1e-50 m: scale the scene */
     COLLIDE_ENDLESS_DEPTH = 6,    /* two half-spaces overlap without end: there is no depth; the boolean has an answer */
     COLLIDE_UNSUPPORTED = 7,      /* Python answers this, this interface does not */
-    COLLIDE_NO_KERNELS = 8        /* the processor is too old, or COLLIDE_CPU names a level that is not to be had */
+    COLLIDE_NO_KERNELS = 8,       /* the processor is too old, or COLLIDE_CPU names a level that is not to be had */
+    COLLIDE_TOO_MANY = 9           /* more contacts than the caller has room for */
 } collide_status;
 
 /* A sentence about a status, in English; of an unknown one, too. Never NULL. */
@@ -197,6 +199,52 @@ COLLIDE_API collide_status collide_collide_each(collide_workspace *workspace, co
 COLLIDE_API collide_status collide_distance_each(collide_workspace *workspace, const collide_shape_set *set,
                                                  const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
                                                  double max_distance, unsigned flags, collide_pair *pairs, size_t *failed);
+
+/* --- contacts -------------------------------------------------------------------------------------------------------
+
+   Where two bodies touch, overlap, or come within a margin: up to max_contacts points, with one normal. The first is the deepest;
+   the others are those that span the greatest area. docs/contacts.md says which points they are. */
+
+/* What is known of a contact: a row of Python's CONTACT_DTYPE, byte by byte. */
+typedef struct collide_contact {
+    double distance;     /* along the normal [m]: the gap there, or minus the overlap */
+    double lower, upper; /* lower <= its true value <= upper, proven against rounding [m] */
+    double apart;        /* of overlaps: moving B by this length along the normal is proven to part the bodies [m] */
+    double normal[3];    /* unit vector from A to B, in W */
+    double point_a[3];   /* a point of each surface in W [m]: point_b - point_a = distance * normal */
+    double point_b[3];
+    int32_t a, b;           /* 0 and 1 */
+    int32_t part_a, part_b; /* 0 and 0: bodies are convex here */
+    int32_t facet_a, facet_b; /* first triangle of the hull's face; -1 where there is none */
+    int32_t feature_a, feature_b; /* number * 4 + class: 0 a vertex, 1 an edge, 2 a face, 3 a corner within a round end; or -1. The
+                                     same from step to step while the same features meet */
+    int32_t patch;          /* 0: convex bodies have one */
+    int32_t kind;           /* COLLIDE_CONTACT_... */
+} collide_contact;
+
+enum { COLLIDE_CONTACT_GAP = 0, COLLIDE_CONTACT_OVERLAP = 1 };
+
+/* Contacts of A and B. margin : >= 0 [m]. contacts : room for max_contacts >= 1 rows. *count : how many there are; none where the
+   bodies are farther apart than the margin. flags : COLLIDE_TRUST_POSES or 0. COLLIDE_ENDLESS_DEPTH: two half-spaces overlap, and
+   there is no normal. */
+COLLIDE_API collide_status collide_contacts(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                            const double X_WA[16], const double X_WB[16], double margin,
+                                            size_t max_contacts, unsigned flags, collide_contact *contacts, size_t *count);
+
+/* Contacts of A and B at n pairs of poses, one pair's after another's: those of pair k are starts[k] to starts[k + 1] - 1.
+   contacts : room for `capacity` rows. starts : room for n + 1 numbers. Where one fails, *failed, unless failed is NULL, becomes the
+   number of the pair; starts and rows of those before it are good. COLLIDE_TOO_MANY: go on from that pair with more room; a pair is
+   asked about where there is room for max_contacts rows, or for as many as it can have. */
+COLLIDE_API collide_status collide_contacts_batch(collide_workspace *workspace, const collide_shape *A, const collide_shape *B,
+                                                  collide_poses X_WA, collide_poses X_WB, double margin, size_t max_contacts,
+                                                  unsigned flags, collide_contact *contacts, size_t capacity, size_t *starts,
+                                                  size_t *failed);
+
+/* The same of a set's shapes: pair k is of the shapes which[2 * k] and which[2 * k + 1]. */
+COLLIDE_API collide_status collide_contacts_each(collide_workspace *workspace, const collide_shape_set *set,
+                                                 const int64_t *which, size_t n, collide_poses X_WA, collide_poses X_WB,
+                                                 double margin, size_t max_contacts, unsigned flags, collide_contact *contacts,
+                                                 size_t capacity, size_t *starts, size_t *failed);
 
 /* --- meshes --------------------------------------------------------------------------------------------------------
 

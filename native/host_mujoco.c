@@ -46,7 +46,7 @@ static struct slot {
     lock taken;
     collide_workspace *space;
     struct manifold_space manifold;
-    struct contact_row rows[MAX_CONTACTS];
+    collide_contact rows[MAX_CONTACTS];
 } slots[SLOTS];
 
 /* Directions that parted two geoms when they were last asked about, under a hash. Threads write them as they come: any direction
@@ -166,7 +166,7 @@ static void put_pose(const void *data, int geom, double *X)
 }
 
 /* Distance, place, normal from the first geom to the second, and a tangent, which MuJoCo works out where it is 0. */
-static void put_contact(const struct contact_row *row, void *contact)
+static void put_contact(const collide_contact *row, void *contact)
 {
     double *out = contact;
     int k;
@@ -217,7 +217,7 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
         keep_axis(kept, count == 0 ? axis : NULL);
         if (count < 0) kept->pause = PAUSE;
     } else {
-        *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, max_contacts, slot->rows, &n);
+        *status = contacts_of_pair(slot->space, &slot->manifold, X_WA, X_WB, asked, max_contacts, 0, slot->rows, &n);
         if (*status == COLLIDE_INVALID_POSE) { /* a state that diverged: MuJoCo notices, and resets it */
             *status = COLLIDE_OK;
             count = -1;
@@ -296,7 +296,7 @@ int collide_mujoco_add(const struct collide_mujoco_model *model)
 {
     int k;
     if (model->face_ints != FACE_INTS || model->manifold_header != MANIFOLD_HEADER ||
-        model->contact_bytes != (int64_t)sizeof(struct contact_row))
+        model->contact_bytes != (int64_t)sizeof(collide_contact))
         return -2;
     for (k = 0; k < MAX_MODELS && models[k].model != NULL; k++) {}
     if (k == MAX_MODELS) return -1;

@@ -13,23 +13,16 @@ import numpy as np
 import collide as engine
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of, shaped
+from collide.adapters.hosts.posed_objects import HostGeometry, HostObject
 from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
 
-#: Counts changes of geometries, so that managers see that boxes around them are old.
-_changes = itertools.count(1)
-latest_change = [0]
 
-
-class CollisionGeometry:
+class CollisionGeometry(HostGeometry):
     """Base of all geometries; of itself it has no points."""
 
     _node_type: int | None = None
     _object_type = OBJECT_TYPE.OT_GEOM
-    #: Lowest and highest corner (2, 3) of a box around it, in its frame.
-    _corners: np.ndarray | None = None
-    #: Shapes whose common points are the set: one, or of a plane its two half-spaces.
-    _shapes: tuple[Shape, ...] = ()
     _center: np.ndarray | None = None
 
     def getNodeType(self):
@@ -54,17 +47,6 @@ class CollisionGeometry:
         if self._node_type is None:
             raise ReferenceError
         self._center = shaped("aabb_center", value, (3,)).copy()
-
-    @property
-    def _shape(self) -> Shape:
-        if not self._shapes:
-            raise InvalidArgument(f"{type(self).__name__} has no facets yet: beginModel, addSubModel, endModel")
-        return self._shapes[0]
-
-    def _become(self, corners, *shapes: Shape) -> None:
-        self._corners = np.array(corners, dtype=np.float64)
-        self._shapes = shapes
-        latest_change[0] = next(_changes)
 
 
 class TriangleP(CollisionGeometry):
@@ -258,13 +240,13 @@ class Plane(_Flat):
         return engine.Halfspace(n, d), engine.Halfspace(-n, -d)
 
 
-class CollisionObject:
+class CollisionObject(HostObject):
     """A geometry at a pose in the world. Unlike python-fcl's, the object handed to callbacks is this very one.
 
     geom : any geometry.   tf : a `Transform`, the identity where there is none.   Raises ValueError without a geometry.
     """
 
-    __slots__ = ("__weakref__", "_X", "_geometry", "_watchers")
+    __slots__ = ()
 
     def __init__(self, geom=None, tf=None, _no_instance=False):
         if geom is not None and not isinstance(geom, CollisionGeometry):
@@ -272,13 +254,8 @@ class CollisionObject:
         if geom is None or geom._node_type is None:
             raise ValueError("CollisionObject needs a geometry, such as Box(1, 1, 1)")
         self._geometry = geom
-        #: Sets of moved objects, of the managers that this one is registered with.
-        self._watchers: tuple = ()
+        self._watchers = ()
         self._X = np.eye(4) if tf is None else _matrix(tf).copy()
-
-    def _moved(self) -> None:
-        for moved in self._watchers:
-            moved.add(self)
 
     def getObjectType(self):
         """A number of `OBJECT_TYPE`."""

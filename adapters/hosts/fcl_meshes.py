@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -80,6 +82,17 @@ class BVHModel(CollisionGeometry):
         self._add(vertices, facets.astype(np.int64))
         return True
 
+    def _cells(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of the facets (n, 3, 3), and what is to be added to them: nothing."""
+        surface: Any = self._shape
+        corners = surface.vertices[surface.faces]
+        return corners, np.zeros_like(corners)
+
+    def _of_cells(self, cells: np.ndarray) -> engine.Mesh:
+        """The surface of these facets alone."""
+        surface: Any = self._shape
+        return engine.Mesh(surface.vertices, surface.faces[cells], solid=False)
+
     def _add(self, vertices: np.ndarray, facets: np.ndarray) -> None:
         if self._state != _STARTED:
             raise ValueError("BVH construction does not follow correct sequence: call beginModel() first")
@@ -105,7 +118,18 @@ class OcTree(CollisionGeometry):
         middles = np.array([middle for middle, _ in boxes])
         half_edges = np.array([[0.5 * edge] for _, edge in boxes])
         shapes = [(engine.Box(edge, edge, edge), engine.pose(middle)) for middle, edge in boxes]
+        self._middles, self._half_edges, self._boxes = middles, half_edges, shapes
         self._become([(middles - half_edges).min(axis=0), (middles + half_edges).max(axis=0)], engine.Compound(shapes))
+
+    def _cells(self) -> tuple[np.ndarray, np.ndarray]:
+        """Middles of the boxes (n, 8, 3), and what is to be added to them for the corners, exactly."""
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+        offsets = self._half_edges[:, :, None] * signs[None]
+        return np.broadcast_to(self._middles[:, None], offsets.shape), offsets
+
+    def _of_cells(self, cells: np.ndarray) -> engine.Compound:
+        """The union of these boxes alone."""
+        return engine.Compound([self._boxes[k] for k in cells.tolist()])
 
 
 #: Levels of an octomap, and what two bits of a child say: bit 0, then bit 1.

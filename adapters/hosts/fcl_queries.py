@@ -6,19 +6,17 @@ came first; results collect over calls.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.fcl_contacts import contact_rows, facet_contacts
+from collide.adapters.hosts.fcl_contacts import contacts_of, nearest_sides, ordered
 from collide.adapters.hosts.fcl_geometry import CollisionObject
+from collide.adapters.hosts.fcl_planes import is_plane_with_pieces, plane_gap, plane_meets, sides_to_move
 from collide.adapters.hosts.fcl_requests import (
     NODE_TYPE,
     OBJECT_TYPE,
     CCDMotionType,
     CollisionRequest,
-    Contact,
     ContinuousCollisionRequest,
 )
 from collide.adapters.hosts.fcl_transform import Transform
@@ -54,25 +52,26 @@ def collide(o1, o2, request=None, result=None):
         raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
     limit, with_geometry = 1, False
     if request is not None:
-        limit, with_geometry = _checked(request), request.enable_contact
+        limit, with_geometry = checked_limit(request), request.enable_contact
         if limit == 0:
             return 0
     g1, g2 = o1._geometry, o2._geometry
     if len(g1._shapes) == len(g2._shapes) == 1:
         hit = hits(g1._shapes[0], g2._shapes[0], o1._X, o2._X)
     else:
-        hit = _meet(o1, o2)
+        hit = meet(o1, o2)
     if not hit:
         return 0
     if result is None:
-        return 1 if limit == 1 else len(_contacts(*_ordered(o1, o2), limit, with_geometry))
+        return 1 if limit == 1 else len(contacts_of(*ordered(o1, o2), limit, with_geometry))
     result.is_collision = True
-    contacts = _contacts(*_ordered(o1, o2), limit, with_geometry)
+    contacts = contacts_of(*ordered(o1, o2), limit, with_geometry)
     result.contacts.extend(contacts)
     return len(contacts)
 
 
-def _checked(request: CollisionRequest) -> int:
+def checked_limit(request: CollisionRequest) -> int:
+    """How many contacts are wanted. Raises OverflowError, and UnsupportedQuery where cost sources are."""
     limit = int(request.num_max_contacts)
     if limit < 0:
         raise OverflowError("num_max_contacts must not be negative")
@@ -81,56 +80,14 @@ def _checked(request: CollisionRequest) -> int:
     return limit
 
 
-def _ordered(o1: CollisionObject, o2: CollisionObject) -> tuple[CollisionObject, CollisionObject]:
-    """The pair as results name it: a mesh or an octree before a plain geometry."""
-    plain = OBJECT_TYPE.OT_GEOM
-    swaps = o1._geometry._object_type == plain and o2._geometry._object_type != plain
-    return (o2, o1) if swaps else (o1, o2)
-
-
-def _meet(o1: CollisionObject, o2: CollisionObject) -> bool:
-    """Of planes: a connected set meets one where it meets both of its half-spaces."""
+def meet(o1: CollisionObject, o2: CollisionObject) -> bool:
+    """Whether two objects meet. A connected set meets a plane where it meets both of its half-spaces."""
     g1, g2 = o1._geometry, o2._geometry
     for geometry in (g1, g2):
         geometry._shape  # noqa: B018 - raises where a mesh is not finished
-    if _in_pieces(g1) or _in_pieces(g2):
-        raise UnsupportedQuery("Plane with an octree or a mesh: use Halfspace, or a thin Box")
+    if is_plane_with_pieces(o1, o2):
+        return plane_meets(o1, o2)
     return all(hits(A, B, o1._X, o2._X) for A in g1._shapes for B in g2._shapes)
-
-
-def _in_pieces(geometry) -> bool:
-    return geometry._object_type != OBJECT_TYPE.OT_GEOM
-
-
-def _contacts(o1: CollisionObject, o2: CollisionObject, limit: int, with_geometry: bool) -> list[Contact]:
-    """Contacts of objects that meet, the deepest first, at least one."""
-    g1, g2 = o1._geometry, o2._geometry
-    both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
-    if both_meshes:
-        contacts = facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
-    elif not with_geometry:
-        contacts = [(-1, -1, np.zeros(3), np.zeros(3), 0.0)]
-    elif g1._node_type in (_PLANE, _HALFSPACE) and g2._node_type in (_PLANE, _HALFSPACE):
-        contacts = [(-1, -1, np.zeros(3), np.zeros(3), math.inf)]  # no translation takes them apart
-    else:
-        A, B = _nearest_sides(o1, o2)
-        contacts = contact_rows(A, B, o1, o2, limit)
-    return [_contact(g1, g2, *values) for values in contacts]
-
-
-def _contact(g1, g2, b1, b2, normal, pos, depth) -> Contact:
-    contact = Contact()
-    contact.o1, contact.o2, contact.b1, contact.b2 = g1, g2, b1, b2
-    contact.normal, contact.pos, contact.penetration_depth = normal, pos, depth
-    return contact
-
-
-def _nearest_sides(o1: CollisionObject, o2: CollisionObject):
-    """The shapes, of a plane that half-space out of which the way is shorter."""
-    pairs = [(A, B) for A in o1._geometry._shapes for B in o2._geometry._shapes]
-    if len(pairs) == 1:
-        return pairs[0]
-    return max(pairs, key=lambda pair: engine.distance(pair[0], pair[1], o1._X, o2._X).distance)
 
 
 def distance(o1, o2, request=None, result=None):
@@ -151,7 +108,7 @@ def distance(o1, o2, request=None, result=None):
     """
     if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
         raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
-    o1, o2 = _ordered(o1, o2)
+    o1, o2 = ordered(o1, o2)
     g1, g2 = o1._geometry, o2._geometry
     both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
     signed = request is not None and request.enable_signed_distance and not both_meshes
@@ -159,10 +116,10 @@ def distance(o1, o2, request=None, result=None):
         geometry._shape  # noqa: B018 - raises where a mesh is not finished
     if len(g1._shapes) == len(g2._shapes) == 1:
         r = engine.distance(g1._shapes[0], g2._shapes[0], o1._X, o2._X, signed=bool(signed))
-    elif _in_pieces(g1) or _in_pieces(g2):
-        raise UnsupportedQuery("Plane with an octree or a mesh: use Halfspace, or a thin Box")
+    elif is_plane_with_pieces(o1, o2):
+        return _plane_distance(o1, o2, bool(signed), result)
     else:
-        r = engine.distance(*_nearest_sides(o1, o2), o1._X, o2._X, signed=bool(signed))
+        r = engine.distance(*nearest_sides(o1, o2), o1._X, o2._X, signed=bool(signed))
     value = float(r.distance)
     if r.hit and not signed:
         value = 0.0 if both_meshes else -1.0
@@ -172,6 +129,18 @@ def distance(o1, o2, request=None, result=None):
         result.o1, result.o2 = g1, g2
         result.b1 = -1 if g1._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_a)
         result.b2 = -1 if g2._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_b)
+    return value
+
+
+def _plane_distance(o1: CollisionObject, o2: CollisionObject, signed: bool, result) -> float:
+    """`distance` of a plane and a mesh or an octree; o1 is the latter."""
+    is_hit, value, point1, point2, cell = plane_gap(o1, o2)
+    if is_hit:
+        A, B = nearest_sides(o1, o2)
+        value = float(engine.distance(A, B, o1._X, o2._X).distance) if signed else -1.0
+    if result is not None and result.min_distance > value:
+        result.min_distance, result.nearest_points = value, [point1, point2]
+        result.o1, result.o2, result.b1, result.b2 = o1._geometry, o2._geometry, cell, -1
     return value
 
 
@@ -224,8 +193,11 @@ def _first_contact(o1, X1, o2, X2) -> tuple[bool, float]:
     if not pairs:
         raise InvalidArgument("continuousCollide: a mesh has no facets yet: beginModel, addSubModel, endModel")
     if len(pairs) > 1:
-        if _meet(o1, o2):
+        if meet(o1, o2):
             return True, 0.0
+        if is_plane_with_pieces(o1, o2):
+            moves = [engine.time_of_impact(*pair, o1._X, X1, o2._X, X2) for pair in sides_to_move(o1, o2)]
+            return any(t.hit for t in moves), min(float(t.time) for t in moves)
         pairs = [pair for pair in pairs if not hits(*pair, o1._X, o2._X)][:1]
     t = engine.time_of_impact(*pairs[0], o1._X, X1, o2._X, X2)
     return bool(t.hit), float(t.time)

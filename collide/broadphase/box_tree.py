@@ -60,8 +60,10 @@ class BoxTree:
         pairs = self._search(self.boxes[self.order], margin, True, static, group, mask)
         if len(self.unbounded):
             pairs = np.concatenate([pairs, _with_unbounded(self.unbounded, len(self.boxes), static, group, mask)])
-        pairs = np.sort(pairs, axis=1)
-        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        n = len(self.boxes)
+        keys = np.minimum(pairs[:, 0], pairs[:, 1]) * n + np.maximum(pairs[:, 0], pairs[:, 1])
+        keys.sort()
+        return np.stack(np.divmod(keys, n), axis=1)
 
     def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
         """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""

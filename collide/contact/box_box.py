@@ -72,6 +72,15 @@ class FaceAxis(NamedTuple):
     gap: float
 
 
+class BoxEnd(NamedTuple):
+    """What an axis of a box adds to its corner least along a direction, and from there to the middle of the edge along
+    that axis where it is across the direction (then is_flat is 1.0), else 0."""
+
+    corner: Vec3
+    side: Vec3
+    is_flat: float
+
+
 @kernel(inline=True)
 def _box_at(numbers, shape, X):
     """The `PosedBox` of a matrix; far off a rotation where the matrix is no pose."""
@@ -167,7 +176,7 @@ def _put_row(A, B, limit, row):
     else:
         of_b = FaceAxis(best.axis - 3, best.gap)
         is_proven = _put_face(B, A, of_b, neg(t), error, True, row) and is_proven
-    if not is_proven:  # a corner over a face, at its distance, needs no look at edges
+    if not is_proven:  # what is over a face, at its distance, needs no look at edges
         edges = _edges(A, B, c0, c1, c2, t_A, error)
         if edges.gap - error / edges.sine > row.doubles[UPPER]:
             row.doubles[LOWER] = edges.gap - error / edges.sine
@@ -254,23 +263,31 @@ def _edge_pair(a, b, u, v, h_u, h_v, t_u, t_v, radius, length, error):
 
 @kernel(inline=True)
 def _put_face(F, G, face, t, error, exchanged, row):
-    """Normal and points of the row, from the corner of G nearest to a face of F; whether it is over that face.
+    """Normal and points of the row, from what of G is nearest to a face of F; whether some of it is over that face.
 
     t : from F's centre to G's.   exchanged : F is B.
+    Axes of G that lie in the face's plane, but for rounding, make an edge or a face of the nearest corner: points of it
+    are higher by twice the error an axis at most. It is over the face where no axis in the plane parts the two, their
+    own and those across the edges (S. Gottschalk et al., theorem 1, in the plane).
     """
     i, j, k = face.axis, (face.axis + 1) % 3, (face.axis + 2) % 3
     a, e, f = _axis_of(F, i), _axis_of(F, j), _axis_of(F, k)
     h_e, h_f = component(F.half, j), component(F.half, k)
     n = scale((1.0 if dot(a, t) >= 0.0 else -1.0) / math.sqrt(dot(a, a)), a)
-    is_over = False
-    corner = t
-    for ends in range(8):  # of axes of G that lie in the face's plane both ends are as near
-        corner = add(_corner(G.x, G.half.x, n, error, ends & 1), _corner(G.y, G.half.y, n, error, (ends >> 1) & 1))
-        corner = add(add(corner, _corner(G.z, G.half.z, n, error, ends >> 2)), t)
-        is_over = abs(dot(corner, e)) <= h_e - error and abs(dot(corner, f)) <= h_f - error
-        if is_over or face.gap < 0.0:
-            break
-    on_g = add(corner, F.p)
+    x, y, z = _end_of(G.x, G.half.x, n, error), _end_of(G.y, G.half.y, n, error), _end_of(G.z, G.half.z, n, error)
+    p = _in_plane(add(t, add(add(x.corner, y.corner), z.corner)), e, f)
+    # Middle of the edge or face, and half of its sides; of a corner these are 0.
+    gx, gy, gz = _in_plane(x.side, e, f), _in_plane(y.side, e, f), _in_plane(z.side, e, f)
+    p = Vec3(p.x + gx.x + gy.x + gz.x, p.y + gx.y + gy.y + gz.y, 0.0)
+    slack = 4.0 * error
+    is_over = abs(p.x) + slack <= h_e + abs(gx.x) + abs(gy.x) + abs(gz.x)
+    is_over = is_over and abs(p.y) + slack <= h_f + abs(gx.y) + abs(gy.y) + abs(gz.y)
+    is_over = is_over and _is_met_across(gx, gy, gz, p, h_e, h_f, slack)
+    is_over = is_over and _is_met_across(gy, gz, gx, p, h_e, h_f, slack)
+    is_over = is_over and _is_met_across(gz, gx, gy, p, h_e, h_f, slack)
+    if face.gap > 0.0:
+        row.doubles[UPPER] = face.gap + error * (1.0 + 2.0 * (x.is_flat + y.is_flat + z.is_flat))
+    on_g = add(add(t, F.p), add(add(x.corner, y.corner), z.corner))
     on_f = sub(on_g, scale(face.gap, n))
     put_vec3(row.doubles, NORMAL, add(scale(-1.0 if exchanged else 1.0, n), Vec3(0.0, 0.0, 0.0)))
     put_vec3(row.doubles, POINT_B if exchanged else POINT_A, on_f)
@@ -279,13 +296,26 @@ def _put_face(F, G, face, t, error, exchanged, row):
 
 
 @kernel(inline=True)
-def _corner(axis, half, n, error, other_end):
-    """What an axis of a box adds to the corner least along n."""
+def _end_of(axis, half, n, error):
+    """The `BoxEnd` of an axis of a box least along n."""
     along = dot(axis, n)
-    end = -half if along > 0.0 else half
-    if abs(half * along) <= error and other_end == 1:
-        end = -end
-    return scale(end, axis)
+    corner = scale(-half if along > 0.0 else half, axis)
+    if abs(half * along) <= error:
+        return BoxEnd(corner, neg(corner), 1.0)
+    return BoxEnd(corner, Vec3(0.0, 0.0, 0.0), 0.0)
+
+
+@kernel(inline=True)
+def _in_plane(v, e, f):
+    return Vec3(dot(e, v), dot(f, v), 0.0)
+
+
+@kernel(inline=True)
+def _is_met_across(side, second, third, p, h_e, h_f, slack):
+    """Whether a rectangle around 0 and a shape around p come within each other along what is across a side of it."""
+    reach = h_e * abs(side.y) + h_f * abs(side.x)
+    reach += abs(side.x * second.y - side.y * second.x) + abs(side.x * third.y - side.y * third.x)
+    return abs(side.x * p.y - side.y * p.x) + slack * (abs(side.x) + abs(side.y)) <= reach
 
 
 @kernel

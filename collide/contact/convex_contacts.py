@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from threading import local
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from collide.batches import answer_batch, length_of
-from collide.contact.box_box import box_rows
+from collide.contact.contact_blocks import (
+    BAD_POSE,
+    BLOCK_HEADER,
+    CAPACITY,
+    CHECK,
+    LIMIT,
+    N_GENERAL,
+    OPEN,
+    OUT_AT,
+    PLACES_AT,
+    ROWS_FULL,
+    UNBOUNDED,
+    WHICH_AT,
+    contacts_of_pairs,
+)
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
     ARE_BOXES,
-    HEADER,
     MARGIN,
     MAX_CONTACTS,
     PAIRS_DONE,
     ROWS_DONE,
-    convex_manifolds,
     max_corners,
     workspace_doubles,
     workspace_integers,
@@ -29,22 +40,53 @@ from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.packed_convex import POINTS
+from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
-from collide.narrowphase.convex_batches import Question, prepare_sets, shape_table
-from collide.narrowphase.convex_kernel_calls import SinglePair
+from collide.narrowphase.convex_batches import prepare_sets, shape_table
+from collide.narrowphase.convex_kernel_calls import SinglePair, block_workspace
+from collide.narrowphase.pose_batches import BLOCK
+from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
-from collide.results import PAIR_DTYPE, UNDECIDED
-from collide.shapes.primitives import Box
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
 
-#: Pairs that go through together: their rows stay in the cache, and what Python does between blocks is little.
-_BLOCK = 2048
 #: The least that a thread is handed.
 _PIECE = 512
-#: Contacts that there is room for, a pair, before more is asked for.
-_USUAL = 8
+#: Contacts a pair that there is room for at first, and of so many pairs: how many they have tells about the others.
+_USUAL, _FIRST = 8, 256
+
+
+class ConvexPairs(NamedTuple):
+    """n pairs of single convex sets at their poses.
+
+    table : of all sets.   which : (n, 2) rows of it a pair, or None for rows 0 and 1 throughout.
+    X_WA, X_WB : C-contiguous matrices (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    of_pair : (n, 2) numbers of matrices a pair, where ``X_WA`` and ``X_WB`` are one array, or None.
+    ids : an id for each of these matrices, for columns a and b; None for 0 and 1.
+    slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m], or None.
+    """
+
+    table: ShapeTable
+    which: np.ndarray | None
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+    of_pair: np.ndarray | None = None
+    ids: np.ndarray | None = None
+    slack: np.ndarray | None = None
+
+    def __len__(self) -> int:  # type: ignore[override]
+        if self.of_pair is not None:
+            return len(self.of_pair)
+        lengths = [len(self.X_WA), len(self.X_WB), *([] if self.which is None else [len(self.which)])]
+        return max(lengths) if min(lengths) else 0
+
+    def take(self, piece: slice) -> ConvexPairs:
+        which, of_pair, slack = (
+            None if column is None else column[piece] for column in (self.which, self.of_pair, self.slack)
+        )
+        X_WA, X_WB = (X if len(X) == 1 or of_pair is not None else X[piece] for X in (self.X_WA, self.X_WB))
+        return ConvexPairs(self.table, which, X_WA, X_WB, of_pair, self.ids, slack)
 
 
 def convex_contacts(
@@ -58,97 +100,100 @@ def convex_contacts(
     towards each other [m]: the margin is larger by that.   check : refuse matrices that are no rotation.
     Raises InvalidPose, UnsupportedQuery.
     """
-    limit = margin if slack is None else margin + float(slack.max(initial=0.0))
-    asked = _Asked(A, B, X_WA, X_WB, slack, margin, max_contacts, Question(False, limit, check=check))
-    n = length_of(A, B, X_WA, X_WB)
-    threads = min(threads, n // _PIECE)
+    table, which = shape_table(A, B)
+    pairs = ConvexPairs(table, which, X_WA, X_WB, slack=slack)
     try:
-        if threads < 2:
-            return _contacts_of(asked, slice(0, n))
-        pieces = pieces_of(n, threads, _PIECE)
-        answered: list = [None] * len(pieces)
-
-        def work(number: int) -> None:
-            answered[number] = _contacts_of(asked, pieces[number])
-
-        share(range(len(pieces)), work, threads)
+        return contacts_of(pairs, margin, max_contacts, check=check, threads=threads)
     except InvalidPose:
         for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
             as_poses(X, name, check=check)  # named by its place in the whole batch
-        raise
+        return contacts_of(pairs, margin, max_contacts, check=False, threads=threads)  # on the brink of the tolerance
+
+
+def contacts_of(
+    pairs: ConvexPairs, margin: float, max_contacts: int, *, check: bool = False, threads: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) as `convex_contacts`. Raises InvalidPose without a name, UnsupportedQuery."""
+    limit = margin if pairs.slack is None else margin + float(pairs.slack.max(initial=0.0))
+    asked = _Asked(margin, max_contacts, limit, check)
+    n = len(pairs)
+    threads = min(threads, n // _PIECE)
+    if threads < 2:
+        return _contacts_of(pairs, asked)
+    pieces = pieces_of(n, threads, _PIECE)
+    answered: list = [None] * len(pieces)
+
+    def work(number: int) -> None:
+        answered[number] = _contacts_of(pairs.take(pieces[number]), asked)
+
+    share(range(len(pieces)), work, threads)
     counts = [np.diff(ends, prepend=0) for _, ends in answered]
     return np.concatenate([rows for rows, _ in answered]), np.cumsum(np.concatenate(counts))
 
 
 class _Asked(NamedTuple):
-    """What `convex_contacts` is asked."""
+    """What `contacts_of` is asked, and up to where distances matter to it [m]."""
 
-    A: Any
-    B: Any
-    X_WA: np.ndarray
-    X_WB: np.ndarray
-    slack: np.ndarray | None
     margin: float
     max_contacts: int
-    question: Question
+    limit: float
+    check: bool
 
 
-def _contacts_of(asked: _Asked, piece: slice) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of the pairs of a piece, in this thread: a block of rows of `distance` at a time."""
-    n = piece.stop - piece.start
-    header = np.zeros(HEADER, dtype=np.int64)
-    ends = np.empty(n, dtype=np.int64)
-    out = np.empty(0, dtype=CONTACT_DTYPE)
-    for begin in range(0, n, _BLOCK):
-        pairs = slice(piece.start + begin, min(piece.start + begin + _BLOCK, piece.stop))
-        A, B = (S if isinstance(S, Shape) else S[pairs] for S in (asked.A, asked.B))
-        X_WA, X_WB = (X if len(X) == 1 else X[pairs] for X in (asked.X_WA, asked.X_WB))
-        slack = None if asked.slack is None else asked.slack[pairs]
-        rows = _rows(asked, A, B, X_WA, X_WB)
-        table, which = shape_table(A, B)
-        faces = face_table_of(table, ROUND)
-        header[:PAIRS_DONE] = _addresses(table, faces, _of_thread.space.fit(faces.largest))
-        header[PAIRS_DONE] = 0
-        max_rows = min(asked.max_contacts, max_corners(faces.largest))
-        out = _with_space(out, int(header[ROWS_DONE]), min(max_rows, _USUAL) * (n - begin) + max_rows)
-        while convex_manifolds(
-            address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
-            address_of(X_WB), 16 * (len(X_WB) > 1), 0 if slack is None else address_of(slack), address_of(rows),
-            len(rows), asked.margin, asked.max_contacts, address_of(out), len(out), address_of(ends) + 8 * begin,
-        ):  # fmt: skip
-            out = _with_space(out, int(header[ROWS_DONE]), len(out) + max_rows)
-    n_rows = int(header[ROWS_DONE])
-    return out[:n_rows] if 2 * n_rows >= len(out) else out[:n_rows].copy(), ends
-
-
-def _with_space(rows: np.ndarray, n_rows: int, n_more: int) -> np.ndarray:
-    """The first rows, and space for so many more behind them, in the same memory where that is large enough."""
-    if n_rows + n_more <= len(rows):
-        return rows
-    larger = np.empty(n_rows + n_more, dtype=CONTACT_DTYPE)
-    larger[:n_rows] = rows[:n_rows]
-    return larger
-
-
-def _rows(asked: _Asked, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """Rows of `distance`; of pairs of boxes as good as contacts need them, where a face tells (`box_box.py`)."""
-    table, which = shape_table(A, B)
-    is_box = _boxes(table)
-    both = is_box[which].all(axis=1) if which is not None else np.array([is_box.all()])
-    if not both.any():
-        return _general_rows(asked.question, A, B, X_WA, X_WB)
-    n = length_of(A, B, X_WA, X_WB)
-    rows = np.zeros(n, dtype=PAIR_DTYPE)
-    n_open = box_rows(
-        *table.addresses, 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
-        address_of(X_WB), 16 * (len(X_WB) > 1), n, asked.question.limit, address_of(rows),
+def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, ends) of pairs, in this thread."""
+    n, table = len(pairs), pairs.table
+    if n == 0:
+        return np.empty(0, dtype=CONTACT_DTYPE), np.empty(0, dtype=np.int64)
+    table.build_trees(np.arange(2) if pairs.which is None else pairs.which)
+    faces = face_table_of(table, ROUND)
+    space, block = _of_thread.space.fit(faces.largest), block_workspace()
+    max_rows = min(asked.max_contacts, max_corners(faces.largest))
+    ends, out = np.empty(n, dtype=np.int64), np.empty(_USUAL * min(n, _FIRST) + max_rows, dtype=CONTACT_DTYPE)
+    places = np.empty(BLOCK, dtype=np.int64)
+    header = np.zeros(BLOCK_HEADER, dtype=np.int64)
+    header[:HEADER_OF_POSES] = block.header_of(table)
+    header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
+        table, faces, space, block.poses.rows, block.shape_of
+    )
+    header[HEADER_OF_POSES + MAX_CONTACTS] = asked.max_contacts
+    header.view(np.float64)[[HEADER_OF_POSES + MARGIN, LIMIT]] = asked.margin, asked.limit
+    header[WHICH_AT : LIMIT] = (
+        _address_or_0(pairs.which), address_of(pairs.X_WA), 16 * (len(pairs.X_WA) > 1), address_of(pairs.X_WB),
+        16 * (len(pairs.X_WB) > 1), _address_or_0(pairs.of_pair), _address_or_0(pairs.ids), _address_or_0(pairs.slack),
+        address_of(out), len(out), address_of(ends),
     )  # fmt: skip
-    if n_open or not both.all():
-        remaining = np.flatnonzero((rows["how"] == UNDECIDED) | ~both)
-        A, B = (S if isinstance(S, Shape) else S[remaining] for S in (A, B))
-        X_WA, X_WB = (X if len(X) == 1 else np.ascontiguousarray(X[remaining]) for X in (X_WA, X_WB))
-        rows[remaining] = _general_rows(asked.question, A, B, X_WA, X_WB)[: len(remaining)]
-    return rows
+    header[CHECK], header[PLACES_AT] = asked.check, address_of(places)
+    n_done, n_rows = HEADER_OF_POSES + PAIRS_DONE, HEADER_OF_POSES + ROWS_DONE
+    while status := contacts_of_pairs(address_of(header), n):
+        if status == BAD_POSE:
+            raise InvalidPose("a matrix is no pose")
+        if status == UNBOUNDED:
+            raise UnsupportedQuery(
+                "contacts of Halfspace and Halfspace: their overlap has no end, so no normal tells the way out; "
+                "collide() still answers"
+            )
+        if status == ROWS_FULL:
+            out = _with_space(out, int(header[n_rows]), int(header[n_done]), n, max_rows)
+            header[OUT_AT], header[CAPACITY] = address_of(out), len(out)
+        else:
+            assert status == OPEN
+            block.settle(table, int(header[N_GENERAL]), asked.limit)
+    rows = out[: header[n_rows]]
+    return rows if 2 * len(rows) >= len(out) else rows.copy(), ends
+
+
+def _address_or_0(array: np.ndarray | None) -> int:
+    return 0 if array is None else address_of(array)
+
+
+def _with_space(rows: np.ndarray, n_rows: int, n_done: int, n: int, max_rows: int) -> np.ndarray:
+    """The first rows, those of so many of n pairs, with space for those of all others if they have as many."""
+    share = 1.125 * n / max(n_done, 1)
+    larger = np.empty(int(max(share, 1.5) * n_rows) + 2 * max_rows, dtype=CONTACT_DTYPE)
+    words = CONTACT_DTYPE.itemsize // 8  # numpy copies records field by field
+    larger.view(np.int64)[: words * n_rows] = rows.view(np.int64)[: words * n_rows]
+    return larger
 
 
 def _boxes(table: ShapeTable) -> np.ndarray:
@@ -156,41 +201,26 @@ def _boxes(table: ShapeTable) -> np.ndarray:
     return (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
 
 
-def _general_rows(question: Question, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    rows = answer_batch(A, B, X_WA, X_WB, question, prepare=True)
-    _refuse_unbounded(rows, A, B)
-    return rows
-
-
-def _refuse_unbounded(rows: np.ndarray, A, B) -> None:
-    unbounded = np.isneginf(rows["distance"])
-    if unbounded.any():
-        k = int(np.argmax(unbounded))
-        names = [type(S if isinstance(S, Shape) else S[k]).__name__ for S in (A, B)]
-        raise UnsupportedQuery(
-            f"contacts of {names[0]} and {names[1]}: their overlap has no end, so no normal tells the way out; "
-            "collide() still answers"
-        )
-
-
-def _addresses(table: ShapeTable, faces: HullFaceTable, space: _Workspace) -> tuple[int, ...]:
+def _addresses(
+    table: ShapeTable, faces: HullFaceTable, space: _Workspace, poses: np.ndarray, shape_of: np.ndarray
+) -> tuple[int, ...]:
     """The header of `convex_manifolds` up to what a call has done."""
     return (
-        *table.addresses, address_of(faces.ints), address_of(space.poses), address_of(space.shape_of),
+        *table.addresses, address_of(faces.ints), address_of(poses), address_of(shape_of),
         address_of(space.doubles), address_of(space.integers), faces.largest,
     )  # fmt: skip
 
 
 def prepare_contacts(A, B) -> None:
-    """Have two shapes that are prepared for single calls prepared for contacts as well; boxes, which `_rows` answers by
-    itself, for both."""
-    if isinstance(A, Shape) and isinstance(B, Shape):
-        pair = prepared_pair(A, B)
-        if pair is None and isinstance(A, Box) and isinstance(B, Box) and single_calls_are_safe():
-            pair = prepare_sets(A, B)
-            keep_prepared(A, B, pair)
-        if isinstance(pair, SinglePair) and pair.of_contacts is None:
-            pair.of_contacts = SingleContacts(pair)
+    """Have two convex sets prepared for single calls, of their distance as of their contacts."""
+    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+        return
+    pair = prepared_pair(A, B)
+    if pair is None and is_single_convex(A) and is_single_convex(B) and single_calls_are_safe():
+        pair = prepare_sets(A, B)
+        keep_prepared(A, B, pair)
+    if isinstance(pair, SinglePair) and pair.of_contacts is None:
+        pair.of_contacts = SingleContacts(pair)
 
 
 class SingleContacts:
@@ -209,7 +239,9 @@ class SingleContacts:
         self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
         self._header[: len(header)] = header
         self._of_manifold = self._header[len(header) :]
-        self._of_manifold[:PAIRS_DONE] = _addresses(table, self._faces, self._space)
+        self._of_manifold[:PAIRS_DONE] = _addresses(
+            table, self._faces, self._space, self._space.poses, self._space.shape_of
+        )
         self._of_manifold[ARE_BOXES] = _boxes(table).all()
         self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
         self._ask = prepared_row(contacts_single, self._header)

@@ -80,8 +80,8 @@ def max_corners(largest: int) -> int:
 
 
 @kernel(inline=True)
-def _max_corners(largest):
-    """The same for kernels: Python calls none of them but entries."""
+def max_corners_of(largest):
+    """`max_corners` for kernels: Python calls none of them but entries."""
     return 2 * largest + 8
 
 
@@ -103,7 +103,7 @@ def convex_manifolds(
     ends = view_i64(ends_at, n)
     poses = view_f64(header[POSES_AT], 2 * POSE)
     shape_of = view_i64(header[SHAPE_OF_AT], 2)
-    max_rows = min(max_contacts, _max_corners(header[LARGEST]))
+    max_rows = min(max_contacts, max_corners_of(header[LARGEST]))
     n_rows = header[ROWS_DONE]
     for k in range(header[PAIRS_DONE], n):
         if capacity - n_rows < max_rows:
@@ -120,7 +120,7 @@ def convex_manifolds(
             set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), False)
             set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), False)
             poses[POSE_SLOP] = slack
-            n_rows += put_manifold(header, row, margin + slack, max_contacts, out_at + _CONTACT * n_rows)
+            n_rows += put_manifold(header_at, 0, 1, row, margin + slack, max_contacts, out_at + _CONTACT * n_rows)
         ends[k] = n_rows
     header[PAIRS_DONE] = n
     header[ROWS_DONE] = n_rows
@@ -128,16 +128,17 @@ def convex_manifolds(
 
 
 @kernel
-def put_manifold(header, row, margin, max_contacts, out_at):
-    """Write the contacts of one pair; how many."""
-    ordered = ordered_pair(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], 0, 1)
+def put_manifold(header_at, a, b, row, margin, max_contacts, out_at):
+    """Write the contacts of one pair, by the numbers of its poses; how many."""
+    header = view_i64(header_at, HEADER)
+    ordered = ordered_pair(header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], a, b)
     pair, flip = ordered.pair, ordered.flip
     sign = -1.0 if flip else 1.0
     axes = axes_across(scale(sign, vec3_at(row.doubles, NORMAL)))
     error = _error(pair, row)
     largest = header[LARGEST]
     doubles, integers = header[DOUBLES_AT], header[INTEGERS_AT]
-    n_max = _max_corners(largest)
+    n_max = max_corners_of(largest)
     of_b = support_face(
         pair, pair.B, header[FACES_AT], axes, -1.0, pair.t, largest, doubles + 24 * largest, integers + 16 * largest
     )
@@ -183,7 +184,7 @@ def put_manifold(header, row, margin, max_contacts, out_at):
     first_point = deepest_point(manifold, n, bound, tolerance)
     n = select_points(manifold, n, first_point, max_contacts, order)
     bound += 8.0 * error + pair.numbers[NUMBERS * pair.A.shape + SLOP] + pair.numbers[NUMBERS * pair.B.shape + SLOP]
-    bound += pair.poses[POSE_SLOP]
+    bound += pair.poses[pair.A.pose_at + POSE_SLOP] + pair.poses[pair.B.pose_at + POSE_SLOP]
     for k in range(n):
         contact = out_at + _CONTACT * k
         _write_contact(contact, manifold, order[k], k == 0, axes, pair, row, flip, bound)

@@ -60,7 +60,7 @@ from collide.narrowphase.facets.collide_kernel import (
     open_space,
 )
 from collide.narrowphase.facets.collide_kernel import SINGULAR as PLACES_NOTHING
-from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, NUMBERS_OF_PAIR, world_error
+from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR, world_error
 from collide.narrowphase.facets.posed_surfaces import is_swapped_order, shift_between
 from collide.narrowphase.facets.surface_collision import FULL
 from collide.numerics.vec3 import Vec3, vec3_at
@@ -80,6 +80,8 @@ DONE, ROWS_FULL, PAIRS_FULL, TOO_MANY, SINGULAR = range(5)
 #: Words of one set of points, a pair; of all that does not grow with them.
 _WORDS_OF_POINTS = MAX_POINTS * (POINT + 4)
 _FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8
+#: Integers that are kept of a pair while more are listed: those of the list, and its group.
+_KNOWN = INTS_OF_PAIR + 1
 
 
 def workspace_words(capacity: int) -> int:
@@ -232,15 +234,18 @@ def _contacts_at(header_at, XA_at, XB_at, margin, out_at, capacity, first):
 
 
 @kernel
-def _list(task, reach):
-    """(DONE, PAIRS_FULL, TOO_MANY or SINGULAR, how many pairs): facets within reach, into the workspace."""
+def _list(task, reach, measures):
+    """(DONE, PAIRS_FULL, TOO_MANY or SINGULAR, how many pairs): facets within reach, into the workspace.
+
+    measures : as of `list_near_pairs`.
+    """
     pair, space = task.pair, task.space
     n = _list_pairs(
         task.near_code,
         (
             pair.A.tree_at, pair.B.tree_at, pair.XA_at, pair.XB_at, reach, task.words_at,
             task.words_at + 8 * NUMBERS_OF_PAIR * task.capacity, task.capacity, space.stack_at, space.n_stack,
-            space.doubles_at, space.integers_at, space.exact,
+            space.doubles_at, space.integers_at, space.exact, measures,
         ),
     )  # fmt: skip
     if n >= 0:
@@ -254,7 +259,7 @@ def _list(task, reach):
 def _put_contacts(task, rows, first):
     """(status, rows then, whether a row of `distance` is lacking) of bodies that may be within the margin."""
     reach = _reach_of(task)
-    status, n = _list(task, reach)
+    status, n = _list(task, reach, True)
     if status == TOO_MANY and reach == 0.0:
         return DONE, first, True
     if status != DONE:
@@ -300,32 +305,40 @@ def _inside(task):
 
 @kernel
 def _list_wider(task, frame, reach):
-    """(status, frame) with the pairs within a larger reach, those that have a translation marked as before."""
-    pairs, saved = frame.pairs, frame.points.pairs
-    n_saved = 0
-    for k in range(pairs.n):
-        if pairs.groups[k] >= 0:
-            saved[3 * n_saved] = pairs.facets[INTS_OF_PAIR * k + FACET_A]
-            saved[3 * n_saved + 1] = pairs.facets[INTS_OF_PAIR * k + FACET_B]
-            saved[3 * n_saved + 2] = pairs.groups[k]
-            n_saved += 1
-    status, n = _list(task, reach)
+    """(status, frame) with the pairs within a larger reach as well.
+
+    What is known of those listed before stays; the others are not measured: all that meet, or are within the margin,
+    are among the first.
+    """
+    before, numbers, integers = frame.pairs, frame.points.manifold.points, frame.points.pairs
+    n_before = before.n
+    for k in range(n_before):
+        for i in range(NUMBERS_OF_PAIR):
+            numbers[NUMBERS_OF_PAIR * k + i] = before.near[NUMBERS_OF_PAIR * k + i]
+        for i in range(INTS_OF_PAIR):
+            integers[_KNOWN * k + i] = before.facets[INTS_OF_PAIR * k + i]
+        integers[_KNOWN * k + INTS_OF_PAIR] = before.groups[k]
+    status, n = _list(task, reach, False)
     if status != DONE:
         return status, frame
     frame = _open_frame(task, n)
     pairs = frame.pairs
     n_facets_b = view_i64(task.pair.B.tree_at, INTS)[N_FACETS]
-    mask = clear_table(pairs.table, n_saved)
-    for i in range(n_saved):
-        key = saved[3 * i] * n_facets_b + saved[3 * i + 1]
+    mask = clear_table(pairs.table, n_before)
+    for i in range(n_before):
+        key = integers[_KNOWN * i + FACET_A] * n_facets_b + integers[_KNOWN * i + FACET_B]
         slot = slot_of(pairs.table, mask, key)
         pairs.table[2 * slot] = key
-        pairs.table[2 * slot + 1] = saved[3 * i + 2]
+        pairs.table[2 * slot + 1] = i
     for k in range(n):
         key = pairs.facets[INTS_OF_PAIR * k + FACET_A] * n_facets_b + pairs.facets[INTS_OF_PAIR * k + FACET_B]
         slot = slot_of(pairs.table, mask, key)
         if pairs.table[2 * slot] == key:
-            pairs.groups[k] = pairs.table[2 * slot + 1]
+            i = pairs.table[2 * slot + 1]
+            for j in range(NUMBERS_OF_PAIR):
+                pairs.near[NUMBERS_OF_PAIR * k + j] = numbers[NUMBERS_OF_PAIR * i + j]
+            pairs.facets[INTS_OF_PAIR * k + MEETS] = integers[_KNOWN * i + MEETS]
+            pairs.groups[k] = integers[_KNOWN * i + INTS_OF_PAIR]
     link_pairs(pairs, frame.B.n_corners)
     return DONE, frame
 

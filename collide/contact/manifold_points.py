@@ -192,13 +192,13 @@ def drop_repeated(manifold, n, error, tolerance):
     n_kept = 0
     for k in range(n):
         last = n_kept - 1
-        if n_kept > 0 and _distance(points, last, k) <= tolerance:
+        if n_kept > 0 and _square(points, last, k) <= tolerance * tolerance:
             if points[POINT * k + GAP] < points[POINT * last + GAP]:
                 copy_point(manifold, k, last)
             continue
         copy_point(manifold, k, n_kept)
         n_kept += 1
-    if n_kept > 1 and _distance(points, 0, n_kept - 1) <= tolerance:
+    if n_kept > 1 and _square(points, 0, n_kept - 1) <= tolerance * tolerance:
         if points[POINT * (n_kept - 1) + GAP] < points[GAP]:
             copy_point(manifold, n_kept - 1, 0)
         n_kept -= 1
@@ -207,7 +207,7 @@ def drop_repeated(manifold, n, error, tolerance):
         before, after = (k - 1 if k > 0 else n_kept - 1), (k + 1 if k + 1 < n_kept else 0)
         shallowest = min(points[POINT * before + GAP], points[POINT * after + GAP])
         if (
-            _height(points, before, after, k) > tolerance
+            _is_right_of(points, before, after, k, tolerance)
             or points[POINT * k + GAP] < shallowest - error
             or not _is_between(points, before, after, k)
         ):
@@ -220,18 +220,18 @@ def drop_repeated(manifold, n, error, tolerance):
 
 
 @kernel(inline=True)
-def _distance(points, i, j):
+def _square(points, i, j):
+    """Of the distance of two points."""
     du, dv = points[POINT * i] - points[POINT * j], points[POINT * i + V] - points[POINT * j + V]
-    return math.sqrt(du * du + dv * dv)
+    return du * du + dv * dv
 
 
 @kernel(inline=True)
-def _height(points, i, j, k):
-    """How far point k is to the right of the line from i to j."""
+def _is_right_of(points, i, j, k, tolerance):
+    """Whether point k is farther than the tolerance to the right of the line from i to j."""
     du, dv = points[POINT * j] - points[POINT * i], points[POINT * j + V] - points[POINT * i + V]
     wide = dv * (points[POINT * k] - points[POINT * i]) - du * (points[POINT * k + V] - points[POINT * i + V])
-    length = math.sqrt(du * du + dv * dv)
-    return wide / length if length > 0.0 else 0.0
+    return wide > 0.0 and wide * wide > tolerance * tolerance * (du * du + dv * dv)
 
 
 @kernel(inline=True)

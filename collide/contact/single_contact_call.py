@@ -14,10 +14,10 @@ from collide.contact.convex_manifolds import (
     put_manifold,
 )
 from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
-from collide.kernels import entry, kernel, prepared, view_f64, view_i64
+from collide.kernels import entry, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
-from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, set_pose
-from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused, view_row
+from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, clear_rows, set_pose
+from collide.narrowphase.rows import BEYOND, LOWER, is_undecided_or_refused, view_row
 
 #: Integers of the header: that of `pose_batches.py`, then that of `convex_manifolds.py`.
 SINGLE_HEADER = HEADER + MANIFOLD_HEADER
@@ -38,12 +38,12 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     block = block_of(header_at)
     rows_at = block.header[ROWS_AT]
     row = view_row(rows_at)
-    _zero_row(rows_at)
+    clear_rows(rows_at, 1)
     is_known = header[ARE_BOXES] != 0 and put_box_row(
         header[INTS_AT], header[NUMBERS_AT], 0, 1, X_WA, X_WB, margin, row
     )
     if not is_known:
-        _zero_row(rows_at)
+        clear_rows(rows_at, 1)
         if not (set_pose(block.poses, 0, X_WA, True) and set_pose(block.poses, BLOCK * POSE, X_WB, True)):
             return -1
         answer_block(block.header, 1, False, True, margin, rows_at)
@@ -55,12 +55,6 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
         poses = view_f64(header[POSES_AT], 2 * POSE)
         set_pose(poses, 0, X_WA, False)
         set_pose(poses, POSE, X_WB, False)
-        header[ROWS_DONE] = put_manifold(header, row, margin, header[MAX_CONTACTS], out_at)
+        header[ROWS_DONE] = put_manifold(manifold_at, 0, 1, row, margin, header[MAX_CONTACTS], out_at)
     return 0
 
-
-@kernel(inline=True)
-def _zero_row(row_at):
-    words = view_i64(row_at, ROW // 8)
-    for k in range(ROW // 8):
-        words[k] = 0

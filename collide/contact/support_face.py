@@ -186,22 +186,13 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
     vertex = _hull_vertex(body, row, g)
     p = column_at(body.coords, body.padded, vertex)
     best = np.int64(-1)
-    best_edge = np.int64(-1)
     best_cosine = _ACROSS
-    least_steep = -_ACROSS * norm(g)
     for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
-        at = fans[k]
-        face = face_of[at]
+        face = face_of[fans[k]]
         cosine = dot(vec3_at(normals, 3 * face), facing)
         if cosine > best_cosine:
             best_cosine = cosine
             best = face
-        following = at + 1 if at + 1 < starts[face + 1] else starts[face]
-        e = sub(column_at(body.coords, body.padded, loop[following]), p)
-        slope = dot(e, g) / norm(e)
-        if slope > least_steep:
-            least_steep = slope
-            best_edge = at
     if best >= 0:
         begin = starts[best]
         n = starts[best + 1] - begin
@@ -211,6 +202,17 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
             edges[k] = 4 * loop_edges[begin + k] + EDGE
         flatness = view_f64(row[FLATNESS_AT], n_faces)[best]
         return n, triangles[best], vec3_at(normals, 3 * best), flatness, 4 * best + FACE
+    best_edge = np.int64(-1)
+    least_steep = -_ACROSS * norm(g)
+    for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
+        at = fans[k]
+        face = face_of[at]
+        following = at + 1 if at + 1 < starts[face + 1] else starts[face]
+        e = sub(column_at(body.coords, body.padded, loop[following]), p)
+        slope = dot(e, g) / norm(e)
+        if slope > least_steep:
+            least_steep = slope
+            best_edge = at
     put_vec3(corners, 0, p)
     features[0] = 4 * vertex + VERTEX
     first = fan_starts[vertex]

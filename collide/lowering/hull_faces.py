@@ -1,4 +1,7 @@
-"""Faces of a polytope as contacts need them: polygons of coplanar hull triangles, and which faces meet at a vertex."""
+"""Faces of a polytope as contacts need them: polygons of coplanar hull triangles, and which faces meet at a vertex.
+
+`native/capi_faces.c` does the same to the last bit: sums of products go from left to right, by no library's routine.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +82,7 @@ def _two_sides(points: np.ndarray, facets: np.ndarray):
     assert loop is not None, "a flat hull is one polygon"
     normals, areas = _normals(points[front])
     widest = int(np.argmax(areas))
-    off = np.abs((points[loop] - points[front[widest, 0]]) @ normals[widest]).max()
+    off = np.abs(((points[loop] - points[front[widest, 0]]) * normals[widest]).sum(axis=1)).max()
     both = np.stack([normals[widest], -normals[widest]])
     return [loop, loop[::-1]], both, np.array([off, off]), np.array([0, len(front)])
 
@@ -102,7 +105,7 @@ def _merged(points: np.ndarray, facets: np.ndarray):
     for members in np.split(order, np.flatnonzero(np.diff(face_of[order])) + 1):
         loop = facets[members[0]] if len(members) == 1 else _boundary(facets[members])
         widest = members[int(np.argmax(areas[members]))]
-        off = np.abs((T[members] - T[widest, 0]) @ units[widest]).max()
+        off = np.abs(((T[members] - T[widest, 0]) * units[widest]).sum(axis=2)).max()
         if loop is None or off > 4.0 * tolerance:  # no polygon, or curved: its triangles are faces each
             for k in members:
                 loops.append(facets[k])
@@ -150,7 +153,10 @@ def _components(T: np.ndarray, units: np.ndarray, areas: np.ndarray, twins: np.n
 def _boundary(facets: np.ndarray) -> np.ndarray | None:
     """The corners around a patch of triangles; None where that is no simple loop."""
     edges = {(int(t[k]), int(t[(k + 1) % 3])) for t in facets for k in range(3)}
-    following = {tail: head for tail, head in edges if (head, tail) not in edges}
+    rim = [(tail, head) for tail, head in edges if (head, tail) not in edges]
+    following = dict(rim)
+    if not rim or len(following) < len(rim):
+        return None
     start = min(following)
     loop = [start]
     while (corner := following.get(loop[-1], -1)) != start:

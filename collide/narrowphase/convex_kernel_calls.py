@@ -173,13 +173,18 @@ def settle_open(
     _finish(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
 
 
+def block_workspace() -> BlockWorkspace:
+    """That of this thread."""
+    return _of_thread.space
+
+
 def finish_distances(rows: np.ndarray, *, depths: bool) -> bool:
     """`finish_rows` of `distance`; whether a depth has no end."""
     return bool(finish_rows(address_of(rows), len(rows), depths))
 
 
-class _Workspace:
-    """Scratch memory of the kernels."""
+class BlockWorkspace:
+    """Scratch memory of the kernels, and a block of poses, pairs and rows."""
 
     def __init__(self) -> None:
         self.doubles = np.zeros(DOUBLES)
@@ -203,22 +208,28 @@ class _Workspace:
         header[:POSES_AT] = code_of(answer_pairs), *table.addresses
         return header
 
+    def settle(self, table: ShapeTable, n: int, limit: float) -> None:
+        """Settle in place what doubles left open of the first n rows of the block, distances up to a limit [m]."""
+        _finish(
+            self.rows[:n], self.pairs[:n], table, self.poses, self.shape_of, boolean=False, limit=limit, depths=True
+        )
+
 
 class _OfThread(local):
     """The workspace of one thread, made when the thread first asks."""
 
     def __init__(self) -> None:
-        self.space = _Workspace()
+        self.space = BlockWorkspace()
 
 
 _of_thread = _OfThread()
 
 
 @cache
-def _space_of_single_calls() -> _Workspace:
+def _space_of_single_calls() -> BlockWorkspace:
     """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
     is good as long as it is held."""
-    return _Workspace()
+    return BlockWorkspace()
 
 
 class SinglePair:

@@ -25,7 +25,7 @@ BLOCK = 64
 #: How `answer_poses` ends, besides 0: rows of the block before are open, or a matrix is no pose.
 OPEN, BAD_POSE = range(1, 3)
 
-# Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`_Workspace` in
+# Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`BlockWorkspace` in
 # `convex_kernel_calls.py` and C write them); the same of `settle_hulls`, for single calls; then how many poses are
 # answered.
 (
@@ -143,7 +143,7 @@ def answer_poses(
             header[ANSWERED] = done
             return BAD_POSE
         if boolean:
-            _clear_rows(rows_at, count)
+            clear_rows(rows_at, count)
             for k in range(count if axes_at != 0 else 0):
                 put_vec3(
                     view_row(rows_at + ROW * k).doubles, NORMAL, vec3_at(view_f64(axes_at + 24 * (done + k), 3), 0)
@@ -196,7 +196,8 @@ def _put_poses(block, which_at, XA_at, step_a, XB_at, step_b, first, count, chec
 
 
 @kernel(inline=True)
-def _clear_rows(rows_at, n):
+def clear_rows(rows_at, n):
+    """Zero n rows."""
     words = view_i64(rows_at, n * ROW // 8)
     for k in range(n * ROW // 8):
         words[k] = 0

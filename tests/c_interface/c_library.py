@@ -14,12 +14,14 @@ from functools import cache
 import numpy as np
 
 import collide
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.kernels.library import library_path
 from collide.results import PAIR_DTYPE
 
 OK, NO_MEMORY, INVALID_ARGUMENT, INVALID_SHAPE, INVALID_POSE, OUT_OF_RANGE, ENDLESS_DEPTH, UNSUPPORTED, NO_KERNELS = (
     range(9)
 )
+TOO_MANY = 9
 TRUST_POSES, UNSIGNED = 1, 2
 
 
@@ -58,6 +60,17 @@ _TYPES = {
     ],
     "collide_distance_each": [
         c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_uint, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_contacts": [
+        c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_size_t, c_uint, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_contacts_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_size_t, c_uint, c_void_p, c_size_t, c_void_p,
+        POINTER(c_size_t),
+    ],
+    "collide_contacts_each": [
+        c_void_p, c_void_p, c_void_p, c_size_t, Poses, Poses, c_double, c_size_t, c_uint, c_void_p, c_size_t, c_void_p,
+        POINTER(c_size_t),
     ],
     "collide_mesh_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_int, c_void_p],
     "collide_mesh_of_shape": [c_void_p, c_void_p],
@@ -188,6 +201,33 @@ class Asker:
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, limit, flags, rows.ctypes.data
         )
         return status, rows
+
+    def contacts(self, A: CShape, B: CShape, X_WA, X_WB, margin: float, max_contacts: int, flags: int = 0):
+        """(status, rows)."""
+        rows, count = np.full(max(max_contacts, 1), 7, dtype=CONTACT_DTYPE), c_size_t()
+        X_WA, X_WB = _doubles(X_WA), _doubles(X_WB)
+        status = library().collide_contacts(
+            self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, margin, max_contacts, flags,
+            rows.ctypes.data, count,
+        )  # fmt: skip
+        return status, rows[: count.value]
+
+    def contact_batch(self, asked, X_WA, X_WB, margin: float, max_contacts: int, *, capacity: int, flags: int = 0):
+        """(status, rows, starts, number of the pair to blame). asked : (A, B), or (set, (n, 2) numbers)."""
+        X_WA, X_WB, failed = _doubles(X_WA).reshape(-1, 4, 4), _doubles(X_WB).reshape(-1, 4, 4), c_size_t(0)
+        one, other = asked
+        if isinstance(one, CSet):
+            which = np.ascontiguousarray(other, dtype=np.int64)
+            n, first, name = len(which), [one.handle, which.ctypes.data, len(which)], "each"
+        else:
+            n, first, name = max(len(X_WA), len(X_WB)), [one.handle, other.handle], "batch"
+            n = n if len(X_WA) and len(X_WB) else 0
+        rows, starts = np.full(capacity, 7, dtype=CONTACT_DTYPE), np.zeros(n + 1, dtype=np.uint64)
+        status = getattr(library(), f"collide_contacts_{name}")(
+            self.handle, *first, Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB)), margin,
+            max_contacts, flags, rows.ctypes.data, capacity, starts.ctypes.data, failed,
+        )  # fmt: skip
+        return status, rows, starts.astype(np.int64), failed.value
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:
         hit, X_WA, X_WB = c_int(), _doubles(X_WA), _doubles(X_WB)

@@ -24,6 +24,7 @@ import pytest
 import soak_pairs
 
 import collide
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.kernels import mode
 from collide.kernels.library import library_path
 from collide.lowering.parts import convex_set_of, parts_of
@@ -85,14 +86,18 @@ def test_header_is_c99_and_cpp(tmp_path):
 
 
 def test_rows_are_those_of_python(tmp_path):
-    fields = "".join(f'    printf("{name} %zu\\n", offsetof(collide_pair, {name}));\n' for name in PAIR_DTYPE.names)
-    fields += '    printf("all %zu\\n", sizeof(collide_pair));\n'
+    fields = ""
+    for struct, dtype in (("collide_pair", PAIR_DTYPE), ("collide_contact", CONTACT_DTYPE)):
+        for name in dtype.names:
+            fields += f'    printf("{struct}.{name} %zu\\n", offsetof({struct}, {name}));\n'
+        fields += f'    printf("{struct} %zu\\n", sizeof({struct}));\n'
     text = f'#include "collide.h"\n#include <stdio.h>\nint main(void) {{\n{fields}    return 0;\n}}\n'
     told = dict(line.split() for line in run(built(tmp_path, text)).splitlines())
-    assert told == {
-        "all": str(PAIR_DTYPE.itemsize),
-        **{name: str(PAIR_DTYPE.fields[name][1]) for name in PAIR_DTYPE.names},
-    }
+    for struct, dtype in (("collide_pair", PAIR_DTYPE), ("collide_contact", CONTACT_DTYPE)):
+        assert told.pop(struct) == str(dtype.itemsize)
+        for name in dtype.names:
+            assert told.pop(f"{struct}.{name}") == str(dtype.fields[name][1])
+    assert not told
 
 
 def test_version_is_that_of_the_package():
@@ -132,6 +137,9 @@ def test_examples_are_built_by_make_and_run(tmp_path):
     told = run(tmp_path / "c" / "two_shapes", env=bare)
     assert f"collide {collide.__version__}, kernels for " in told
     assert "x = 0.8 m: free" in told and "x = 0.7 m: they meet" in told and "a matrix is no pose" in told
+    told = run(tmp_path / "c" / "resting", env=bare)
+    assert "4 contacts, the normal is (0, 0, 1)" in told and told.count("gap 1.0000 mm") == 4
+    assert "the first within the margin is 30, with a gap of 2.00 mm; 280 rows" in told
     told = run(tmp_path / "c" / "threads", env=bare)
     assert "1838 of 4000 pairs meet" in told and "4000 answers of four threads are those of one" in told
 

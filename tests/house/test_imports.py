@@ -179,6 +179,7 @@ ROOMS = {
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "shapes"},
     "world_hits": set(),
+    "world_contacts": {"contact", "errors", "packed_world"},
     "world_casts": {
         "errors",
         "argument_checks",
@@ -202,6 +203,7 @@ ROOMS = {
         "broadphase",
         "casts",
         "world_casts",
+        "world_contacts",
         "world_hits",
         "results",
         "certificates",

@@ -64,6 +64,7 @@ class _Query(NamedTuple):
     shift : t_B − t_A.
     leaf : triangles of a leaf of A, and one of B, with boxes.
     out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
+    measures : whether they are measured.
     """
 
     trees: PosedTrees
@@ -78,6 +79,7 @@ class _Query(NamedTuple):
     out: np.ndarray
     facets: np.ndarray
     capacity: int
+    measures: bool
 
 
 @kernel
@@ -156,8 +158,14 @@ def _visit_leaves(query, pair):
                 put_triangle(T, 9, triangle_at(leaf, of_b))
                 is_placed = True
             put_triangle(T, 0, triangle_at(leaf, _BOXED * i))
-            if not separated_by(T, bound):
+            if separated_by(T, bound):
+                continue
+            if query.measures:
                 _measure(query, first_a + i, b)
+            else:
+                put_vec3(query.points, 0, Vec3(0.0, 0.0, 0.0))
+                put_vec3(query.points, 3, Vec3(0.0, 0.0, 0.0))
+                _list(query, first_a + i, b, math.inf, math.inf, False)
     return False
 
 
@@ -192,19 +200,25 @@ def _measure(query, a, b):
     lower = max(0.0, min(width, length) - 4.0 * query.error)
     if not meets and lower > query.reach:
         return
-    point_a = vec3_at(points, 0)
-    point_b = vec3_at(points, 3)
     if meets:
         common_point(query.triangles, length, points)
-        point_a = add(scale(0.5, vec3_at(points, 0)), scale(0.5, vec3_at(points, 3)))
-        point_b = point_a
+        middle = add(scale(0.5, vec3_at(points, 0)), scale(0.5, vec3_at(points, 3)))
+        put_vec3(points, 0, middle)
+        put_vec3(points, 3, middle)
         length = 0.0
         lower = 0.0
+    _list(query, a, b, length, lower, meets)
+
+
+@kernel(inline=True)
+def _list(query, a, b, length, lower, meets):
+    """Append a pair, whose nearest points are the query's."""
+    counters = query.counters
     out = NUMBERS_OF_PAIR * counters[_N_PAIRS]
     query.out[out + LENGTH] = length
     query.out[out + LOWER] = lower
-    put_vec3(query.out, out + POINT_A, point_a)
-    put_vec3(query.out, out + POINT_B, point_b)
+    for k in range(6):
+        query.out[out + POINT_A + k] = query.points[k]
     out = INTS_OF_PAIR * counters[_N_PAIRS]
     query.facets[out + FACET_A] = query.trees.A.ids[a]
     query.facets[out + FACET_B] = query.trees.B.ids[b]
@@ -216,17 +230,20 @@ _traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open
 
 
 #: Of `list_near_pairs`.
-SIGNATURE = "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64)"
+SIGNATURE = (
+    "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64, boolean)"
+)
 
 
 @entry(SIGNATURE)
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
-    integers_at, exact_at,
+    integers_at, exact_at, measures,
 ):  # fmt: skip
     """How many pairs of facets come within ``reach`` at one pair of poses (16 doubles each); −FULL, −SINGULAR.
 
     Every pair whose distance is at most ``reach`` is listed; a few that are farther by rounding may be.
+    measures : otherwise distances are infinite, no pair meets, and more pairs may be listed that are farther.
     out, facets : NUMBERS_OF_PAIR doubles and INTS_OF_PAIR integers a pair, room for ``capacity`` of them.
     Arguments are flat, as those of all entries.
     """
@@ -244,6 +261,7 @@ def list_near_pairs(
         view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),
         view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(numbers_at + 8 * _LEAF, _BOXED * (MAX_LEAF + 1)),
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
+        measures,
     )  # fmt: skip
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)
     query.counters[_N_PAIRS] = 0

@@ -1,0 +1,41 @@
+/* The faces of a hull as contacts need them. */
+#ifndef COLLIDE_CAPI_FACES_H
+#define COLLIDE_CAPI_FACES_H
+
+#include "capi_tree.h"
+
+/* A shape's row of faces, as collide/lowering/hull_faces.py has it: counts, then addresses of arrays. */
+enum {
+    N_VERTICES, FACE_PADDED, N_FACES, FACE_COLUMNS_AT, VERTEX_IDS_AT, NORMALS_AT, FLATNESS_AT, TRIANGLES_AT, STARTS_AT, CORNERS_AT,
+    EDGES_AT, FACE_OF_AT, FAN_STARTS_AT, FANS_AT, FACE_INTS
+};
+/* Corners that the end of a cylinder has (collide/contact/support_face.py: ROUND): no pair has room for fewer. */
+enum { ROUND_CORNERS = 8 };
+
+struct hull_faces {
+    int64_t ints[FACE_INTS];
+    int64_t largest; /* most corners of a face, at least ROUND_CORNERS */
+    void *held[2];
+};
+
+/* The faces of a shape that any number of threads may ask about: made by the first of them, and kept with it; NULL of shapes that are
+   no hulls. */
+collide_status faces_of(const collide_shape *shape, const struct hull_faces **faces);
+void free_faces(struct hull_faces *faces);
+
+/* What is made of a hull on the way: triangles, then polygons. */
+struct making {
+    struct arena arena;
+    struct hull hull;
+    const double *points; /* (n, 3) */
+    int64_t n;
+    double *units, *areas, tolerance; /* of triangles */
+    int64_t n_faces, n_corners;
+    double *normals, *flatness; /* of faces */
+    int64_t *triangles, *starts, *corners;
+};
+
+/* capi_polygons.c: faces of the hull of `points`, into arrays of the arena. */
+void put_polygons(struct making *making);
+
+#endif
