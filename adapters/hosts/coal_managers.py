@@ -1,13 +1,15 @@
-"""coal's broadphase managers and their callbacks: all managers are one, over that of python-fcl's interface."""
+"""coal's broadphase managers and their callbacks: all managers are one, over collide's broadphase."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from collide.adapters.hosts import fcl_managers
 from collide.adapters.hosts.coal_geometry import CollisionObject
 from collide.adapters.hosts.coal_queries import collide_posed, distance_posed
 from collide.adapters.hosts.coal_requests import CollisionData, DistanceData, DistanceResult
+from collide.adapters.hosts.object_tree import ObjectTree
 
 
 class CollisionCallBackBase:
@@ -111,13 +113,13 @@ class BroadPhaseCollisionManager:
     def __init__(self):
         if type(self) is BroadPhaseCollisionManager:
             raise RuntimeError("BroadPhaseCollisionManager cannot be instantiated: it is a base class")
-        self._manager = fcl_managers.DynamicAABBTreeCollisionManager()
+        self._tree = ObjectTree()
 
     def registerObject(self, obj):
         """Add a `CollisionObject`."""
         if not isinstance(obj, CollisionObject):
             raise TypeError(f"registerObject takes a CollisionObject of this module, got {type(obj).__name__}")
-        self._manager.registerObject(obj)
+        self._tree.add(obj)
 
     def registerObjects(self, objs):
         """Add several."""
@@ -125,63 +127,73 @@ class BroadPhaseCollisionManager:
             self.registerObject(obj)
 
     def unregisterObject(self, obj):
-        """Take an object out."""
-        self._manager.unregisterObject(obj)
+        """Take an object out; nothing happens where it is not in."""
+        self._tree.remove(obj)
 
     def setup(self):
         """Build the tree now, rather than at the next question."""
-        self._manager.setup()
+        self._tree.refresh()
 
     def update(self, arg=None):
-        """Take in what moved; arg : an object, several, or None for all."""
-        self._manager.update(arg)
+        """Nothing to do, for poses are watched; arg : an object, several, or None for all."""
 
     def clear(self):
         """Take all objects out."""
-        self._manager.clear()
+        self._tree.clear()
 
     def getObjects(self):
         """The objects, a list of its own."""
-        return self._manager.getObjects()
+        return list(self._tree.objects)
 
     def empty(self):
         """Whether there are no objects."""
-        return self._manager.empty()
+        return not self._tree.objects
 
     def size(self):
         """How many objects there are."""
-        return self._manager.size()
+        return len(self._tree.objects)
 
     def collide(self, *args):
         """See the class. Raises TypeError for other arguments."""
-        whom, callback = _asked("collide", args, CollisionCallBackBase)
+        body, callback = self._asked("collide", args, CollisionCallBackBase)
         callback.init()
-        self._manager.collide(*whom, callback, lambda o1, o2, _: callback.collide(o1, o2))
+        mine = self._tree.objects
+        if isinstance(body, CollisionObject):
+            for row in self._tree.touching(body):
+                if callback.collide(mine[row], body):
+                    return
+            return
+        theirs = mine if body is None else body.objects
+        for block in self._tree.pairs(body):
+            for i, j in block.tolist():
+                if callback.collide(mine[i], theirs[j]):
+                    return
 
     def distance(self, *args):
-        """See the class. Raises TypeError for other arguments."""
-        whom, callback = _asked("distance", args, DistanceCallBackBase)
+        """See the class; pairs whose boxes are near come first. Raises TypeError for other arguments."""
+        body, callback = self._asked("distance", args, DistanceCallBackBase)
         callback.init()
-        dist = np.array([np.inf])
+        mine = self._tree.objects
+        theirs = [body] if isinstance(body, CollisionObject) else mine if body is None else body.objects
+        least, dist = [np.inf], np.array([np.inf])
+        for gaps, rows in self._tree.near(body, least):
+            for gap, (i, j) in zip(gaps.tolist(), rows.tolist()):
+                if gap >= least[0]:
+                    break
+                if callback.distance(mine[i], theirs[j], dist):
+                    return
+                least[0] = float(dist[0])
 
-        def nearer(o1, o2, _):
-            """(whether that is all, the least distance so far)."""
-            is_done = callback.distance(o1, o2, dist)
-            return is_done, float(dist[0])
-
-        self._manager.distance(*whom, callback, nearer)
-
-
-def _asked(name: str, args: tuple, kind: type) -> tuple[tuple, object]:
-    """(what the python-fcl manager is asked with, the callback). Raises TypeError."""
-    if len(args) in (1, 2) and isinstance(args[-1], kind):
-        if len(args) == 1:
-            return (), args[0]
-        if isinstance(args[0], BroadPhaseCollisionManager):
-            return (args[0]._manager,), args[1]
-        if isinstance(args[0], CollisionObject):
-            return (args[0],), args[1]
-    raise TypeError(f"{name} takes (callback), (object, callback) or (manager, callback), with a {kind.__name__}")
+    def _asked(self, name: str, args: tuple, kind: type) -> tuple[Any, Any]:
+        """(an object, the tree of another manager, or None; the callback). Raises TypeError."""
+        if len(args) in (1, 2) and isinstance(args[-1], kind):
+            if len(args) == 1 or args[0] is self:
+                return None, args[-1]
+            if isinstance(args[0], BroadPhaseCollisionManager):
+                return args[0]._tree, args[1]
+            if isinstance(args[0], CollisionObject):
+                return args
+        raise TypeError(f"{name} takes (callback), (object, callback) or (manager, callback), with a {kind.__name__}")
 
 
 class DynamicAABBTreeCollisionManager(BroadPhaseCollisionManager):
