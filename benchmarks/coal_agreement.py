@@ -2,8 +2,8 @@
 
 python benchmarks/coal_agreement.py [--calls 10000] [--seed 22]
 
-Pairs are those of `host_agreement.py`, a quarter of them on a grid, where bodies touch; every eighth has a half-space or
-a plane for its second body. Each is asked for contacts with coal's default request and with Pinocchio's, which wants
+Pairs are those of `host_agreement.py`, a quarter of them on a grid, where bodies touch; every eighth has a half-space
+or a plane for its second body. Each is asked for contacts with coal's default request and with Pinocchio's, which wants
 none, and for its signed distance. coal answers in a child process. Where booleans differ, or signed distances by more
 than a micrometre, `tests/oracles/curved_oracle.py` judges both: it proves a bracket of the signed distance in decimals
 of 80 digits and shares no code with the engine.
@@ -135,12 +135,16 @@ def compare(pair, ours: Reply, theirs: Reply, counts: Counter) -> None:
         if differs[name]:
             verdict = judge_boolean(truth, getattr(ours, name))
             counts[name, {True: "coal wrong", False: "OURS WRONG", None: "touching"}[verdict]] += 1
+            if verdict is not None:
+                print(f"# {name}: {pair!r}, signed distance {float(truth[0])!r} … {float(truth[1])!r}")
     if differs["distance"]:
         sign = "gap" if truth[0] > 0 else "depth"
         rights = is_near(truth, ours.distance), is_near(truth, theirs.distance)
-        is_bound = sign == "depth" and "BVHModel" in (pair[0][0], pair[1][0])
-        verdict = "a depth of a mesh" if is_bound else {
-            (True, False): "coal wrong", (False, True): "OURS WRONG", (True, True): "both right", (False, False): "both wrong",
+        if sign == "depth" and "BVHModel" in (pair[0][0], pair[1][0]):
+            sign = "depth, mesh"
+        verdict = {
+            (True, False): "coal wrong", (False, True): "OURS WRONG", (True, True): "both right",
+            (False, False): "both wrong",
         }[rights]  # fmt: skip
         counts[sign, verdict] += 1
         if verdict in ("OURS WRONG", "both wrong"):

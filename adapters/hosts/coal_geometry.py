@@ -54,6 +54,10 @@ class CollisionGeometry(fcl_geometry.CollisionGeometry):
         """Middle (3,) of that box; of planes and half-spaces the point nearest to the origin."""
         return self.aabb_local.center() if self._center is None else self._center.copy()
 
+    @aabb_center.setter
+    def aabb_center(self, value):
+        self._center = shaped("aabb_center", value, (3,)).copy()
+
     @property
     def aabb_radius(self):
         """Half of its diagonal [m]."""

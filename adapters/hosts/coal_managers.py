@@ -139,7 +139,7 @@ class BroadPhaseCollisionManager:
 
     def clear(self):
         """Take all objects out."""
-        self._tree.clear()
+        self._tree.remove_all()
 
     def getObjects(self):
         """The objects, a list of its own."""

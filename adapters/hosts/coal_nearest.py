@@ -83,11 +83,11 @@ def _connected(g: CollisionGeometry) -> list[tuple[tuple[Shape, ...], np.ndarray
 def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: bool) -> Nearest:
     A, B = shapes
     swept_1, swept_2 = g1._radius_swept, g2._radius_swept
-    swept = swept_1 + swept_2
-    total = margin + swept
+    radii = swept_1 + swept_2
+    total = margin + radii
     try:
         if g1._has_parts or g2._has_parts:  # others are answered sooner without a limit
-            largest = max(limit, margin, 0.0) + swept
+            largest = max(limit, margin, 0.0) + radii
             largest = largest if largest < _FAR else math.inf
             row = engine.distance(A, B, X1, X2, max_distance=largest, signed=is_signed).rows[0]
         else:
@@ -104,10 +104,10 @@ def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: b
     part_1 = int(row["part_a"]) if g1._has_parts else -1
     part_2 = int(row["part_b"]) if g2._has_parts else -1
     normal, point_1, point_2 = row["normal"], row["point_a"], row["point_b"]
-    if swept:
+    if radii:
         point_1, point_2 = point_1 + swept_1 * normal, point_2 - swept_2 * normal
         if is_signed or not is_hit:
-            distance, lower = distance - swept, lower - swept
+            distance, lower = distance - radii, lower - radii
     return Nearest(distance, lower, normal, point_1, point_2, part_1, part_2, bool(is_within), shapes)
 
 

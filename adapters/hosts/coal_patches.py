@@ -59,8 +59,8 @@ def _patch_rows(g1, X1, g2, X2, collision_result, tolerance: float) -> np.ndarra
     if isinstance(g1, (Plane, Halfspace)) and isinstance(g2, (Plane, Halfspace)):
         return np.zeros(0)
     answer = nearest(g1, X1, g2, X2, 0.0, np.inf, False)
-    swept = g1._radius_swept + g2._radius_swept
-    reach = max(0.0, float(answer.distance) + swept) + 2.0 * tolerance
+    radii = g1._radius_swept + g2._radius_swept
+    reach = max(0.0, float(answer.distance) + radii) + 2.0 * tolerance
     return engine.contacts(*answer.shapes, X1, X2, margin=reach, max_contacts=_CORNERS).rows
 
 

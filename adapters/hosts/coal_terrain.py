@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.coal_containers import AABB
+from collide.adapters.hosts.coal_containers import AABB, StdVec_Vec6
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
@@ -114,6 +114,10 @@ class OcTree(CollisionGeometry):
             half_edges = np.array([[0.5 * edge] for _, edge in self._boxes])
             union = engine.Compound([(engine.Box(edge, edge, edge), engine.pose(p)) for p, edge in self._boxes])
             self._become([(middles - half_edges).min(axis=0), (middles + half_edges).max(axis=0)], union)
+
+    def toBoxes(self):
+        """`StdVec_Vec6` of the occupied boxes: middle, edge [m], occupancy 1, and the threshold of it."""
+        return StdVec_Vec6(np.array([*middle, edge, 1.0, self._occupied]) for middle, edge in self._boxes)
 
     def getResolution(self):
         """Edge of the smallest box [m]."""

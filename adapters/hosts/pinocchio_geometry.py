@@ -11,7 +11,6 @@ from collide.adapters.hosts import coal_geometry as shapes
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, Convex
 from collide.adapters.hosts.coal_terrain import HeightFieldAABB, HeightFieldOBBRSS, OcTree
-from collide.adapters.hosts.fcl_meshes import occupied_boxes
 from collide.errors import CollideError, InvalidArgument, InvalidShape, UnsupportedQuery
 
 
@@ -42,7 +41,7 @@ def _field(kind: type) -> Callable[[Any], CollisionGeometry]:
 
 
 def _octree(g) -> CollisionGeometry:
-    return OcTree(g.getResolution(), occupied_boxes(g.getResolution(), bytes(g.tobytes())))
+    return OcTree(g.getResolution(), [(np.array(box[:3]), float(box[3])) for box in g.toBoxes()])
 
 
 #: What is made of a geometry, by the name of its class in coal; of derived classes the first of their bases.
@@ -55,7 +54,6 @@ _BUILDERS: dict[str, Callable[[Any], CollisionGeometry]] = {
     "Cylinder": lambda g: shapes.Cylinder(g.radius, 2.0 * g.halfLength),
     "Halfspace": lambda g: shapes.Halfspace(np.array(g.n), g.d),
     "Plane": lambda g: shapes.Plane(np.array(g.n), g.d),
-    "TriangleP": lambda g: shapes.TriangleP(np.array(g.a), np.array(g.b), np.array(g.c)),
     "ConvexBase": _convex,
     "BVHModelOBBRSS": _model(BVHModelOBBRSS),
     "BVHModelOBB": _model(BVHModelOBB),
@@ -67,7 +65,7 @@ _BUILDERS: dict[str, Callable[[Any], CollisionGeometry]] = {
 _FIELDS = {
     "Box": ("halfSide",), "Sphere": ("radius",), "Ellipsoid": ("radii",), "Capsule": ("radius", "halfLength"),
     "Cone": ("radius", "halfLength"), "Cylinder": ("radius", "halfLength"), "Halfspace": ("n", "d"),
-    "Plane": ("n", "d"), "TriangleP": ("a", "b", "c"), "ConvexBase": ("num_points",),
+    "Plane": ("n", "d"), "ConvexBase": ("num_points",),
     "BVHModelOBBRSS": ("num_tris", "num_vertices"), "BVHModelOBB": ("num_tris", "num_vertices"),
 }  # fmt: skip
 
@@ -83,8 +81,11 @@ def numbers_of(geometry) -> tuple:
     if name is None:
         return ()
     values = tuple(np.asarray(getattr(geometry, field)).tobytes() for field in _FIELDS.get(name, ()))
-    swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
-    return (geometry.id(), swept, *values)
+    radius = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
+    if hasattr(geometry, "id"):
+        return (geometry.id(), radius, *values)
+    data = geometry.points() if name == "ConvexBase" else list(geometry.toBoxes())
+    return (name, np.asarray(data).tobytes(), radius)
 
 
 def geometry_of(geometry_object) -> CollisionGeometry:
@@ -102,9 +103,9 @@ def geometry_of(geometry_object) -> CollisionGeometry:
         )
     try:
         made = _BUILDERS[name](geometry)
-        swept = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
-        if swept:
-            made.setSweptSphereRadius(swept)
+        radius = geometry.getSweptSphereRadius() if hasattr(geometry, "getSweptSphereRadius") else 0.0
+        if radius and isinstance(made, shapes.ShapeBase):
+            made.setSweptSphereRadius(radius)
     except CollideError as error:
         raise InvalidShape(f"geometry {geometry_object.name!r}, a {type(geometry).__name__}: {error}") from None
     return made
