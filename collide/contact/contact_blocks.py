@@ -19,10 +19,10 @@ from collide.contact.convex_manifolds import (
     max_corners_of,
     put_manifold,
 )
+from collide.contact.posed_box import has_box_row
 from collide.contact.single_contact_call import SINGLE_HEADER
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.lowering.packed_convex import POINTS
-from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, POSE_SLOP
+from collide.lowering.shape_table import POSE, POSE_SLOP
 from collide.narrowphase.pose_batches import (
     BLOCK,
     HEADER,
@@ -116,18 +116,11 @@ def _shapes_of(words, k):
     return which[0], which[1]
 
 
-@kernel(inline=True)
-def _is_box(words, shape):
-    kind = view_i64(words[INTS_AT] + 8 * INTS * shape, INTS)[KIND]
-    return kind == POINTS and view_f64(words[NUMBERS_AT] + 8 * NUMBERS * shape, NUMBERS)[PARAMS] > 0.0
-
-
 @kernel
 def _answer_rows(task, limit, count):
     """Rows of `distance` of a block; DONE, OPEN or BAD_POSE.
 
-    Boxes that a face parts or holds together are answered here and stand last in the block; all others go to the
-    narrowphase together.
+    What `box_box.py` answers stands last in the block; all others go to the narrowphase together.
     """
     words, block = task.words, task.block
     rows_at, check = words[ROWS_AT], words[CHECK] != 0
@@ -141,7 +134,7 @@ def _answer_rows(task, limit, count):
         X_WB = view_f64(words[XB_AT] + 8 * words[STEP_B] * b, 16)
         place = BLOCK - 1 - n_boxes
         is_known = False
-        if _is_box(words, sa) and _is_box(words, sb):
+        if has_box_row(words[INTS_AT], words[NUMBERS_AT], sa, sb):
             row_at = rows_at + ROW * place
             is_known = put_box_row(words[INTS_AT], words[NUMBERS_AT], sa, sb, X_WA, X_WB, limit, view_row(row_at))
             if not is_known:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collide.contact.box_box import put_box_row
+from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
 from collide.contact.convex_manifolds import (
-    ARE_BOXES,
     INTS_AT,
     MARGIN,
     MAX_CONTACTS,
@@ -13,7 +13,7 @@ from collide.contact.convex_manifolds import (
     ROWS_DONE,
     put_manifold,
 )
-from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
+from collide.contact.posed_box import has_box_row
 from collide.kernels import entry, prepared, view_f64, view_i64
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.pose_batches import BLOCK, HEADER, ROWS_AT, answer_block, block_of, clear_rows, set_pose
@@ -39,7 +39,7 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     rows_at = block.header[ROWS_AT]
     row = view_row(rows_at)
     clear_rows(rows_at, 1)
-    is_known = header[ARE_BOXES] != 0 and put_box_row(
+    is_known = has_box_row(header[INTS_AT], header[NUMBERS_AT], 0, 1) and put_box_row(
         header[INTS_AT], header[NUMBERS_AT], 0, 1, X_WA, X_WB, margin, row
     )
     if not is_known:
