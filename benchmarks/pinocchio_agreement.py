@@ -78,10 +78,10 @@ def main() -> None:
             pin.computeCollisions(model, data, geom_model, theirs, q, False)
             times.append(time.perf_counter())
             spent[row] = 1e6 * np.diff(times)
-            hits, other = (np.array([r.isCollision() for r in d.collisionResults]) for d in (ours, theirs))
+            hits, their_hits = (np.array([r.isCollision() for r in d.collisionResults]) for d in (ours, theirs))
             counts["asked"] += len(hits)
             counts["collide"] += int(hits.sum())
-            for k in np.flatnonzero(hits != other).tolist():
+            for k in np.flatnonzero(hits != their_hits).tolist():
                 counts[judge(geom_model, ours, k, bool(hits[k]))] += 1
         begin = time.perf_counter()
         host.collides(model, data, geom_model, ours, Q)

@@ -37,8 +37,8 @@ for name in ("allegro_hand_description/urdf/allegro_right_hand", "panda_descript
     for q in Q:
         host.compute_collisions(model, data, geom_model, ours, q)
         pin.computeCollisions(model, data, geom_model, theirs, q, False)
-        for k, (result, other) in enumerate(zip(ours.collisionResults, theirs.collisionResults)):
-            if result.isCollision() and not other.isCollision():
+        for k, (result, reply) in enumerate(zip(ours.collisionResults, theirs.collisionResults)):
+            if result.isCollision() and not reply.isCollision():
                 depth = -host.distances(model, data, geom_model, ours, None).distance[k]
                 print(f"{path[-16:]}: pair {k}, {1e3 * depth:.1f} mm deep, is missed by Pinocchio")
     begin = time.perf_counter()
