@@ -147,6 +147,7 @@ def _put_row(A, B, limit, row):
         row.doubles[LOWER] = best.gap - error - radius
         row.doubles[DISTANCE] = best.gap - error - radius
         row.doubles[UPPER] = math.inf
+        put_vec3(row.doubles, NORMAL, _axis_towards(A, B, best.axis, t))
         row.flags[BEYOND] = 1
         row.flags[HOW] = PLANE
         return True
@@ -346,6 +347,13 @@ def _put_edges(A, B, edges, t, error, row):
 @kernel(inline=True)
 def _axis_of(box, k):
     return box.x if k == 0 else box.y if k == 1 else box.z
+
+
+@kernel(inline=True)
+def _axis_towards(A, B, axis, t):
+    """The axis of a `FaceAxis`, turned along t."""
+    v = _axis_of(A, axis) if axis < 3 else _axis_of(B, axis - 3)
+    return scale(_sign(dot(v, t)), v)
 
 
 @kernel(inline=True)
