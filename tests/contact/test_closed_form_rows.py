@@ -1,4 +1,4 @@
-"""Contacts of half-spaces, spheres and capsules, whose rows take no search: brackets against decimals of sixty digits."""
+"""Contacts of half-spaces, spheres and capsules, whose rows take no search: brackets against sixty-digit decimals."""
 
 from __future__ import annotations
 
