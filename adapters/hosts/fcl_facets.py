@@ -62,13 +62,20 @@ def facet_contact(o1: CollisionObject, o2: CollisionObject, with_geometry: bool)
 
 
 def facet_contacts(o1: CollisionObject, o2: CollisionObject, limit: int, with_geometry: bool) -> list[Contact]:
-    """One for each pair of facets of two meshes that meet, found exactly."""
+    """One for each pair of facets of two meshes that meet."""
     g1, g2 = o1._geometry, o2._geometry
-    pairs = engine.facet_pairs(g1._shape, g2._shape, o1._X, o2._X).pairs[:limit]
+    values = contacts_of_facets(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
+    return [new_contact(g1, g2, *of_pair) for of_pair in values]
+
+
+def contacts_of_facets(A, B, X_WA, X_WB, limit: int, with_geometry: bool) -> list[tuple]:
+    """(facet of A, of B, normal, pos, depth) of up to ``limit`` pairs of facets of two meshes that meet, which is
+    decided exactly.   with_geometry : whether the last three are wanted; else they are 0.
+    """
+    pairs = engine.facet_pairs(A, B, X_WA, X_WB, first=limit == 1).pairs[:limit]
     if not with_geometry:
-        return [new_contact(g1, g2, i, j, np.zeros(3), np.zeros(3), 0.0) for i, j in pairs.tolist()]
-    values = _of_facet_pairs(g1._shape, g2._shape, o1._X, o2._X, pairs)
-    return [new_contact(g1, g2, i, j, *of_pair) for (i, j), of_pair in zip(pairs.tolist(), values)]
+        return [(i, j, np.zeros(3), np.zeros(3), 0.0) for i, j in pairs.tolist()]
+    return [(i, j, *of_pair) for (i, j), of_pair in zip(pairs.tolist(), _of_facet_pairs(A, B, X_WA, X_WB, pairs))]
 
 
 def _of_facet_and_solid(triangle: np.ndarray, B, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:

@@ -22,8 +22,6 @@ from collide.shapes.shape_set import Picked, ShapeSet
 _FIRST_LEAVES = 32
 #: Up to so many pairs are sorted by their gaps all at once.
 _MAX_SORTED = 2048
-#: A tree is built anew once its objects have moved so often, on average.
-_MOVES_TO_REBUILD = 8
 #: Gaps of boxes are less than this part below what they are in doubles.
 _ROUNDING = 1e-12
 
@@ -40,7 +38,6 @@ class ObjectTree:
         self._tree: _Tree | None = None
         self._rows_of: dict[HostObject, list[int]] = {}
         self._known_change = 0
-        self._n_moves = 0
         self._shapes: tuple[ShapeSet | None, np.ndarray] | None = None
 
     def add(self, obj: HostObject) -> None:
@@ -86,18 +83,15 @@ class ObjectTree:
         if not self.objects:
             self._moved.clear()
             return None
-        if self._tree is None or self._known_change != latest_change[0] or self._has_drifted():
+        if self._tree is None or self._known_change != latest_change[0]:
             self._build()
         elif self._moved:
             self._refit(self._tree)
         self._moved.clear()
         return self._tree
 
-    def _has_drifted(self) -> bool:
-        return self._n_moves > _MOVES_TO_REBUILD * len(self.objects)
-
     def _build(self) -> None:
-        self._known_change, self._n_moves, self._shapes = latest_change[0], 0, None
+        self._known_change, self._shapes = latest_change[0], None
         self._corners = np.array([obj._geometry._corners for obj in self.objects])
         self.X_W = _poses(self.objects)
         self._tree = _Tree(boxes_of_objects(self._corners, self.X_W))
@@ -106,7 +100,6 @@ class ObjectTree:
             self._rows_of.setdefault(obj, []).append(row)
 
     def _refit(self, tree: _Tree) -> None:
-        self._n_moves += len(self._moved)
         if len(self._moved) == len(self._rows_of) == len(self.objects):
             self.X_W = _poses(self.objects)
             tree.refit(boxes_of_objects(self._corners, self.X_W))
@@ -204,9 +197,17 @@ class _Tree(BoxTree):
         super().__init__(boxes)
         self._zeros = np.zeros(len(boxes), dtype=np.int64)
         self._ones = self._zeros + 1
-        self._bounded = np.isfinite(boxes).all(axis=1)
-        #: Of single boxes: arguments of the kernel that stay, and room for what it finds.
+        self._is_bounded = np.isfinite(boxes).all(axis=1)
         self._hits = np.empty((64, 2), dtype=np.int64)
+        self._keep_addresses()
+
+    def refit(self, boxes: np.ndarray) -> None:
+        """As of `BoxTree`, which may sort anew."""
+        super().refit(boxes)
+        self._keep_addresses()
+
+    def _keep_addresses(self) -> None:
+        """Of single boxes: arguments of the kernel that stay, and room for what it finds."""
         self._fixed = (
             address_of(self.nodes), self.leaves, address_of(self.order), len(self.order), 0.0, False,
             address_of(self._zeros), address_of(self._ones), address_of(self._ones), address_of(self._hits), 64,
@@ -250,11 +251,11 @@ class _Tree(BoxTree):
                 if len(hits):
                     yield _sorted_keys(hits[:, 1] * n + some[hits[:, 0]], n)
         if len(self.unbounded) or len(which) < n:
-            yield np.argwhere(~(self._bounded[:, None] & guests.is_bounded[None, :]))
+            yield np.argwhere(~(self._is_bounded[:, None] & guests.is_bounded[None, :]))
 
     def as_guests(self) -> _Guests:
         """These boxes, to be compared with another tree's."""
-        return _Guests(self.boxes, self._bounded, *self.nodes[1].reshape(2, 3))
+        return _Guests(self.boxes, self._is_bounded, *self.nodes[1].reshape(2, 3))
 
     def near_gap(self, guests: _Guests | None) -> float:
         """A margin within which there is a pair, if there is one at all: of boxes at leaves side by side, or of a guest
@@ -273,7 +274,7 @@ class _Tree(BoxTree):
         question = np.zeros((1, SWEEP))
         question[0, :3], question[0, 9] = point, np.inf
         rows = bodies_ahead(self, question, of_points=True)[0][:, 1]
-        return int(rows[self._bounded[rows]][0])
+        return int(rows[self._is_bounded[rows]][0])
 
 
 class _Guests(NamedTuple):
