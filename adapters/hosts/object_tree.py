@@ -119,7 +119,7 @@ class ObjectTree:
     def pairs(self, against: ObjectTree | None = None) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows whose boxes meet: i < j of this tree, or i of this one and j of that.
 
-        Changes of objects between two blocks have no say in the second: what is asked is how things stood.
+        Objects that move between two blocks may or may not be found where they went; no pair comes twice.
         """
         tree = self.refresh()
         if against is None:
@@ -228,16 +228,16 @@ class _Tree(BoxTree):
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""
         n = len(self.boxes)
+        is_first = np.zeros(n, dtype=bool)
+        is_first[self.order[:_FIRST_LEAVES]] = True
         first = _sorted_pairs(self._meeting(self.boxes[self.order[:_FIRST_LEAVES]], margin, True), n)
         if len(first):
             yield first
         if len(self.unbounded):
             yield _all_with(self.unbounded, n)
         if len(self.order) > _FIRST_LEAVES:
-            is_first = np.zeros(n, dtype=bool)
-            is_first[self.order[:_FIRST_LEAVES]] = True
             hits = self._meeting(self.boxes[self.order], margin, True)
-            hits = hits[~is_first[hits[:, 0]]]  # the earlier leaf is named first
+            hits = hits[~is_first[hits].any(axis=1)]
             if len(hits):
                 yield _sorted_pairs(hits, n)
 
