@@ -291,7 +291,7 @@ def _near_one(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Blocks of pairs with one box: those that meet it, else the one nearest its middle; then all within the least."""
     if len(tree.boxes) <= _MAX_SORTED // 8:
-        yield from _all_by_gap(tree.boxes, box[None])
+        yield from _all_by_gap(tree.boxes, box[None], least[0])
         return
     rows = np.array(tree.touching_one(box), dtype=np.int64)
     if len(rows):
@@ -311,14 +311,18 @@ def _near_one(
         yield gaps[order], _with_zero(rows[order])
 
 
-def _all_by_gap(boxes: np.ndarray, guests: np.ndarray | None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """All pairs in one block, of boxes with guests or among themselves: sooner than a tree where they are few."""
+def _all_by_gap(
+    boxes: np.ndarray, guests: np.ndarray | None, least: float
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """All pairs nearer than the least in one block, of boxes with guests or among themselves: sooner than a tree where
+    they are few.
+    """
     gaps = _gaps(boxes[:, None], (boxes if guests is None else guests)[None])
     if guests is None:
         gaps[np.tri(len(boxes), dtype=bool)] = np.inf
     flat = gaps.ravel()
     order = np.argsort(flat, kind="stable")
-    order = order[: int(np.isfinite(flat).sum())]
+    order = order[: int((flat < least).sum())]
     if len(order):
         yield flat[order], np.stack(np.divmod(order, gaps.shape[1]), axis=1)
 
@@ -335,7 +339,7 @@ def _near_first(
     """
     theirs = tree.as_guests() if guests is None else guests
     if len(tree.boxes) * len(theirs.boxes) <= _MAX_SORTED:
-        yield from _all_by_gap(tree.boxes, None if guests is None else guests.boxes)
+        yield from _all_by_gap(tree.boxes, None if guests is None else guests.boxes, least[0])
         return
     low, high = np.minimum(tree.nodes[1, :3], theirs.low), np.maximum(tree.nodes[1, 3:], theirs.high)
     extent = float(np.linalg.norm(high - low)) if (low <= high).all() else 0.0

@@ -101,6 +101,21 @@ def test_near_ones_come_first_and_none_is_left_out(seed):
             assert found or not np.isfinite(gaps).any(), case
 
 
+def test_a_limit_from_the_start():
+    """Few objects and many: all pairs nearer than it, and hardly any other."""
+    rng = np.random.default_rng(9)
+    for n in (20, 400):
+        objects, guest = scattered(rng, n, n ** (1 / 3)), scattered(rng, 1, 1.0)[0]
+        tree, others = tree_of(objects), objects[::3]
+        for against, theirs in ((None, objects), (tree_of(others), others), (guest, [guest])):
+            gaps = naive_gaps(objects, theirs)
+            if against is None:
+                gaps[np.tril_indices(n)] = np.inf
+            rows = [tuple(pair) for _, block in tree.near(against, [0.5]) for pair in block.tolist()]
+            wanted = set(map(tuple, np.argwhere(gaps < 0.5).tolist()))
+            assert wanted <= set(rows) and len(rows) == len(set(rows)) and max(gaps[pair] for pair in rows) < 1.0, n
+
+
 def test_boxes_hold_their_bodies():
     """One by one and together alike, however far from the origin."""
     rng = np.random.default_rng(5)
