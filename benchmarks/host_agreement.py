@@ -47,13 +47,13 @@ def geometry(fcl, kind: str, s: np.ndarray):
     return model
 
 
-def calls(n: int, seed: int):
+def calls(n: int, seed: int, kinds: tuple[str, ...] = KINDS):
     """(kind, lengths, rotation, translation) of both bodies, a quarter of them on a grid, where bodies touch."""
     rng = np.random.default_rng(seed)
     for k in range(n):
         pair = []
         for _ in range(2):
-            kind = KINDS[rng.integers(len(KINDS))]
+            kind = kinds[rng.integers(len(kinds))]
             R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
             s, t = rng.uniform(0.2, 1.0, 3), rng.uniform(-0.6, 0.6, 3)
             if k % 4 == 0:

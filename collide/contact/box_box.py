@@ -1,8 +1,13 @@
-"""Two boxes by the separating axis test: rows of `distance` good enough for contacts, where a face tells.
+"""A box and a box, a sphere or a capsule by separating axes: rows of `distance` good enough for contacts, where a face
+tells.
 
 Of the 15 axes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996, theorem 1) the one of least overlap, or of widest
 gap, is the normal. Where it is that of a face, the answer is proven here; edges against edges, and pairs whose matrices
 are no rotations but for rounding, are left to the general narrowphase.
+
+The segment of a capsule and the centre of a sphere are boxes without width, swept by a ball. Axes that are normals of
+no facet of the Minkowski difference do no harm: along none is the gap wider than the distance, or the overlap less than
+the depth.
 """
 
 from __future__ import annotations
@@ -10,8 +15,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from collide.contact.posed_box import box_at
 from collide.kernels import entry, kernel, view_f64, view_i64
-from collide.lowering.shape_table import INTS, NUMBERS, PARAMS, RANK
+from collide.lowering.shape_table import INTS, NUMBERS, RANK
 from collide.narrowphase.rows import (
     BEYOND,
     CERTIFIED,
@@ -22,13 +28,24 @@ from collide.narrowphase.rows import (
     NORMAL,
     POINT_A,
     POINT_B,
-    ROW,
     UPPER,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, absolute, add, component, cross, dot, neg, norm1, put_vec3, scale, sub, vec3_at
-from collide.results import PLANE, SIMPLEX, UNDECIDED
-from collide.transforms import LARGEST
+from collide.numerics.vec3 import (
+    Vec3,
+    absolute,
+    add,
+    component,
+    cross,
+    dot,
+    neg,
+    norm1,
+    put_vec3,
+    scale,
+    sub,
+    vec3_at,
+)
+from collide.results import PLANE, SIMPLEX
 
 _U = 2.0**-53
 #: Matrices farther from a rotation than this are none.
@@ -37,17 +54,6 @@ _ORTHONORMAL = 2.0**-44
 _PARALLEL = 2.0**-46
 #: A bracket wider than this part of the size is left to the general narrowphase.
 _WIDEST = 2.0**-40
-
-
-class PosedBox(NamedTuple):
-    """Half sizes, axes in the world, and centre.   off : how far the axes are from a rotation, at most."""
-
-    half: Vec3
-    x: Vec3
-    y: Vec3
-    z: Vec3
-    p: Vec3
-    off: float
 
 
 class EdgeAxes(NamedTuple):
@@ -82,55 +88,31 @@ class BoxEnd(NamedTuple):
 
 
 @kernel(inline=True)
-def _box_at(numbers, shape, X):
-    """The `PosedBox` of a matrix; far off a rotation where the matrix is no pose."""
-    at = NUMBERS * shape + PARAMS
-    x, y, z = Vec3(X[0], X[4], X[8]), Vec3(X[1], X[5], X[9]), Vec3(X[2], X[6], X[10])
-    off = max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0), abs(dot(z, z) - 1.0))
-    off = max(off, abs(dot(x, y)), abs(dot(y, z)), abs(dot(z, x)))
-    p = Vec3(X[3], X[7], X[11])
-    is_pose = X[12] == 0.0 and X[13] == 0.0 and X[14] == 0.0 and X[15] == 1.0 and dot(x, cross(y, z)) > 0.0
-    if not (is_pose and norm1(p) <= LARGEST):
-        off = 1.0
-    return PosedBox(Vec3(numbers[at], numbers[at + 1], numbers[at + 2]), x, y, z, p, off + 4.0 * _U)
-
-
-@kernel(inline=True)
 def _in_frame(box, v):
     return Vec3(dot(box.x, v), dot(box.y, v), dot(box.z, v))
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, float64, int64)")
-def box_rows(ints_at, numbers_at, which_at, XA_at, step_a, XB_at, step_b, n, limit, rows_at):
-    """Rows of n pairs of boxes, `UNDECIDED` where a face does not tell; how many are left so.
-
-    ints, numbers : a `ShapeTable`.   which : 0, or two shape rows a pair.   XA, XB : matrices; step 16 or 0.
-    limit : of gaps beyond it no more is said than that [m].   rows : PAIR_DTYPE, zeroed. Of a decided row the numbers,
-    the normal and two points are set that a manifold needs, no vertices.
-    """
-    n_open = 0
-    for k in range(n):
-        sa, sb = 0, 1
-        if which_at != 0:
-            which = view_i64(which_at + 16 * k, 2)
-            sa, sb = which[0], which[1]
-        row = view_row(rows_at + ROW * k)
-        X_WA, X_WB = view_f64(XA_at + 8 * step_a * k, 16), view_f64(XB_at + 8 * step_b * k, 16)
-        if not put_box_row(ints_at, numbers_at, sa, sb, X_WA, X_WB, limit, row):
-            row.flags[HOW] = UNDECIDED
-            n_open += 1
-    return n_open
+@entry("boolean(int64, int64, int64, int64, float64, int64)")
+def box_row(ints_at, numbers_at, XA_at, XB_at, limit, row_at):
+    """`put_box_row` of rows 0 and 1 of a `ShapeTable`, by itself: for tests and measurements."""
+    return put_box_row(ints_at, numbers_at, 0, 1, view_f64(XA_at, 16), view_f64(XB_at, 16), limit, view_row(row_at))
 
 
 @kernel(inline=True)
 def put_box_row(ints_at, numbers_at, sa, sb, X_WA, X_WB, limit, row):
-    """The row of one pair of boxes, by their rows of the `ShapeTable`; False where a face does not tell."""
+    """The row of one pair, by their rows of the `ShapeTable` (`has_box_row`); False where a face does not tell.
+
+    XA, XB : matrices.   limit : of gaps beyond it no more is said than that [m].   row : of PAIR_DTYPE, zeroed. Of a
+    decided row the numbers, the normal and two points are set that a manifold needs, no vertices.
+    """
     n = max(sa, sb) + 1
     ints, numbers = view_i64(ints_at, INTS * n), view_f64(numbers_at, NUMBERS * n)
-    A, B = _box_at(numbers, sa, X_WA), _box_at(numbers, sb, X_WB)
-    # The same numbers are worked on whichever way round the pair is asked.
+    A, B = box_at(ints, numbers, sa, X_WA), box_at(ints, numbers, sb, X_WB)
+    # The same numbers are worked on whichever way round the pair is asked; a box is before what has no faces.
     flip = ints[INTS * sb + RANK] < ints[INTS * sa + RANK]
-    if ints[INTS * sb + RANK] == ints[INTS * sa + RANK]:
+    if A.half.x == 0.0 or B.half.x == 0.0:
+        flip = A.half.x == 0.0
+    elif ints[INTS * sb + RANK] == ints[INTS * sa + RANK]:
         for k in range(12):
             if X_WA[k] != X_WB[k]:
                 flip = X_WB[k] < X_WA[k]
@@ -153,17 +135,19 @@ def _put_row(A, B, limit, row):
     if not off <= _ORTHONORMAL:
         return False
     t = sub(B.p, A.p)
-    size = norm1(A.half) + norm1(B.half) + norm1(t)
+    radius = A.radius + B.radius
+    size = norm1(A.half) + norm1(B.half) + norm1(t) + radius
     # Each gap is a sum of products of columns: 16u of the size, and what the matrices are off.
     error = (16.0 * _U + 2.0 * off) * size
     c0, c1, c2 = _in_frame(A, B.x), _in_frame(A, B.y), _in_frame(A, B.z)  # columns: B's axes in A
     r0, r1, r2 = Vec3(c0.x, c1.x, c2.x), Vec3(c0.y, c1.y, c2.y), Vec3(c0.z, c1.z, c2.z)
     t_A, t_B = _in_frame(A, t), _in_frame(B, t)
     best = _best_face(A, B, r0, r1, r2, c0, c1, c2, t_A, t_B, error)
-    if best.gap - error > limit:
-        row.doubles[LOWER] = best.gap - error
-        row.doubles[DISTANCE] = best.gap - error
+    if best.gap - error - radius > limit:
+        row.doubles[LOWER] = best.gap - error - radius
+        row.doubles[DISTANCE] = best.gap - error - radius
         row.doubles[UPPER] = math.inf
+        put_vec3(row.doubles, NORMAL, _axis_towards(A, B, best.axis, t))
         row.flags[BEYOND] = 1
         row.flags[HOW] = PLANE
         return True
@@ -185,6 +169,10 @@ def _put_row(A, B, limit, row):
         else:
             is_proven = best.gap < 0.0
         row.doubles[UPPER] = max(row.doubles[UPPER], edges.upper) + edges.missed
+    # Cores that touch, or nearly, have no clear direction.
+    is_proven = is_proven and (row.doubles[LOWER] > 0.0 or row.doubles[UPPER] < 0.0)
+    if radius > 0.0:
+        _sweep(A.radius, B.radius, row)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     row.flags[HIT] = 1 if upper < 0.0 else 0
     row.flags[CERTIFIED] = 1
@@ -192,6 +180,18 @@ def _put_row(A, B, limit, row):
     # What touches, or nearly, is left to exact arithmetic, and so is what may be beyond the limit.
     is_decided = (lower > 0.0 or upper < 0.0) and upper <= limit
     return is_proven and is_decided and upper - lower <= _WIDEST * size
+
+
+@kernel(inline=True)
+def _sweep(radius_a, radius_b, row):
+    """From the row of cores to that of what balls swept over them cover."""
+    doubles = row.doubles
+    nhat = vec3_at(doubles, NORMAL)
+    doubles[DISTANCE] -= radius_a + radius_b
+    doubles[LOWER] -= radius_a + radius_b
+    doubles[UPPER] -= radius_a + radius_b
+    put_vec3(doubles, POINT_A, add(vec3_at(doubles, POINT_A), scale(radius_a, nhat)))
+    put_vec3(doubles, POINT_B, sub(vec3_at(doubles, POINT_B), scale(radius_b, nhat)))
 
 
 @kernel(inline=True)
@@ -347,6 +347,13 @@ def _put_edges(A, B, edges, t, error, row):
 @kernel(inline=True)
 def _axis_of(box, k):
     return box.x if k == 0 else box.y if k == 1 else box.z
+
+
+@kernel(inline=True)
+def _axis_towards(A, B, axis, t):
+    """The axis of a `FaceAxis`, turned along t."""
+    v = _axis_of(A, axis) if axis < 3 else _axis_of(B, axis - 3)
+    return scale(_sign(dot(v, t)), v)
 
 
 @kernel(inline=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collide.contact.box_box import put_box_row
+from collide.contact.closed_form_rows import has_closed_form, put_closed_form
 from collide.contact.contact_rows import CONTACT_DTYPE, field_at
 from collide.contact.convex_manifolds import (
     LARGEST,
@@ -19,22 +20,28 @@ from collide.contact.convex_manifolds import (
     max_corners_of,
     put_manifold,
 )
+from collide.contact.posed_box import has_box_row
 from collide.contact.single_contact_call import SINGLE_HEADER
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.lowering.packed_convex import POINTS
-from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, POSE_SLOP
+from collide.lowering.shape_table import POSE, POSE_SLOP
+from collide.narrowphase.pair_workspace import workspace_at
 from collide.narrowphase.pose_batches import (
     BLOCK,
+    DOUBLES_AT,
     HEADER,
+    INTEGERS_AT,
     INTS_AT,
     NUMBERS_AT,
+    POSES_AT,
     ROWS_AT,
+    SHAPE_OF_AT,
     PoseBlock,
     answer_block,
     block_of,
     clear_rows,
     set_pose,
 )
+from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused, view_row
 
 # Header: that of single calls, then what is asked: addresses of two rows of the `ShapeTable` a pair, or 0 for rows 0
@@ -116,51 +123,38 @@ def _shapes_of(words, k):
     return which[0], which[1]
 
 
-@kernel(inline=True)
-def _is_box(words, shape):
-    kind = view_i64(words[INTS_AT] + 8 * INTS * shape, INTS)[KIND]
-    return kind == POINTS and view_f64(words[NUMBERS_AT] + 8 * NUMBERS * shape, NUMBERS)[PARAMS] > 0.0
-
-
 @kernel
 def _answer_rows(task, limit, count):
     """Rows of `distance` of a block; DONE, OPEN or BAD_POSE.
 
-    Boxes that a face parts or holds together are answered here and stand last in the block; all others go to the
-    narrowphase together.
+    What takes no search stands last in the block; all others go to the narrowphase together.
     """
     words, block = task.words, task.block
     rows_at, check = words[ROWS_AT], words[CHECK] != 0
+    work = workspace_at(words[DOUBLES_AT], words[INTEGERS_AT])
     clear_rows(rows_at, BLOCK)
-    n_general, n_boxes, is_good = 0, 0, True
+    n_general, n_known, is_good = 0, 0, True
     for j in range(count):
         k = words[BEGIN] + j
         sa, sb = _shapes_of(words, k)
         a, b = _numbers_of(words, k)
         X_WA = view_f64(words[XA_AT] + 8 * words[STEP_A] * a, 16)
         X_WB = view_f64(words[XB_AT] + 8 * words[STEP_B] * b, 16)
-        place = BLOCK - 1 - n_boxes
-        is_known = False
-        if _is_box(words, sa) and _is_box(words, sb):
-            row_at = rows_at + ROW * place
-            is_known = put_box_row(words[INTS_AT], words[NUMBERS_AT], sa, sb, X_WA, X_WB, limit, view_row(row_at))
-            if not is_known:
-                clear_rows(row_at, 1)
+        place = BLOCK - 1 - n_known
+        is_posed, is_known = _put_known_row(block, work, sa, sb, X_WA, X_WB, limit, check, place, rows_at)
         if is_known:
-            n_boxes += 1
-            is_near = _is_within(view_row(rows_at + ROW * place), limit)
+            n_known += 1
         else:
+            clear_rows(rows_at + ROW * place, 1)
             place = n_general
             n_general += 1
-            is_near = True
+            block.shape_of[place] = sa
+            block.shape_of[BLOCK + place] = sb
+            is_posed = _pose_pair(block, place, X_WA, X_WB, check)
+        is_good = is_posed and is_good
         task.places[j] = place
         block.pairs[2 * j] = j
         block.pairs[2 * j + 1] = BLOCK + j
-        block.shape_of[place] = sa
-        block.shape_of[BLOCK + place] = sb
-        if is_near:
-            is_good = set_pose(block.poses, POSE * place, X_WA, check) and is_good
-            is_good = set_pose(block.poses, POSE * (BLOCK + place), X_WB, check) and is_good
     if not is_good:
         return BAD_POSE
     words[N_GENERAL] = n_general
@@ -169,6 +163,37 @@ def _answer_rows(task, limit, count):
         if is_undecided_or_refused(view_row(rows_at + ROW * place)):
             return OPEN
     return DONE
+
+
+@kernel(inline=True)
+def _pose_pair(block, place, X_WA, X_WB, check):
+    """Set both poses at a place of the block; False where a matrix is none."""
+    is_good = set_pose(block.poses, POSE * place, X_WA, check)
+    return set_pose(block.poses, POSE * (BLOCK + place), X_WB, check) and is_good
+
+
+@kernel(inline=True)
+def _put_known_row(block, work, sa, sb, X_WA, X_WB, limit, check, place, rows_at):
+    """(whether both matrices are poses, whether the row at a place is written): of pairs that take no search.
+
+    Poses are set where the row is written and within the limit.
+    """
+    header = block.header
+    row = view_row(rows_at + ROW * place)
+    block.shape_of[place] = sa
+    block.shape_of[BLOCK + place] = sb
+    if has_box_row(header[INTS_AT], header[NUMBERS_AT], sa, sb):
+        if not put_box_row(header[INTS_AT], header[NUMBERS_AT], sa, sb, X_WA, X_WB, limit, row):
+            return True, False
+        return not _is_within(row, limit) or _pose_pair(block, place, X_WA, X_WB, check), True
+    if not has_closed_form(header[INTS_AT], sa, sb):
+        return True, False
+    if not _pose_pair(block, place, X_WA, X_WB, check):
+        return False, False
+    ordered = ordered_pair(
+        header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], place, BLOCK + place
+    )
+    return True, put_closed_form(ordered, limit, work, row)
 
 
 @kernel(inline=True)

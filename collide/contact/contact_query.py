@@ -88,7 +88,7 @@ def contacts(
     try:
         rows = A._prepared[B._serial].of_contacts.contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
         if rows is not None:
-            return Contacts(rows, np.array([0, len(rows)]))
+            return Contacts(rows)
     except (AttributeError, KeyError, TypeError):
         pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)

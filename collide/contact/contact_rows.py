@@ -120,7 +120,7 @@ class Contacts:
     Parameters
     ----------
     rows : (k,) `CONTACT_DTYPE`, all contacts, pair after pair, and in each patch after patch, the deepest first.
-    starts : (N + 1,) int64: the contacts of pair k are ``rows[starts[k]:starts[k + 1]]``.
+    starts : (N + 1,) int64: the contacts of pair k are ``rows[starts[k]:starts[k + 1]]``; None of a single pair.
 
     Notes
     -----
@@ -128,7 +128,7 @@ class Contacts:
     ``len(starts) − 1``. Iterating gives the rows.
     """
 
-    __slots__ = ("rows", "starts")
+    __slots__ = ("_starts", "rows")
 
     if TYPE_CHECKING:
         distance: Floats
@@ -147,10 +147,19 @@ class Contacts:
         patch: Ints
         kind: Ints
 
-    def __init__(self, rows: np.ndarray, starts: np.ndarray):
-        self.rows, self.starts = rows, starts
-        for array in (rows, starts):
-            array.flags.writeable = False
+    def __init__(self, rows: np.ndarray, starts: np.ndarray | None = None):
+        self.rows, self._starts = rows, starts
+        rows.setflags(write=False)
+        if starts is not None:
+            starts.setflags(write=False)
+
+    @property
+    def starts(self) -> np.ndarray:
+        """(N + 1,) int64: the contacts of pair k are ``rows[starts[k]:starts[k + 1]]``."""
+        if self._starts is None:
+            self._starts = np.array([0, len(self.rows)])
+            self._starts.setflags(write=False)
+        return self._starts
 
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
@@ -193,7 +202,7 @@ class Contacts:
         if not -poses <= k < poses:
             raise IndexError(f"there are poses 0 … {poses - 1}, not {k}" if poses else "there are no poses")
         begin, end = self.starts[k % poses], self.starts[k % poses + 1]
-        return Contacts(self.rows[begin:end], np.array([0, end - begin]))
+        return Contacts(self.rows[begin:end])
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{int((self.rows['kind'] == k).sum())} {name}" for k, name in enumerate(KINDS))

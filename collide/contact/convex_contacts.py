@@ -47,6 +47,7 @@ from collide.narrowphase.convex_kernel_calls import SinglePair, block_workspace
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
+from collide.results import zeroed_rows
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 from collide.transforms import as_poses
@@ -248,7 +249,7 @@ class SingleContacts:
 
     def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
         """Rows; None where more than doubles, or an error, is called for."""
-        rows = np.empty(min(max_contacts, self.max_rows), dtype=CONTACT_DTYPE)
+        rows = zeroed_rows(min(max_contacts, self.max_rows), CONTACT_DTYPE)
         self._margin[0], self._of_manifold[MAX_CONTACTS] = margin, max_contacts
         if self._ask(X_WA, X_WB, rows, False) is None:
             return None

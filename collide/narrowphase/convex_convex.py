@@ -89,7 +89,7 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
         radius_a = radius_b = 0.0  # a point of both cores is one of both bodies
     # On curved cores the last facet still has a width: what the two points miss of depth·n is shared between them.
     share = 0.5 if curved and not query.boolean else 0.0
-    _write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip)
+    write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip)
     write_vertices(row, work.ids, core.n_vertices, flip)
     return -1
 
@@ -105,7 +105,7 @@ def _how(core, is_closed_form, lower, radius):
 
 
 @kernel(inline=True)
-def _write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip):
+def write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip):
     """Normal and witness points of the bodies, from the deciding feature of the cores.
 
     share : of what the cores' points miss ``depth · nhat`` by, how much each of them is moved.

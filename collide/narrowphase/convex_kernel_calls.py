@@ -21,7 +21,7 @@ from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
 from collide.narrowphase.single_call import collide_single, distance_single
-from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, zeroed_rows
 from collide.transforms import SMALLEST
 
 #: Set by tests: no pair of hulls is settled in doubles, whatever they have proven.
@@ -247,5 +247,5 @@ class SinglePair:
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
-        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        rows = zeroed_rows(1, PAIR_DTYPE)
         return None if self._distance(X_WA, X_WB, rows, depths) is None else rows

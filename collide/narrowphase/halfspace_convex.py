@@ -74,10 +74,26 @@ def reach_of_plane(pair, body):
     return max(abs(plane.offset), abs(offset) * row * math.sqrt(row)) / plane.length, skew
 
 
+class PlaneGap(NamedTuple):
+    """How far a convex set is in front of a plane, but for its last digits.
+
+    nhat : out of the half-space.   gap, error : of the set with its radius, and how far off it is [m].
+    vertex : of the core, the deepest, −1 of a curved one.   b : that point, seen from the frame's origin.
+    size, skew : what the error is made of.
+    """
+
+    nhat: Vec3
+    gap: float
+    error: float
+    vertex: int
+    b: Vec3
+    size: float
+    skew: float
+
+
 @kernel
-def halfspace_convex(ordered, query, row, work):
-    """Write the row of a half-space A and a convex set B: the point of B's core deepest behind the plane, moved by the
-    radius."""
+def plane_gap(ordered):
+    """The `PlaneGap` of a half-space A and a convex set B."""
     pair = ordered.pair
     A, B, poses = pair.A, pair.B, pair.poses
     distance, skew = reach_of_plane(pair, A)
@@ -91,16 +107,34 @@ def halfspace_convex(ordered, query, row, work):
         k = settled_vertex(B.coords, B.padded, B.tree, k, g)
         corner = column_at(B.coords, B.padded, k)
     b = rotate(poses, B.pose_at, corner)
-    radius = radius_of(pair, B)
-    gap = dot(add(b, pair.t), nhat) - plane.offset / plane.length - radius
+    gap = dot(add(b, pair.t), nhat) - plane.offset / plane.length - radius_of(pair, B)
+    return PlaneGap(nhat, gap, error, k, b, size, skew)
+
+
+@kernel(inline=True)
+def write_plane_points(ordered, nearest, gap, row):
+    """Normal and witness points of the row."""
+    pair = ordered.pair
+    p_WB = vec3_at(pair.poses, pair.B.pose_at + 9)
+    p_WBb = add(nearest.b, sub(p_WB, scale(radius_of(pair, pair.B), nearest.nhat)))
+    write_vectors(row, nearest.nhat, sub(p_WBb, scale(gap, nearest.nhat)), p_WBb, ordered.flip)
+
+
+@kernel
+def halfspace_convex(ordered, query, row, work):
+    """Write the row of a half-space A and a convex set B: the point of B's core deepest behind the plane, moved by the
+    radius."""
+    pair = ordered.pair
+    coarse = plane_gap(ordered)
+    gap, error = coarse.gap, coarse.error
     lower = gap - error
     upper = gap + error
     decided = lower > 0.0 or upper <= 0.0
-    exact_numbers = ordered.exact_numbers and B.kind == POINTS
+    exact_numbers = ordered.exact_numbers and pair.B.kind == POINTS
     if exact_numbers and lower <= query.limit and not query.boolean:
-        refined = refine_height(pair, work.fine_at, work.ties_at, k, size, error, skew)
+        refined = refine_height(pair, work.fine_at, work.ties_at, coarse.vertex, coarse.size, error, coarse.skew)
         if refined.proven:
-            bracket = dd.bracket(dd.sub(refined.height, DD(radius, 0.0)), refined.error)
+            bracket = dd.bracket(dd.sub(refined.height, DD(radius_of(pair, pair.B), 0.0)), refined.error)
             gap = bracket.nearest
             lower = max(lower, bracket.lower)
             upper = min(upper, bracket.upper)
@@ -108,10 +142,9 @@ def halfspace_convex(ordered, query, row, work):
     write_verdict(row, gap, lower, upper, FORMULA, width, query.limit)
     if exact_numbers and (not decided or (row.flags[CERTIFIED] == 0 and not query.boolean)):
         row.flags[HOW] = UNDECIDED  # the exact stage settles the sign, or the last digits
-    p_WBb = add(b, sub(vec3_at(poses, B.pose_at + 9), scale(radius, nhat)))
-    write_vectors(row, nhat, sub(p_WBb, scale(gap, nhat)), p_WBb, ordered.flip)
+    write_plane_points(ordered, coarse, gap, row)
     work.ids[0] = -1
-    work.ids[1] = k
+    work.ids[1] = coarse.vertex
     write_vertices(row, work.ids, 1, ordered.flip)
 
 

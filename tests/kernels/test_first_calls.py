@@ -371,7 +371,7 @@ from collide.narrowphase.facets import facet_kernel_calls
 mesh = collide.Mesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 union = collide.Compound([(collide.Sphere(1), np.eye(4)), (collide.Sphere(0.5), np.eye(4))])
 module, name, shape = {
-    "convex": (run, "_Workspace", collide.Sphere(1)), "union": (unions, "_SingleSpace", union),
+    "convex": (run, "BlockWorkspace", collide.Sphere(1)), "union": (unions, "_SingleSpace", union),
     "mesh": (facet_kernel_calls, "Workspace", mesh),
 }[sys.argv[1]]
 X, made, both, out = collide.pose((0.25, 0.5, 0)), [], threading.Barrier(2, timeout=200), [None] * 2

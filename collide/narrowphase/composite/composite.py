@@ -19,7 +19,7 @@ from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compo
 from collide.narrowphase.composite.composite_rows import SCORE, combine_rows
 from collide.narrowphase.composite.single_composite_call import collide_single_compound, distance_single_compound
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
-from collide.results import PAIR_DTYPE
+from collide.results import PAIR_DTYPE, zeroed_rows
 
 # --- workspaces ---------------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ class CompoundPair:
 
     def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
-        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        rows = zeroed_rows(1, PAIR_DTYPE)
         return None if self._distance(X_WA, X_WB, rows, depths) is None else rows
 
 

@@ -51,7 +51,7 @@ from collide.narrowphase.facets.facet_queries import (
     workspace,
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
+from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped, zeroed_rows
 from collide.transforms import as_poses
 
 #: Points of parts, more than which keep single calls from holding Python's lock.
@@ -331,5 +331,5 @@ class SinglePair:
         if not self._has_slabs:
             _make_slabs(*self._held[:2])
             self._has_slabs = True
-        rows = np.zeros(1, dtype=PAIR_DTYPE)
+        rows = zeroed_rows(1, PAIR_DTYPE)
         return None if self._gap(X_WA, X_WB, rows, depths) is None else rows

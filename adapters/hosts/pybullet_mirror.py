@@ -1,0 +1,306 @@
+"""pybullet on collide: `Mirror`, a World that follows a client; `attach` and `install` for programs as they are.
+
+    import pybullet as p
+    mirror = Mirror(p.connect(p.DIRECT))
+    ...
+    mirror.update()
+    mirror.getClosestPoints(robot, table, 0.1)
+
+Tuples and conventions are pybullet's: the normal stands on B and points to A, distances below 0 are overlaps, link −1
+is the base. What only a solver knows (forces, directions of friction) is 0. docs/hosts.md says what is different.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import warnings
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+from collide.adapters.hosts.bullet_arguments import (
+    BODY_ARGUMENTS,
+    SHAPE_ARGUMENTS,
+    inertial_frames,
+    moved,
+    named,
+    shape_of_arguments,
+)
+from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybullet
+from collide.errors import CollideError, InvalidArgument
+from collide.shapes import Shape
+
+__all__ = ["MARGINS", "QUESTIONS", "Mirror", "attach", "check", "install", "installed", "uninstall"]
+
+#: What collide answers in place of pybullet.
+QUESTIONS = ("getClosestPoints", "getContactPoints", "getOverlappingObjects", "rayTest", "rayTestBatch")
+#: Where physicsClientId stands among the arguments of what is watched.
+_CLIENT_AT = {
+    "createCollisionShape": SHAPE_ARGUMENTS.index("physicsClientId"), "createMultiBody": len(BODY_ARGUMENTS) - 1,
+    "loadURDF": 7, "loadSDF": 3, "loadMJCF": 3, "resetSimulation": 1, "disconnect": 0, "setCollisionFilterPair": 5,
+    "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99,
+}  # fmt: skip
+_CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
+#: Where flags stand among those of what loads bodies.
+_FLAGS_AT = {"createMultiBody": BODY_ARGUMENTS.index("flags"), "loadURDF": 5, "loadMJCF": 1}
+
+_before: ModuleType | None = None
+_stand_in: ModuleType | None = None
+
+
+def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIONS, **options) -> ModuleType:
+    """pybullet with collide's answers: a module to use in place of it. Every other name is pybullet's own.
+
+    Parameters
+    ----------
+    pybullet : the module, or a ``BulletClient``; pybullet itself if left out.
+    client : the client that calls without physicsClientId are about, and then the only one that is followed; for a
+        ``BulletClient`` its number. None: that which was connected through this module, or 0.
+    questions : names of `QUESTIONS` that collide answers; the others stay pybullet's.
+    options : of `Mirror`: ``margins``, ``shapes``, ``contact_margin``.
+
+    Returns
+    -------
+    module : ``mirror_of(client)`` is the `Mirror` of a client. A mirror is up to date with its client before each
+        question. What pybullet does not give back is noted as it passes: filters, flags of self-collision, shapes
+        without bodies, height fields and meshes of triangles made from arrays.
+
+    Raises
+    ------
+    InvalidArgument : questions that are none.   MissingExtra : pybullet is not installed.
+    """
+    unknown = sorted(set(questions) - set(QUESTIONS))
+    if unknown:
+        raise InvalidArgument(f"attach: questions are among {', '.join(QUESTIONS)}, got {', '.join(unknown)}")
+    return _StandIn(genuine_pybullet() if pybullet is None else pybullet, client, tuple(questions), options)
+
+
+def install(**options) -> _Installed:
+    """Let ``import pybullet`` find `attach`'s module, until `uninstall`, or to the end of a ``with`` block.
+
+    Parameters
+    ----------
+    options : as of `attach`: ``questions``, ``margins``, ``shapes``, ``contact_margin``.
+
+    Returns
+    -------
+    context manager : its value is that module. Installing twice is as once.
+
+    Notes
+    -----
+    Modules that imported pybullet before keep it: a RuntimeWarning names them.
+    """
+    global _before, _stand_in
+    if _stand_in is None:
+        genuine = genuine_pybullet()
+        holders = sorted(
+            name
+            for name, module in list(sys.modules.items())
+            if isinstance(module, ModuleType) and not name.startswith("collide.")
+            and any(value is genuine for value in list(vars(module).values()))
+        )  # fmt: skip
+        _before, _stand_in = genuine, attach(genuine, **options)
+        sys.modules["pybullet"] = _stand_in
+        if holders:
+            warnings.warn(
+                f"these modules hold pybullet already: {', '.join(holders)}; install() before they are imported",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+    return _Installed()
+
+
+def uninstall() -> None:
+    """Let ``import pybullet`` find pybullet again; modules that hold ours keep it."""
+    global _before, _stand_in
+    if _before is not None:
+        sys.modules["pybullet"] = _before
+    _before = _stand_in = None
+
+
+def installed() -> bool:
+    """Whether ``import pybullet`` finds collide's module."""
+    return _stand_in is not None
+
+
+class _Installed:
+    """Leaving the block takes the stand-in away."""
+
+    def __enter__(self) -> ModuleType:
+        return sys.modules["pybullet"]
+
+    def __exit__(self, *exception) -> None:
+        uninstall()
+
+
+class _WatchedMirror(Mirror):
+    """Told of bodies before it looks at them."""
+
+    _follows_at_once = False
+
+
+class _StandIn(ModuleType):
+    """pybullet, but for the questions; and what passes is looked at."""
+
+    def __init__(self, pybullet: Any, client: int | None, questions: tuple[str, ...], options: dict) -> None:
+        super().__init__("pybullet", "pybullet; nearest points, contacts, boxes and rays are collide's.")
+        self.__wrapped__ = pybullet
+        self.__all__ = [name for name in dir(pybullet) if not name.startswith("_")]
+        self._client, self._options = client, options
+        self._mirrors: dict[int, Mirror] = {}
+        self._connected: set[int] = set()
+        self._shapes: dict[tuple[int, int], Shape] = {}
+        for name in questions:
+            setattr(self, name, self._answering(name))
+        for name in ("connect", *_CLIENT_AT):
+            setattr(self, name, self._watching(name))
+
+    def __getattr__(self, name: str):
+        return getattr(self.__wrapped__, name)
+
+    def __dir__(self):
+        return sorted({*dir(self.__wrapped__), "mirror_of"})
+
+    def mirror_of(self, client: int | None = None) -> Mirror:
+        """The `Mirror` of a client, up to date. Raises InvalidArgument."""
+        mirror = self._mirror(client)
+        mirror.update()
+        return mirror
+
+    def _mirror(self, client: int | None) -> Mirror:
+        client = self._number(client)
+        if client not in self._mirrors:
+            mirror = self._mirrors[client] = _WatchedMirror(client, **self._options)
+            for (owner, number), shape in self._shapes.items():
+                if owner == client:
+                    mirror.collision_shapes[number] = shape
+        return self._mirrors[client]
+
+    def _number(self, client: int | None) -> int:
+        if client is None:
+            client = self._client
+        if client is None and len(self._connected) > 1:
+            raise InvalidArgument(
+                "several clients are connected: say physicsClientId; for a BulletClient use attach(it, its number)"
+            )
+        return client if client is not None else next(iter(self._connected), 0)
+
+    def _answering(self, name: str) -> Callable:
+        method, place = getattr(Mirror, name), _CLIENT_AT_OF_QUESTIONS[name]
+
+        @functools.wraps(method)
+        def answer(*values, **keywords):
+            client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
+            if self._client is not None and client not in (None, self._client):
+                return getattr(self.__wrapped__, name)(*values, **keywords)
+            mirror = self._mirror(client)
+            if name == "getClosestPoints":
+                bodies = named(("bodyA", "bodyB"), values, keywords)
+                mirror.update_bodies(*{bodies[side] for side in ("bodyA", "bodyB") if bodies.get(side, -1) >= 0})
+            else:
+                mirror.update()
+            return method(mirror, *values, **keywords)
+
+        return answer
+
+    def _watching(self, name: str) -> Callable:
+        genuine = getattr(self.__wrapped__, name)
+        note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
+
+        @functools.wraps(genuine)
+        def watched(*values, **keywords):
+            result = genuine(*values, **keywords)
+            place = _CLIENT_AT.get(name, 0)
+            client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
+            if name == "connect":
+                self._connected.add(result)
+            elif self._client is None or client in (None, self._client):
+                note(self._client if client is None else client, values, keywords, result)
+            return result
+
+        return watched
+
+    # --- what passes ----------------------------------------------------------------------------
+
+    def _note_connect(self, *_) -> None:
+        """Nothing more."""
+
+    def _note_disconnect(self, client: int | None, *_) -> None:
+        number = 0 if client is None else client
+        self._connected.discard(number)
+        self._note_resetSimulation(number)
+        self._mirrors.pop(number, None)
+
+    def _note_resetSimulation(self, client: int | None, *_) -> None:
+        number = self._number(client)
+        self._shapes = {place: shape for place, shape in self._shapes.items() if place[0] != number}
+        if number in self._mirrors:
+            self._mirrors[number].forget_everything()
+
+    def _note_createCollisionShape(self, client: int | None, values: tuple, keywords: dict, number: int) -> None:
+        try:
+            shape = shape_of_arguments(self.__wrapped__, named(SHAPE_ARGUMENTS, values, keywords))
+        except CollideError:
+            shape = None  # it is asked about, or not: then the question says that it is not known
+        if shape is not None and number >= 0:
+            self._shapes[self._number(client), number] = shape
+            if self._number(client) in self._mirrors:
+                self._mirrors[self._number(client)].collision_shapes[number] = shape
+
+    def _note_bodies(self, name: str, client: int | None, values: tuple, keywords: dict, result: Any) -> None:
+        """Bodies were loaded or made: their flags, and shapes that pybullet does not give back."""
+        mirror = self._mirror(client)
+        place = _FLAGS_AT.get(name)
+        flags = keywords.get("flags", values[place] if place is not None and len(values) > place else 0)
+        shapes: dict[int, Shape] = {}
+        if name == "createMultiBody":
+            for link, (number, X) in inertial_frames(named(BODY_ARGUMENTS, values, keywords)).items():
+                shape = mirror.collision_shapes.get(number)
+                if shape is not None:
+                    shapes[link] = moved(shape, X)
+        for body in result if isinstance(result, tuple | list) else (result,):
+            if body >= 0:
+                mirror.note_body(body, flags, shapes)
+
+    def _note_setCollisionFilterPair(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
+        self._mirror(client).setCollisionFilterPair(*values, **keywords)
+
+    def _note_setCollisionFilterGroupMask(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
+        self._mirror(client).setCollisionFilterGroupMask(*values, **keywords)
+
+    def _note_changeDynamics(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
+        if "collisionMargin" in keywords or len(values) > 19:
+            self._mirror(client).note_margin(keywords.get("bodyUniqueId", values[0] if values else -1))
+
+    def _note_setPhysicsEngineParameter(self, client: int | None, values: tuple, keywords: dict, _: Any) -> None:
+        if "collisionFilterMode" in keywords:
+            self._mirror(client).set_filter_mode(keywords["collisionFilterMode"])
+
+
+def check() -> str:
+    """For `collide doctor`: two hulls in a client of their own, asked through `attach`.
+
+    Returns
+    -------
+    One line that says what held.
+
+    Raises
+    ------
+    RuntimeError : where the answer is not the one that is known.   MissingExtra : pybullet is not installed.
+    """
+    genuine = genuine_pybullet()
+    corners = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+    client = genuine.connect(genuine.DIRECT)
+    try:
+        p = attach(genuine, client)
+        hull = p.createCollisionShape(genuine.GEOM_MESH, vertices=corners, physicsClientId=client)
+        A, B = (p.createMultiBody(1.0, hull, basePosition=[x, 0, 0], physicsClientId=client) for x in (0.0, 3.0))
+        for x in (3.0, 4.0):
+            genuine.resetBasePositionAndOrientation(B, [x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], client)
+            ((*_, gap, _, _, _, _, _),) = p.getClosestPoints(A, B, 9.0, physicsClientId=client)
+            if abs(gap - (x - 1.0)) > 1e-12:
+                raise RuntimeError(f"two cubes of 1 m whose middles are {x} m apart: {gap!r} m")
+    finally:
+        genuine.disconnect(client)
+    return "two hulls followed, apart as they stand"
