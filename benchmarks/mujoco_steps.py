@@ -41,7 +41,7 @@ CONTESTANTS = (None, "contacts", "cull")
 ROBOTS = {
     "a1": "a1_description/urdf/a1.urdf",
     "g1": "g1_description/urdf/g1_29dof_rev_1_0.urdf",
-    "talos": "talos_data/robots/talos_full_v2.urdf",
+    "go2": "go2_description/urdf/go2.urdf",
 }
 TIMESTEP = 0.004
 #: Rounds, and steps of each, by the number of bodies.
@@ -147,10 +147,10 @@ def timed(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, mode: s
     return {"step": step, "collision": collision, "contacts": data.ncon, "qpos": data.qpos.copy()}
 
 
-def measured(name: str, n: int, when: str, few: bool) -> list[dict]:
+def measured(name: str, n: int, when: str, is_quick: bool) -> list[dict]:
     model, state = scene(name, n), saved_state(name, n, when)
     data = mujoco.MjData(model)
-    rounds, n_steps = (3, 5 if n > 1 else 200) if few else ROUNDS.get(n, (9, 20))
+    rounds, n_steps = (3, 5 if n > 1 else 200) if is_quick else ROUNDS.get(n, (9, 20))
     runs: dict = {mode: [] for mode in CONTESTANTS}
     for _ in range(rounds):
         for mode in CONTESTANTS:

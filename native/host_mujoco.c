@@ -205,11 +205,10 @@ static void put_box_axis(const struct collide_mujoco_model *made, int64_t a, int
 {
     double t[3], tried[3], widest = -INFINITE;
     int k, j;
-    for (j = 0; j < 3; j++) t[j] = X_WB[4 * j + 3] - X_WA[4 * j + 3];
     for (k = 0; k < 6; k++) {
         const double *X = k < 3 ? X_WA : X_WB;
         double sign, gap;
-        for (j = 0; j < 3; j++) tried[j] = X[4 * j + k % 3];
+        for (j = 0; j < 3; j++) tried[j] = X[4 * j + k % 3], t[j] = X_WB[4 * j + 3] - X_WA[4 * j + 3];
         sign = tried[0] * t[0] + tried[1] * t[1] + tried[2] * t[2] < 0.0 ? -1.0 : 1.0;
         for (j = 0; j < 3; j++) tried[j] *= sign;
         gap = gap_along(made->ints + INTS * a, made->numbers + NUMBERS * a, X_WA, made->ints + INTS * b, made->numbers + NUMBERS * b,

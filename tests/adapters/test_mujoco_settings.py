@@ -91,7 +91,7 @@ def test_margin_and_gap_are_mujocos():
 
 
 def test_distances_of_all_kinds():
-    """`mj_geomDistance` of each two kinds is that of collide, with its points; beyond `distmax` it is that."""
+    """`mj_geomDistance` of each two kinds is that of collide, with its points; beyond the limit it is that."""
     forms = [f'<geom type="{kind}" size="{size}"/>' for kind, (size, _) in FORMS.items()]
     model = model_of("".join(body(form) for form in [*forms, '<geom type="mesh" mesh="m"/>']))
     data = mujoco.MjData(model)
