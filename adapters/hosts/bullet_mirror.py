@@ -115,7 +115,7 @@ class Mirror:
             return
         members = set(bodies)
         rows = [row for body in members for row in self._tables.rows_of.get(body, [])]
-        self._move(np.array(sorted(rows), dtype=np.int64), self._bodies.coordinates(tuple(members)))
+        self._move(np.array(rows, dtype=np.int64), self._bodies.coordinates_of_bodies(members))
 
     def refresh(self, body: int | None = None) -> None:
         """Read shapes anew, of one body or all: after changeDynamics of a margin, or resetMeshData."""

@@ -205,12 +205,11 @@ class _StandIn(ModuleType):
         return answer
 
     def _watching(self, name: str) -> Callable:
-        genuine = getattr(self.__wrapped__, name)
         note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
 
-        @functools.wraps(genuine)
         def watched(*values, **keywords):
-            result = genuine(*values, **keywords)
+            # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
+            result = getattr(self.__wrapped__, name)(*values, **keywords)
             place = _CLIENT_AT.get(name, 0)
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             if name == "connect":
@@ -219,6 +218,7 @@ class _StandIn(ModuleType):
                 note(self._client if client is None else client, values, keywords, result)
             return result
 
+        watched.__name__ = watched.__qualname__ = name
         return watched
 
     # --- what passes ----------------------------------------------------------------------------

@@ -195,6 +195,24 @@ def test_links_stand_where_their_colliders_do_also_in_motion(client):
         assert max(abs(a[8] - b[8]) for a, b in zip(ours, theirs)) < 1e-9
 
 
+def test_two_bodies_alone_are_followed_as_all_are(client):
+    """Also a body whose base has no shape, and links that have none."""
+    random = np.random.default_rng(12)
+    stand_in = attach(p, client)
+    car = p.loadURDF(f"{DATA}/racecar/racecar.urdf", physicsClientId=client)
+    arm = p.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", [1, 0, 0], physicsClientId=client)
+    ball = sphere_of(client, 0.1, (0, 0, 0))
+    bodies = (car, arm, ball)
+    for _ in range(12):
+        for moved in bodies:
+            p.resetBasePositionAndOrientation(moved, random.normal(size=3).tolist(), quaternion(random), client)
+            for joint in range(p.getNumJoints(moved, client)):
+                p.resetJointState(moved, joint, random.uniform(-1, 1), physicsClientId=client)
+        a, b = (bodies[k] for k in random.choice(3, 2, replace=False))
+        ours = stand_in.getClosestPoints(a, b, 9.0)
+        assert len(ours) > 2 and ours == Mirror(client).getClosestPoints(a, b, 9.0)
+
+
 def test_steps_have_the_same_bits_with_a_mirror():
     def run(mirrored: bool) -> list:
         number = p.connect(p.DIRECT)
@@ -529,6 +547,22 @@ def test_import_finds_ours_between_install_and_uninstall():
     pybullet_mirror.uninstall()
     with pytest.raises(InvalidArgument, match="questions are among"):
         attach(held, questions=("stepSimulation",))
+
+
+def test_a_bullet_client_is_attached_by_its_number(client):
+    from pybullet_utils.bullet_client import BulletClient
+
+    wrapped = BulletClient(p.DIRECT)  # closes itself, and its number is not told otherwise
+    number = wrapped._client
+    assert number != client  # calls that said nothing would be about the other one
+    q = attach(wrapped, number)
+    for x in (0, 3):
+        ball = q.createMultiBody(1, q.createCollisionShape(q.GEOM_MESH, vertices=CORNERS), basePosition=[x, 0, 0])
+    assert abs(q.getClosestPoints(0, ball, 9.0)[0][8] - 2.0) < 1e-12
+    assert q.rayTest([3, 0, 5], [3, 0, -5])[0][0] == ball and p.getNumBodies(client) == 0
+    q.resetSimulation()
+    assert len(q.mirror_of().world) == 0
+    q.disconnect()
 
 
 # --- what goes wrong ----------------------------------------------------------------------------
