@@ -3,19 +3,24 @@
 python benchmarks/pybullet_agreement.py [--calls 10000] [--rays 10000] [--seed 22]
 
 Two bodies a call, a quarter of them on a grid where bodies touch. Verdicts are signs of getClosestPoints. Of polytopes
-rationals say who is right, asked about the vertices and poses that Bullet has; of other pairs the proven bracket of the
-distance. A second mirror takes over Bullet's margins, so that what is due to them is told from what is wrong. Rays are
-judged by where they meet spheres and boxes in closed form.
+rationals say who is right, asked about the vertices and poses that Bullet has; of other pairs the tests' oracle, in
+decimals of 80 digits. A second mirror takes over Bullet's margins, so that what is due to them is told from what is
+wrong. Rays are judged by where they meet balls in closed form.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pybullet as p
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[1] / "tests" / "oracles")]
+from curved_oracle import bracket
 from host_agreement import CORNERS, FACETS, calls
 
 import collide
@@ -53,10 +58,10 @@ def judged(mirror: Mirror, kinds: set[str], theirs: float, ours: float, grown: f
         bodies = [(points_of(b.shape), b.X_WB[:3, :3], b.X_WB[:3, 3]) for b in (first, second)]
         truth = exact.hit(*bodies[0], *bodies[1])
     else:
-        r = collide.distance(first.shape, second.shape, first.X_WB, second.X_WB)
-        if r.lower <= 0.0 <= r.upper:
+        proven = bracket(first.shape, second.shape, first.X_WB, second.X_WB, depths=False)
+        if proven.lower <= 0 <= proven.upper:
             return "touching within rounding"
-        truth = r.upper < 0.0
+        truth = proven.upper < 0
     if truth != (ours <= 0.0):
         return "OURS WRONG"
     return "Bullet wrong, by its margins" if (theirs <= 0.0) == (grown <= 0.0) else "Bullet wrong"
