@@ -93,7 +93,7 @@ def main() -> None:
     random = np.random.default_rng(arguments.seed)
     verdicts: Counter = Counter()
     off: dict[str, list[float]] = {"Newton": [], "collide": []}
-    spent, n_hits = np.zeros(2), 0
+    spent, n_hits, missed = np.zeros(2), 0, []
     model, kinds = model_of(random)
     pipelines = newton.CollisionPipeline(model), Pipeline(model, rigid_contact_max=20_000)
     state, buffers = model.state(), [pipeline.contacts() for pipeline in pipelines]
@@ -119,12 +119,16 @@ def main() -> None:
                 wrong = verdict(shapes, poses, gap, who)
                 if wrong:
                     verdicts["–".join(sorted(kinds[pair])), wrong] += 1
+                    missed.append((gap, truth.distance))
                 elif 0.0 < truth.lower < 0.5:
                     off[who].append(abs(gap - truth.distance))
     n = arguments.calls // N_PAIRS * N_PAIRS
     print(f"{n} pairs, {n_hits} overlap; wrong verdicts:")
     for (both, wrong), count in sorted(verdicts.items()):
         print(f"  {both:22} {wrong:26} {count}")
+    if missed:
+        (low, true_low), (high, true_high) = np.min(missed, axis=0), np.max(missed, axis=0)
+        print(f"said to be {low:.1e} to {high:.1e} m apart, and are {true_low:.3f} to {true_high:.3f} m")
     for who, differences in off.items():
         print(f"gaps of {who}: median off by {np.median(differences):.1e} m, greatest {np.max(differences):.1e} m")
     print(f"a pair: Newton {1e6 * spent[0] / n:.2f} µs, collide {1e6 * spent[1] / n:.2f} µs")
