@@ -15,6 +15,8 @@ from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.shapes import Shape
 
 _serial = itertools.count()
+#: How the keys of marks begin.
+MARK = "collide mirror"
 #: Link number of a body's base.
 BASE = -1
 
@@ -48,7 +50,7 @@ class ClientBodies:
         self._reader = ShapeReader(pybullet, client, margins)
         #: Shapes of links, in the frames of their centres of mass, for those that pybullet does not give back.
         self.spare_shapes: dict[int, dict[int, Shape]] = {}
-        self._key = f"collide mirror {os.getpid()} {next(_serial)}"
+        self._key = f"{MARK} {os.getpid()} {next(_serial)}"
         self._bodies: list[int] = []
         self._marks: list[int] = []
         self._mark_of: dict[int, int] = {}

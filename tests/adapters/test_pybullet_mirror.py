@@ -6,8 +6,10 @@ where its definition is the same; rays by closed forms. Skipped where pybullet i
 
 from __future__ import annotations
 
+import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -547,6 +549,39 @@ def test_import_finds_ours_between_install_and_uninstall():
     pybullet_mirror.uninstall()
     with pytest.raises(InvalidArgument, match="questions are among"):
         attach(held, questions=("stepSimulation",))
+
+
+def test_marks_are_not_among_the_user_data_of_a_program(client):
+    stand_in = attach(p, client)
+    ball = sphere_of(client, 0.1, (0, 0, 0))
+    first = stand_in.addUserData(ball, "colour", "red")
+    stand_in.mirror_of()
+    second = stand_in.addUserData(ball, "weight", "5")
+    assert p.getNumUserData(ball, client) == 3 and stand_in.getNumUserData(ball) == 2
+    infos = [stand_in.getUserDataInfo(ball, k) for k in range(2)]
+    assert sorted(infos) == [(first, b"colour", ball, -1, -1), (second, b"weight", ball, -1, -1)]
+    with pytest.raises(p.error):
+        stand_in.getUserDataInfo(ball, 2)
+
+
+def test_an_example_of_pybullets_own_runs_as_it_is(tmp_path):
+    """Without its window, and not for ever."""
+    source = (Path(pybullet_data.getDataPath()).parent / "pybullet_examples" / "getClosestPoints.py").read_text()
+    changes = {"p.connect(p.GUI)": "p.connect(p.DIRECT)", "while (p.isConnected()):": "for step in range(30):"}
+    for before, after in changes.items():
+        assert source.count(before) == 1
+        source = source.replace(before, after)
+    source = source.replace("    distance = pts[0][8]\n", "    distance = pts[0][8]\n    rows.append(pts)\n")
+    script = tmp_path / "example.py"
+    script.write_text(f"rows = []\n{source}\np.disconnect()\n")
+    answers = [runpy.run_path(str(script))["rows"]]
+    with pytest.warns(RuntimeWarning, match="hold pybullet already"):
+        context = pybullet_mirror.install()
+    with context:
+        answers.append(runpy.run_path(str(script))["rows"])
+    assert len(answers[0]) == len(answers[1]) == 30
+    for (theirs,), (row,) in zip(*answers):
+        assert row[:5] == theirs[:5] and abs(row[8] - theirs[8]) < 1e-3 and np.allclose(row[7], theirs[7], atol=1e-2)
 
 
 def test_a_bullet_client_is_attached_by_its_number(client):
