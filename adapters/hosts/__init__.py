@@ -30,6 +30,8 @@ class Host(NamedTuple):
 HOSTS = (
     Host("MuJoCo", "mujoco", True, "collide.adapters.hosts.mujoco", "with install(model): steps have our contacts"),
     Host("python-fcl", "python-fcl", False, "collide.adapters.hosts.fcl_api", "after install(), import fcl finds it"),
+    Host("coal", "coal", False, "collide.adapters.hosts.coal_api", "after install(), import coal and hppfcl find it"),
+    Host("Pinocchio", "pin", True, "collide.adapters.hosts.pinocchio", "compute_collisions for pin.computeCollisions"),
     Host("pybullet", "pybullet", True, "collide.adapters.hosts.pybullet_mirror", "attach(pybullet): answers are ours"),
     Host("Newton", "newton", True, "collide.adapters.hosts.newton", "Pipeline(model): contacts for solver.step"),
 )

@@ -9,9 +9,7 @@ what is different, and why.
 from __future__ import annotations
 
 import sys
-import warnings
 from importlib import import_module
-from types import ModuleType
 
 from collide.adapters.hosts import fcl_requests
 from collide.adapters.hosts.fcl_geometry import (
@@ -55,6 +53,7 @@ from collide.adapters.hosts.fcl_requests import (
     GJKSolverType,
 )
 from collide.adapters.hosts.fcl_transform import Transform
+from collide.adapters.hosts.stand_in import StandIn
 
 #: The release whose interface this is.
 __version__ = "0.7.0.11"
@@ -68,21 +67,12 @@ __all__ = [
     "continuousCollide", "defaultCollisionCallback", "defaultDistanceCallback", "distance",
 ]  # fmt: skip
 
-#: What ``sys.modules`` held under python-fcl's names before `install`; None while not installed.
-_before: dict[str, ModuleType] | None = None
+_stand_in = StandIn({
+    "fcl": sys.modules[__name__], "fcl.fcl": sys.modules[__name__], "fcl.collision_data": fcl_requests,
+})  # fmt: skip
 
 
-class _Installed:
-    """Leaving the block takes the stand-in away."""
-
-    def __enter__(self) -> ModuleType:
-        return sys.modules[__name__]
-
-    def __exit__(self, *exception) -> None:
-        uninstall()
-
-
-def install() -> _Installed:
+def install() -> StandIn:
     """Let ``import fcl`` find this module, until `uninstall`, or to the end of a ``with`` block.
 
     Returns
@@ -95,37 +85,17 @@ def install() -> _Installed:
     Modules that imported python-fcl before keep it: a RuntimeWarning names them. trimesh looks for fcl when
     ``trimesh.collision`` is imported, and goes on without where that fails.
     """
-    global _before
-    if _before is None:
-        _before = {name: module for name, module in sys.modules.items() if name.split(".")[0] == "fcl"}
-        for name in _before:
-            del sys.modules[name]
-        module = sys.modules[__name__]
-        sys.modules.update({"fcl": module, "fcl.fcl": module, "fcl.collision_data": fcl_requests})
-        holders = _holders(_before.get("fcl"))
-        if holders:
-            warnings.warn(
-                f"these modules hold another fcl already: {', '.join(holders)}; install() before they are imported",
-                RuntimeWarning,
-                stacklevel=2,
-            )
-    return _Installed()
+    return _stand_in.install()
 
 
 def uninstall() -> None:
     """Put back what ``import fcl`` found before `install`; modules that hold this one keep it."""
-    global _before
-    if _before is None:
-        return
-    for name in [name for name in sys.modules if name.split(".")[0] == "fcl"]:
-        del sys.modules[name]
-    sys.modules.update(_before)
-    _before = None
+    _stand_in.uninstall()
 
 
 def installed() -> bool:
     """Whether ``import fcl`` finds this module."""
-    return _before is not None
+    return _stand_in.installed
 
 
 def check() -> str:
@@ -146,13 +116,3 @@ def check() -> str:
     if sys.modules.get("fcl") is not before:
         raise RuntimeError("uninstall() did not put back what import fcl found before")
     return "import fcl finds it, a pair was answered, uninstalled cleanly"
-
-
-def _holders(former: ModuleType | None) -> list[str]:
-    """Modules whose ``fcl`` is python-fcl, or nothing: trimesh's where the import failed."""
-    names = []
-    for name, module in list(sys.modules.items()):
-        held = vars(module).get("fcl", module) if isinstance(module, ModuleType) else module
-        if held is not module and (held is former if former is not None else held is None):
-            names.append(name)
-    return sorted(names)

@@ -36,7 +36,7 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
     """
     g1, g2 = o1._geometry, o2._geometry
     if g1._object_type == g2._object_type == _MESH:
-        results = _facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
+        results = facet_contacts(g1._shape, g2._shape, o1._X, o2._X, limit, with_geometry)
         return [_contact(g1, g2, *values) for values in results]
     if not with_geometry:
         return [_contact(g1, g2, -1, -1, np.zeros(3), np.zeros(3), 0.0)]
@@ -129,8 +129,8 @@ def _contact(g1, g2, b1, b2, normal, pos, depth) -> Contact:
     return contact
 
 
-def _facet_contacts(A, B, X_WA, X_WB, limit: int, with_geometry: bool) -> list[tuple]:
-    """One for each pair of facets that meet, results exactly.
+def facet_contacts(A, B, X_WA, X_WB, limit: int, with_geometry: bool) -> list[tuple]:
+    """One for each pair of facets that meet, which is decided exactly.
 
     The normal of each is that along which the two triangles, as flat convex sets, come apart after the shortest way,
     which is its depth; pos is the middle of what they share. In doubles, good to rounding.

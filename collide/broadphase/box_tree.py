@@ -18,6 +18,9 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Bits of a Morton code along each axis.
 _BITS = 16
+#: Bodies that have moved are sorted anew once all sides of the tree's boxes, added up, have grown by this factor: in
+#: metres, or in sides of the box around all.
+_GROWN = 1.5
 
 
 class BoxTree:
@@ -29,28 +32,39 @@ class BoxTree:
 
     def __init__(self, boxes: np.ndarray):
         finite = np.isfinite(boxes).all(axis=1)
-        self.boxes = boxes
-        self.unbounded = np.flatnonzero(~finite)
-        bounded = np.flatnonzero(finite)
-        self.order = bounded[_sorted_order(boxes[bounded])] if len(bounded) else bounded
-        self.leaves = 1 << max(0, (len(bounded) - 1).bit_length())
+        self.boxes = np.ascontiguousarray(boxes)
+        self.unbounded, self._bounded = np.flatnonzero(~finite), np.flatnonzero(finite)
+        self.leaves = 1 << max(0, (len(self._bounded) - 1).bit_length())
         self.nodes = np.empty((2 * self.leaves, 6))
-        self._fit()
+        self._sort()
 
     def refit(self, boxes: np.ndarray) -> None:
-        """Take moved boxes without sorting anew; answers stay right, only speed drifts."""
+        """Take moved boxes. Bodies are sorted anew where the tree has become much worse than it was when they were
+        last: what is near in the order is to be near in space.
+        """
         if len(boxes) != len(self.boxes):
             raise ValueError("refit needs the same bodies; build a new tree")
-        self.boxes = boxes
-        self._fit()
+        self.boxes = np.ascontiguousarray(boxes)
+        sides = self._fit()
+        if (sides > _GROWN * self._least_sides).any():
+            self._sort()
+        self._least_sides = np.minimum(self._least_sides, sides)
 
-    def _fit(self) -> None:
-        boxes = self.boxes = np.ascontiguousarray(self.boxes)
-        is_bounded = fit_nodes(
-            address_of(boxes), len(boxes), address_of(self.order), len(self.order), address_of(self.nodes), self.leaves
-        )
-        if not is_bounded or np.isfinite(boxes[self.unbounded]).all(axis=1).any():
+    def _sort(self) -> None:
+        bounded = self._bounded
+        self.order = bounded[_sorted_order(self.boxes[bounded])] if len(bounded) else bounded
+        self._least_sides = self._fit()
+
+    def _fit(self) -> np.ndarray:
+        """Make all nodes; (2,) the sum of their boxes' sides, in metres and in sides of the box around all."""
+        sides = fit_nodes(
+            address_of(self.boxes), len(self.boxes), address_of(self.order), len(self.order), address_of(self.nodes),
+            self.leaves,
+        )  # fmt: skip
+        if sides < 0.0 or np.isfinite(self.boxes[self.unbounded]).all(axis=1).any():
             raise ValueError("refit needs the same bodies, bounded and unbounded ones; build a new tree")
+        around_all = float((self.nodes[1, 3:] - self.nodes[1, :3]).sum()) if len(self.order) else 0.0
+        return np.array([sides, sides / around_all if around_all > 0.0 else 0.0])
 
     def pairs(self, margin: float, static: np.ndarray, group: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis.
@@ -93,13 +107,20 @@ def _sorted_order(boxes: np.ndarray) -> np.ndarray:
     extent = float((centres.max(axis=0) - low).max())
     scale = (2**_BITS - 1) / extent if extent > 0.0 and math.isfinite(2**_BITS / extent) else 0.0
     cells = np.clip((centres - low) * scale, 0, 2**_BITS - 1).astype(np.uint64)
-    code = np.zeros(len(boxes), dtype=np.uint64)
-    for bit in range(_BITS):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    x, y, z = (_spread_bits(cells[:, axis]) for axis in range(3))
     size = (boxes[:, 3:] - boxes[:, :3]).max(axis=1)
     size_class = np.frexp(np.maximum(size, np.finfo(float).tiny))[1]
-    return np.lexsort((code, -size_class))
+    smaller = (int(size_class.max()) - size_class).astype(np.uint64)  # at most 2,100: twelve bits
+    code = x | (y << np.uint64(1)) | (z << np.uint64(2))
+    return np.argsort((smaller << np.uint64(3 * _BITS)) | code, kind="stable")
+
+
+def _spread_bits(values: np.ndarray) -> np.ndarray:
+    """Numbers of _BITS bits with two zeros between any two bits (H. S. Warren, "Hacker's Delight", 7-2)."""
+    for shift, mask in ((32, 0xFFFF00000000FFFF), (16, 0x00FF0000FF0000FF), (8, 0xF00F00F00F00F00F),
+                        (4, 0x30C30C30C30C30C3), (2, 0x9249249249249249)):  # fmt: skip
+        values = (values | (values << np.uint64(shift))) & np.uint64(mask)
+    return values
 
 
 def _with_unbounded(unbounded, n, static, group, mask) -> np.ndarray:
@@ -121,9 +142,9 @@ def _next_subtree(node):
     return node + 1 if node > 0 else 0
 
 
-@entry("boolean(int64, int64, int64, int64, int64, int64)")
+@entry("float64(int64, int64, int64, int64, int64, int64)")
 def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
-    """Write all nodes of a tree; False where the box of a leaf is not finite.
+    """Write all nodes of a tree; the sum of their boxes' sides, or −1 where the box of a leaf is not finite.
 
     boxes : 6·n_boxes doubles, low x, y, z, high x, y, z.   order : the body of each leaf.   nodes : 12·leaves doubles
         out.
@@ -132,6 +153,7 @@ def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
     order = view_i64(order_at, n_order)
     nodes = view_f64(nodes_at, 12 * leaves)
     is_bounded = True
+    sides = 0.0
     for leaf in range(leaves):
         at = 6 * (leaves + leaf)
         for axis in range(3):
@@ -148,7 +170,9 @@ def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
         for axis in range(3):
             nodes[at + axis] = min(nodes[child + axis], nodes[child + 6 + axis])
             nodes[at + 3 + axis] = max(nodes[child + 3 + axis], nodes[child + 9 + axis])
-    return is_bounded
+            side = nodes[at + 3 + axis] - nodes[at + axis]
+            sides += max(side, 0.0)  # of empty places it is −inf
+    return sides if is_bounded else -1.0
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)")

@@ -133,9 +133,8 @@ def stepped(stepper: Stepper, seconds: float) -> list[Step]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_bodies_that_fall_on_bumps_stay_there(seed):
-    """A box and a tetrahedron, from above and askew. They may rock between peaks: a patch has the corners of what is
-    near and its deepest point, and a peak between them is known when it is the deepest. But they stay within a
-    centimetre for two seconds, sink less than half of one, as into a peak that is no row yet, and gain no energy."""
+    """A box and a tetrahedron, from above and askew: for two seconds they stay within a tenth of a millimetre, sink
+    less than half of one, and gain no energy. A patch has all the peaks that carry (`carrying_points.py`)."""
     stepper, size = Stepper(friction=0.6), np.array([0.3, 0.2, 0.1])
     stepper.add(bumpy_bowl(seed), EYE)
     inertia = (np.square(size).sum() - np.square(size)) / 12
@@ -144,9 +143,9 @@ def test_bodies_that_fall_on_bumps_stay_there(seed):
     stepper.add(collide.ConvexHull(corners), collide.pose((-0.5, -0.6, 0.5)), 1.0, np.full(3, 0.009))
     last = stepped(stepper, 6.0)[-120:]
     places = np.array([step.X[1:, :3, 3] for step in last])
-    assert np.ptp(places, axis=0).max() < 0.01, np.ptp(places, axis=0)
+    assert np.ptp(places, axis=0).max() < 1e-4, np.ptp(places, axis=0)
     assert {key[:2] for step in last for key in step.keys} == {(0, 1), (0, 2)}
-    assert min(step.contacts["distance"].min() for step in last) > -0.005
+    assert min(step.contacts["distance"].min() for step in last) > -5e-4
     assert all(len(step.keys) >= 6 and step.contacts["normal"][:, 2].min() > 0.8 for step in last)
 
 
@@ -158,5 +157,5 @@ def test_a_ball_rolls_over_bumps_and_never_through():
     steps = stepped(stepper, 5.0)
     centres = np.array([step.X[ball] for step in steps])
     gaps = collide.distance(field, collide.Sphere(radius), EYE, centres).distance
-    assert gaps.min() > -0.01 and sum(len(step.keys) > 0 for step in steps) > 200
+    assert gaps.min() > -0.005 and sum(len(step.keys) > 0 for step in steps) > 200
     assert np.linalg.norm(centres[-1, :2, 3] - centres[0, :2, 3]) > 0.1  # it did roll

@@ -83,6 +83,14 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         for name in ("hierarchy_queries", "matrix_game", "validate_walk", "walk_steps")
     },
     ("adapters/hosts/fcl_managers.py", "clear"): "python-fcl's name",
+    **{
+        (f"adapters/hosts/coal_{name}.py", word): "coal's name"
+        for name, word in (
+            ("containers", "other"), ("enums", "BVH_BUILD_STATE_BEGUN"), ("enums", "BVH_BUILD_STATE_REPLACE_BEGUN"),
+            ("enums", "BVH_BUILD_STATE_UPDATE_BEGUN"), ("managers", "clear"), ("requests", "clear"),
+            ("requests", "other"), ("transform", "other"),
+        )
+    },
     ("collide/narrowphase/dispatch.py", "P"): "a cell of the table: Method.PLANES",
     ("scenes/families/case.py", "P"): "the same: the arguments of the exact oracle, field by field",
     ("scenes/worst_cases.py", "left"): "beside right: two vertices of one roof",

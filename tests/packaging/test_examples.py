@@ -61,6 +61,7 @@ SHOWS = {
         "touch at 0.250000",
         "trimesh asks collide.adapters.hosts.fcl_api: [('cube 0', 'cube 1'), ('cube 1', 'cube 2')]",
     ],
+    "15_coal_and_pinocchio": ["import coal is collide.adapters.hosts.coal_api: 1 contact of a can in a box, -0.25 m"],
     "13_mujoco_pit": [
         "culled steps have MuJoCo's bits: True", "a World of 41 bodies", "with collide all are seen: True",
     ],
@@ -129,3 +130,10 @@ def test_python_in_the_readme_runs():
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
     done = run("-c", "\n".join(blocks))
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(find_spec("pinocchio") is None, reason="Pinocchio (pin) is not installed")
+def test_example_of_pinocchio_finds_what_is_missed():
+    done = run(str(ROOT / "examples" / "15_coal_and_pinocchio.py"))
+    assert "_right_hand.urdf: pair 5, 40.8 mm deep, is missed by Pinocchio" in done.stdout
+    assert re.search(r"panda.urdf: 5 of 200 collide; \d+ µs each, Pinocchio \d+ µs", done.stdout)

@@ -1,0 +1,85 @@
+"""Modules of ours in the place of a host's: what ``import`` finds between `install` and `uninstall`."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Mapping
+from types import ModuleType
+
+
+class StandIn:
+    """Lets imports of a host find modules of ours.
+
+    modules : by the name that programs import. The first is the host's, the value of a ``with`` block; names of
+        packages take the place of everything within them.
+
+    Notes
+    -----
+    Only ``sys.modules`` changes, and is put back. Modules that imported the host before keep it.
+    """
+
+    def __init__(self, modules: Mapping[str, ModuleType]):
+        self._modules = dict(modules)
+        #: What ``sys.modules`` held under the host's names; None while not installed.
+        self._before: dict[str, ModuleType] | None = None
+
+    @property
+    def installed(self) -> bool:
+        """Whether imports find our modules."""
+        return self._before is not None
+
+    def install(self) -> StandIn:
+        """Until `uninstall`, or to the end of a ``with`` block. Installing twice is as once.
+
+        A RuntimeWarning names modules that hold the host already, or nothing in its place.
+        """
+        if self._before is None:
+            self._before = {name: sys.modules[name] for name in self._names()}
+            for name in self._before:
+                del sys.modules[name]
+            sys.modules.update(self._modules)
+            holders = self._holders(self._before)
+            if holders:
+                host = next(iter(self._modules))
+                warnings.warn(
+                    f"these modules hold another {host} already: {', '.join(holders)}; install() before they are "
+                    "imported",
+                    RuntimeWarning,
+                    stacklevel=3,
+                )
+        return self
+
+    def uninstall(self) -> None:
+        """Put back what imports found before; modules that hold ours keep them."""
+        if self._before is None:
+            return
+        for name in self._names():
+            del sys.modules[name]
+        sys.modules.update(self._before)
+        self._before = None
+
+    def __enter__(self) -> ModuleType:
+        return next(iter(self._modules.values()))
+
+    def __exit__(self, *exception) -> None:
+        self.uninstall()
+
+    def _roots(self) -> set[str]:
+        return {name.split(".")[0] for name in self._modules}
+
+    def _names(self) -> list[str]:
+        """What ``sys.modules`` holds of the host, whoever it is."""
+        roots = self._roots()
+        return [name for name in sys.modules if name.split(".")[0] in roots]
+
+    def _holders(self, before: Mapping[str, ModuleType]) -> list[str]:
+        """Modules whose attribute of the host's name is the former host, or None: trimesh's where the import failed."""
+        names = set()
+        for root in self._roots():
+            former = before.get(root)
+            for name, module in list(sys.modules.items()):
+                held = vars(module).get(root, module) if isinstance(module, ModuleType) else module
+                if held is not module and held is former:
+                    names.add(name)
+        return sorted(names)
