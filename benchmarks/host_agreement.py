@@ -2,8 +2,9 @@
 
 python benchmarks/host_agreement.py [--calls 10000] [--seed 22]
 
-python-fcl is asked in a child process, which it may end. Of differing booleans of polytopes rationals say who is right;
-of other pairs, the proven bracket of the distance.
+python-fcl is asked in a child process, which it may end. Where booleans differ, `tests/oracles/exact_verdict.py` says
+who is right: a bracket of the signed distance in 80 digits that leaves out 0, or a common point in fractions. Where
+gaps differ by more than a micrometre, that bracket. Neither shares code with collide.
 """
 
 from __future__ import annotations
@@ -13,12 +14,17 @@ import json
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
 import collide
 from collide.adapters.hosts import fcl_api
-from collide.adapters.peers import exact
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "oracles"))
+
+from curved_oracle import bracket
+from exact_verdict import verdict
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 FACETS = [
@@ -75,17 +81,35 @@ def answers(fcl, n: int, seed: int) -> list:
     return [replies, 1e6 * spent / max(n, 1)]
 
 
+def question_of(pair) -> tuple:
+    """(A, B, X_WA, X_WB) of a call, as collide has them."""
+    a, b = (fcl_api.CollisionObject(geometry(fcl_api, k, s), fcl_api.Transform(R, t)) for k, s, R, t in pair)
+    return a._geometry._shape, b._geometry._shape, a._X, b._X
+
+
 def judged(pair, hit: bool) -> str:
     """Who is right about a pair whose booleans differ; hit : what the stand-in says."""
-    (kind_a, s_a, R_a, t_a), (kind_b, s_b, R_b, t_b) = pair
-    if {kind_a, kind_b} <= {"Box", "Convex"}:
-        truth = exact.hit(CORNERS * s_a, R_a, t_a, CORNERS * s_b, R_b, t_b)
-        return "python-fcl wrong" if truth == hit else "OURS WRONG"
-    a, b = (fcl_api.CollisionObject(geometry(fcl_api, k, s), fcl_api.Transform(R, t)) for k, s, R, t in pair)
-    r = collide.distance(a._geometry._shape, b._geometry._shape, a._X, b._X)
-    if r.lower > 0.0 or r.upper < 0.0:
-        return "python-fcl wrong" if hit == (r.upper < 0.0) else "OURS WRONG"
-    return "touching within rounding"
+    question = question_of(pair)
+    r = collide.distance(*question)  # proposes points that both may hold
+    truth = verdict(*question, [0.5 * (r.point_a + r.point_b), r.point_a, r.point_b])
+    if truth == "open":
+        return "open"
+    how = "they touch in a point" if truth == "touch" else truth
+    return f"{how}: python-fcl wrong" if hit == (truth != "apart") else f"{how}: OURS WRONG"
+
+
+#: Gaps that differ by more are judged [m].
+_GAP = 1e-6
+
+
+def judged_gap(pair, gap: float, their_gap: float) -> str:
+    """Whose gap is within 50 nm of the bracket: collide promises 2⁻²⁶ of the size of curved pairs."""
+    truth = bracket(*question_of(pair))
+    low, high = float(truth.lower) - 5e-8, float(truth.upper) + 5e-8
+    if high - low > 2e-7:
+        return "open"
+    right = [name for name, value in (("ours", gap), ("python-fcl", their_gap)) if low <= value <= high]
+    return f"{' and '.join(right) or 'nobody'} right"
 
 
 def main() -> None:
@@ -104,6 +128,7 @@ def main() -> None:
     theirs, their_time = json.loads(done.stdout.split("ANSWERS")[1])
     ours, our_time = answers(fcl_api, arguments.calls, arguments.seed)
     counts: dict[tuple[str, str], int] = {}
+    gaps: dict[str, int] = {}
     worst = 0.0
     for pair, (hit, gap), (their_hit, their_gap) in zip(calls(arguments.calls, arguments.seed), ours, theirs):
         if hit != their_hit:
@@ -111,9 +136,13 @@ def main() -> None:
             counts[key] = counts.get(key, 0) + 1
         elif not hit:
             worst = max(worst, abs(gap - their_gap))
+            if abs(gap - their_gap) > _GAP:
+                key_of_gap = judged_gap(pair, gap, their_gap)
+                gaps[key_of_gap] = gaps.get(key_of_gap, 0) + 1
     print(f"{arguments.calls} calls, {sum(hit for hit, _ in ours)} hits, {sum(counts.values())} booleans differ")
-    for (kinds, verdict), count in sorted(counts.items()):
-        print(f"  {kinds:24} {verdict:26} {count}")
+    for (kinds, who), count in sorted(counts.items()):
+        print(f"  {kinds:24} {who:40} {count}")
+    print(f"gaps that differ by more than {_GAP:g} m:", ", ".join(f"{who} {n}" for who, n in sorted(gaps.items())))
     print(f"greatest difference of gaps: {worst:.2g} m")
     print(f"the second call of collide with two new geometries: {our_time:.2f} µs, python-fcl {their_time:.2f} µs")
 

@@ -17,7 +17,11 @@ result = fcl.CollisionResult()
 n = fcl.collide(a, b, fcl.CollisionRequest(num_max_contacts=8, enable_contact=True), result)
 print(f"{n} contacts, each {result.contacts[0].penetration_depth:.3f} m deep along {result.contacts[0].normal}")
 
-# Where python-fcl aborts, hangs or errs: concentric balls, half-spaces, motions that it tunnels through.
+# Where python-fcl errs, aborts, hangs or tunnels: hulls face to face, concentric balls, half-spaces, motions.
+corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+cube = fcl.Convex(corners, 2, np.array([4, 0, 1, 3, 2, 4, 4, 6, 7, 5]))  # the hull counts, whatever faces are listed
+below = fcl.CollisionObject(cube, fcl.Transform(np.array([0.0, -3.0, 0.0])))
+print(f"cubes as hulls: {fcl.distance(fcl.CollisionObject(cube), below):.3f} m apart; python-fcl says 2.236")
 signed = fcl.DistanceRequest(enable_signed_distance=True)
 ball = fcl.CollisionObject(fcl.Sphere(0.5))
 print(f"concentric balls: {fcl.distance(ball, fcl.CollisionObject(fcl.Sphere(0.5)), signed):.1f} m")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ class DistanceCallBackDefault(DistanceCallBackBase):
 
 
 class BroadPhaseCollisionManager:
-    """Objects, and callbacks for pairs of them whose boxes meet, or are near.
+    """Objects, and callbacks for pairs of them whose boxes meet, or come within the request's margin.
 
     ``collide`` and ``distance`` take ``(callback)``, ``(object, callback)`` or ``(manager, callback)``. Objects that
     moved are noticed without `update`; exceptions of callbacks are raised.
@@ -158,16 +159,23 @@ class BroadPhaseCollisionManager:
         body, callback = self._asked("collide", args, CollisionCallBackBase)
         callback.init()
         mine = self._tree.objects
-        if isinstance(body, CollisionObject):
-            for row in self._tree.touching(body):
-                if callback.collide(mine[row], body):
-                    return
-            return
-        theirs = mine if body is None else body.objects
-        for block in self._tree.pairs(body):
+        theirs = [body] if isinstance(body, CollisionObject) else mine if body is None else body.objects
+        margin = callback.data.request.security_margin if isinstance(callback, CollisionCallBackDefault) else 0.0
+        for block in self._blocks(body, margin):
             for i, j in block.tolist():
                 if callback.collide(mine[i], theirs[j]):
                     return
+
+    def _blocks(self, body, margin: float) -> Iterator[np.ndarray]:
+        """Blocks (k, 2) of rows of pairs that may be at most the margin apart; an object's row is 0."""
+        if margin > 0.0:
+            for _, rows in self._tree.near(body, [np.nextafter(margin, np.inf)]):
+                yield rows
+        elif isinstance(body, CollisionObject):
+            rows = self._tree.touching(body)
+            yield np.column_stack([rows, np.zeros(len(rows), dtype=np.int64)]).astype(np.int64)
+        else:
+            yield from self._tree.pairs(body)
 
     def distance(self, *args):
         """See the class; pairs whose boxes are near come first. Raises TypeError for other arguments."""

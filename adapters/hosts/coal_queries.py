@@ -16,7 +16,7 @@ from collide.adapters.hosts.coal_enums import OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry, CollisionObject, checked_geometry, pose_of
 from collide.adapters.hosts.coal_nearest import Nearest, nearest
 from collide.adapters.hosts.coal_requests import Contact
-from collide.adapters.hosts.fcl_contacts import facet_contacts
+from collide.adapters.hosts.fcl_facets import contacts_of_facets
 from collide.errors import InvalidArgument
 
 #: How many contacts of two meshes are looked at where those are wanted that are deeper than something.
@@ -102,7 +102,7 @@ def _facet_rows(
     """One for each pair of facets of two meshes that meet, deep enough where the margin is below 0; and minus the
     greatest depth among those looked at [m].
     """
-    pairs = facet_contacts(g1._shape, g2._shape, X1, X2, _ALL if margin < 0.0 else n_wanted, with_geometry)
+    pairs = contacts_of_facets(g1._shape, g2._shape, X1, X2, _ALL if margin < 0.0 else n_wanted, with_geometry)
     deepest = max((float(depth) for *_, depth in pairs), default=0.0)
     rows = []
     for b1, b2, normal, pos, depth in [pair for pair in pairs if margin >= 0.0 or -pair[4] <= margin][:n_wanted]:

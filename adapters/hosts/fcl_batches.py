@@ -95,19 +95,20 @@ def distance_in_batches(tree: ObjectTree, against: ObjectTree | HostObject | Non
     if cdata.done:
         return
     mine, theirs = tree.objects, _their_objects(tree, against)
-    least, size = [np.inf], 4
+    least = [np.inf]
     for gaps, rows in tree.near(against, least):
-        begin = 0
+        begin, size = 0, _FIRST
         while begin < len(rows) and gaps[begin] < least[0]:
-            end = begin + size
-            chunk = rows[begin:end][gaps[begin:end] < least[0]]
-            if size > 4:
-                chunk = _nearest_of(tree, against, chunk, least[0])
-            for i, j in chunk.tolist():
+            wanted = rows[begin : begin + size][gaps[begin : begin + size] < least[0]]
+            chunk = wanted if begin == 0 or len(wanted) <= _FIRST else _nearest_of(tree, against, wanted, least[0])
+            nearest = chunk is not wanted
+            for gap, (i, j) in zip(gaps[begin:].tolist(), chunk.tolist()):
+                if gap >= least[0] and not nearest:
+                    break
                 is_done, least[0] = defaultDistanceCallback(mine[i], theirs[j], cdata)
                 if is_done:
                     return
-            begin, size = end, min(4 * size, _MAX_BATCH)
+            begin, size = begin + size, min(4 * size, _MAX_BATCH)
 
 
 def _nearest_of(tree: ObjectTree, against, pairs: np.ndarray, least: float) -> np.ndarray:

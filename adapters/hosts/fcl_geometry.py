@@ -181,23 +181,34 @@ class Convex(CollisionGeometry):
     def __init__(self, vertices, num_faces, faces):
         points = np.array(vertices, dtype=np.float64)
         self._become([points.min(axis=0), points.max(axis=0)], engine.ConvexHull(points))
-        flat, at, count = [int(k) for k in faces], 0, 0
-        while at < len(flat):
-            corners = flat[at + 1 : at + 1 + flat[at]]
-            if flat[at] < 3 or len(corners) != flat[at] or not all(0 <= k < len(points) for k in corners):
-                raise InvalidArgument(
-                    f"Convex: face {count} is {flat[at : at + 6]} …: faces are flat, [3, i, j, k, …], each led by the "
-                    f"number of its corners, and there are {len(points)} vertices"
-                )
-            at, count = at + 1 + flat[at], count + 1
-        if count != int(num_faces):
-            raise InvalidArgument(f"Convex: num_faces is {num_faces}, but faces holds {count}")
-        self._num_faces = count
+        self._num_faces = _checked_faces(faces, num_faces, len(points))
 
     @property
     def num_faces(self):
         """How many faces there are."""
         return self._num_faces
+
+
+def _checked_faces(faces, num_faces, n_points: int) -> int:
+    """How many faces a flat list holds, each led by the number of its corners. Raises InvalidArgument."""
+    values = np.asarray(faces)
+    width = int(values[0]) + 1 if values.ndim == 1 and len(values) else 0
+    if width > 3 and len(values) == width * int(num_faces) and values.dtype.kind in "iu":  # as a rule all are alike
+        rows = values.reshape(-1, width)
+        if (rows[:, 0] == width - 1).all() and rows[:, 1:].min() >= 0 and rows[:, 1:].max() < n_points:
+            return len(rows)
+    flat, at, count = [int(k) for k in faces], 0, 0
+    while at < len(flat):
+        corners = flat[at + 1 : at + 1 + flat[at]]
+        if flat[at] < 3 or len(corners) != flat[at] or not all(0 <= k < n_points for k in corners):
+            raise InvalidArgument(
+                f"Convex: face {count} is {flat[at : at + 6]} …: faces are flat, [3, i, j, k, …], each led by the "
+                f"number of its corners, and there are {n_points} vertices"
+            )
+        at, count = at + 1 + flat[at], count + 1
+    if count != int(num_faces):
+        raise InvalidArgument(f"Convex: num_faces is {num_faces}, but faces holds {count}")
+    return count
 
 
 class _Flat(CollisionGeometry):
@@ -271,8 +282,10 @@ class CollisionObject(HostObject):
 
     def setTranslation(self, vec):
         """vec : (3,) [m]."""
-        self._X[:3, 3] = shaped("vec", vec, (3,))
-        self._moved()
+        is_vector = vec.__class__ is np.ndarray and vec.shape == (3,)
+        self._X[:3, 3] = vec if is_vector else shaped("vec", vec, (3,))
+        for moved in self._watchers:
+            moved.add(self)
 
     def getRotation(self):
         """A copy (3, 3)."""

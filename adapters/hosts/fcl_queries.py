@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.fcl_contacts import contacts_of, nearest_sides, ordered
+from collide.adapters.hosts.fcl_contacts import FLAT, contacts_of, nearest_sides, ordered
 from collide.adapters.hosts.fcl_geometry import CollisionObject
 from collide.adapters.hosts.fcl_planes import is_plane_with_pieces, plane_gap, plane_meets, sides_to_move
 from collide.adapters.hosts.fcl_requests import (
@@ -80,11 +80,16 @@ def checked_limit(request: CollisionRequest) -> int:
     return limit
 
 
+def _refuse_unfinished(*geometries) -> None:
+    """Raises InvalidArgument for a mesh that is not finished."""
+    for geometry in geometries:
+        geometry._shape  # noqa: B018 - asks for it
+
+
 def meet(o1: CollisionObject, o2: CollisionObject) -> bool:
     """Whether two objects meet. A connected set meets a plane where it meets both of its half-spaces."""
     g1, g2 = o1._geometry, o2._geometry
-    for geometry in (g1, g2):
-        geometry._shape  # noqa: B018 - raises where a mesh is not finished
+    _refuse_unfinished(g1, g2)
     if is_plane_with_pieces(o1, o2):
         return plane_meets(o1, o2)
     return all(hits(A, B, o1._X, o2._X) for A in g1._shapes for B in g2._shapes)
@@ -103,32 +108,35 @@ def distance(o1, o2, request=None, result=None):
     Returns
     -------
     float
-        [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it; 0 of two meshes,
-        which have no inside.
+        [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it. Meshes have no
+        inside: −1 in any case, but with planes and half-spaces, and 0 of two of them.
     """
     if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
         raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
     o1, o2 = ordered(o1, o2)
     g1, g2 = o1._geometry, o2._geometry
-    both_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
-    signed = request is not None and request.enable_signed_distance and not both_meshes
-    for geometry in (g1, g2):
-        geometry._shape  # noqa: B018 - raises where a mesh is not finished
+    is_mesh = g1._object_type == OBJECT_TYPE.OT_BVH  # which stands first
+    both_meshes = is_mesh and g2._object_type == OBJECT_TYPE.OT_BVH
+    signed = request is not None and bool(request.enable_signed_distance) and (not is_mesh or g2._node_type in FLAT)
+    if not (g1._shapes and g2._shapes):
+        _refuse_unfinished(g1, g2)
     if len(g1._shapes) == len(g2._shapes) == 1:
-        r = engine.distance(g1._shapes[0], g2._shapes[0], o1._X, o2._X, signed=bool(signed))
+        rows = engine.distance(g1._shapes[0], g2._shapes[0], o1._X, o2._X, signed=signed).rows
     elif is_plane_with_pieces(o1, o2):
-        return _plane_distance(o1, o2, bool(signed), result)
+        return _plane_distance(o1, o2, signed, result)
     else:
-        r = engine.distance(*nearest_sides(o1, o2), o1._X, o2._X, signed=bool(signed))
-    value = float(r.distance)
-    if r.hit and not signed:
+        A, B = nearest_sides(o1, o2)
+        rows = engine.distance(A, B, o1._X, o2._X, signed=signed).rows
+    value = rows["distance"].item()
+    if not signed and rows["hit"].item():
         value = 0.0 if both_meshes else -1.0
     if result is not None and result.min_distance > value:
         result.min_distance = value
-        result.nearest_points = [np.array(r.point_a), np.array(r.point_b)]
-        result.o1, result.o2 = g1, g2
-        result.b1 = -1 if g1._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_a)
-        result.b2 = -1 if g2._object_type == OBJECT_TYPE.OT_GEOM else int(r.part_b)
+        result.nearest_points = [rows["point_a"][0].copy(), rows["point_b"][0].copy()]
+        result.o1, result.o2, result.b1, result.b2 = g1, g2, -1, -1
+        if g1._object_type != OBJECT_TYPE.OT_GEOM:  # which stands first
+            result.b1 = rows["part_a"].item()
+            result.b2 = rows["part_b"].item() if g2._object_type != OBJECT_TYPE.OT_GEOM else -1
     return value
 
 

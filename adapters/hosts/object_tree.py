@@ -20,8 +20,8 @@ from collide.shapes.shape_set import Picked, ShapeSet
 
 #: The pairs of so many leaves are looked for first, before those of all.
 _FIRST_LEAVES = 32
-#: A tree is built anew once its objects have moved so often, on average.
-_MOVES_TO_REBUILD = 8
+#: Up to so many pairs are sorted by their gaps all at once.
+_MAX_SORTED = 2048
 #: Gaps of boxes are less than this part below what they are in doubles.
 _ROUNDING = 1e-12
 
@@ -38,7 +38,6 @@ class ObjectTree:
         self._tree: _Tree | None = None
         self._rows_of: dict[HostObject, list[int]] = {}
         self._known_change = 0
-        self._n_moves = 0
         self._shapes: tuple[ShapeSet | None, np.ndarray] | None = None
 
     def add(self, obj: HostObject) -> None:
@@ -84,18 +83,15 @@ class ObjectTree:
         if not self.objects:
             self._moved.clear()
             return None
-        if self._tree is None or self._known_change != latest_change[0] or self._has_drifted():
+        if self._tree is None or self._known_change != latest_change[0]:
             self._build()
         elif self._moved:
             self._refit(self._tree)
         self._moved.clear()
         return self._tree
 
-    def _has_drifted(self) -> bool:
-        return self._n_moves > _MOVES_TO_REBUILD * len(self.objects)
-
     def _build(self) -> None:
-        self._known_change, self._n_moves, self._shapes = latest_change[0], 0, None
+        self._known_change, self._shapes = latest_change[0], None
         self._corners = np.array([obj._geometry._corners for obj in self.objects])
         self.X_W = _poses(self.objects)
         self._tree = _Tree(boxes_of_objects(self._corners, self.X_W))
@@ -104,7 +100,6 @@ class ObjectTree:
             self._rows_of.setdefault(obj, []).append(row)
 
     def _refit(self, tree: _Tree) -> None:
-        self._n_moves += len(self._moved)
         if len(self._moved) == len(self._rows_of) == len(self.objects):
             self.X_W = _poses(self.objects)
             tree.refit(boxes_of_objects(self._corners, self.X_W))
@@ -124,7 +119,7 @@ class ObjectTree:
     def pairs(self, against: ObjectTree | None = None) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows whose boxes meet: i < j of this tree, or i of this one and j of that.
 
-        Changes of objects between two blocks have no say in the second: what is asked is how things stood.
+        Objects that move between two blocks may or may not be found where they went; no pair comes twice.
         """
         tree = self.refresh()
         if against is None:
@@ -142,15 +137,14 @@ class ObjectTree:
             there.
         """
         tree = self.refresh()
-        guests: _Guests | None = None
-        if isinstance(against, ObjectTree):
-            theirs = against.refresh()
-            if theirs is None:
-                return iter(())
-            guests = theirs.as_guests()
-        elif against is not None:
-            guests = _guests_of(box_of(against)[None])
-        return iter(()) if tree is None else _near_first(tree, guests, least)
+        if tree is None:
+            return iter(())
+        if isinstance(against, HostObject):
+            return _near_one(tree, box_of(against), least)
+        theirs = None if against is None else against.refresh()
+        if against is not None and theirs is None:
+            return iter(())
+        return _near_first(tree, None if theirs is None else theirs.as_guests(), least)
 
     # --- batches --------------------------------------------------------------------------------
 
@@ -203,9 +197,17 @@ class _Tree(BoxTree):
         super().__init__(boxes)
         self._zeros = np.zeros(len(boxes), dtype=np.int64)
         self._ones = self._zeros + 1
-        self._bounded = np.isfinite(boxes).all(axis=1)
-        #: Of single boxes: arguments of the kernel that stay, and room for what it finds.
+        self._is_bounded = np.isfinite(boxes).all(axis=1)
         self._hits = np.empty((64, 2), dtype=np.int64)
+        self._keep_addresses()
+
+    def refit(self, boxes: np.ndarray) -> None:
+        """As of `BoxTree`, which may sort anew."""
+        super().refit(boxes)
+        self._keep_addresses()
+
+    def _keep_addresses(self) -> None:
+        """Of single boxes: arguments of the kernel that stay, and room for what it finds."""
         self._fixed = (
             address_of(self.nodes), self.leaves, address_of(self.order), len(self.order), 0.0, False,
             address_of(self._zeros), address_of(self._ones), address_of(self._ones), address_of(self._hits), 64,
@@ -226,16 +228,16 @@ class _Tree(BoxTree):
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""
         n = len(self.boxes)
+        is_first = np.zeros(n, dtype=bool)
+        is_first[self.order[:_FIRST_LEAVES]] = True
         first = _sorted_pairs(self._meeting(self.boxes[self.order[:_FIRST_LEAVES]], margin, True), n)
         if len(first):
             yield first
         if len(self.unbounded):
             yield _all_with(self.unbounded, n)
         if len(self.order) > _FIRST_LEAVES:
-            is_first = np.zeros(n, dtype=bool)
-            is_first[self.order[:_FIRST_LEAVES]] = True
             hits = self._meeting(self.boxes[self.order], margin, True)
-            hits = hits[~is_first[hits[:, 0]]]  # the earlier leaf is named first
+            hits = hits[~is_first[hits].any(axis=1)]
             if len(hits):
                 yield _sorted_pairs(hits, n)
 
@@ -249,11 +251,11 @@ class _Tree(BoxTree):
                 if len(hits):
                     yield _sorted_keys(hits[:, 1] * n + some[hits[:, 0]], n)
         if len(self.unbounded) or len(which) < n:
-            yield np.argwhere(~(self._bounded[:, None] & guests.is_bounded[None, :]))
+            yield np.argwhere(~(self._is_bounded[:, None] & guests.is_bounded[None, :]))
 
     def as_guests(self) -> _Guests:
         """These boxes, to be compared with another tree's."""
-        return _Guests(self.boxes, self._bounded, *self.nodes[1].reshape(2, 3))
+        return _Guests(self.boxes, self._is_bounded, *self.nodes[1].reshape(2, 3))
 
     def near_gap(self, guests: _Guests | None) -> float:
         """A margin within which there is a pair, if there is one at all: of boxes at leaves side by side, or of a guest
@@ -265,10 +267,14 @@ class _Tree(BoxTree):
         bounded = guests.boxes[guests.is_bounded]
         if not len(bounded) or not len(self.order):
             return np.inf
+        return float(_gaps(self.boxes[self.nearest_to(0.5 * (bounded[0, :3] + bounded[0, 3:]))], bounded[0]))
+
+    def nearest_to(self, point: np.ndarray) -> int:
+        """The row of a bounded box, of which there is one, that is nearest to a point (3,)."""
         question = np.zeros((1, SWEEP))
-        question[0, :3], question[0, 9] = 0.5 * (bounded[0, :3] + bounded[0, 3:]), np.inf
+        question[0, :3], question[0, 9] = point, np.inf
         rows = bodies_ahead(self, question, of_points=True)[0][:, 1]
-        return float(_gaps(self.boxes[rows[self._bounded[rows]][0]], bounded[0]))
+        return int(rows[self._is_bounded[rows]][0])
 
 
 class _Guests(NamedTuple):
@@ -280,20 +286,57 @@ class _Guests(NamedTuple):
     high: np.ndarray
 
 
-def _guests_of(boxes: np.ndarray) -> _Guests:
-    """One box (1, 6)."""
-    is_bounded = np.isfinite(boxes).all(axis=1)
-    around = boxes[0] if is_bounded[0] else np.repeat([np.inf, -np.inf], 3)
-    return _Guests(boxes, is_bounded, around[:3], around[3:])
+def _near_one(
+    tree: _Tree, box: np.ndarray, least: list[float]
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Blocks of pairs with one box: those that meet it, else the one nearest its middle; then all within the least."""
+    if len(tree.boxes) <= _MAX_SORTED // 8:
+        yield from _all_by_gap(tree.boxes, box[None])
+        return
+    rows = np.array(tree.touching_one(box), dtype=np.int64)
+    if len(rows):
+        yield np.zeros(len(rows)), _with_zero(rows)
+    if least[0] <= 0.0 or not np.isfinite(box).all():
+        return
+    done = rows
+    if not len(rows):  # then all boxes are bounded
+        done = np.array([tree.nearest_to(0.5 * (box[:3] + box[3:]))])
+        yield _gaps(tree.boxes[done], box), _with_zero(done)
+    slack = _ROUNDING * float(np.abs(box).max() + min(least[0], 1e300))
+    rows = tree.touching(box, least[0] + slack)
+    rows = rows[~np.isin(rows, done)]
+    gaps = _gaps(tree.boxes[rows], box)
+    order = np.argsort(gaps, kind="stable")
+    if len(rows):
+        yield gaps[order], _with_zero(rows[order])
+
+
+def _all_by_gap(boxes: np.ndarray, guests: np.ndarray | None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """All pairs in one block, of boxes with guests or among themselves: sooner than a tree where they are few."""
+    gaps = _gaps(boxes[:, None], (boxes if guests is None else guests)[None])
+    if guests is None:
+        gaps[np.tri(len(boxes), dtype=bool)] = np.inf
+    flat = gaps.ravel()
+    order = np.argsort(flat, kind="stable")
+    order = order[: int(np.isfinite(flat).sum())]
+    if len(order):
+        yield flat[order], np.stack(np.divmod(order, gaps.shape[1]), axis=1)
+
+
+def _with_zero(rows: np.ndarray) -> np.ndarray:
+    return np.stack([rows, np.zeros_like(rows)], axis=1)
 
 
 def _near_first(
     tree: _Tree, guests: _Guests | None, least: list[float]
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks of pairs by their gaps: those whose boxes meet, then those within a margin, twice of that, and so on up to
-    the least.
+    """Blocks of pairs by their gaps: those whose boxes meet, those within a margin, within four times that, and so on
+    up to the least.
     """
     theirs = tree.as_guests() if guests is None else guests
+    if len(tree.boxes) * len(theirs.boxes) <= _MAX_SORTED:
+        yield from _all_by_gap(tree.boxes, None if guests is None else guests.boxes)
+        return
     low, high = np.minimum(tree.nodes[1, :3], theirs.low), np.maximum(tree.nodes[1, 3:], theirs.high)
     extent = float(np.linalg.norm(high - low)) if (low <= high).all() else 0.0
     slack = _ROUNDING * float(np.abs([low, high]).max()) if extent else 0.0
@@ -311,9 +354,7 @@ def _near_first(
                 return
         if margin >= extent or margin >= least[0]:
             return
-        wider = 2.0 * margin or min(tree.near_gap(guests), least[0]) * (1.0 + 4 * _ROUNDING)
-        if least[0] < np.inf and len(theirs.boxes) == 1:  # all at once: they are not many
-            wider = least[0]
+        wider = 4.0 * margin or min(tree.near_gap(guests), least[0]) * (1.0 + 4 * _ROUNDING)
         done, margin = margin, min(least[0], extent, max(wider, 1e-3 * extent))
 
 

@@ -26,7 +26,7 @@ from collide.adapters.hosts.pinocchio_pairs import (
     meet,
     shapes_of,
 )
-from collide.errors import InvalidArgument, MissingExtra
+from collide.errors import InvalidArgument, MissingExtra, UnsupportedQuery
 
 #: How many pairs are asked together where the first collision ends it.
 _BLOCK = 64
@@ -247,6 +247,11 @@ def _pinocchio():
         import pinocchio
     except ImportError:
         raise MissingExtra("pin", extra="pinocchio", purpose="ask the pairs of a Pinocchio model") from None
+    if hasattr(pinocchio, "coal") and pinocchio.coal.__name__.startswith("collide."):
+        raise UnsupportedQuery(
+            "Pinocchio was imported while coal_api stood in for coal, and has no geometries without coal's own: import "
+            "pinocchio before coal_api.install(), in a new process"
+        )
     return pinocchio
 
 

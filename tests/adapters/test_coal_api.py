@@ -548,6 +548,21 @@ class Finder(coal.CollisionCallBackBase):
         return False
 
 
+class Near(coal.CollisionCallBackDefault):
+    """All pairs that come within a margin: the default callback, told never to end."""
+
+    def __init__(self, margin):
+        super().__init__()
+        self.data.request.security_margin = margin
+        self.pairs = set()
+
+    def collide(self, o1, o2):
+        self.data.clear()
+        if super().collide(o1, o2):
+            self.pairs.add(frozenset((id(o1), id(o2))))
+        return False
+
+
 @pytest.mark.parametrize("kind", ["DynamicAABBTreeCollisionManager", "SSaPCollisionManager", "NaiveCollisionManager"])
 def test_managers_find_all_pairs(kind):
     objects, guests = scattered(60, 1), scattered(25, 2)
@@ -576,6 +591,19 @@ def test_managers_find_all_pairs(kind):
     found = {frozenset((id(c.o1), id(c.o2))) for c in callback.data.result.getContacts()}
     geometries = {frozenset((id(a._geometry), id(b._geometry))) for a, b in itertools.combinations(objects, 2)}
     assert callback.data.result.numContacts() >= len(expected) and found <= geometries
+    for margin in (0.0, 0.25):
+        callback.data.request.security_margin, callback.data.request.num_max_contacts = margin, 1
+        lists = [(manager.collide, itertools.combinations(objects, 2)),
+                 (lambda cb: manager.collide(guests[1], cb), ((a, guests[1]) for a in objects)),
+                 (lambda cb: manager.collide(guest_manager, cb), itertools.product(objects, guests))]  # fmt: skip
+        for ask, pairs in lists:
+            near = Near(margin)
+            ask(near)
+            wanted = {
+                frozenset((id(a), id(b))) for a, b in pairs
+                if measured(a._geometry, a.getTransform(), b._geometry, b.getTransform()).min_distance <= margin
+            }  # fmt: skip
+            assert near.pairs == wanted
     collected = coal.CollisionCallBackCollect(10)
     manager.collide(collected)
     pairs = collected.getCollisionPairs()

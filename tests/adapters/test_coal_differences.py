@@ -68,6 +68,12 @@ ROWS = {
         "for o in objects: m.registerObject(o)\nm.setup()\ncb = coal.DistanceCallBackDefault()\n"
         "m.distance(cb)\nanswer = cb.data.result.min_distance", 9.0, 1.0,
     ),
+    "managers and margins": Row(
+        "m = coal.NaiveCollisionManager()\nball = coal.Sphere(0.5)\n"
+        "objects = [coal.CollisionObject(ball, at(k)) for k in (0, 1.1)]\n"
+        "for o in objects: m.registerObject(o)\nm.setup()\ncb = coal.CollisionCallBackDefault()\n"
+        "cb.data.request.security_margin = 0.2\nm.collide(cb)\nanswer = cb.data.result.numContacts()", 0, 1,
+    ),
     "facets of a mesh that comes second": Row(
         "r = distance(coal.Sphere(0.5), at(2.0, 0.1, 0.2), mesh(), at())\nanswer = [r.b1, r.b2]", [3, -1], [-1, 3],
     ),

@@ -81,7 +81,7 @@ def test_sides_are_exact():
     """Whether they meet, and how far apart they are, as fractions have it."""
     rng = np.random.default_rng(22)
     n_hits = n_apart = n_touching = n_both_sides = 0
-    for k in range(600):
+    for k in range(450):
         plane, body, cells = random_case(rng, k)
         case = f"random_case(default_rng(22), …) number {k}"
         heights = [exact_heights(plane, body, cell) for cell in cells]
@@ -106,8 +106,8 @@ def test_sides_are_exact():
         n_both_sides += len({h[0] > 0 for h in heights}) == 2
         assert math.isclose(gap, min(abs(h) for cell in heights for h in cell), abs_tol=1e-12), case
         assert math.isclose(np.linalg.norm(on_body - on_plane), gap, abs_tol=1e-9), case
-    assert n_hits > 150 and n_apart > 100, (n_hits, n_apart)
-    assert n_touching > 20 and n_both_sides > 20, (n_touching, n_both_sides)
+    assert n_hits > 120 and n_apart > 80, (n_hits, n_apart)
+    assert n_touching > 20 and n_both_sides > 15, (n_touching, n_both_sides)
 
 
 def test_moving_planes_stop_at_the_nearer_side():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import subprocess
 import sys
 from pathlib import Path
 
@@ -283,3 +284,18 @@ def test_joints_that_are_not_numbers():
     q = np.full(arm.nq, np.nan)
     with pytest.raises(InvalidArgument, match="finite"):
         host.compute_collisions(arm, arm.createData(), geom_model, geom_model.createData(), q)
+
+
+def test_pinocchio_needs_coals_own():
+    code = """
+import coal  # without it Pinocchio itself cannot be imported there
+from collide.adapters.hosts import coal_api, pinocchio as host
+with coal_api.install():
+    import pinocchio
+try:
+    host.check()
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert "UnsupportedQuery Pinocchio was imported while coal_api stood in" in done.stdout, done.stderr

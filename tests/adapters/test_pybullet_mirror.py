@@ -6,8 +6,10 @@ where its definition is the same; rays by closed forms. Skipped where pybullet i
 
 from __future__ import annotations
 
+import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,6 +195,24 @@ def test_links_stand_where_their_colliders_do_also_in_motion(client):
         ours = mirror.getClosestPoints(arm, probe, 9.0)
         assert [row[:5] for row in ours] == [row[:5] for row in theirs] and len(ours) == 8
         assert max(abs(a[8] - b[8]) for a, b in zip(ours, theirs)) < 1e-9
+
+
+def test_two_bodies_alone_are_followed_as_all_are(client):
+    """Also a body whose base has no shape, and links that have none."""
+    random = np.random.default_rng(12)
+    stand_in = attach(p, client)
+    car = p.loadURDF(f"{DATA}/racecar/racecar.urdf", physicsClientId=client)
+    arm = p.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", [1, 0, 0], physicsClientId=client)
+    ball = sphere_of(client, 0.1, (0, 0, 0))
+    bodies = (car, arm, ball)
+    for _ in range(12):
+        for moved in bodies:
+            p.resetBasePositionAndOrientation(moved, random.normal(size=3).tolist(), quaternion(random), client)
+            for joint in range(p.getNumJoints(moved, client)):
+                p.resetJointState(moved, joint, random.uniform(-1, 1), physicsClientId=client)
+        a, b = (bodies[k] for k in random.choice(3, 2, replace=False))
+        ours = stand_in.getClosestPoints(a, b, 9.0)
+        assert len(ours) > 2 and ours == Mirror(client).getClosestPoints(a, b, 9.0)
 
 
 def test_steps_have_the_same_bits_with_a_mirror():
@@ -529,6 +549,55 @@ def test_import_finds_ours_between_install_and_uninstall():
     pybullet_mirror.uninstall()
     with pytest.raises(InvalidArgument, match="questions are among"):
         attach(held, questions=("stepSimulation",))
+
+
+def test_marks_are_not_among_the_user_data_of_a_program(client):
+    stand_in = attach(p, client)
+    ball = sphere_of(client, 0.1, (0, 0, 0))
+    first = stand_in.addUserData(ball, "colour", "red")
+    stand_in.mirror_of()
+    second = stand_in.addUserData(ball, "weight", "5")
+    assert p.getNumUserData(ball, client) == 3 and stand_in.getNumUserData(ball) == 2
+    infos = [stand_in.getUserDataInfo(ball, k) for k in range(2)]
+    assert sorted(infos) == [(first, b"colour", ball, -1, -1), (second, b"weight", ball, -1, -1)]
+    with pytest.raises(p.error):
+        stand_in.getUserDataInfo(ball, 2)
+
+
+def test_an_example_of_pybullets_own_runs_as_it_is(tmp_path):
+    """Without its window, and not for ever."""
+    source = (Path(pybullet_data.getDataPath()).parent / "pybullet_examples" / "getClosestPoints.py").read_text()
+    changes = {"p.connect(p.GUI)": "p.connect(p.DIRECT)", "while (p.isConnected()):": "for step in range(30):"}
+    for before, after in changes.items():
+        assert source.count(before) == 1
+        source = source.replace(before, after)
+    source = source.replace("    distance = pts[0][8]\n", "    distance = pts[0][8]\n    rows.append(pts)\n")
+    script = tmp_path / "example.py"
+    script.write_text(f"rows = []\n{source}\np.disconnect()\n")
+    answers = [runpy.run_path(str(script))["rows"]]
+    with pytest.warns(RuntimeWarning, match="hold pybullet already"):
+        context = pybullet_mirror.install()
+    with context:
+        answers.append(runpy.run_path(str(script))["rows"])
+    assert len(answers[0]) == len(answers[1]) == 30
+    for (theirs,), (row,) in zip(*answers):
+        assert row[:5] == theirs[:5] and abs(row[8] - theirs[8]) < 1e-3 and np.allclose(row[7], theirs[7], atol=1e-2)
+
+
+def test_a_bullet_client_is_attached_by_its_number(client):
+    from pybullet_utils.bullet_client import BulletClient
+
+    wrapped = BulletClient(p.DIRECT)  # closes itself, and its number is not told otherwise
+    number = wrapped._client
+    assert number != client  # calls that said nothing would be about the other one
+    q = attach(wrapped, number)
+    for x in (0, 3):
+        ball = q.createMultiBody(1, q.createCollisionShape(q.GEOM_MESH, vertices=CORNERS), basePosition=[x, 0, 0])
+    assert abs(q.getClosestPoints(0, ball, 9.0)[0][8] - 2.0) < 1e-12
+    assert q.rayTest([3, 0, 5], [3, 0, -5])[0][0] == ball and p.getNumBodies(client) == 0
+    q.resetSimulation()
+    assert len(q.mirror_of().world) == 0
+    q.disconnect()
 
 
 # --- what goes wrong ----------------------------------------------------------------------------

@@ -133,8 +133,8 @@ def stepped(stepper: Stepper, seconds: float) -> list[Step]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_bodies_that_fall_on_bumps_stay_there(seed):
-    """A box and a tetrahedron, from above and askew: for two seconds they stay within a tenth of a millimetre, sink less
-    than half of one, and gain no energy. A patch has all the peaks that carry (`carrying_points.py`)."""
+    """A box and a tetrahedron, from above and askew: for two seconds they stay within a tenth of a millimetre, sink
+    less than half of one, and gain no energy. A patch has all the peaks that carry (`carrying_points.py`)."""
     stepper, size = Stepper(friction=0.6), np.array([0.3, 0.2, 0.1])
     stepper.add(bumpy_bowl(seed), EYE)
     inertia = (np.square(size).sum() - np.square(size)) / 12
