@@ -619,6 +619,19 @@ def test_links_that_cannot_be_read_are_told_and_never_taken_for_free(client):
     assert abs(given.getClosestPoints(ball, crate, 1.0)[0][8] - 0.4) < 1e-12
 
 
+def test_soft_bodies_and_those_of_maximal_coordinates_are_told_apart(client):
+    p.resetSimulation(p.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
+    cloth = p.loadSoftBody(f"{DATA}/cloth_z_up.obj", useMassSpring=1, useBendingSprings=1, physicsClientId=client)
+    number = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1, physicsClientId=client)
+    maximal = p.createMultiBody(1.0, number, useMaximalCoordinates=1, physicsClientId=client)
+    with pytest.warns(RuntimeWarning, match="is left out"):
+        mirror = Mirror(client)
+    assert "of a soft body" in mirror.remaining[cloth, -1]
+    assert "useMaximalCoordinates" in mirror.remaining[maximal, -1]
+    mirror.update()
+    assert len(mirror.world) == 0
+
+
 def test_bad_arguments_are_named(client):
     ball = sphere_of(client, 0.1, (0, 0, 0))
     mirror = Mirror(client)
