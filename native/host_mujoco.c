@@ -35,9 +35,20 @@ static struct {
     void (*error)(const char *, ...);
 } hook;
 
+/* What is read of a geom in every call, in one cache line. */
+struct geom {
+    double size[3], reach;
+    const int64_t *ints; /* rows of the tables; NULL of geoms that are left to MuJoCo */
+    const double *numbers;
+    int64_t row;
+    int32_t type, dataid;
+};
+
 static struct {
     const void *volatile model; /* NULL of a free place */
     struct collide_mujoco_model made;
+    struct geom *geoms;
+    void *held;
 } models[MAX_MODELS];
 static volatile int n_models; /* places used so far */
 
@@ -54,7 +65,7 @@ static struct slot {
 enum { AXES = 1 << 15, PAUSE = 7 };
 static volatile struct kept_axis {
     float direction[3]; /* 0 where none is known */
-    int32_t pause;      /* of culling: so many calls go to MuJoCo at once, whose bodies met when last asked about */
+    int32_t pause;      /* of bodies that met when last asked about: so many calls go by until another direction is tried */
 } kept_axes[AXES];
 
 static volatile struct kept_axis *kept_axis_of(const void *data, int g1, int g2)
@@ -86,21 +97,21 @@ static int type_of(const void *model, int geom)
 }
 
 /* Whether a geom is still what its row of the tables was made from; its mesh is looked at where that may be another one. */
-static int is_as_it_was(const struct collide_mujoco_model *made, const void *model, int geom, int look_at_mesh)
+static int is_as_it_was(const struct collide_mujoco_model *made, const struct geom *was, const void *model, int geom, int look_at_mesh)
 {
-    const double *size = (const double *)pointer_at(model, hook.layout.geom_size) + 3 * geom, *was = made->sizes + 3 * geom;
+    const double *size = (const double *)pointer_at(model, hook.layout.geom_size) + 3 * geom;
     int32_t dataid = ((const int32_t *)pointer_at(model, hook.layout.geom_dataid))[geom];
     const float *vertices;
-    if (type_of(model, geom) != made->types[geom] || dataid != made->dataids[geom]) return 0;
-    if (size[0] != was[0] || size[1] != was[1] || size[2] != was[2]) return 0;
-    if (!look_at_mesh || made->types[geom] != MESH || dataid < 0) return 1;
+    if (type_of(model, geom) != was->type || dataid != was->dataid) return 0;
+    if (size[0] != was->size[0] || size[1] != was->size[1] || size[2] != was->size[2]) return 0;
+    if (!look_at_mesh || was->type != MESH || dataid < 0) return 1;
     vertices = (const float *)pointer_at(model, hook.layout.mesh_vert) + 3 * (size_t)made->vertex_starts[dataid];
     return memcmp(vertices, made->vertices + 3 * (size_t)made->vertex_starts[dataid],
                   3 * sizeof(float) * (size_t)made->vertex_counts[dataid]) == 0;
 }
 
-/* What answers for two geoms; NULL where nothing does. *changed : 1 where the model is ours, and was changed since. */
-static const struct collide_mujoco_model *model_of(const void *model, int g1, int g2, int *changed)
+/* Number of the model that answers for two geoms; -1 where none does. *changed : 1 where the model is ours, and was changed since. */
+static int model_of(const void *model, int g1, int g2, int *changed)
 {
     uint64_t signature;
     int k;
@@ -108,17 +119,19 @@ static const struct collide_mujoco_model *model_of(const void *model, int g1, in
     for (k = n_models - 1; k >= 0; k--) /* of two that stand for one model the later */
         if (models[k].model == model) {
             const struct collide_mujoco_model *made = &models[k].made;
-            *changed = !is_as_it_was(made, model, g1, 0) || !is_as_it_was(made, model, g2, 0);
-            return made;
+            const struct geom *geoms = models[k].geoms;
+            *changed = !is_as_it_was(made, geoms + g1, model, g1, 0) || !is_as_it_was(made, geoms + g2, model, g2, 0);
+            return k;
         }
     memcpy(&signature, (const char *)model + hook.layout.signature, sizeof signature);
     for (k = n_models - 1; k >= 0; k--) {
         const struct collide_mujoco_model *made = &models[k].made;
+        const struct geom *geoms = models[k].geoms;
         if (models[k].model != NULL && made->signature == signature && g1 < made->n_geoms && g2 < made->n_geoms &&
-            is_as_it_was(made, model, g1, 1) && is_as_it_was(made, model, g2, 1))
-            return made;
+            is_as_it_was(made, geoms + g1, model, g1, 1) && is_as_it_was(made, geoms + g2, model, g2, 1))
+            return k;
     }
-    return NULL;
+    return -1;
 }
 
 /* --- workspaces ---------------------------------------------------------------------------------------------------- */
@@ -186,16 +199,59 @@ static int left_to_mujoco(const void *model, void *data, void *contacts, int g1,
     return call(model, data, contacts, g1, g2, margin);
 }
 
-/* Contacts into `out`; how many, or -1 where MuJoCo is to be asked; *status where neither will do. */
-static int answer(const struct collide_mujoco_model *made, const void *data, char *out, int g1, int g2, double margin,
-                  collide_status *status)
+/* The axis of either of two boxes along which they are farthest apart. The test of boxes leaves no direction of its own. */
+static void put_box_axis(const struct collide_mujoco_model *made, int64_t a, int64_t b, const double *X_WA, const double *X_WB,
+                         double axis[3])
 {
-    int64_t a = made->rows[g1], b = made->rows[g2], max_contacts = made->max_contacts[KINDS * made->types[g1] + made->types[g2]], n = 0, k;
+    double t[3], tried[3], widest = -INFINITE;
+    int k, j;
+    for (k = 0; k < 6; k++) {
+        const double *X = k < 3 ? X_WA : X_WB;
+        double sign, gap;
+        for (j = 0; j < 3; j++) tried[j] = X[4 * j + k % 3], t[j] = X_WB[4 * j + 3] - X_WA[4 * j + 3];
+        sign = tried[0] * t[0] + tried[1] * t[1] + tried[2] * t[2] < 0.0 ? -1.0 : 1.0;
+        for (j = 0; j < 3; j++) tried[j] *= sign;
+        gap = gap_along(made->ints + INTS * a, made->numbers + NUMBERS * a, X_WA, made->ints + INTS * b, made->numbers + NUMBERS * b,
+                        X_WB, tried);
+        if (gap > widest) {
+            widest = gap;
+            memcpy(axis, tried, sizeof tried);
+        }
+    }
+}
+
+/* Whether the direction that parted two geoms before parts them by more than `gap`; or, where they were apart or are new, that from
+   one to the other. */
+static int are_parted(volatile struct kept_axis *kept, const struct geom *A, const struct geom *B, const double *X_WA,
+                      const double *X_WB, double gap)
+{
+    double axis[3] = {kept->direction[0], kept->direction[1], kept->direction[2]}, length = 0.0;
+    int k;
+    if (gap_along(A->ints, A->numbers, X_WA, B->ints, B->numbers, X_WB, axis) > gap) return 1;
+    if (kept->pause > 0) {
+        kept->pause--;
+        return 0;
+    }
+    for (k = 0; k < 3; k++) {
+        axis[k] = X_WB[4 * k + 3] - X_WA[4 * k + 3];
+        length += axis[k] * axis[k];
+    }
+    if (!(length > 0.0)) return 0;
+    for (k = 0; k < 3; k++) axis[k] /= sqrt(length);
+    if (!(gap_along(A->ints, A->numbers, X_WA, B->ints, B->numbers, X_WB, axis) > gap)) return 0;
+    keep_axis(kept, axis);
+    return 1;
+}
+
+/* Contacts into `out`; how many, or -1 where MuJoCo is to be asked; *status where neither will do. */
+static int answer(const struct collide_mujoco_model *made, const struct geom *A, const struct geom *B,
+                  volatile struct kept_axis *kept, const void *data, char *out, int g1, int g2, double margin, collide_status *status)
+{
+    int64_t a = A->row, b = B->row, max_contacts = made->max_contacts[KINDS * A->type + B->type], n = 0, k;
     struct slot *slot;
-    volatile struct kept_axis *kept = kept_axis_of(data, g1, g2);
     double X_WA[16], X_WB[16], axis[3], asked = margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0;
     /* MuJoCo finds contacts of bodies that are a little farther apart than it allows: those are left to it. */
-    double slack = made->is_cull ? 1e-3 * (made->reaches[g1] + made->reaches[g2]) + 1e-5 : 0.0;
+    double slack = made->is_cull ? 1e-3 * (A->reach + B->reach) + 1e-5 : 0.0;
     int count = 0;
     if (made->is_cull && kept->pause > 0) {
         kept->pause--;
@@ -203,10 +259,7 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
     }
     put_pose(data, g1, X_WA);
     put_pose(data, g2, X_WB);
-    for (k = 0; k < 3; k++) axis[k] = kept->direction[k];
-    if (gap_along(made->ints + INTS * a, made->numbers + NUMBERS * a, X_WA, made->ints + INTS * b, made->numbers + NUMBERS * b,
-                  X_WB, axis) > asked + slack)
-        return 0;
+    if (are_parted(kept, A, B, X_WA, X_WB, asked + slack)) return 0;
     if ((slot = take_slot(made->largest)) == NULL) {
         *status = COLLIDE_NO_MEMORY;
         return -1;
@@ -222,7 +275,15 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
             *status = COLLIDE_OK;
             count = -1;
         }
-        keep_axis(kept, n == 0 && *status == COLLIDE_OK ? slot->space->rows->normal : NULL);
+        if (n == 0 && *status == COLLIDE_OK) {
+            memcpy(axis, slot->space->rows->normal, sizeof axis);
+            if (axis[0] == 0.0 && axis[1] == 0.0 && axis[2] == 0.0 && made->boxes[a] && made->boxes[b])
+                put_box_axis(made, a, b, X_WA, X_WB, axis);
+            keep_axis(kept, axis);
+        } else {
+            keep_axis(kept, NULL);
+            kept->pause = PAUSE;
+        }
         for (k = 0; k < n; k++)
             if (slot->rows[k].distance <= margin) put_contact(&slot->rows[k], out + hook.layout.contact_size * count++);
     }
@@ -233,15 +294,18 @@ static int answer(const struct collide_mujoco_model *made, const void *data, cha
 static int contacts_of_geoms(const void *model, void *data, void *contacts, int g1, int g2, double margin)
 {
     collide_status status = COLLIDE_OK;
-    int changed, count;
-    const struct collide_mujoco_model *made = model_of(model, g1, g2, &changed);
+    int changed, count, number = model_of(model, g1, g2, &changed);
+    const struct geom *A = number < 0 ? NULL : models[number].geoms + g1, *B = number < 0 ? NULL : models[number].geoms + g2;
     if (changed) {
         hook.error("collide: geom %d or %d is not what it was when install() looked at the model (kind, size or mesh): call "
                    "refresh() of what install() returned", g1, g2);
         return 0;
     }
-    if (made == NULL || made->rows[g1] < 0 || made->rows[g2] < 0) return left_to_mujoco(model, data, contacts, g1, g2, margin);
-    count = answer(made, data, contacts, g1, g2, margin, &status);
+    /* Culling wins nothing where MuJoCo has a formula for two kinds: others share its search with meshes. */
+    if (number < 0 || A->ints == NULL || B->ints == NULL ||
+        (models[number].made.is_cull && hook.before[KINDS * A->type + B->type] != hook.before[KINDS * MESH + MESH]))
+        return left_to_mujoco(model, data, contacts, g1, g2, margin);
+    count = answer(&models[number].made, A, B, kept_axis_of(data, g1, g2), data, contacts, g1, g2, margin, &status);
     if (status != COLLIDE_OK) {
         hook.error("collide: contacts of geoms %d and %d: %s", g1, g2, collide_status_text(status));
         return 0;
@@ -292,6 +356,24 @@ void collide_mujoco_unhook(void)
     free_slots();
 }
 
+/* A line for every geom of a model; NULL where there is no memory. */
+static struct geom *lines_of(const struct collide_mujoco_model *made, void **held)
+{
+    struct geom *geoms = cache_lines((size_t)(made->n_geoms + 1) * sizeof *geoms, held);
+    int64_t k;
+    for (k = 0; geoms != NULL && k < made->n_geoms; k++) {
+        int64_t row = made->rows[k];
+        memcpy(geoms[k].size, made->sizes + 3 * k, sizeof geoms[k].size);
+        geoms[k].reach = made->reaches[k];
+        geoms[k].row = row;
+        geoms[k].ints = row < 0 ? NULL : made->ints + INTS * row;
+        geoms[k].numbers = row < 0 ? NULL : made->numbers + NUMBERS * row;
+        geoms[k].type = made->types[k];
+        geoms[k].dataid = made->dataids[k];
+    }
+    return geoms;
+}
+
 int collide_mujoco_add(const struct collide_mujoco_model *model)
 {
     int k;
@@ -300,6 +382,7 @@ int collide_mujoco_add(const struct collide_mujoco_model *model)
         return -2;
     for (k = 0; k < MAX_MODELS && models[k].model != NULL; k++) {}
     if (k == MAX_MODELS) return -1;
+    if ((models[k].geoms = lines_of(model, &models[k].held)) == NULL) return -3;
     models[k].made = *model;
     PUBLISH();
     models[k].model = model->model;
@@ -309,7 +392,9 @@ int collide_mujoco_add(const struct collide_mujoco_model *model)
 
 void collide_mujoco_remove(int number)
 {
-    if (number < 0 || number >= MAX_MODELS) return;
+    if (number < 0 || number >= MAX_MODELS || models[number].model == NULL) return;
     models[number].model = NULL;
+    free(models[number].held);
+    models[number].held = models[number].geoms = NULL;
     while (n_models > 0 && models[n_models - 1].model == NULL) n_models--;
 }

@@ -46,7 +46,8 @@ COLLIDE_EXPORT void collide_mujoco_unhook(void);
 /* How many functions of the table are ours. */
 COLLIDE_EXPORT int collide_mujoco_hooked(void);
 
-/* Have a model answered; its number, -1 where there are too many, -2 where the layouts of Python and C differ. */
+/* Have a model answered; its number, -1 where there are too many, -2 where the layouts of Python and C differ, -3 where there is
+   no memory. */
 COLLIDE_EXPORT int collide_mujoco_add(const struct collide_mujoco_model *model);
 COLLIDE_EXPORT void collide_mujoco_remove(int number);
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.shapes import Shape
 
 _serial = itertools.count()
+#: How the keys of marks begin.
+MARK = "collide mirror"
 #: Link number of a body's base.
 BASE = -1
 
@@ -48,15 +50,15 @@ class ClientBodies:
         self._reader = ShapeReader(pybullet, client, margins)
         #: Shapes of links, in the frames of their centres of mass, for those that pybullet does not give back.
         self.spare_shapes: dict[int, dict[int, Shape]] = {}
-        self._key = f"collide mirror {os.getpid()} {next(_serial)}"
+        self._key = f"{MARK} {os.getpid()} {next(_serial)}"
         self._bodies: list[int] = []
         self._marks: list[int] = []
+        self._mark_of: dict[int, int] = {}
         self._geoms_of: dict[int, list[Geom]] = {}
-        self._named: set[str] = set()
         self.geoms: list[Geom] = []
         self.remaining: dict[tuple[int, int], str] = {}
         self._bases: list[int] = []
-        self._links: list[tuple[int, list[int]]] = []
+        self._links: dict[int, list[int]] = {}
 
     def listed_anew(self) -> bool:
         """Look at the list of bodies; True where it changed. About 0.15 µs a body."""
@@ -75,6 +77,7 @@ class ClientBodies:
                 if mark < 0:
                     p.addUserData(body, self._key, "followed", physicsClientId=client)
         self._bodies, self._marks = bodies, self._marks_of(bodies)
+        self._mark_of = dict(zip(self._bodies, self._marks))
         self._geoms_of = {body: self._geoms_of[body] for body in bodies}
         for body in set(known) - set(bodies):
             self.spare_shapes.pop(body, None)
@@ -84,7 +87,7 @@ class ClientBodies:
 
     def has(self, body: int) -> bool:
         """Whether a body is there, and is the one that was listed."""
-        return body in self._geoms_of and self._mark(body) == self._marks[self._bodies.index(body)]
+        return body in self._geoms_of and self._mark(body) == self._mark_of[body]
 
     def knows(self, body: int) -> bool:
         """Whether a body was there when the list was looked at."""
@@ -95,28 +98,42 @@ class ClientBodies:
         for place in [place for place in self.remaining if body is None or place[0] == body]:
             del self.remaining[place]
         self._marks = [-2 if body in (None, b) else mark for b, mark in zip(self._bodies, self._marks)]
+        self._mark_of = dict(zip(self._bodies, self._marks))
 
     def replace(self, body: int, link: int, shape: Shape) -> None:
         """Take a shape for a link, whatever pybullet says."""
         self._shapes[body, link] = shape
         self.forget(body)
 
-    def coordinates(self, bodies: tuple[int, ...] | None = None) -> np.ndarray:
-        """(n, 7) position and quaternion x, y, z, w of every geom's collider, in W; or of those of some bodies."""
-        p, client = self._pybullet, self._client
-        numbers: list[float] = []
-        get = p.getBasePositionAndOrientation
-        for body in self._bases if bodies is None else [b for b in self._bases if b in bodies]:
+    def coordinates(self) -> np.ndarray:
+        """(n, 7) position and quaternion x, y, z, w of every geom's collider, in W."""
+        client, get, numbers = self._client, self._pybullet.getBasePositionAndOrientation, list[float]()
+        for body in self._bases:
             position, orientation = get(body, client)
             numbers += position
             numbers += orientation
-        for body, links in self._links:
-            if bodies is None or body in bodies:
-                # Without the last 1 links stand where they were a step ago; their colliders do not.
-                for state in p.getLinkStates(body, links, 0, 1, client):
-                    numbers += state[0]
-                    numbers += state[1]
+        for body, links in self._links.items():
+            self._add_links(numbers, body, links)
         return np.array(numbers).reshape(-1, 7)
+
+    def coordinates_of_bodies(self, bodies: Iterable[int]) -> np.ndarray:
+        """The same of some bodies, one after another: the base, then links, where they collide."""
+        numbers: list[float] = []
+        for body in bodies:
+            geoms = self._geoms_of[body]
+            if geoms and geoms[0].link == BASE:
+                position, orientation = self._pybullet.getBasePositionAndOrientation(body, self._client)
+                numbers += position
+                numbers += orientation
+            if body in self._links:
+                self._add_links(numbers, body, self._links[body])
+        return np.array(numbers).reshape(-1, 7)
+
+    def _add_links(self, numbers: list[float], body: int, links: list[int]) -> None:
+        # Without the last 1 links stand where they were a step ago; their colliders do not.
+        for state in self._pybullet.getLinkStates(body, links, 0, 1, self._client):
+            numbers += state[0]
+            numbers += state[1]
 
     def coordinates_of(self, body: int, link: int) -> tuple:
         """Position and quaternion of one link's centre of mass, in W."""
@@ -186,7 +203,7 @@ class ClientBodies:
         links: dict[int, list[int]] = {}
         for geom in self.geoms[len(bases) :]:
             links.setdefault(geom.body, []).append(geom.link)
-        self._links = list(links.items())
+        self._links = links
 
 
 def _chain(parent_of: dict[int, int], link: int) -> tuple[int, ...]:

@@ -115,7 +115,7 @@ class Mirror:
             return
         members = set(bodies)
         rows = [row for body in members for row in self._tables.rows_of.get(body, [])]
-        self._move(np.array(sorted(rows), dtype=np.int64), self._bodies.coordinates(tuple(members)))
+        self._move(np.array(rows, dtype=np.int64), self._bodies.coordinates_of_bodies(members))
 
     def refresh(self, body: int | None = None) -> None:
         """Read shapes anew, of one body or all: after changeDynamics of a margin, or resetMeshData."""
@@ -201,16 +201,16 @@ class Mirror:
         for body in (bodyA, bodyB):
             if body >= 0:
                 self._rows(body, EVERY_LINK)
+        wanted = bodyA, bodyB, linkIndexA, linkIndexB
+        if wanted == (-1, -1, EVERY_LINK, EVERY_LINK):
+            return tuple(self._contacts)
         rows = []
         for row in self._contacts:
-            for candidate in (row, exchanged(row)):
-                wanted = (bodyA, bodyB, linkIndexA, linkIndexB)
-                if all(
-                    want == value or (want < 0 if k < 2 else want == EVERY_LINK)
-                    for k, (want, value) in enumerate(zip(wanted, candidate[1:5]))
-                ):
-                    rows.append(candidate)
-                    break
+            _, a, b, link_a, link_b, *_ = row
+            if _matches(wanted, (a, b, link_a, link_b)):
+                rows.append(row)
+            elif _matches(wanted, (b, a, link_b, link_a)):
+                rows.append(exchanged(row))
         return tuple(rows)
 
     def getOverlappingObjects(self, aabbMin, aabbMax, physicsClientId=None):
@@ -322,6 +322,14 @@ def genuine_pybullet() -> Any:
             "pybullet", extra="pybullet", purpose="follow its bodies (wheels up to Python 3.11)"
         ) from error
     return getattr(module, "__wrapped__", module)
+
+
+def _matches(wanted: tuple, places: tuple) -> bool:
+    """Whether bodies and links are those asked for; negative bodies, and every link, are any."""
+    return (
+        (wanted[0] < 0 or wanted[0] == places[0]) and (wanted[1] < 0 or wanted[1] == places[1])
+        and wanted[2] in (EVERY_LINK, places[2]) and wanted[3] in (EVERY_LINK, places[3])
+    )  # fmt: skip
 
 
 def _vectors(name: str, values) -> np.ndarray:

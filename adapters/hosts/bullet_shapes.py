@@ -21,6 +21,8 @@ from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspa
 DEFAULT_MARGIN = 0.001
 #: The name pybullet gives to what was made from arrays.
 NO_FILE = "unknown_file"
+#: What getDynamicsInfo calls the type of a soft body.
+_SOFT = 3
 #: A collider without shapes has a box of at most so much, by its margin [m].
 _EMPTY = 4.0 * DEFAULT_MARGIN
 #: Lengths of file vertices and of Bullet's differ by its grid and by single precision: this part of the size.
@@ -100,9 +102,9 @@ class ShapeReader:
         try:
             rows = self._pybullet.getCollisionShapeData(body, link, self._client)
         except self._pybullet.error:
-            raise UnsupportedQuery(
-                "pybullet does not give back shapes of bodies made with useMaximalCoordinates"
-            ) from None
+            info = self._pybullet.getDynamicsInfo(body, link, self._client)
+            what = "a soft body" if info[10] == _SOFT else "a body made with useMaximalCoordinates"
+            raise UnsupportedQuery(f"pybullet does not give back the shape of {what}") from None
         # Ids of the second and later rows are memory as it was found: they are not looked at.
         return [
             _Record(k, row[2], row[3], row[4].decode(errors="replace"), pose_of(row[5], row[6]))

@@ -124,13 +124,15 @@ class Installed:
         try:
             for made in tables:
                 number = library.collide_mujoco_add(ctypes.byref(made.made))
+                if number == -3:
+                    raise MemoryError("install: no memory for another model")
                 if number < 0:
                     raise UnsupportedQuery(
                         "install: too many models; at most 256 at a time" if number == -1
                         else "install: libcollide and the Python package differ; install collide-robotics again"
                     )  # fmt: skip
                 self._numbers.append(number)
-        except UnsupportedQuery:
+        except (UnsupportedQuery, MemoryError):
             self._remove()
             if not _installed:
                 library.collide_mujoco_unhook()

@@ -27,6 +27,7 @@ from collide.adapters.hosts.bullet_arguments import (
     named,
     shape_of_arguments,
 )
+from collide.adapters.hosts.bullet_bodies import MARK
 from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybullet
 from collide.errors import CollideError, InvalidArgument
 from collide.shapes import Shape
@@ -155,6 +156,7 @@ class _StandIn(ModuleType):
             setattr(self, name, self._answering(name))
         for name in ("connect", *_CLIENT_AT):
             setattr(self, name, self._watching(name))
+        self.getNumUserData, self.getUserDataInfo = self._n_user_data, self._user_data_info
 
     def __getattr__(self, name: str):
         return getattr(self.__wrapped__, name)
@@ -205,12 +207,11 @@ class _StandIn(ModuleType):
         return answer
 
     def _watching(self, name: str) -> Callable:
-        genuine = getattr(self.__wrapped__, name)
         note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
 
-        @functools.wraps(genuine)
         def watched(*values, **keywords):
-            result = genuine(*values, **keywords)
+            # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
+            result = getattr(self.__wrapped__, name)(*values, **keywords)
             place = _CLIENT_AT.get(name, 0)
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             if name == "connect":
@@ -219,7 +220,27 @@ class _StandIn(ModuleType):
                 note(self._client if client is None else client, values, keywords, result)
             return result
 
+        watched.__name__ = watched.__qualname__ = name
         return watched
+
+    # --- user data without the marks of mirrors -------------------------------------------------
+
+    def _n_user_data(self, bodyUniqueId, physicsClientId=None) -> int:
+        return len(self._user_data(bodyUniqueId, physicsClientId))
+
+    def _user_data_info(self, bodyUniqueId, userDataIndex, physicsClientId=None) -> tuple:
+        client = self._number(physicsClientId)
+        places = self._user_data(bodyUniqueId, physicsClientId)
+        if not 0 <= userDataIndex < len(places):
+            places, userDataIndex = [-1], 0  # pybullet says what is wrong
+        return self.__wrapped__.getUserDataInfo(bodyUniqueId, places[userDataIndex], physicsClientId=client)
+
+    def _user_data(self, body: int, client: int | None) -> list[int]:
+        """Places in pybullet's list of those that the program has made."""
+        p, client = self.__wrapped__, self._number(client)
+        places = range(p.getNumUserData(body, physicsClientId=client))
+        marked = MARK.encode()
+        return [k for k in places if not p.getUserDataInfo(body, k, physicsClientId=client)[1].startswith(marked)]
 
     # --- what passes ----------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ class BoxTree:
         self.unbounded, self._bounded = np.flatnonzero(~finite), np.flatnonzero(finite)
         self.leaves = 1 << max(0, (len(self._bounded) - 1).bit_length())
         self.nodes = np.empty((2 * self.leaves, 6))
+        self._least_sides = np.zeros(2)
         self._sort()
 
     def refit(self, boxes: np.ndarray) -> None:

@@ -37,7 +37,7 @@ from collide.numerics.vec3 import put_vec3, vec3_at
 #: A longer translation is preferred where it separates more pairs, up to so many times the length needed for all.
 _LONGER = 4.0
 #: Sines below which all facets of the pairs count as lying on their side of a plane.
-_PLANE = 2.0**-8
+_PLANE = 2.0**-6
 #: A facet may turn away from the normal of its patch by this cosine.
 _TURNED = 0.25
 #: A translation is longer than the depth measured by so many errors of a coordinate.

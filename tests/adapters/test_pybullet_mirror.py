@@ -1,27 +1,19 @@
-"""A mirror of a pybullet client: what it follows, and its tuples.
+"""What a mirror of a pybullet client follows: where shapes stand, and which bodies there are.
 
 Distances are judged by closed forms worked out here, where the arguments of bodies say they stand, and by Bullet itself
-where its definition is the same; rays by closed forms. Skipped where pybullet is not installed.
+where its definition is the same. Skipped where pybullet is not installed.
 """
 
 from __future__ import annotations
-
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 import collide
-from collide.adapters.hosts import pybullet_mirror
 from collide.adapters.hosts.pybullet_mirror import Mirror, attach
-from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
 
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
-pybullet_data = pytest.importorskip("pybullet_data")
-DATA = pybullet_data.getDataPath()
-CORNERS = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
-FACETS = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3]
+from bullet_scenes import CORNERS, DATA, body, quaternion, rotation, sphere_of
 
 
 @pytest.fixture
@@ -30,30 +22,6 @@ def client():
     yield number
     if p.isConnected(number):
         p.disconnect(number)
-
-
-def body(
-    client: int, mass: float = 1.0, position=(0, 0, 0), turned=(0, 0, 0, 1), *, frame=None, inertial=None, **shape
-):
-    """A body of one shape.   frame, inertial : position and quaternion of its shape and of its centre of mass."""
-    if frame:
-        shape |= {"collisionFramePosition": list(frame[0]), "collisionFrameOrientation": list(frame[1])}
-    number = p.createCollisionShape(physicsClientId=client, **shape)
-    more = {}
-    if inertial:
-        more = {"baseInertialFramePosition": list(inertial[0]), "baseInertialFrameOrientation": list(inertial[1])}
-    return p.createMultiBody(
-        mass, number, basePosition=list(position), baseOrientation=list(turned), physicsClientId=client, **more
-    )
-
-
-def quaternion(random: np.random.Generator) -> list[float]:
-    q = random.normal(size=4)
-    return (q / np.linalg.norm(q)).tolist()
-
-
-def rotation(q) -> np.ndarray:
-    return np.array(p.getMatrixFromQuaternion(q)).reshape(3, 3)
 
 
 def gap_to_box(point: np.ndarray, half: np.ndarray) -> float:
@@ -69,10 +37,6 @@ def gap_to_capsule(point: np.ndarray, radius: float, length: float) -> float:
 def gap_to_cylinder(point: np.ndarray, radius: float, length: float) -> float:
     outside = np.array([np.hypot(point[0], point[1]) - radius, abs(point[2]) - length / 2])
     return float(np.linalg.norm(np.maximum(outside, 0.0)) + min(outside.max(), 0.0))
-
-
-def sphere_of(client: int, radius: float, position) -> int:
-    return body(client, position=position, shapeType=p.GEOM_SPHERE, radius=radius)
 
 
 # --- where shapes stand -------------------------------------------------------------------------
@@ -195,6 +159,24 @@ def test_links_stand_where_their_colliders_do_also_in_motion(client):
         assert max(abs(a[8] - b[8]) for a, b in zip(ours, theirs)) < 1e-9
 
 
+def test_two_bodies_alone_are_followed_as_all_are(client):
+    """Also a body whose base has no shape, and links that have none."""
+    random = np.random.default_rng(12)
+    stand_in = attach(p, client)
+    car = p.loadURDF(f"{DATA}/racecar/racecar.urdf", physicsClientId=client)
+    arm = p.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", [1, 0, 0], physicsClientId=client)
+    ball = sphere_of(client, 0.1, (0, 0, 0))
+    bodies = (car, arm, ball)
+    for _ in range(12):
+        for moved in bodies:
+            p.resetBasePositionAndOrientation(moved, random.normal(size=3).tolist(), quaternion(random), client)
+            for joint in range(p.getNumJoints(moved, client)):
+                p.resetJointState(moved, joint, random.uniform(-1, 1), physicsClientId=client)
+        a, b = (bodies[k] for k in random.choice(3, 2, replace=False))
+        ours = stand_in.getClosestPoints(a, b, 9.0)
+        assert len(ours) > 2 and ours == Mirror(client).getClosestPoints(a, b, 9.0)
+
+
 def test_steps_have_the_same_bits_with_a_mirror():
     def run(mirrored: bool) -> list:
         number = p.connect(p.DIRECT)
@@ -288,302 +270,3 @@ def test_bodies_that_rest_are_not_moved(client, monkeypatch):
     mirror.update()
     mirror.update()
     assert moved == [[3]] and mirror.world.body(3).X_WB[1, 3] == 1.0
-
-
-# --- contacts and filters -----------------------------------------------------------------------
-
-
-def test_contacts_of_a_box_on_a_plane_have_pybullets_conventions(client):
-    plane = body(client, 0.0, shapeType=p.GEOM_PLANE, planeNormal=[0, 0, 1])
-    box = body(client, 1.0, (0, 0, 0.299), shapeType=p.GEOM_BOX, halfExtents=[0.1, 0.2, 0.3])
-    mirror = Mirror(client)
-    p.performCollisionDetection(client)
-    for arguments in ((box, plane), (plane, box), (box,), (-1, plane)):
-        ours = mirror.getContactPoints(*arguments)
-        theirs = p.getContactPoints(*arguments, physicsClientId=client)
-        assert len(ours) == 4
-        assert len({row[1:5] for row in ours}) == 1
-        first, second, *_ = (*arguments, -1)
-        assert first in (-1, ours[0][1]) and second in (-1, ours[0][2])
-        down = 1.0 if ours[0][1] == box else -1.0
-        for row in ours:
-            assert abs(row[8] + 0.001) < 1e-12 and row[9:] == (0.0, 0.0, (0, 0, 0), 0.0, (0, 0, 0))
-            assert np.allclose(row[7], [0, 0, down])
-            assert np.allclose(np.array(row[5]) - row[6], np.array(row[7]) * row[8], atol=1e-12)
-        if theirs:  # of (-1, plane) Bullet has none or all, as it happened to store the pair
-            matching = [row for row in theirs if row[1] == ours[0][1]]
-            assert matching and np.allclose([row[7] for row in matching], [0, 0, down], atol=1e-6)
-    assert mirror.getContactPoints(box, plane, linkIndexA=3) == ()
-    assert Mirror(client, contact_margin=0.0).getContactPoints(box, plane)
-    p.resetBasePositionAndOrientation(box, [0, 0, 0.302], [0, 0, 0, 1], client)
-    mirror.update()
-    assert len(mirror.getContactPoints(box, plane)) == 4 and mirror.getContactPoints()[0][8] > 0.0019
-    assert Mirror(client, contact_margin=0.001).getContactPoints() == ()
-
-
-def pairs_of(rows) -> set:
-    return {frozenset([(row[1], row[3]), (row[2], row[4])]) for row in rows}
-
-
-@pytest.mark.parametrize("mode", [None, 0, 1])
-def test_pairs_that_filters_leave_out_are_those_of_bullet(client, mode):
-    random = np.random.default_rng(4)
-    stand_in = attach(p, client, contact_margin=0.0)
-    if mode is not None:
-        stand_in.setPhysicsEngineParameter(collisionFilterMode=mode)
-    bodies = []
-    for k in range(24):
-        stand_in.createMultiBody(
-            float(k % 4 > 0), stand_in.createCollisionShape(p.GEOM_BOX, halfExtents=[0.3, 0.3, 0.3]),
-            basePosition=random.uniform(-0.5, 0.5, 3).tolist(), baseOrientation=quaternion(random),
-        )  # fmt: skip
-        bodies.append(k)
-    seen = 0
-    for k in range(25):
-        a, b = (int(n) for n in random.choice(24, 2, replace=False))
-        if k % 2:
-            group, mask = (int(n) for n in random.integers(0, 4, 2))
-            stand_in.setCollisionFilterGroupMask(a, -1, group, mask)
-        else:
-            stand_in.setCollisionFilterPair(a, b, -1, -1, int(random.integers(2)))
-        p.performCollisionDetection(client)
-        theirs = pairs_of(row for row in p.getContactPoints(physicsClientId=client) if row[8] < -1e-6)
-        ours = stand_in.getContactPoints()
-        assert theirs <= pairs_of(ours)
-        assert pairs_of(row for row in ours if row[8] < -1e-6) <= theirs
-        seen += len(theirs)
-    assert seen > 500
-
-
-@pytest.mark.parametrize("flags", [0, 8, 8 | 16, 8 | 32, 8 | 8192])
-def test_self_collision_is_that_of_the_flags(client, flags):
-    stand_in = attach(p, client, margins="bullet")
-    arm = stand_in.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", useFixedBase=True, flags=flags)
-    random = np.random.default_rng(1)
-    n = 0
-    for _ in range(12):
-        for joint in range(7):
-            p.resetJointState(arm, joint, random.uniform(-2.5, 2.5), physicsClientId=client)
-        p.performCollisionDetection(client)
-        theirs, ours = p.getContactPoints(physicsClientId=client), stand_in.getContactPoints()
-        assert pairs_of(row for row in theirs if row[8] < -1e-5) == pairs_of(row for row in ours if row[8] < -1e-5)
-        n += len(pairs_of(theirs))
-    assert (n > 0) == (flags not in (0, 8 | 32))  # each link hangs on all links before it
-
-
-# --- rays and boxes -----------------------------------------------------------------------------
-
-
-def test_rays_meet_spheres_and_boxes_where_closed_forms_say(client):
-    random = np.random.default_rng(3)
-    ball = sphere_of(client, 0.4, (0.1, 0.2, 0.3))
-    box = body(client, position=(2, 0, 0), shapeType=p.GEOM_BOX, halfExtents=[0.3, 0.2, 0.5])
-    mirror = Mirror(client)
-    origins, ends = random.uniform(-3, 3, (2, 1500, 3))
-    rows = mirror.rayTestBatch(origins, ends)
-    hits = {ball: 0, box: 0, -1: 0}
-    for origin, end, (who, link, fraction, place, normal) in zip(origins, ends, rows):
-        d = end - origin
-        best = (1.0, -1)
-        m = origin - [0.1, 0.2, 0.3]
-        a, b, c = d @ d, m @ d, m @ m - 0.16
-        if c > 0 and b * b - a * c > 0 and 0 <= (t := (-b - np.sqrt(b * b - a * c)) / a) <= 1:
-            best = min(best, (t, ball))
-        enter, leave = np.sort(
-            np.array([-1, 1])[:, None] * [0.3, 0.2, 0.5] / d + (np.array([2, 0, 0]) - origin) / d, axis=0
-        )
-        if 0 <= enter.max() <= min(leave.min(), 1):
-            best = min(best, (enter.max(), box))
-        assert (who, link) == (best[1], -1) and abs(fraction - best[0]) < 1e-12
-        hits[who] += 1
-        if who == -1:
-            assert (fraction, place, normal) == (1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        else:
-            assert np.allclose(place, origin + fraction * d, atol=1e-12) and np.array(normal) @ d < 0
-    assert min(hits.values()) > 25
-    assert rows[0] == mirror.rayTest(origins[0].tolist(), ends[0].tolist())[0]
-
-
-def test_rays_begin_inside_come_from_behind_and_pass_filters_as_in_bullet(client):
-    made = {
-        "box": body(client, shapeType=p.GEOM_BOX, halfExtents=[0.5] * 3),
-        "ball": sphere_of(client, 0.5, (2, 0, 0)),
-        "triangles": p.loadURDF(f"{DATA}/samurai.urdf", [0, 0, -40], physicsClientId=client),
-        "plane": body(client, 0.0, (8, 0, 0), shapeType=p.GEOM_PLANE, planeNormal=[-1, 0, 0]),
-    }
-    mirror = Mirror(client)
-    assert len(made) == len(mirror.world)
-    rays = [
-        ((0.1, 0.1, 0.1), (5, 0.1, 0.1)), ((0.1, 0.1, 0.1), (1.2, 0.1, 0.1)), ((2.1, 0.1, 0.1), (6, 0.1, 0.1)),
-        ((10, 0, 0), (4, 0, 0)), ((4, 0.3, 0), (12, 0, 0)), ((-3, 0.2, 0.1), (9, 0.1, 0.1)), ((0, 0, 5), (0, 0, 5)),
-    ]  # fmt: skip
-    p.performCollisionDetection(client)
-    for origin, end in rays:
-        (theirs,), (ours,) = p.rayTest(origin, end, physicsClientId=client), mirror.rayTest(origin, end)
-        assert ours[:2] == theirs[:2] and abs(ours[2] - theirs[2]) < 1e-3, (origin, end, ours, theirs)
-        assert np.allclose(ours[4], theirs[4], atol=5e-3)
-    mirror.setCollisionFilterGroupMask(made["box"], -1, 4, 1)
-    through = (-3, 0.2, 0.1), (9, 0.1, 0.1)
-    assert mirror.rayTest(*through)[0][0] == made["box"]
-    assert mirror.rayTest(*through, collisionFilterMask=4)[0][0] == made["box"]
-    assert mirror.rayTest(*through, collisionFilterMask=3)[0][0] == made["ball"]
-    assert [mirror.rayTest(*through, reportHitNumber=k)[0][0] for k in range(4)] == [
-        made["box"], made["ball"], made["plane"], -1
-    ]  # fmt: skip
-    ((_, _, fraction, _, _),) = mirror.rayTestBatch([[0, 0, 3]], [[0, 0, -3]], parentObjectUniqueId=made["ball"])
-    assert abs(fraction - 2.5 / 6) < 1e-12
-    assert mirror.rayTestBatch([], []) == ()
-
-
-def test_boxes_that_overlap_are_those_of_the_bodies(client):
-    random = np.random.default_rng(6)
-    centers = random.uniform(-2, 2, (40, 3))
-    bodies = [sphere_of(client, 0.3, center) for center in centers]
-    mirror = Mirror(client)
-    n = empty = 0
-    for _ in range(60):
-        low = random.uniform(-2.5, 2.5, 3)
-        high = low + random.uniform(0, 1.5, 3)
-        want = [(b, -1) for b, c in zip(bodies, centers) if (low <= c + 0.3).all() and (c - 0.3 <= high).all()]
-        ours = mirror.getOverlappingObjects(low.tolist(), high.tolist())
-        assert (list(ours) if ours is not None else []) == want
-        theirs = p.getOverlappingObjects(low.tolist(), high.tolist(), physicsClientId=client) or ()
-        assert set(want) <= set(theirs)
-        n, empty = n + len(want), empty + (ours is None)
-    assert n > 25 and empty > 3
-
-
-# --- programs as they are -----------------------------------------------------------------------
-
-
-def test_what_pybullet_does_not_give_back_is_noted_as_it_passes(client):
-    random = np.random.default_rng(9)
-    stand_in = attach(p, client, margins="bullet")
-    heights = random.uniform(0, 0.5, 30)
-    field = stand_in.createCollisionShape(
-        p.GEOM_HEIGHTFIELD, numHeightfieldRows=6, numHeightfieldColumns=5, heightfieldData=heights.tolist(),
-        meshScale=[0.5, 0.4, 2.0],
-    )  # fmt: skip
-    ground = stand_in.createMultiBody(0.0, field, basePosition=[1, 2, 0])
-    crate = stand_in.createMultiBody(
-        0.0,
-        stand_in.createCollisionShape(
-            p.GEOM_MESH, vertices=CORNERS, indices=FACETS, collisionFramePosition=[0.1, 0, 0]
-        ),
-        basePosition=[6, 0, 1], baseInertialFramePosition=[0.3, 0.2, 0.1], baseInertialFrameOrientation=[0.5] * 4,
-    )  # fmt: skip
-    ball = stand_in.createMultiBody(
-        1.0, stand_in.createCollisionShape(p.GEOM_SPHERE, radius=0.2), useMaximalCoordinates=1
-    )
-    assert stand_in.mirror_of(client).remaining == {}
-    p.performCollisionDetection(client)
-    n = 0
-    for target, middle, size in ((ground, [1, 2, 0], [1.2, 0.7, 0.4]), (crate, [6.1, 0, 1], [0.6, 0.6, 0.6])):
-        for _ in range(40):
-            end = np.array(middle) + np.array(size) * random.uniform(-0.7, 0.7, 3)
-            origin = end + random.normal(size=3) * 5
-            (theirs,) = p.rayTest(origin.tolist(), (2 * end - origin).tolist(), physicsClientId=client)
-            (ours,) = stand_in.rayTest(origin.tolist(), (2 * end - origin).tolist())
-            if ours[0] == theirs[0] == target:
-                assert abs(ours[2] - theirs[2]) < 1e-5
-                n += 1
-            p.resetBasePositionAndOrientation(ball, np.add(end, [0, 0, 2.0]).tolist(), [0, 0, 0, 1], client)
-            least = min(row[8] for row in p.getClosestPoints(target, ball, 9.0, physicsClientId=client))
-            assert abs(stand_in.getClosestPoints(target, ball, 9.0)[0][8] - least) < 1e-6
-    assert n > 50
-    rows = stand_in.getClosestPoints(
-        -1,
-        ball,
-        99.0,
-        collisionShapeA=field,
-        collisionShapePositionA=[1, 2, 0],
-        collisionShapeOrientationA=[0, 0, 0, 1],
-    )
-    assert rows[0][1:5] == (-1, ball, -2, -1)
-    assert abs(rows[0][8] - stand_in.getClosestPoints(ground, ball, 99.0)[0][8]) < 1e-12
-
-
-def test_import_finds_ours_between_install_and_uninstall():
-    held = sys.modules["pybullet"]
-    with pytest.warns(RuntimeWarning, match="hold pybullet already: .*test_pybullet_mirror"):
-        context = pybullet_mirror.install(questions=("getClosestPoints",))
-    with context as module:
-        import pybullet as q
-
-        assert q is module and q is not held and pybullet_mirror.installed()
-        number = q.connect(q.DIRECT)
-        a = q.createMultiBody(1, q.createCollisionShape(q.GEOM_MESH, vertices=CORNERS))
-        b = q.createMultiBody(1, q.createCollisionShape(q.GEOM_MESH, vertices=CORNERS), basePosition=[3, 0, 0])
-        assert abs(q.getClosestPoints(a, b, 9.0)[0][8] - 2.0) < 1e-12  # 1.998 in Bullet
-        assert abs(held.getClosestPoints(a, b, 9.0, physicsClientId=number)[0][8] - 1.998) < 1e-9
-        assert q.rayTest is held.rayTest and q.getQuaternionFromEuler([0, 0, 0]) == (0, 0, 0, 1)
-        other = q.connect(q.DIRECT)
-        with pytest.raises(InvalidArgument, match="say physicsClientId"):
-            q.getClosestPoints(a, b, 9.0)
-        assert len(q.getClosestPoints(a, b, 9.0, physicsClientId=number)) == 1
-        with pytest.raises(UnknownBody):
-            q.getClosestPoints(a, b, 9.0, physicsClientId=other)
-        q.disconnect(other)
-        q.disconnect(number)
-    assert sys.modules["pybullet"] is held and not pybullet_mirror.installed()
-    pybullet_mirror.uninstall()
-    with pytest.raises(InvalidArgument, match="questions are among"):
-        attach(held, questions=("stepSimulation",))
-
-
-# --- what goes wrong ----------------------------------------------------------------------------
-
-
-def test_links_that_cannot_be_read_are_told_and_never_taken_for_free(client):
-    ball = sphere_of(client, 0.1, (0, 0, 0))
-    crate = body(client, 0.0, (1, 0, 0), shapeType=p.GEOM_MESH, vertices=CORNERS, indices=FACETS)
-    with pytest.warns(RuntimeWarning, match="is left out: a mesh of triangles made from arrays"):
-        mirror = Mirror(client)
-    assert list(mirror.remaining) == [(crate, -1)]
-    with pytest.raises(UnsupportedQuery, match="set_shape"):
-        mirror.getClosestPoints(ball, crate, 1.0)
-    with pytest.raises(UnsupportedQuery, match="triangles"):
-        mirror.getContactPoints(crate)
-    mirror.set_shape(crate, -1, collide.Box((1, 1, 1)))
-    assert mirror.remaining == {} and abs(mirror.getClosestPoints(ball, crate, 1.0)[0][8] - 0.4) < 1e-12
-    given = Mirror(client, shapes={(crate, -1): collide.Box((1, 1, 1))})
-    assert abs(given.getClosestPoints(ball, crate, 1.0)[0][8] - 0.4) < 1e-12
-
-
-def test_bad_arguments_are_named(client):
-    ball = sphere_of(client, 0.1, (0, 0, 0))
-    mirror = Mirror(client)
-    for make, error, text in (
-        (lambda: Mirror(77), InvalidArgument, "client must be what pybullet.connect returned.*77"),
-        (
-            lambda: Mirror(client, margins="thick"),
-            InvalidArgument,
-            "margins must be one of 'none', 'bullet', got 'thick'",
-        ),
-        (lambda: Mirror(client, shapes={(0, -1): 3}), InvalidArgument, "must be a shape, got int"),
-        (lambda: mirror.getClosestPoints(ball, 9, 1.0), UnknownBody, "no body 9"),
-        (lambda: mirror.getContactPoints(9), UnknownBody, "no body 9"),
-        (lambda: mirror.getClosestPoints(ball, -1, 1.0, collisionShapeB=5), InvalidArgument, "shape 5 is not known"),
-        (lambda: mirror.rayTest([0, 0], [1, 0, 0]), InvalidArgument, "rayFromPositions must be finite positions"),
-        (lambda: mirror.rayTestBatch([[0, 0, 0]], [[1, 0, 0]] * 2), InvalidArgument, "1 origins and 2 ends"),
-        (lambda: mirror.getOverlappingObjects([0, 0, np.nan], [1, 1, 1]), InvalidArgument, "aabbMin"),
-    ):
-        with pytest.raises(error, match=text):
-            make()
-    p.resetBasePositionAndOrientation(ball, [np.nan, 0, 0], [0, 0, 0, 1], client)
-    with pytest.raises(InvalidPose, match=f"{ball}: its pose in pybullet is not finite"):
-        mirror.update()
-    p.disconnect(client)
-    with pytest.raises(InvalidArgument, match=f"client {client} does not answer"):
-        mirror.update()
-
-
-def test_the_extra_is_named_where_pybullet_is_missing():
-    code = (
-        "import sys; sys.modules['pybullet'] = None\n"
-        "from collide.adapters.hosts.pybullet_mirror import Mirror\n"
-        "from collide.errors import MissingExtra\n"
-        "try:\n  Mirror(0)\nexcept MissingExtra as error: print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "pip install 'collide-robotics[pybullet]'" in done.stdout

@@ -20,6 +20,8 @@ NEEDS = {
     "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
     "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
 }
+#: What hosts print when they are imported.
+HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
 #: What each example's output must hold.
 SHOWS = {
     "17_newton_solver": ["newton: ", "collide: ", "of 500 pairs: Newton 20, collide 0"],
@@ -92,7 +94,7 @@ def test_example_runs(file):
         pytest.skip(f"{file.name} compares with {needed}, which is not installed")
     done = run(str(file))
     assert done.returncode == 0, done.stderr
-    warned = [line for line in done.stderr.splitlines() if not line.startswith("pybullet build time")]
+    warned = [line for line in done.stderr.splitlines() if not line.startswith(HOSTS_SAY)]
     assert not warned, "an example prints no warnings"
     assert file.stem in SHOWS, f"say in SHOWS what {file.name} must print"
     for words in SHOWS[file.stem]:

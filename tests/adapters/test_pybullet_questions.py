@@ -1,0 +1,178 @@
+"""Contacts, filters, rays and boxes of a mirror, beside Bullet's and closed forms. Skipped without pybullet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from collide.adapters.hosts.pybullet_mirror import Mirror, attach
+
+p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
+from bullet_scenes import DATA, body, pairs_of, quaternion, sphere_of
+
+
+@pytest.fixture
+def client():
+    number = p.connect(p.DIRECT)
+    yield number
+    if p.isConnected(number):
+        p.disconnect(number)
+
+
+# --- contacts and filters -----------------------------------------------------------------------
+
+
+def test_contacts_of_a_box_on_a_plane_have_pybullets_conventions(client):
+    plane = body(client, 0.0, shapeType=p.GEOM_PLANE, planeNormal=[0, 0, 1])
+    box = body(client, 1.0, (0, 0, 0.299), shapeType=p.GEOM_BOX, halfExtents=[0.1, 0.2, 0.3])
+    mirror = Mirror(client)
+    p.performCollisionDetection(client)
+    for arguments in ((box, plane), (plane, box), (box,), (-1, plane)):
+        ours = mirror.getContactPoints(*arguments)
+        theirs = p.getContactPoints(*arguments, physicsClientId=client)
+        assert len(ours) == 4
+        assert len({row[1:5] for row in ours}) == 1
+        first, second, *_ = (*arguments, -1)
+        assert first in (-1, ours[0][1]) and second in (-1, ours[0][2])
+        down = 1.0 if ours[0][1] == box else -1.0
+        for row in ours:
+            assert abs(row[8] + 0.001) < 1e-12 and row[9:] == (0.0, 0.0, (0, 0, 0), 0.0, (0, 0, 0))
+            assert np.allclose(row[7], [0, 0, down])
+            assert np.allclose(np.array(row[5]) - row[6], np.array(row[7]) * row[8], atol=1e-12)
+        if theirs:  # of (-1, plane) Bullet has none or all, as it happened to store the pair
+            matching = [row for row in theirs if row[1] == ours[0][1]]
+            assert matching and np.allclose([row[7] for row in matching], [0, 0, down], atol=1e-6)
+    assert mirror.getContactPoints(box, plane, linkIndexA=3) == ()
+    assert Mirror(client, contact_margin=0.0).getContactPoints(box, plane)
+    p.resetBasePositionAndOrientation(box, [0, 0, 0.302], [0, 0, 0, 1], client)
+    mirror.update()
+    assert len(mirror.getContactPoints(box, plane)) == 4 and mirror.getContactPoints()[0][8] > 0.0019
+    assert Mirror(client, contact_margin=0.001).getContactPoints() == ()
+
+
+@pytest.mark.parametrize("mode", [None, 0, 1])
+def test_pairs_that_filters_leave_out_are_those_of_bullet(client, mode):
+    random = np.random.default_rng(4)
+    stand_in = attach(p, client, contact_margin=0.0)
+    if mode is not None:
+        stand_in.setPhysicsEngineParameter(collisionFilterMode=mode)
+    bodies = []
+    for k in range(24):
+        stand_in.createMultiBody(
+            float(k % 4 > 0), stand_in.createCollisionShape(p.GEOM_BOX, halfExtents=[0.3, 0.3, 0.3]),
+            basePosition=random.uniform(-0.5, 0.5, 3).tolist(), baseOrientation=quaternion(random),
+        )  # fmt: skip
+        bodies.append(k)
+    seen = 0
+    for k in range(25):
+        a, b = (int(n) for n in random.choice(24, 2, replace=False))
+        if k % 2:
+            group, mask = (int(n) for n in random.integers(0, 4, 2))
+            stand_in.setCollisionFilterGroupMask(a, -1, group, mask)
+        else:
+            stand_in.setCollisionFilterPair(a, b, -1, -1, int(random.integers(2)))
+        p.performCollisionDetection(client)
+        theirs = pairs_of(row for row in p.getContactPoints(physicsClientId=client) if row[8] < -1e-6)
+        ours = stand_in.getContactPoints()
+        assert theirs <= pairs_of(ours)
+        assert pairs_of(row for row in ours if row[8] < -1e-6) <= theirs
+        seen += len(theirs)
+    assert seen > 500
+
+
+@pytest.mark.parametrize("flags", [0, 8, 8 | 16, 8 | 32, 8 | 8192])
+def test_self_collision_is_that_of_the_flags(client, flags):
+    stand_in = attach(p, client, margins="bullet")
+    arm = stand_in.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", useFixedBase=True, flags=flags)
+    random = np.random.default_rng(1)
+    n = 0
+    for _ in range(12):
+        for joint in range(7):
+            p.resetJointState(arm, joint, random.uniform(-2.5, 2.5), physicsClientId=client)
+        p.performCollisionDetection(client)
+        theirs, ours = p.getContactPoints(physicsClientId=client), stand_in.getContactPoints()
+        assert pairs_of(row for row in theirs if row[8] < -1e-5) == pairs_of(row for row in ours if row[8] < -1e-5)
+        n += len(pairs_of(theirs))
+    assert (n > 0) == (flags not in (0, 8 | 32))  # each link hangs on all links before it
+
+
+# --- rays and boxes -----------------------------------------------------------------------------
+
+
+def test_rays_meet_spheres_and_boxes_where_closed_forms_say(client):
+    random = np.random.default_rng(3)
+    ball = sphere_of(client, 0.4, (0.1, 0.2, 0.3))
+    box = body(client, position=(2, 0, 0), shapeType=p.GEOM_BOX, halfExtents=[0.3, 0.2, 0.5])
+    mirror = Mirror(client)
+    origins, ends = random.uniform(-3, 3, (2, 1500, 3))
+    rows = mirror.rayTestBatch(origins, ends)
+    hits = {ball: 0, box: 0, -1: 0}
+    for origin, end, (who, link, fraction, place, normal) in zip(origins, ends, rows):
+        d = end - origin
+        best = (1.0, -1)
+        m = origin - [0.1, 0.2, 0.3]
+        a, b, c = d @ d, m @ d, m @ m - 0.16
+        if c > 0 and b * b - a * c > 0 and 0 <= (t := (-b - np.sqrt(b * b - a * c)) / a) <= 1:
+            best = min(best, (t, ball))
+        enter, leave = np.sort(
+            np.array([-1, 1])[:, None] * [0.3, 0.2, 0.5] / d + (np.array([2, 0, 0]) - origin) / d, axis=0
+        )
+        if 0 <= enter.max() <= min(leave.min(), 1):
+            best = min(best, (enter.max(), box))
+        assert (who, link) == (best[1], -1) and abs(fraction - best[0]) < 1e-12
+        hits[who] += 1
+        if who == -1:
+            assert (fraction, place, normal) == (1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        else:
+            assert np.allclose(place, origin + fraction * d, atol=1e-12) and np.array(normal) @ d < 0
+    assert min(hits.values()) > 25
+    assert rows[0] == mirror.rayTest(origins[0].tolist(), ends[0].tolist())[0]
+
+
+def test_rays_begin_inside_come_from_behind_and_pass_filters_as_in_bullet(client):
+    made = {
+        "box": body(client, shapeType=p.GEOM_BOX, halfExtents=[0.5] * 3),
+        "ball": sphere_of(client, 0.5, (2, 0, 0)),
+        "triangles": p.loadURDF(f"{DATA}/samurai.urdf", [0, 0, -40], physicsClientId=client),
+        "plane": body(client, 0.0, (8, 0, 0), shapeType=p.GEOM_PLANE, planeNormal=[-1, 0, 0]),
+    }
+    mirror = Mirror(client)
+    assert len(made) == len(mirror.world)
+    rays = [
+        ((0.1, 0.1, 0.1), (5, 0.1, 0.1)), ((0.1, 0.1, 0.1), (1.2, 0.1, 0.1)), ((2.1, 0.1, 0.1), (6, 0.1, 0.1)),
+        ((10, 0, 0), (4, 0, 0)), ((4, 0.3, 0), (12, 0, 0)), ((-3, 0.2, 0.1), (9, 0.1, 0.1)), ((0, 0, 5), (0, 0, 5)),
+    ]  # fmt: skip
+    p.performCollisionDetection(client)
+    for origin, end in rays:
+        (theirs,), (ours,) = p.rayTest(origin, end, physicsClientId=client), mirror.rayTest(origin, end)
+        assert ours[:2] == theirs[:2] and abs(ours[2] - theirs[2]) < 1e-3, (origin, end, ours, theirs)
+        assert np.allclose(ours[4], theirs[4], atol=5e-3)
+    mirror.setCollisionFilterGroupMask(made["box"], -1, 4, 1)
+    through = (-3, 0.2, 0.1), (9, 0.1, 0.1)
+    assert mirror.rayTest(*through)[0][0] == made["box"]
+    assert mirror.rayTest(*through, collisionFilterMask=4)[0][0] == made["box"]
+    assert mirror.rayTest(*through, collisionFilterMask=3)[0][0] == made["ball"]
+    assert [mirror.rayTest(*through, reportHitNumber=k)[0][0] for k in range(4)] == [
+        made["box"], made["ball"], made["plane"], -1
+    ]  # fmt: skip
+    ((_, _, fraction, _, _),) = mirror.rayTestBatch([[0, 0, 3]], [[0, 0, -3]], parentObjectUniqueId=made["ball"])
+    assert abs(fraction - 2.5 / 6) < 1e-12
+    assert mirror.rayTestBatch([], []) == ()
+
+
+def test_boxes_that_overlap_are_those_of_the_bodies(client):
+    random = np.random.default_rng(6)
+    centers = random.uniform(-2, 2, (40, 3))
+    bodies = [sphere_of(client, 0.3, center) for center in centers]
+    mirror = Mirror(client)
+    n = empty = 0
+    for _ in range(60):
+        low = random.uniform(-2.5, 2.5, 3)
+        high = low + random.uniform(0, 1.5, 3)
+        want = [(b, -1) for b, c in zip(bodies, centers) if (low <= c + 0.3).all() and (c - 0.3 <= high).all()]
+        ours = mirror.getOverlappingObjects(low.tolist(), high.tolist())
+        assert (list(ours) if ours is not None else []) == want
+        theirs = p.getOverlappingObjects(low.tolist(), high.tolist(), physicsClientId=client) or ()
+        assert set(want) <= set(theirs)
+        n, empty = n + len(want), empty + (ours is None)
+    assert n > 25 and empty > 3
