@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
-from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, N, check_model, max_contacts
+from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, N, check_model
+from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import HEADER
 from collide.contact.support_face import ROUND

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import re
 import struct
 import sys
 from contextlib import contextmanager
@@ -27,8 +26,6 @@ PLANE, BOX = KINDS.index("plane"), KINDS.index("box")
 N = len(KINDS)
 #: Kinds that are ours.
 OURS = tuple(KINDS.index(name) for name in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"))
-#: Contacts of a pair where MuJoCo sets no limit of its own below that.
-_MAX_CONTACTS = 8
 #: Bytes that a structure is looked through for at most.
 _MODEL_BYTES, _DATA_BYTES = 1 << 16, 1 << 20
 
@@ -36,7 +33,7 @@ _FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_double
 )
 
-_TRIAL = """<mujoco><asset><mesh name="t" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/></asset><worldbody>
+TRIAL = """<mujoco><asset><mesh name="t" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/></asset><worldbody>
 <geom type="plane" size="1 1 1"/><body pos=".3 .1 .09"><freejoint/><geom type="box" size=".1 .12 .1"/></body>
 <body pos="0 5 5"><freejoint/><geom type="mesh" mesh="t"/></body></worldbody></mujoco>"""
 
@@ -84,7 +81,7 @@ def host() -> Host:
     return Host(mujoco, library, table, layout, layout.contact_size < 128)
 
 
-def _refuse(mujoco, what: str) -> UnsupportedQuery:
+def refused(mujoco, what: str) -> UnsupportedQuery:
     return UnsupportedQuery(
         f"MuJoCo {mujoco.__version__}: {what}; this version cannot be hooked, use one from 3.3 to 4.0, or MuJoCo alone"
     )
@@ -96,13 +93,13 @@ def _library(mujoco) -> ctypes.CDLL:
     names = {"win32": "mujoco.dll", "darwin": "libmujoco*.dylib"}
     files = sorted(folder.glob(names.get(sys.platform, "libmujoco.so*")))
     if not files:
-        raise _refuse(mujoco, f"no library in {folder}")
+        raise refused(mujoco, f"no library in {folder}")
     library = ctypes.CDLL(str(files[0]))
     for name in ("mjCOLLISIONFUNC", "mju_error", "mj_version"):
         if not hasattr(library, name):
-            raise _refuse(mujoco, f"{files[0].name} has no {name}")
+            raise refused(mujoco, f"{files[0].name} has no {name}")
     if library.mj_version() != mujoco.mj_version():
-        raise _refuse(mujoco, f"{files[0].name} is of another version")
+        raise refused(mujoco, f"{files[0].name} is of another version")
     return library
 
 
@@ -141,20 +138,20 @@ def _where(mujoco, address: int, limit: int, wanted: dict[str, int]) -> dict[str
     for name, hit in hits.items():
         hits[name] = hit = hit[hit <= end]  # a model's signature is its last field: what follows is other memory
         if not len(hit) or np.ptp(hit) >= len(hit):
-            raise _refuse(mujoco, f"{name} stands in {len(hit)} places instead of one")
+            raise refused(mujoco, f"{name} stands in {len(hit)} places instead of one")
     return {name: 8 * int(hit[-1]) for name, hit in hits.items()}
 
 
 def _offsets(mujoco) -> Layout:
     """All but `contact_size`, the same from two models."""
     layouts = []
-    for text in (_TRIAL, _TRIAL.replace("</worldbody>", '<geom type="sphere" size=".1" pos="9 9 9"/></worldbody>')):
+    for text in (TRIAL, TRIAL.replace("</worldbody>", '<geom type="sphere" size=".1" pos="9 9 9"/></worldbody>')):
         model = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(model)
         if not (hasattr(model, "_address") and hasattr(data, "_address") and hasattr(model, "signature")):
-            raise _refuse(mujoco, "its models tell no address or no signature")
+            raise refused(mujoco, "its models tell no address or no signature")
         if model.geom_size.dtype != np.float64 or model.geom_type.dtype != np.int32:
-            raise _refuse(mujoco, "its numbers are no doubles")
+            raise refused(mujoco, "its numbers are no doubles")
         arrays = ("geom_type", "geom_dataid", "geom_size", "mesh_vert")
         wanted = {name: getattr(model, name).ctypes.data for name in arrays} | {"signature": model.signature}
         of_data = {name: getattr(data, name).ctypes.data for name in ("geom_xpos", "geom_xmat")}
@@ -163,7 +160,7 @@ def _offsets(mujoco) -> Layout:
             | _where(mujoco, data._address, _DATA_BYTES, of_data)
         )
     if layouts[0] != layouts[1]:
-        raise _refuse(mujoco, "two models are laid out differently")
+        raise refused(mujoco, "two models are laid out differently")
     return Layout(**layouts[0])
 
 
@@ -174,11 +171,11 @@ def check_model(model) -> None:
         array = getattr(model, name)
         (stands,) = struct.unpack("<Q", ctypes.string_at(model._address + getattr(layout, name), 8))
         if array.size and stands != array.ctypes.data:
-            raise _refuse(host().mujoco, f"{name} of this model is not where it was in others")
+            raise refused(host().mujoco, f"{name} of this model is not where it was in others")
 
 
 @contextmanager
-def _instead(table, index: int, function):
+def instead(table, index: int, function):
     """A Python function in one place of the table."""
     before, callback = table[index], _FUNCTION(function)
     table[index] = ctypes.cast(callback, ctypes.c_void_p).value
@@ -193,7 +190,7 @@ def _contact_size(mujoco, table) -> int:
 
     A box on a plane has four, and MuJoCo tells them afterwards.
     """
-    model = mujoco.MjModel.from_xml_string(_TRIAL)
+    model = mujoco.MjModel.from_xml_string(TRIAL)
     data = mujoco.MjData(model)
     index, written = N * PLANE + BOX, []
     original = _FUNCTION(table[index])
@@ -203,56 +200,13 @@ def _contact_size(mujoco, table) -> int:
         written.append((n, _bytes_at(contacts, 8192)))
         return n
 
-    with _instead(table, index, look):
+    with instead(table, index, look):
         mujoco.mj_forward(model, data)
     if len(written) != 1 or written[0][0] != 4 or data.ncon != 4:
-        raise _refuse(mujoco, "a function put into its collision table is not called")
+        raise refused(mujoco, "a function put into its collision table is not called")
     known = {struct.pack("<7d", contact.dist, *contact.pos, *contact.frame[:3]) for contact in data.contact}
     seen = written[0][1]
     sizes = [s for s in range(80, 2049, 8) if {seen[k * s : k * s + 56] for k in range(4)} == known]
     if len(known) != 4 or len(sizes) != 1:
-        raise _refuse(mujoco, f"contacts of a known pair were found at {len(sizes)} distances instead of one")
+        raise refused(mujoco, f"contacts of a known pair were found at {len(sizes)} distances instead of one")
     return sizes[0]
-
-
-def max_contacts(flags: tuple[int, int]) -> np.ndarray:
-    """(N, N) int64: contacts of a pair that MuJoCo takes under these `disableflags` and `enableflags`; 0 where not
-    ours."""
-    mujoco = host().mujoco
-    off, on = (getattr(bits, name, 0) for bits, name in (
-        (mujoco.mjtDisableBit, "mjDSBL_MULTICCD"), (mujoco.mjtEnableBit, "mjENBL_MULTICCD"),
-    ))  # fmt: skip
-    return _max_contacts(flags[0] & int(off), flags[1] & int(on))
-
-
-@cache
-def _max_contacts(disabled: int, enabled: int) -> np.ndarray:
-    counts = np.zeros((N, N), dtype=np.int64)
-    for i in OURS:
-        for j in OURS:
-            if i <= j and j != PLANE and host().table[N * i + j]:
-                limit = _limit(i, j, disabled, enabled) if host().has_limits else _MAX_CONTACTS
-                counts[i, j] = min(limit, _MAX_CONTACTS)
-    return counts
-
-
-def _limit(i: int, j: int, disabled: int, enabled: int) -> int:
-    """What MuJoCo says it expects at most, when it is reported of one contact more than it ever takes."""
-    mujoco, table = host().mujoco, host().table
-    bodies = [_geom_text(i) if i == PLANE else f"<body><freejoint/>{_geom_text(i)}</body>"]
-    bodies.append(f"<body><freejoint/>{_geom_text(j)}</body>")
-    text = _TRIAL[: _TRIAL.index("<worldbody>")] + f"<worldbody>{''.join(bodies)}</worldbody></mujoco>"
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.disableflags |= disabled
-    model.opt.enableflags |= enabled
-    try:
-        with _instead(table, N * i + j, lambda *_: int(mujoco.mjMAXCONPAIR) + 1):
-            mujoco.mj_forward(model, mujoco.MjData(model))
-    except mujoco.FatalError as error:
-        if reported := re.search(r"expected at most (\d+)", str(error)):
-            return int(reported[1])
-    raise _refuse(mujoco, f"how many contacts {KINDS[i]} and {KINDS[j]} may have is not reported")
-
-
-def _geom_text(kind: int) -> str:
-    return '<geom type="mesh" mesh="t"/>' if KINDS[kind] == "mesh" else f'<geom type="{KINDS[kind]}" size=".1 .1 .1"/>'

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import collide
-from collide.adapters.hosts import mujoco_layout
+from collide.adapters.hosts import mujoco_layout, mujoco_limits
 from collide.adapters.hosts.mujoco import MODES, install, is_hooked, world
 from collide.adapters.hosts.mujoco_geoms import geom_shapes
 from collide.kernels import mode
@@ -107,7 +107,7 @@ def test_contacts_are_those_of_collide(a):
         model = pair_of(a, b, more='margin="0.01"')
         shapes, rows, _ = geom_shapes(model)
         A, B = (shapes[row] for row in rows)
-        most = int(mujoco_layout.max_contacts((0, 0))[tuple(sorted(model.geom_type.tolist()))])
+        most = int(mujoco_limits.max_contacts((0, 0))[tuple(sorted(model.geom_type.tolist()))])
         data = mujoco.MjData(model)
         with install(model):
             for _ in range(40):
