@@ -48,11 +48,11 @@ def _all_limits() -> dict[tuple[bool, bool], np.ndarray]:
     command = [sys.executable, "-c", "from collide.adapters.hosts.mujoco_limits import main; main()"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_SECONDS, check=True)
-        told = json.loads(done.stdout.splitlines()[-1])
+        reported = json.loads(done.stdout.splitlines()[-1])
     except (OSError, subprocess.SubprocessError, ValueError, IndexError) as error:
         last = (getattr(error, "stderr", None) or str(error)).strip().splitlines()[-1:]
-        raise refused(host().mujoco, f"how many contacts pairs may have was not told ({' '.join(last)})") from None
-    return {(bool(off), bool(on)): np.array(counts, dtype=np.int64) for off, on, counts in told}
+        raise refused(host().mujoco, f"how many contacts pairs may have is not reported ({' '.join(last)})") from None
+    return {(bool(off), bool(on)): np.array(counts, dtype=np.int64) for off, on, counts in reported}
 
 
 def main() -> None:

@@ -108,10 +108,11 @@ class CShape:
 
     def __init__(self, shape: collide.Shape):
         status, self.handle = raw_shape(*_made_by(shape))
+        self._free = library().collide_shape_free  # at the end of a process modules go before shapes do
         assert status == OK, (shape, library().collide_status_text(status))
 
     def __del__(self):
-        library().collide_shape_free(self.handle)
+        self._free(self.handle)
 
 
 def _made_by(shape) -> tuple:

@@ -208,8 +208,10 @@ def test_metadata_names_version_python_and_licence(metadata):
 
 def test_extras(metadata):
     assert {"robots", "demo", "decompose", "peers", "plots", "jit", "dev"} <= set(metadata.get_all("Provides-Extra"))
-    (pybullet,) = (line for line in metadata.get_all("Requires-Dist") if line.startswith("pybullet"))
-    assert re.search(r"python_version < ['\"]3\.12['\"]", pybullet), "pybullet has no wheels from Python 3.12 on"
+    pybullet = [line for line in metadata.get_all("Requires-Dist") if line.startswith("pybullet")]
+    assert len(pybullet) == 2, "of the extras peers and pybullet"
+    for line in pybullet:
+        assert re.search(r"python_version < ['\"]3\.12['\"]", line), "pybullet has no wheels from Python 3.12 on"
 
 
 def test_extras_that_errors_name_exist(metadata):
