@@ -19,9 +19,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import csv
-import os
-import platform
 import re
 import statistics
 import time
@@ -30,6 +27,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from convex import write
+from startup import machine
 
 from collide.adapters.hosts.mujoco import install
 from collide.errors import SceneError
@@ -213,11 +212,7 @@ def main() -> None:
             energy, speed, depth = rest(name, n, mode)
             print(f"{name:16}{n:7} {mode or 'MuJoCo alone':>13}{energy:12.2e}{speed:12.2e}{depth:9.3f}", flush=True)
     if not arguments.quick and not arguments.no_csv:
-        name = f"mujoco_steps_{platform.machine()}_{len(os.sched_getaffinity(0))}.csv"
-        with (Path(__file__).parent / "results" / name).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        print(f"written: {write('mujoco-steps', rows, machine() | {'mujoco': mujoco.__version__}).name}")
 
 
 if __name__ == "__main__":
