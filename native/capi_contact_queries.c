@@ -29,7 +29,7 @@ static collide_status take_shapes(collide_workspace *space, struct manifold_spac
     const collide_shape *shapes[2];
     const struct hull_faces *faces;
     int64_t largest = ROUND_CORNERS;
-    int k, are_boxes = 1;
+    int k;
     shapes[0] = A;
     shapes[1] = B;
     take_pair(space, A, B);
@@ -40,9 +40,7 @@ static collide_status take_shapes(collide_workspace *space, struct manifold_spac
         if (status != COLLIDE_OK) return status;
         for (j = 0; j < FACE_INTS; j++) row[j] = faces != NULL ? faces->ints[j] : 0;
         if (faces != NULL && faces->largest > largest) largest = faces->largest;
-        are_boxes = are_boxes && shapes[k]->ints[KIND] == POINTS && shapes[k]->numbers[PARAMS] > 0.0;
     }
-    manifold->header[HEADER + F_ARE_BOXES] = are_boxes;
     return fit_manifolds(manifold, largest) ? COLLIDE_OK : COLLIDE_NO_MEMORY;
 }
 

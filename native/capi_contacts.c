@@ -42,7 +42,7 @@ int fit_manifolds(struct manifold_space *manifold, int64_t largest)
 }
 
 void take_table_pair(collide_workspace *space, struct manifold_space *manifold, const int64_t *ints, const double *numbers,
-                     const int64_t *faces, int64_t a, int64_t b, int are_boxes)
+                     const int64_t *faces, int64_t a, int64_t b)
 {
     const int64_t which[2] = {a, b};
     int k;
@@ -58,7 +58,6 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
     space->header[NUMBERS_AT] = address_of(space->numbers);
     space->shape_of[0] = 0; /* a batch of a set may have left others */
     space->shape_of[BLOCK] = 1;
-    manifold->header[HEADER + F_ARE_BOXES] = are_boxes;
 }
 
 /* What the single call leaves: the row by all means there are, then the same manifold. */
@@ -66,17 +65,14 @@ static collide_status contacts_by_rows(collide_workspace *space, struct manifold
                                        const double *X_WB, double margin, int64_t max_contacts, unsigned flags,
                                        collide_contact *rows, int64_t *n)
 {
-    int64_t *header = manifold->header + HEADER, end = 0;
-    int64_t corners = 2 * header[F_LARGEST] + 8;
+    int64_t *header = manifold->header + HEADER;
     collide_pair row;
     collide_status status = row_of_pair(space, X_WA, X_WB, margin, flags, &row);
     if (status != COLLIDE_OK) return status;
-    header[F_PAIRS_DONE] = header[F_ROWS_DONE] = 0;
     manifold->shape_of[0] = 0;
     manifold->shape_of[1] = 1;
-    space->kernels->convex_manifolds(address_of(header), 0, address_of(X_WA), 0, address_of(X_WB), 0, 0, address_of(&row), 1,
-                                     margin, max_contacts, address_of(rows), max_contacts < corners ? max_contacts : corners, address_of(&end));
-    *n = end;
+    *n = space->kernels->manifold_of_row(address_of(header), address_of(X_WA), address_of(X_WB), address_of(&row), margin, max_contacts,
+                                         address_of(rows));
     return COLLIDE_OK;
 }
 

@@ -8,7 +8,7 @@
    (collide/contact/single_contact_call.py). */
 enum {
     F_INTS_AT, F_NUMBERS_AT, F_FACES_AT, F_POSES_AT, F_SHAPE_OF_AT, F_DOUBLES_AT, F_INTEGERS_AT, F_LARGEST, F_PAIRS_DONE,
-    F_ROWS_DONE, F_MARGIN, F_MAX_CONTACTS, F_ARE_BOXES, MANIFOLD_HEADER
+    F_ROWS_DONE, F_MARGIN, F_MAX_CONTACTS, MANIFOLD_HEADER
 };
 
 /* What contacts take beside a workspace, with which it goes. */
@@ -30,7 +30,7 @@ int fit_manifolds(struct manifold_space *manifold, int64_t largest);
 
 /* The pair that is asked about: rows of a table of shapes and of a table of faces. */
 void take_table_pair(collide_workspace *space, struct manifold_space *manifold, const int64_t *ints, const double *numbers,
-                     const int64_t *faces, int64_t a, int64_t b, int are_boxes);
+                     const int64_t *faces, int64_t a, int64_t b);
 
 /* Contacts of the pair taken, at most `max_contacts`, into `rows`, which has room for as many; *n : how many. flags : as of
    `collide_contacts`. */

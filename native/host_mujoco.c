@@ -264,7 +264,7 @@ static int answer(const struct collide_mujoco_model *made, const struct geom *A,
         *status = COLLIDE_NO_MEMORY;
         return -1;
     }
-    take_table_pair(slot->space, &slot->manifold, made->ints, made->numbers, made->faces, a, b, made->boxes[a] && made->boxes[b]);
+    take_table_pair(slot->space, &slot->manifold, made->ints, made->numbers, made->faces, a, b);
     if (made->is_cull) {
         count = is_farther_apart(slot->space, X_WA, X_WB, asked + slack, axis) ? 0 : -1;
         keep_axis(kept, count == 0 ? axis : NULL);

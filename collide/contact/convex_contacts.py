@@ -24,7 +24,6 @@ from collide.contact.contact_blocks import (
 )
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
-    ARE_BOXES,
     MARGIN,
     MAX_CONTACTS,
     PAIRS_DONE,
@@ -39,9 +38,8 @@ from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
-from collide.lowering.packed_convex import POINTS
 from collide.lowering.parts import is_single_convex
-from collide.lowering.shape_table import KIND, PARAMS, POSE, ShapeTable
+from collide.lowering.shape_table import POSE, ShapeTable
 from collide.narrowphase.convex_batches import prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import SinglePair, block_workspace
 from collide.narrowphase.pose_batches import BLOCK
@@ -197,11 +195,6 @@ def _with_space(rows: np.ndarray, n_rows: int, n_done: int, n: int, max_rows: in
     return larger
 
 
-def _boxes(table: ShapeTable) -> np.ndarray:
-    """(rows,) bool: which of the sets are boxes."""
-    return (table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)
-
-
 def _addresses(
     table: ShapeTable, faces: HullFaceTable, space: _Workspace, poses: np.ndarray, shape_of: np.ndarray
 ) -> tuple[int, ...]:
@@ -243,7 +236,6 @@ class SingleContacts:
         self._of_manifold[:PAIRS_DONE] = _addresses(
             table, self._faces, self._space, self._space.poses, self._space.shape_of
         )
-        self._of_manifold[ARE_BOXES] = _boxes(table).all()
         self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
         self._ask = prepared_row(contacts_single, self._header)
 

@@ -1,4 +1,4 @@
-"""Contacts of pairs of convex sets from their rows of `distance`: the kernel over a batch of posed pairs.
+"""Contacts of two convex sets from their row of `distance`.
 
 The normal is that of the row. Where both bodies have a face, or an edge, across it (`support_face.py`), the corners of
 their overlap are the contacts (`manifold_points.py`); the nearest points of the row are one where no corner is as near.
@@ -37,7 +37,7 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import NUMBERS, POSE, POSE_SLOP, SLOP
 from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
-from collide.narrowphase.rows import BEYOND, DISTANCE, HIT, LOWER, NORMAL, POINT_A, POINT_B, ROW, UPPER, view_row
+from collide.narrowphase.rows import BEYOND, DISTANCE, HIT, LOWER, NORMAL, POINT_A, POINT_B, UPPER, view_row
 from collide.numerics.vec3 import Vec3, add, norm1, put_vec3, scale, sub, vec3_at
 
 #: Lengths up to so many errors of a coordinate, or up to this part of the manifold's size, are rounding.
@@ -48,14 +48,13 @@ _NEAR = 2.0**-8
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
-# two shape numbers, of the workspace; most corners of a face. Then what a call has done: pairs,
-# and rows; of single calls the bits of the margin, max_contacts, and
-# whether both shapes are boxes.
+# two shape numbers, of the workspace; most corners of a face. Then what a call of a batch has done, pairs and rows; the
+# bits of the margin, and max_contacts.
 (
     INTS_AT, NUMBERS_AT, FACES_AT, POSES_AT, SHAPE_OF_AT, DOUBLES_AT, INTEGERS_AT, LARGEST, PAIRS_DONE, ROWS_DONE,
-    MARGIN, MAX_CONTACTS, ARE_BOXES,
-) = range(13)  # fmt: skip
-HEADER = 13
+    MARGIN, MAX_CONTACTS,
+) = range(12)  # fmt: skip
+HEADER = 12
 
 
 _CONTACT = CONTACT_DTYPE.itemsize
@@ -85,46 +84,25 @@ def max_corners_of(largest):
     return 2 * largest + 8
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)")
-def convex_manifolds(
-    header_at, which_at, XA_at, step_a, XB_at, step_b, slack_at, rows_at, n, margin, max_contacts, out_at, capacity,
-    ends_at,
-):  # fmt: skip
-    """Contacts of pairs from header[PAIRS_DONE] on, of n, while there is space for rows; 1 where there is none left.
+@entry("int64(int64, int64, int64, int64, float64, int64, int64)")
+def manifold_of_row(header_at, XA_at, XB_at, row_at, margin, max_contacts, out_at):
+    """`contacts_of_row` for C, where that row takes the long way."""
+    X_WA, X_WB = view_f64(XA_at, 16), view_f64(XB_at, 16)
+    return contacts_of_row(header_at, X_WA, X_WB, view_row(row_at), margin, max_contacts, out_at)
 
-    which : 0, or two shape rows a pair.   XA, XB : matrices; step 16 or, for a single pose, 0.
-    slack : 0, or by how much rounding may have moved the bodies of each pair towards each other [m].
-    rows : PAIR_DTYPE, one a pair.   out : `CONTACT_DTYPE`, for ``capacity`` rows, filled from header[ROWS_DONE] on.
-    ends : where the contacts of each pair end.
 
-    Fourteen arguments: Python calls it, with integers and doubles alone.
+@kernel(inline=True)
+def contacts_of_row(header_at, X_WA, X_WB, row, margin, max_contacts, out_at):
+    """Write the contacts of a pair at two matrices, if its row of `distance` is within the margin; how many.
+
+    header : its two poses become the matrices.   out : `CONTACT_DTYPE`, for as many rows as a manifold may have.
     """
-    header = view_i64(header_at, HEADER)
-    ends = view_i64(ends_at, n)
-    poses = view_f64(header[POSES_AT], 2 * POSE)
-    shape_of = view_i64(header[SHAPE_OF_AT], 2)
-    max_rows = min(max_contacts, max_corners_of(header[LARGEST]))
-    n_rows = header[ROWS_DONE]
-    for k in range(header[PAIRS_DONE], n):
-        if capacity - n_rows < max_rows:
-            header[PAIRS_DONE] = k
-            header[ROWS_DONE] = n_rows
-            return 1
-        row = view_row(rows_at + ROW * k)
-        slack = view_f64(slack_at + 8 * k, 1)[0] if slack_at != 0 else 0.0
-        if row.flags[BEYOND] == 0 and row.doubles[LOWER] <= margin + slack:
-            if which_at != 0:
-                which = view_i64(which_at + 16 * k, 2)
-                shape_of[0] = which[0]
-                shape_of[1] = which[1]
-            set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), False)
-            set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), False)
-            poses[POSE_SLOP] = slack
-            n_rows += put_manifold(header_at, 0, 1, row, margin + slack, max_contacts, out_at + _CONTACT * n_rows)
-        ends[k] = n_rows
-    header[PAIRS_DONE] = n
-    header[ROWS_DONE] = n_rows
-    return 0
+    if row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= margin:
+        return 0
+    poses = view_f64(view_i64(header_at, HEADER)[POSES_AT], 2 * POSE)
+    set_pose(poses, 0, X_WA, False)
+    set_pose(poses, POSE, X_WB, False)
+    return put_manifold(header_at, 0, 1, row, margin, max_contacts, out_at)
 
 
 @kernel

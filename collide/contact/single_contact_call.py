@@ -10,9 +10,8 @@ from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
     NUMBERS_AT,
-    POSES_AT,
     ROWS_DONE,
-    put_manifold,
+    contacts_of_row,
 )
 from collide.contact.posed_box import has_box_row
 from collide.kernels import entry, kernel, prepared, view_f64, view_i64
@@ -34,7 +33,7 @@ from collide.narrowphase.pose_batches import INTS_AT as BLOCK_INTS_AT
 from collide.narrowphase.pose_batches import NUMBERS_AT as BLOCK_NUMBERS_AT
 from collide.narrowphase.pose_batches import POSES_AT as BLOCK_POSES_AT
 from collide.narrowphase.posed_pair import ordered_pair
-from collide.narrowphase.rows import BEYOND, LOWER, is_undecided_or_refused, view_row
+from collide.narrowphase.rows import LOWER, is_undecided_or_refused, view_row
 
 #: Integers of the header: that of `pose_batches.py`, then that of `convex_manifolds.py`.
 SINGLE_HEADER = HEADER + MANIFOLD_HEADER
@@ -71,12 +70,7 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
         # A half-space within another has no depth that ends.
         if is_undecided_or_refused(row) or not row.doubles[LOWER] > -1e300:
             return -1
-    header[ROWS_DONE] = 0
-    if row.flags[BEYOND] == 0 and row.doubles[LOWER] <= margin:
-        poses = view_f64(header[POSES_AT], 2 * POSE)
-        set_pose(poses, 0, X_WA, False)
-        set_pose(poses, POSE, X_WB, False)
-        header[ROWS_DONE] = put_manifold(manifold_at, 0, 1, row, margin, header[MAX_CONTACTS], out_at)
+    header[ROWS_DONE] = contacts_of_row(manifold_at, X_WA, X_WB, row, margin, header[MAX_CONTACTS], out_at)
     return 0
 
 
