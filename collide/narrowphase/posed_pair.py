@@ -214,14 +214,7 @@ def sum_of_reaches(numbers, at_a, at_b, poses, p, q):
 def _stretch(R, p):
     """No vector gets longer by more than this factor; worked out once a pose."""
     if R[p + POSE_STRETCH] < 0.0:
-        R[p + POSE_STRETCH] = stretch_of(
-            R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
-            R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],
-            R[p + 2] * R[p + 2] + R[p + 5] * R[p + 5] + R[p + 8] * R[p + 8],
-            R[p] * R[p + 1] + R[p + 3] * R[p + 4] + R[p + 6] * R[p + 7],
-            R[p + 1] * R[p + 2] + R[p + 4] * R[p + 5] + R[p + 7] * R[p + 8],
-            R[p + 2] * R[p] + R[p + 5] * R[p + 3] + R[p + 8] * R[p + 6],
-        )
+        R[p + POSE_STRETCH] = stretch_of_pose(R, p)
     return R[p + POSE_STRETCH]
 
 
