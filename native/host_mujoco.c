@@ -199,27 +199,6 @@ static int left_to_mujoco(const void *model, void *data, void *contacts, int g1,
     return call(model, data, contacts, g1, g2, margin);
 }
 
-/* The axis of either of two boxes along which they are farthest apart. The test of boxes leaves no direction of its own. */
-static void put_box_axis(const struct collide_mujoco_model *made, int64_t a, int64_t b, const double *X_WA, const double *X_WB,
-                         double axis[3])
-{
-    double t[3], tried[3], widest = -INFINITE;
-    int k, j;
-    for (k = 0; k < 6; k++) {
-        const double *X = k < 3 ? X_WA : X_WB;
-        double sign, gap;
-        for (j = 0; j < 3; j++) tried[j] = X[4 * j + k % 3], t[j] = X_WB[4 * j + 3] - X_WA[4 * j + 3];
-        sign = tried[0] * t[0] + tried[1] * t[1] + tried[2] * t[2] < 0.0 ? -1.0 : 1.0;
-        for (j = 0; j < 3; j++) tried[j] *= sign;
-        gap = gap_along(made->ints + INTS * a, made->numbers + NUMBERS * a, X_WA, made->ints + INTS * b, made->numbers + NUMBERS * b,
-                        X_WB, tried);
-        if (gap > widest) {
-            widest = gap;
-            memcpy(axis, tried, sizeof tried);
-        }
-    }
-}
-
 /* Whether the direction that parted two geoms before parts them by more than `gap`; or, where they were apart or are new, that from
    one to the other. */
 static int are_parted(volatile struct kept_axis *kept, const struct geom *A, const struct geom *B, const double *X_WA,
@@ -277,8 +256,6 @@ static int answer(const struct collide_mujoco_model *made, const struct geom *A,
         }
         if (n == 0 && *status == COLLIDE_OK) {
             memcpy(axis, slot->space->rows->normal, sizeof axis);
-            if (axis[0] == 0.0 && axis[1] == 0.0 && axis[2] == 0.0 && made->boxes[a] && made->boxes[b])
-                put_box_axis(made, a, b, X_WA, X_WB, axis);
             keep_axis(kept, axis);
         } else {
             keep_axis(kept, NULL);

@@ -31,7 +31,6 @@ struct collide_mujoco_model {
     const int64_t *ints;      /* tables: of shapes, */
     const double *numbers;
     const int64_t *faces;     /* and of their faces */
-    const uint8_t *boxes;     /* rows that are boxes */
     int64_t largest;          /* most corners of a face */
     int64_t face_ints, manifold_header, contact_bytes; /* as Python has them */
     int64_t max_contacts[COLLIDE_MUJOCO_KINDS * COLLIDE_MUJOCO_KINDS]; /* contacts of a pair of kinds */

@@ -19,9 +19,8 @@ from collide.contact.convex_manifolds import HEADER
 from collide.contact.support_face import ROUND
 from collide.errors import CollideError, InvalidShape
 from collide.lowering.hull_faces import FACE_INTS, face_table_of
-from collide.lowering.packed_convex import POINTS
 from collide.lowering.parts import convex_set_of
-from collide.lowering.shape_table import KIND, PARAMS, RADIUS, REACH, ShapeTable
+from collide.lowering.shape_table import RADIUS, REACH, ShapeTable
 
 
 class GeomShapes(NamedTuple):
@@ -96,7 +95,7 @@ class Model(ctypes.Structure):
         ("is_cull", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in (
             "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "ints",
-            "numbers", "faces", "boxes",
+            "numbers", "faces",
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
         ("max_contacts", ctypes.c_int64 * (N * N)),
@@ -128,7 +127,6 @@ class ModelTables:
             "ints": table.ints,
             "numbers": table.numbers,
             "faces": faces.ints,
-            "boxes": ((table.ints[:, KIND] == POINTS) & (table.numbers[:, PARAMS] > 0.0)).astype(np.uint8),
         }
         self._held: tuple[Any, ...] = (model, table, faces, arrays)
         counts = max_contacts((int(model.opt.disableflags), int(model.opt.enableflags)))
