@@ -7,6 +7,7 @@ immutable, and keep what makes single calls fast. Lengths are [m]; ``lz`` is the
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 
@@ -226,8 +227,8 @@ class _Flat(CollisionGeometry):
         self._become([[-np.inf] * 3, [np.inf] * 3], *self._sides(self._n, self._d))
         self._center = self._n * self._d
 
-    def _sides(self, n, d) -> tuple[Shape, ...]:
-        raise NotImplementedError
+    #: The half-spaces of a normal and an offset, of each kind its own.
+    _sides: Callable[..., tuple[Shape, ...]]
 
     n = property(lambda self: self._n.copy(), lambda self, value: self._set(value, self._d), doc="Unit normal (3,).")
     d = property(lambda self: self._d, lambda self, value: self._set(self._n, value), doc="Offset along n [m].")

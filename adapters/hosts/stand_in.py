@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 
 class StandIn:
@@ -58,6 +60,25 @@ class StandIn:
             del sys.modules[name]
         sys.modules.update(self._before)
         self._before = None
+
+    def check(self, gap_of: Callable[[Any], float]) -> str:
+        """Install, ask one pair of what imports find, uninstall: one line for `collide doctor`.
+
+        gap_of : asks a module for the gap of a ball and a box 1 m apart [m].   Raises RuntimeError for what does not
+        hold.
+        """
+        hosts = list(dict.fromkeys(name.split(".")[0] for name in self._modules))
+        before = [sys.modules.get(name) for name in hosts]
+        with self.install() as module:
+            imported = [import_module(name) for name in hosts]
+            gap = gap_of(imported[0])
+        if any(host is not module for host in imported) or gap != 1.0:
+            names = ", ".join(host.__name__ for host in imported)
+            raise RuntimeError(f"import {hosts[0]} finds {names}; a ball and a box 1 m apart: {gap!r} m")
+        if [sys.modules.get(name) for name in hosts] != before:
+            raise RuntimeError(f"uninstall() did not put back what import {hosts[0]} found before")
+        imports = " and ".join(f"import {name}" for name in hosts)
+        return f"{imports} {'finds' if len(hosts) == 1 else 'find'} it, a pair was answered, uninstalled cleanly"
 
     def __enter__(self) -> ModuleType:
         return next(iter(self._modules.values()))
