@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pybullet as p
 import pybullet_data
+import unit_cube
 
 DATA = pybullet_data.getDataPath()
-CORNERS = [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
-FACETS = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3]
+CORNERS, FACETS = unit_cube.CORNERS.tolist(), unit_cube.FACETS.ravel().tolist()
 
 
 def body(

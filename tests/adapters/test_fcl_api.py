@@ -11,6 +11,7 @@ import sys
 
 import numpy as np
 import pytest
+from unit_cube import CORNERS, FACETS
 
 from collide import InvalidArgument, InvalidShape, UnsupportedQuery
 from collide.adapters.hosts import fcl_api as fcl
@@ -18,12 +19,6 @@ from collide.adapters.peers import exact
 
 needs_fcl = pytest.mark.skipif(importlib.util.find_spec("fcl") is None, reason="python-fcl is not installed")
 needs_trimesh = pytest.mark.skipif(importlib.util.find_spec("trimesh") is None, reason="trimesh is not installed")
-
-CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-FACETS = np.array([
-    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
-    [1, 5, 7], [1, 7, 3],
-])  # fmt: skip
 
 
 def cube_mesh():

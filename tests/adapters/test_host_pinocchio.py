@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from unit_cube import CORNERS, FACETS
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio (pin) is not installed")
 
@@ -201,18 +202,15 @@ def test_changes_are_noticed():
 
 
 def test_every_geometry_is_read():
-    corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    facets = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
-              [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for corner in corners:
+    for corner in CORNERS:
         points.append(corner)
-    for facet in facets:
+    for facet in FACETS.tolist():
         triangles.append(coal.Triangle(*facet))
     model = coal.BVHModelOBBRSS()
     model.beginModel(12, 8)
-    model.addVertices(corners)
-    model.addTriangles(np.array(facets))
+    model.addVertices(CORNERS)
+    model.addTriangles(FACETS)
     model.endModel()
     gaps = [
         (coal.Box(1, 1, 1), 2.5), (coal.Sphere(0.5), 2.5), (coal.Ellipsoid(0.1, 0.2, 0.25), 2.75),

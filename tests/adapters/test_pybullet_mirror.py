@@ -16,14 +16,6 @@ p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip insta
 from bullet_scenes import CORNERS, DATA, body, quaternion, rotation, sphere_of
 
 
-@pytest.fixture
-def client():
-    number = p.connect(p.DIRECT)
-    yield number
-    if p.isConnected(number):
-        p.disconnect(number)
-
-
 def gap_to_box(point: np.ndarray, half: np.ndarray) -> float:
     """Signed distance of a point from a box around the origin."""
     outside = np.abs(point) - half

@@ -18,15 +18,6 @@ from collide.errors import InvalidArgument, InvalidPose, UnknownBody, Unsupporte
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
 from bullet_scenes import CORNERS, DATA, FACETS, body, sphere_of
 
-
-@pytest.fixture
-def client():
-    number = p.connect(p.DIRECT)
-    yield number
-    if p.isConnected(number):
-        p.disconnect(number)
-
-
 # --- programs as they are -----------------------------------------------------------------------
 
 

@@ -10,15 +10,6 @@ from collide.adapters.hosts.pybullet_mirror import Mirror, attach
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
 from bullet_scenes import DATA, body, pairs_of, quaternion, sphere_of
 
-
-@pytest.fixture
-def client():
-    number = p.connect(p.DIRECT)
-    yield number
-    if p.isConnected(number):
-        p.disconnect(number)
-
-
 # --- contacts and filters -----------------------------------------------------------------------
 
 
