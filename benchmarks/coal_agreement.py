@@ -11,9 +11,6 @@ of 80 digits and shares no code with the engine.
 
 from __future__ import annotations
 
-import argparse
-import json
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -21,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from host_agreement import CORNERS, FACETS, calls
+from host_agreement import CORNERS, FACETS, asked_of_both, calls
 
 from collide.adapters.hosts import coal_api
 
@@ -156,20 +153,10 @@ def compare(pair, ours: Reply, theirs: Reply, counts: Counter) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--calls", type=int, default=10000)
-    parser.add_argument("--seed", type=int, default=22)
-    parser.add_argument("--host", action="store_true", help="answer with coal, as JSON (the child)")
-    arguments = parser.parse_args()
-    if arguments.host:
-        import coal
-
-        print("ANSWERS", json.dumps(answers(coal, arguments.calls, arguments.seed)))
+    arguments, answered = asked_of_both(__file__, __doc__, answers, "coal", coal_api)
+    if answered is None:
         return
-    command = [sys.executable, __file__, "--host", "--calls", str(arguments.calls), "--seed", str(arguments.seed)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    theirs, their_times = json.loads(done.stdout.split("ANSWERS")[1])
-    ours, our_times = answers(coal_api, arguments.calls, arguments.seed)
+    (ours, our_times), (theirs, their_times) = answered
     counts: Counter = Counter()
     for pair, mine, reply in zip(pairs(arguments.calls, arguments.seed), ours, theirs):
         compare(pair, mine, Reply(*reply), counts)

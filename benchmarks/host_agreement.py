@@ -14,6 +14,8 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -112,21 +114,31 @@ def judged_gap(pair, gap: float, their_gap: float) -> str:
     return f"{' and '.join(right) or 'nobody'} right"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+def asked_of_both(file: str, description: str | None, answers: Callable, host: str, drop_in) -> tuple:
+    """(arguments of the command line, (answers of the drop-in, those of the host)); None for these in the child, which
+    prints the host's: hosts may abort.
+
+    file : the script, run once more as the child.   answers : (module, calls, seed) to what JSON can hold.
+    """
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--calls", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=22)
-    parser.add_argument("--host", action="store_true", help="answer with python-fcl, as JSON (the child)")
+    parser.add_argument("--host", action="store_true", help=f"answer with {host}, as JSON (the child)")
     arguments = parser.parse_args()
     if arguments.host:
-        import fcl
-
-        print("ANSWERS", json.dumps(answers(fcl, arguments.calls, arguments.seed)))
-        return
-    command = [sys.executable, __file__, "--host", "--calls", str(arguments.calls), "--seed", str(arguments.seed)]
+        print("ANSWERS", json.dumps(answers(import_module(host), arguments.calls, arguments.seed)))
+        return arguments, None
+    command = [sys.executable, file, "--host", "--calls", str(arguments.calls), "--seed", str(arguments.seed)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    theirs, their_time = json.loads(done.stdout.split("ANSWERS")[1])
-    ours, our_time = answers(fcl_api, arguments.calls, arguments.seed)
+    theirs = json.loads(done.stdout.split("ANSWERS")[1])
+    return arguments, (answers(drop_in, arguments.calls, arguments.seed), theirs)
+
+
+def main() -> None:
+    arguments, answered = asked_of_both(__file__, __doc__, answers, "fcl", fcl_api)
+    if answered is None:
+        return
+    (ours, our_time), (theirs, their_time) = answered
     counts: dict[tuple[str, str], int] = {}
     gaps: dict[str, int] = {}
     worst = 0.0
