@@ -1,6 +1,6 @@
 """Geoms of a MuJoCo model as shapes, and the tables that the hook reads.
 
-Planes are half-spaces, meshes their convex hulls, as in MuJoCo. MuJoCo keeps vertices of meshes in single precision:
+Planes are half-spaces, meshes their convex hulls, as in MuJoCo; height fields reach down to their base. MuJoCo keeps vertices of meshes in single precision:
 those numbers are taken as they are.
 """
 
@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
-from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, N, check_model
+from collide import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, Halfspace, HeightField, Shape, Sphere
+from collide.adapters.hosts.mujoco_layout import FIELD, KINDS, OURS, PLANE, N, check_model
 from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import HEADER
@@ -35,8 +35,11 @@ class GeomShapes(NamedTuple):
     remaining: dict[int, str]
 
 
-def geom_shapes(model) -> GeomShapes:
-    """Shapes of all geoms. Raises InvalidShape, naming the geom, where its numbers make none."""
+def geom_shapes(model, with_fields: bool = True) -> GeomShapes:
+    """Shapes of all geoms. Raises InvalidShape, naming the geom, where its numbers make none.
+
+    with_fields : without, height fields have no shape, and row −1: the hook reads their heights itself.
+    """
     shapes: list[Shape] = []
     known: dict = {}
     rows = np.full(model.ngeom, -1, dtype=np.int64)
@@ -47,7 +50,9 @@ def geom_shapes(model) -> GeomShapes:
             remaining[geom] = f"{KINDS[kind] if kind < N else f'geoms of kind {kind}'}: left to MuJoCo"
             continue
         name = KINDS[kind]
-        numbers = int(model.geom_dataid[geom]) if name == "mesh" else model.geom_size[geom].tobytes()
+        if kind == FIELD and not with_fields:
+            continue
+        numbers = int(model.geom_dataid[geom]) if name in ("mesh", "hfield") else model.geom_size[geom].tobytes()
         key = (kind, 0 if kind == PLANE else numbers)
         if key not in known:
             known[key] = len(shapes)
@@ -73,7 +78,18 @@ def _shape(model, geom: int, name: str) -> Shape:
         return Ellipsoid(size)
     if name == "box":
         return Box([2.0 * length for length in size])
+    if name == "hfield":
+        return _height_field(model, int(model.geom_dataid[geom]))
     return ConvexHull(_hull_vertices(model, int(model.geom_dataid[geom])))
+
+
+def _height_field(model, field: int) -> HeightField:
+    n_rows, n_columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    first = int(model.hfield_adr[field])
+    x, y, z, base = model.hfield_size[field].tolist()
+    heights = z * np.array(model.hfield_data[first : first + n_rows * n_columns], dtype=np.float64)
+    cell = 2.0 * x / (n_columns - 1), 2.0 * y / (n_rows - 1)
+    return HeightField(heights.reshape(n_rows, n_columns), cell, bottom=-base)
 
 
 def _hull_vertices(model, mesh: int) -> np.ndarray:
@@ -94,7 +110,7 @@ class Model(ctypes.Structure):
         ("model", ctypes.c_void_p), ("signature", ctypes.c_uint64), ("n_geoms", ctypes.c_int64),
         ("is_cull", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in (
-            "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "ints",
+            "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "fields", "ints",
             "numbers", "faces",
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
@@ -110,7 +126,7 @@ class ModelTables:
 
     def __init__(self, model, is_cull: bool):
         check_model(model)
-        shapes, rows, self.remaining = geom_shapes(model)
+        shapes, rows, self.remaining = geom_shapes(model, with_fields=False)
         table = ShapeTable([convex_set_of(shape) for shape in shapes] or [convex_set_of(Sphere(1.0))])
         table.build_trees(np.arange(len(table.ints)))
         faces = face_table_of(table, ROUND)
@@ -124,6 +140,7 @@ class ModelTables:
             "vertices": np.array(model.mesh_vert, dtype=np.float32),
             "vertex_starts": np.array(model.mesh_vertadr, dtype=np.int32),
             "vertex_counts": np.array(model.mesh_vertnum, dtype=np.int32),
+            "fields": np.stack([model.hfield_nrow, model.hfield_ncol, model.hfield_adr], axis=1).astype(np.int64),
             "ints": table.ints,
             "numbers": table.numbers,
             "faces": faces.ints,
