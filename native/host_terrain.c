@@ -10,83 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- facets near a body -------------------------------------------------------------------------------------------- */
-
-static int64_t cell_at(double x, int64_t n_cells)
-{
-    return x < 0.0 ? 0 : x >= (double)n_cells ? n_cells - 1 : (int64_t)x;
-}
-
-static int keep_near(struct terrain_space *own, const struct terrain_facet *facet, double gap, const double support[3])
-{
-    struct near_facet *near;
-    if (own->n_near == own->capacity) {
-        size_t capacity = own->capacity > 0 ? 2 * own->capacity : 64;
-        if ((near = realloc(own->near, capacity * sizeof *near)) == NULL) return 0;
-        own->near = near;
-        own->capacity = capacity;
-    }
-    near = own->near + own->n_near++;
-    near->gap = gap;
-    memcpy(near->support, support, sizeof near->support);
-    near->i = (int32_t)facet->i;
-    near->j = (int32_t)facet->j;
-    near->t = facet->t;
-    near->is_hit = near->is_chosen = 0;
-    return 1;
-}
-
-/* Facets that no direction tried here proves to be farther from the body than `margin`, into own->near; where own is NULL, 1 at the
-   first of them. -1 where there is no memory. */
-static int find_near(const struct terrain *terrain, const struct terrain_body *body, double margin, struct terrain_space *own)
-{
-    int64_t n_rows = terrain->n_rows - 1, n_columns = terrain->n_columns - 1, i, j, i_first, i_last, j_first, j_last;
-    double length = sqrt(terrain->dx * terrain->dx + terrain->dy * terrain->dy), far[3], highest, lowest;
-    double diagonal[3] = {-terrain->dy / length, terrain->dx / length, 0.0}, back[3] = {terrain->dy / length, -terrain->dx / length, 0.0};
-    margin += 1e-9 * (body->reach + terrain->size[0] + terrain->size[1] + terrain->size[2] + terrain->size[3]);
-    if (own != NULL) own->n_near = 0;
-    if (body->low[0] > terrain->size[0] + margin || body->high[0] < -terrain->size[0] - margin ||
-        body->low[1] > terrain->size[1] + margin || body->high[1] < -terrain->size[1] - margin ||
-        body->low[2] > terrain->size[2] + margin || body->high[2] < -terrain->size[3] - margin)
-        return 0;
-    highest = body_support(body, diagonal, far);
-    lowest = -body_support(body, back, far);
-    j_first = cell_at((body->low[0] - margin + terrain->size[0]) / terrain->dx, n_columns);
-    j_last = cell_at((body->high[0] + margin + terrain->size[0]) / terrain->dx, n_columns);
-    i_first = cell_at((body->low[1] - margin + terrain->size[1]) / terrain->dy, n_rows);
-    i_last = cell_at((body->high[1] + margin + terrain->size[1]) / terrain->dy, n_rows);
-    for (i = i_first; i <= i_last; i++)
-        for (j = j_first; j <= j_last; j++) {
-            const float *h = terrain->heights + terrain->n_columns * i + j, *above = h + terrain->n_columns;
-            double along = diagonal[0] * (terrain->dx * (double)j - terrain->size[0]) + diagonal[1] * (terrain->dy * (double)i - terrain->size[1]);
-            double needed = (body->low[2] - margin) / terrain->size[2];
-            int t;
-            if (h[0] < needed && h[1] < needed && above[0] < needed && above[1] < needed) continue;
-            for (t = 0; t < 2; t++) {
-                struct terrain_facet facet;
-                double away[3], support[3], gap;
-                int k;
-                if (t == 0 ? lowest - along > margin || (h[0] < needed && h[1] < needed && above[1] < needed)
-                           : along - highest > margin || (h[0] < needed && above[0] < needed && above[1] < needed))
-                    continue;
-                facet = facet_at(terrain, i, j, t);
-                for (k = 0; k < 3; k++) away[k] = -facet.n[k];
-                gap = -body_support(body, away, support) - dot3(facet.n, facet.v[0]);
-                if (gap > margin) continue;
-                if (own == NULL) return 1;
-                if (!keep_near(own, &facet, gap, support)) return -1;
-            }
-        }
-    return 0;
-}
-
-int is_off_terrain(const struct terrain_pair *pair)
-{
-    const int64_t *ints = pair->ints + INTS * pair->b;
-    struct terrain_body body = body_seen_from(ints, pair->numbers + NUMBERS * pair->b, pair->X_WH, pair->X_WB);
-    return find_near(pair->terrain, &body, pair->margin, NULL) == 0;
-}
-
 /* --- contacts ------------------------------------------------------------------------------------------------------ */
 
 static void keep_touch(const struct task *task, const double n[3], const double p[3], double distance, int is_point)
@@ -151,6 +74,35 @@ static int put_face_contact(const struct task *task, const struct near_facet *ne
     return 1;
 }
 
+/* Grid points within the body, or within the margin of it, around which the field is lower along the body's shortest way out: all other
+   ways out of their prisms are longer. */
+static void put_point_contacts(const struct task *task)
+{
+    const struct terrain *terrain = task->pair->terrain;
+    const struct terrain_body *body = &task->body;
+    double margin = task->pair->margin, p[3], n[3], distance;
+    int64_t i, j, i_first = line_at((body->low[1] - margin + terrain->size[1]) / terrain->dy, terrain->n_rows);
+    int64_t j_first = line_at((body->low[0] - margin + terrain->size[0]) / terrain->dx, terrain->n_columns);
+    for (i = i_first; i < terrain->n_rows; i++) {
+        for (j = j_first; j < terrain->n_columns; j++) {
+            collide_contact row;
+            int k;
+            grid_point(terrain, i, j, p);
+            if (p[0] > body->high[0] + margin || p[1] > body->high[1] + margin) break;
+            if (p[2] < body->low[2] - margin || !distance_to_point(body, task->faces, p, margin, n, &distance)) continue;
+            if (distance > margin || n[2] < 0.0 || ring_rises(terrain, i, j, p, n, 0.0)) continue;
+            memset(&row, 0, sizeof row);
+            row.distance = distance;
+            turn_to_world(task->pair->X_WH, n, row.normal);
+            point_to_world(task->pair->X_WH, p, row.point_a);
+            for (k = 0; k < 3; k++) row.point_b[k] = row.point_a[k] + distance * row.normal[k];
+            keep_touch(task, n, p, distance, 0);
+            keep_rows(task, &row, 1);
+        }
+        if (terrain->dy * (double)i - terrain->size[1] > body->high[1] + margin) return;
+    }
+}
+
 /* Whether contacts that are known say all of a facet: it is apart along one of their normals, or shares one. */
 static int is_accounted_for(const struct task *task, const struct terrain_facet *facet)
 {
@@ -205,33 +157,53 @@ static int put_ball_contact(const struct task *task, const struct terrain_facet 
     return 1;
 }
 
-/* Whether the direction from the facet's point nearest to the body's middle parts them. */
+/* Whether a direction n of H, upwards, parts the body and a facet's prism. */
+static int parts(const struct task *task, const struct terrain_facet *facet, const double n[3])
+{
+    double back[3] = {-n[0], -n[1], -n[2]}, support[3];
+    return n[2] >= 0.0 && facet_gap_along(facet, n, -body_support(&task->body, back, support)) > task->pair->margin + 1e-3 * task->tolerance;
+}
+
+/* Whether a direction parts them that is easily found: from the facet's nearest point to the body's middle, or of a capsule to its axis,
+   or across the faces of a box. */
 static int is_parted(const struct task *task, const struct terrain_facet *facet)
 {
-    double q[3], n[3], back[3], support[3], length;
-    int k;
-    nearest_on_facet(facet, task->body.p_HB, q);
-    length = sqrt(square_between(task->body.p_HB, q));
-    if (!(length > task->tolerance) || !(task->body.p_HB[2] > q[2])) return 0; /* else the base may be farther along it */
-    for (k = 0; k < 3; k++) back[k] = -(n[k] = (task->body.p_HB[k] - q[k]) / length);
-    return facet_gap_along(facet, n, -body_support(&task->body, back, support)) > task->pair->margin + 1e-3 * task->tolerance;
+    const struct terrain_body *body = &task->body;
+    double c[3], q[3], n[3], length;
+    int k, round, is_box = body->ints[KIND] == POINTS && body->numbers[PARAMS] > 0.0;
+    memcpy(c, body->p_HB, sizeof c);
+    for (round = 0; round < (body->is_capsule ? 3 : 1); round++) {
+        nearest_on_facet(facet, c, q);
+        if (body->is_capsule) nearest_on_axis(body, q, c);
+    }
+    length = sqrt(square_between(c, q));
+    for (k = 0; k < 3 && length > task->tolerance; k++) n[k] = (c[k] - q[k]) / length;
+    if (length > task->tolerance && parts(task, facet, n)) return 1;
+    for (k = 0; k < 3 && is_box; k++) {
+        double sign = body->R_HB[6 + k] < 0.0 ? -1.0 : 1.0;
+        n[0] = sign * body->R_HB[k];
+        n[1] = sign * body->R_HB[3 + k];
+        n[2] = sign * body->R_HB[6 + k];
+        if (parts(task, facet, n)) return 1;
+    }
+    return 0;
 }
 
 static collide_status ask_facet(const struct task *task, struct near_facet *near)
 {
     const struct terrain_pair *pair = task->pair;
-    struct terrain_facet facet = facet_at(pair->terrain, near->i, near->j, near->t);
+    const struct terrain_facet *facet = &near->facet;
     collide_contact *found = task->own->found;
     double n[3], p[3];
     collide_status status;
     int64_t count;
-    if (is_accounted_for(task, &facet) || put_ball_contact(task, &facet) || is_parted(task, &facet)) return COLLIDE_OK;
-    take_prism(task, &facet);
+    if (is_accounted_for(task, facet) || put_ball_contact(task, facet) || is_parted(task, facet)) return COLLIDE_OK;
+    take_prism(task, facet);
     status = contacts_of_pair(task->space, task->manifold, pair->X_WH, pair->X_WB, pair->margin, PER_FACET, 0, found, &count);
     if (status != COLLIDE_OK || count == 0) return status;
     turn_from_world(pair->X_WH, found->normal, n);
     point_from_world(pair->X_WH, found->point_a, p);
-    if (leaves_terrain(pair->terrain, &facet, p, n, task->tolerance)) {
+    if (leaves_terrain(pair->terrain, facet, p, n, task->tolerance)) {
         keep_touch(task, n, p, found->distance, 0);
         keep_rows(task, found, count);
     } else if (found->distance < 0.0) {
@@ -250,9 +222,9 @@ static int by_gap(const void *one, const void *other)
     const struct near_facet *p = one, *q = other;
     double a = fabs(p->gap), b = fabs(q->gap);
     if (a != b) return a < b ? -1 : 1;
-    if (p->i != q->i) return p->i < q->i ? -1 : 1;
-    if (p->j != q->j) return p->j < q->j ? -1 : 1;
-    return p->t - q->t;
+    if (p->facet.i != q->facet.i) return p->facet.i < q->facet.i ? -1 : 1;
+    if (p->facet.j != q->facet.j) return p->facet.j < q->facet.j ? -1 : 1;
+    return p->facet.t - q->facet.t;
 }
 
 /* All contacts within the margin, into own->rows. */
@@ -266,10 +238,10 @@ static collide_status find_contacts(const struct task *task)
     if (own->n_near == 0) return COLLIDE_OK;
     take_body(task);
     for (k = 0; k < own->n_near; k++) {
-        struct terrain_facet facet = facet_at(task->pair->terrain, own->near[k].i, own->near[k].j, own->near[k].t);
-        if (!put_face_contact(task, own->near + k, &facet)) own->near[left++] = own->near[k];
+        if (!put_face_contact(task, own->near + k, &own->near[k].facet)) own->near[left++] = own->near[k];
     }
     own->n_near = left;
+    put_point_contacts(task);
     if (left > 1) qsort(own->near, left, sizeof *own->near, by_gap);
     for (k = 0; k < left && status == COLLIDE_OK; k++) status = ask_facet(task, own->near + k);
     if (status == COLLIDE_OK) put_deep_contact(task);
@@ -303,18 +275,16 @@ static collide_status find_nearest(const struct task *task, double within)
     size_t k;
     if (find_near(pair->terrain, &task->body, within, own) < 0) return COLLIDE_NO_MEMORY;
     for (k = 0; k < own->n_near; k++) {
-        struct terrain_facet facet = facet_at(pair->terrain, own->near[k].i, own->near[k].j, own->near[k].t);
-        double of_boxes = gap_of_boxes(&task->body, &facet);
+        double of_boxes = gap_of_boxes(&task->body, &own->near[k].facet);
         own->near[k].gap = own->near[k].gap > of_boxes ? own->near[k].gap : of_boxes;
     }
     if (own->n_near > 1) qsort(own->near, own->n_near, sizeof *own->near, by_gap);
     if (own->n_near > 0) take_body(task);
     for (k = 0; k < own->n_near; k++) {
-        struct terrain_facet facet = facet_at(pair->terrain, own->near[k].i, own->near[k].j, own->near[k].t);
         collide_status status;
         int64_t count;
         if (own->near[k].gap > best) continue;
-        take_prism(task, &facet);
+        take_prism(task, &own->near[k].facet);
         status = contacts_of_pair(task->space, task->manifold, pair->X_WH, pair->X_WB, best, PER_FACET, 0, own->found, &count);
         if (status != COLLIDE_OK) return status;
         if (count == 0 || own->found[0].distance > best) continue;
@@ -337,6 +307,7 @@ collide_status terrain_contacts(struct terrain_space *own, collide_workspace *sp
     task.own = own;
     task.space = space;
     task.manifold = manifold;
+    task.faces = pair->faces + FACE_INTS * pair->b;
     task.body = body_seen_from(pair->ints + INTS * pair->b, pair->numbers + NUMBERS * pair->b, pair->X_WH, pair->X_WB);
     task.tolerance = PLACES * (task.body.reach + terrain->dx + terrain->dy);
     within = task.body.reach + terrain->dx + terrain->dy;

@@ -35,6 +35,7 @@ struct terrain_body {
     double R_HB[9], p_HB[3];
     double low[3], high[3]; /* its box along the axes of H */
     double reach;
+    int is_capsule;
     int is_round;           /* a ball or an ellipsoid: it touches at one point */
 };
 
@@ -48,6 +49,14 @@ double body_support(const struct terrain_body *body, const double n[3], double p
 /* Other points of a body that may touch, where the one lowest along n does, are higher than it by this at least [m]. */
 double height_of_next(const struct terrain_body *body, const double n[3]);
 
+/* The point of a capsule's axis nearest to p. */
+void nearest_on_axis(const struct terrain_body *body, const double p[3], double nearest[3]);
+
+/* How far a point is from a body, negative within it, and the unit vector from the point to what is nearest: which way the body has to go;
+   0 where that is not known here, or farther than the limit. faces : of the body. */
+int distance_to_point(const struct terrain_body *body, const int64_t *faces, const double p[3], double limit, double n[3],
+                      double *distance);
+
 /* The point of a facet nearest to p. */
 void nearest_on_facet(const struct terrain_facet *facet, const double p[3], double nearest[3]);
 
@@ -56,6 +65,14 @@ double facet_gap_along(const struct terrain_facet *facet, const double n[3], dou
 
 /* How far a point is from the nearest wall of a facet's prism, seen from above; negative outside. */
 double depth_in_walls(const struct terrain_facet *facet, const double p[3]);
+
+void grid_point(const struct terrain *terrain, int64_t i, int64_t j, double p[3]);
+
+/* The first of n lines of the grid at or beyond x, in cells. */
+int64_t line_at(double x, int64_t n);
+
+/* Whether a grid point around one is farther along n than p, which is at that one. */
+int ring_rises(const struct terrain *terrain, int64_t i, int64_t j, const double p[3], const double n[3], double tolerance);
 
 /* Whether n leaves the field at right angles from a point of a facet's prism: no part of the field around the point is farther
    along n. tolerance : of places [m]. */

@@ -11,27 +11,21 @@ struct way_out {
 
 /* How far the body has to be moved along n until it is clear of a facet's prism, at most: until n parts them, or the direction does
    that is the prism's own way out, or the facet's plane. */
-static double clearing_length(const struct near_facet *near, const struct terrain_facet *facet, const double n[3], double lowest)
+static double clearing_length(const struct near_facet *near, const double n[3], double lowest)
 {
-    double length = -facet_gap_along(facet, n, lowest), along = dot3(near->n, n), rise = dot3(facet->n, n);
+    double length = -facet_gap_along(&near->facet, n, lowest), along = dot3(near->n, n), rise = dot3(near->facet.n, n);
     if (along > 0.0 && near->depth < length * along) length = near->depth / along;
     if (rise > 0.0 && -near->gap < length * rise) length = -near->gap / rise;
     return length;
 }
 
-static struct terrain_facet facet_of(const struct task *task, const struct near_facet *near)
-{
-    return facet_at(task->pair->terrain, near->i, near->j, near->t);
-}
-
 static int is_cleared(const struct task *task, const struct near_facet *near)
 {
     const struct terrain_space *own = task->own;
-    struct terrain_facet facet = facet_of(task, near);
     int k;
     for (k = 0; k < own->n_touches; k++) {
         const struct touch *touch = own->touches + k;
-        if (clearing_length(near, &facet, touch->n, touch->lowest) <= -touch->distance + task->tolerance) return 1;
+        if (clearing_length(near, touch->n, touch->lowest) <= -touch->distance + task->tolerance) return 1;
     }
     return 0;
 }
@@ -44,8 +38,7 @@ static size_t try_way(const struct task *task, const double n[3], struct way_out
     size_t k, last = 0;
     for (k = 0; k < own->n_near; k++)
         if (own->near[k].is_hit) {
-            struct terrain_facet facet = facet_of(task, own->near + k);
-            double of_facet = clearing_length(own->near + k, &facet, n, lowest);
+            double of_facet = clearing_length(own->near + k, n, lowest);
             if (of_facet > length) {
                 length = of_facet;
                 last = k;
@@ -72,9 +65,8 @@ static struct way_out best_way_out(const struct task *task)
     last = try_way(task, upwards, &best);
     for (k = 0; k < own->n_near && n_tried < MAX_TRIED; k++)
         if (own->near[k].is_hit) {
-            struct terrain_facet facet = facet_of(task, own->near + k);
             n_tried++;
-            try_way(task, facet.n, &best);
+            try_way(task, own->near[k].facet.n, &best);
             try_way(task, own->near[k].n, &best);
         }
     for (n_tried = 0; n_tried < MAX_HULLS && !own->near[last].is_chosen; n_tried++) {
@@ -98,8 +90,7 @@ static void put_way_out(const struct task *task, const struct way_out *way)
     turn_to_world(task->pair->X_WH, way->n, row.normal);
     for (k = 0; k < own->n_near && !task->body.is_round; k++)
         if (own->near[k].is_hit) {
-            struct terrain_facet facet = facet_of(task, own->near + k);
-            take_prism(task, &facet);
+            take_prism(task, &own->near[k].facet);
             add_manifold(task, way->n, NULL, NULL, 0.0);
         }
     for (c = 0; c < own->n_rows; c++)

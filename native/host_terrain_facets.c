@@ -1,5 +1,5 @@
-/* Facets of a height field, a convex body seen from it, and which directions leave it. */
-#include "host_terrain.h"
+/* Facets of a height field, and which directions leave it. */
+#include "host_terrain_task.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,9 +7,7 @@
 /* Sines of angles that count as none: normals of curved bodies are good to a hundredth of that. */
 #define FLAT 1e-6
 
-static double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static void grid_point(const struct terrain *terrain, int64_t i, int64_t j, double p[3])
+void grid_point(const struct terrain *terrain, int64_t i, int64_t j, double p[3])
 {
     p[0] = terrain->dx * (double)j - terrain->size[0];
     p[1] = terrain->dy * (double)i - terrain->size[1];
@@ -93,113 +91,6 @@ void nearest_on_facet(const struct terrain_facet *facet, const double p[3], doub
     for (k = 0; k < 3; k++) nearest[k] = a[k] + s * ab[k] + t * ac[k];
 }
 
-/* --- a body -------------------------------------------------------------------------------------------------------- */
-
-/* The hull's point farthest along m of the body's own frame. */
-static void hull_support(const int64_t *ints, const double *size, const double m[3], double p[3])
-{
-    const double *x = (const double *)(intptr_t)ints[ADDRESS], *y = x + ints[PADDED], *z = y + ints[PADDED];
-    double largest = -INFINITE;
-    int64_t k, best = 0;
-    int j;
-    if (size[0] > 0.0) { /* a box */
-        for (j = 0; j < 3; j++) p[j] = m[j] < 0.0 ? -size[j] : size[j];
-        return;
-    }
-    for (k = 0; k < ints[COUNT]; k++) {
-        double along = x[k] * m[0] + y[k] * m[1] + z[k] * m[2];
-        if (along > largest) {
-            largest = along;
-            best = k;
-        }
-    }
-    p[0] = x[best];
-    p[1] = y[best];
-    p[2] = z[best];
-}
-
-double body_support(const struct terrain_body *body, const double n[3], double point[3])
-{
-    const double *size = body->numbers + PARAMS, *R = body->R_HB;
-    double m[3], p[3], length;
-    int j;
-    for (j = 0; j < 3; j++) m[j] = R[j] * n[0] + R[3 + j] * n[1] + R[6 + j] * n[2];
-    if (body->ints[KIND] == CYLINDER) {
-        length = sqrt(m[0] * m[0] + m[1] * m[1]);
-        p[0] = length > 0.0 ? size[0] * m[0] / length : 0.0;
-        p[1] = length > 0.0 ? size[0] * m[1] / length : 0.0;
-        p[2] = m[2] < 0.0 ? -size[1] : size[1];
-    } else if (body->ints[KIND] == ELLIPSOID) {
-        for (j = 0; j < 3; j++) m[j] *= size[j];
-        length = sqrt(dot3(m, m));
-        for (j = 0; j < 3; j++) p[j] = size[j] * m[j] / length;
-    } else {
-        hull_support(body->ints, size, m, p);
-    }
-    for (j = 0; j < 3; j++)
-        point[j] = body->p_HB[j] + dot3(R + 3 * j, p) + body->numbers[RADIUS] * n[j];
-    return dot3(n, point);
-}
-
-struct terrain_body body_seen_from(const int64_t *ints, const double *numbers, const double *X_WH, const double *X_WB)
-{
-    struct terrain_body body;
-    double away[3], n[3] = {0.0, 0.0, 0.0}, point[3];
-    int i, j, k;
-    body.ints = ints;
-    body.numbers = numbers;
-    for (k = 0; k < 3; k++) away[k] = X_WB[4 * k + 3] - X_WH[4 * k + 3];
-    for (i = 0; i < 3; i++) {
-        body.p_HB[i] = X_WH[i] * away[0] + X_WH[4 + i] * away[1] + X_WH[8 + i] * away[2];
-        for (j = 0; j < 3; j++)
-            body.R_HB[3 * i + j] = X_WH[i] * X_WB[j] + X_WH[4 + i] * X_WB[4 + j] + X_WH[8 + i] * X_WB[8 + j];
-    }
-    for (k = 0; k < 3; k++) {
-        n[k] = 1.0;
-        body.high[k] = body_support(&body, n, point);
-        n[k] = -1.0;
-        body.low[k] = -body_support(&body, n, point);
-        n[k] = 0.0;
-    }
-    body.reach = numbers[REACH] + numbers[RADIUS];
-    body.is_round = ints[KIND] == ELLIPSOID || (ints[KIND] == POINTS && ints[COUNT] == 1);
-    return body;
-}
-
-double height_of_next(const struct terrain_body *body, const double n[3])
-{
-    const int64_t *ints = body->ints;
-    const double *size = body->numbers + PARAMS, *R = body->R_HB, *x, *y, *z;
-    double m[3], least = INFINITE, next = INFINITE;
-    int64_t k;
-    int j;
-    if (body->is_round) return INFINITE;
-    for (j = 0; j < 3; j++) m[j] = R[j] * n[0] + R[3 + j] * n[1] + R[6 + j] * n[2];
-    if (ints[KIND] == CYLINDER) { /* corners within its end: the next is an eighth of a turn away */
-        double on_end = 0.29 * size[0] * sqrt(m[0] * m[0] + m[1] * m[1]), on_side = 2.0 * size[1] * fabs(m[2]);
-        return on_end < on_side ? on_end : on_side;
-    }
-    if (ints[KIND] != POINTS) return 0.0;
-    if (size[0] > 0.0) {
-        for (j = 0; j < 3; j++)
-            if (2.0 * size[j] * fabs(m[j]) < next) next = 2.0 * size[j] * fabs(m[j]);
-        return next;
-    }
-    x = (const double *)(intptr_t)ints[ADDRESS];
-    y = x + ints[PADDED];
-    z = y + ints[PADDED];
-    for (k = 0; k < ints[COUNT]; k++) {
-        double along = x[k] * m[0] + y[k] * m[1] + z[k] * m[2];
-        if (along < least) {
-            next = least;
-            least = along;
-        } else if (along < next) {
-            next = along;
-        }
-    }
-    return next - least;
-}
-
 double facet_gap_along(const struct terrain_facet *facet, const double n[3], double lowest)
 {
     double a = dot3(n, facet->v[0]), b = dot3(n, facet->v[1]), c = dot3(n, facet->v[2]);
@@ -235,8 +126,7 @@ static int grid_point_rises(const struct terrain *terrain, int64_t i, int64_t j,
     return rises(w, p, n, tolerance);
 }
 
-/* The grid points around one. */
-static int ring_rises(const struct terrain *terrain, int64_t i, int64_t j, const double p[3], const double n[3], double tolerance)
+int ring_rises(const struct terrain *terrain, int64_t i, int64_t j, const double p[3], const double n[3], double tolerance)
 {
     static const int around[6][2] = {{0, 1}, {1, 1}, {1, 0}, {0, -1}, {-1, -1}, {-1, 0}};
     int k;
@@ -268,6 +158,12 @@ static int leaves_upwards(const struct terrain *terrain, const struct terrain_fa
             return 0;
     }
     return 1;
+}
+
+int64_t line_at(double x, int64_t n)
+{
+    double up = ceil(x);
+    return up < 0.0 ? 0 : up >= (double)n ? n : (int64_t)up;
 }
 
 int leaves_terrain(const struct terrain *terrain, const struct terrain_facet *facet, const double p[3], const double n[3],

@@ -150,14 +150,13 @@ static int64_t put_hull_points(const struct task *task, double *columns)
     size_t k;
     int c;
     for (k = 0; k < own->n_near; k++) {
-        struct terrain_facet facet;
+        const struct terrain_facet *facet = &own->near[k].facet;
         if (!own->near[k].is_chosen) continue;
-        facet = facet_at(task->pair->terrain, own->near[k].i, own->near[k].j, own->near[k].t);
         for (c = 0; c < 3; c++) {
-            for (i = 0; i < n && memcmp(points[i], facet.v[c], sizeof points[i]) != 0; i++) {}
+            for (i = 0; i < n && memcmp(points[i], facet->v[c], sizeof points[i]) != 0; i++) {}
             if (i < n) continue;
             if (n == HULL_POINTS / 2) return 0;
-            memcpy(points[n++], facet.v[c], sizeof points[i]);
+            memcpy(points[n++], facet->v[c], sizeof points[i]);
         }
     }
     for (i = 0; i < n; i++) {

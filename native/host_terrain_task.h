@@ -15,7 +15,8 @@ enum { PRISM_POINTS = 6, PRISM_FACES = 5, PRISM_CORNERS = 18 };
 struct near_facet {
     double gap, support[3];  /* along its normal, and the body's point nearest to its plane */
     double n[3], p[3], depth; /* where it is hit, the way out of the prism alone, from a point of it */
-    int32_t i, j, t, is_hit; /* hit : the prism overlaps, along a direction that does not leave the field */
+    struct terrain_facet facet;
+    int32_t is_hit;          /* hit : the prism overlaps, along a direction that does not leave the field */
     int32_t is_chosen;
 };
 
@@ -45,6 +46,7 @@ struct task {
     collide_workspace *space;
     struct manifold_space *manifold;
     struct terrain_body body;
+    const int64_t *faces; /* of the body */
     double tolerance; /* of places [m] */
 };
 
@@ -80,6 +82,10 @@ static inline void point_from_world(const double *X_WH, const double p[3], doubl
     double away[3] = {p[0] - X_WH[3], p[1] - X_WH[7], p[2] - X_WH[11]};
     turn_from_world(X_WH, away, out);
 }
+
+/* host_terrain_near.c: facets that no direction tried there proves to be farther from the body than `margin`, into own->near; where own
+   is NULL, 1 at the first of them. -1 where there is no memory. */
+int find_near(const struct terrain *terrain, const struct terrain_body *body, double margin, struct terrain_space *own);
 
 /* host_terrain_prisms.c: have the second body, once a question, and the prism below a facet take their places in the workspace. */
 void take_body(const struct task *task);
