@@ -239,7 +239,7 @@ static int answer_on_field(const struct collide_mujoco_model *made, const struct
 {
     double X_WH[16], X_WB[16];
     struct terrain terrain = terrain_of(made, model, A);
-    struct terrain_pair pair = {&terrain, made->ints, made->faces, made->numbers, X_WH, X_WB, B->row,
+    struct terrain_pair pair = {&terrain, made->ints, made->faces, made->extremes, made->numbers, made->boxes, X_WH, X_WB, B->row,
                                 margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0};
     int64_t n = 0, k;
     int count = 0;

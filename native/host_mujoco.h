@@ -32,6 +32,8 @@ struct collide_mujoco_model {
     const int64_t *ints;      /* tables: of shapes, */
     const double *numbers;
     const int64_t *faces;     /* and of their faces */
+    const double *boxes;      /* around hulls: (rows of the tables, 6), middles and half sides */
+    const int64_t *extremes;  /* of large hulls: (rows of the tables, 14) vertices that are farthest along some directions */
     int64_t largest;          /* most corners of a face */
     int64_t face_ints, manifold_header, contact_bytes; /* as Python has them */
     int64_t max_contacts[COLLIDE_MUJOCO_KINDS * COLLIDE_MUJOCO_KINDS]; /* contacts of a pair of kinds */

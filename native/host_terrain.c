@@ -12,7 +12,7 @@
 
 /* --- contacts ------------------------------------------------------------------------------------------------------ */
 
-static void keep_touch(const struct task *task, const double n[3], const double p[3], double distance, int is_point)
+static void keep_touch(const struct task *task, const struct terrain_facet *facet, const double n[3], const double p[3], double distance, int is_point)
 {
     struct terrain_space *own = task->own;
     double away[3] = {-n[0], -n[1], -n[2]}, point[3];
@@ -21,6 +21,7 @@ static void keep_touch(const struct task *task, const double n[3], const double 
     memcpy(touch->n, n, sizeof touch->n);
     memcpy(touch->p, p, sizeof touch->p);
     touch->distance = distance;
+    touch->facet = *facet;
     touch->is_point = is_point;
     touch->lowest = -body_support(&task->body, away, point);
     own->n_touches++;
@@ -59,7 +60,7 @@ static int put_face_contact(const struct task *task, const struct near_facet *ne
     depth = depth_in_walls(facet, gap > 0.0 ? q : near->support);
     if (!(depth >= (gap > 0.0 ? 0.0 : -gap)) || near->support[2] + task->pair->terrain->size[3] < -gap) return 0;
     is_point = gap + height_of_next(&task->body, facet->n) > task->pair->margin + task->tolerance;
-    keep_touch(task, facet->n, q, gap, is_point);
+    keep_touch(task, facet, facet->n, q, gap, is_point);
     memset(&row, 0, sizeof row);
     row.distance = gap;
     turn_to_world(task->pair->X_WH, facet->n, row.normal);
@@ -85,25 +86,38 @@ static void put_point_contacts(const struct task *task)
     int64_t j_first = line_at((body->low[0] - margin + terrain->size[0]) / terrain->dx, terrain->n_columns);
     for (i = i_first; i < terrain->n_rows; i++) {
         for (j = j_first; j < terrain->n_columns; j++) {
+            struct terrain_facet facet;
             collide_contact row;
             int k;
             grid_point(terrain, i, j, p);
             if (p[0] > body->high[0] + margin || p[1] > body->high[1] + margin) break;
-            if (p[2] < body->low[2] - margin || !distance_to_point(body, task->faces, p, margin, n, &distance)) continue;
+            if (p[2] < body->low[2] - margin || !distance_to_point(body, p, margin, n, &distance)) continue;
             if (distance > margin || n[2] < 0.0 || ring_rises(terrain, i, j, p, n, 0.0)) continue;
             memset(&row, 0, sizeof row);
             row.distance = distance;
             turn_to_world(task->pair->X_WH, n, row.normal);
             point_to_world(task->pair->X_WH, p, row.point_a);
             for (k = 0; k < 3; k++) row.point_b[k] = row.point_a[k] + distance * row.normal[k];
-            keep_touch(task, n, p, distance, 0);
+            facet = facet_at(terrain, i < terrain->n_rows - 1 ? i : i - 1, j < terrain->n_columns - 1 ? j : j - 1, 0);
+            keep_touch(task, &facet, n, p, distance, 0);
             keep_rows(task, &row, 1);
         }
         if (terrain->dy * (double)i - terrain->size[1] > body->high[1] + margin) return;
     }
 }
 
-/* Whether contacts that are known say all of a facet: it is apart along one of their normals, or shares one. */
+/* Whether two facets share a grid point. */
+static int are_linked(const struct terrain_facet *one, const struct terrain_facet *other)
+{
+    int k, c;
+    for (k = 0; k < 3; k++)
+        for (c = 0; c < 3; c++)
+            if (one->v[k][0] == other->v[c][0] && one->v[k][1] == other->v[c][1]) return 1;
+    return 0;
+}
+
+/* Whether contacts that are known say all of a facet: it is apart along one of their normals; or it lies beside the facet of one, or on
+   its plane, and is no deeper along its normal. Then it may add points along that. */
 static int is_accounted_for(const struct task *task, const struct terrain_facet *facet)
 {
     const struct terrain_space *own = task->own;
@@ -113,12 +127,9 @@ static int is_accounted_for(const struct task *task, const struct terrain_facet 
         if (facet_gap_along(facet, own->touches[k].n, own->touches[k].lowest) > task->pair->margin + 1e-3 * tolerance) return 1;
     for (k = 0; k < own->n_touches; k++) {
         const struct touch *touch = own->touches + k;
-        double off[3] = {touch->p[0] - facet->v[0][0], touch->p[1] - facet->v[0][1], touch->p[2] - facet->v[0][2]};
         int n_more = 0;
         if (facet_gap_along(facet, touch->n, touch->lowest) < touch->distance - 1e-3 * tolerance) continue;
-        if (dot3(touch->n, facet->n) < SAME_NORMAL &&
-            (fabs(dot3(off, facet->n)) > tolerance || depth_in_walls(facet, touch->p) < -tolerance))
-            continue;
+        if (dot3(touch->n, facet->n) < SAME_NORMAL && !are_linked(facet, &touch->facet)) continue;
         for (c = 0; c < 3; c++)
             n_more += touch->lowest - dot3(touch->n, facet->v[c]) <= task->pair->margin + tolerance &&
                       square_between(facet->v[c], touch->p) > tolerance * tolerance;
@@ -152,7 +163,7 @@ static int put_ball_contact(const struct task *task, const struct terrain_facet 
     turn_to_world(pair->X_WH, n, row.normal);
     point_to_world(pair->X_WH, q, row.point_a);
     for (k = 0; k < 3; k++) row.point_b[k] = row.point_a[k] + row.distance * row.normal[k];
-    keep_touch(task, n, q, row.distance, 1);
+    keep_touch(task, facet, n, q, row.distance, 1);
     keep_rows(task, &row, 1);
     return 1;
 }
@@ -204,7 +215,7 @@ static collide_status ask_facet(const struct task *task, struct near_facet *near
     turn_from_world(pair->X_WH, found->normal, n);
     point_from_world(pair->X_WH, found->point_a, p);
     if (leaves_terrain(pair->terrain, facet, p, n, task->tolerance)) {
-        keep_touch(task, n, p, found->distance, 0);
+        keep_touch(task, facet, n, p, found->distance, 0);
         keep_rows(task, found, count);
     } else if (found->distance < 0.0) {
         near->is_hit = 1;
@@ -234,7 +245,7 @@ static collide_status find_contacts(const struct task *task)
     collide_status status = COLLIDE_OK;
     size_t k, left = 0;
     own->n_touches = own->n_rows = 0;
-    if (find_near(task->pair->terrain, &task->body, task->pair->margin, own) < 0) return COLLIDE_NO_MEMORY;
+    if (find_near(task->pair, &task->body, task->pair->margin, own) < 0) return COLLIDE_NO_MEMORY;
     if (own->n_near == 0) return COLLIDE_OK;
     take_body(task);
     for (k = 0; k < own->n_near; k++) {
@@ -273,7 +284,7 @@ static collide_status find_nearest(const struct task *task, double within)
     const struct terrain_pair *pair = task->pair;
     double best = within;
     size_t k;
-    if (find_near(pair->terrain, &task->body, within, own) < 0) return COLLIDE_NO_MEMORY;
+    if (find_near(pair, &task->body, within, own) < 0) return COLLIDE_NO_MEMORY;
     for (k = 0; k < own->n_near; k++) {
         double of_boxes = gap_of_boxes(&task->body, &own->near[k].facet);
         own->near[k].gap = own->near[k].gap > of_boxes ? own->near[k].gap : of_boxes;
@@ -303,12 +314,12 @@ collide_status terrain_contacts(struct terrain_space *own, collide_workspace *sp
     struct task task;
     collide_status status;
     double within;
+    int64_t vertex;
     task.pair = &asked;
     task.own = own;
     task.space = space;
     task.manifold = manifold;
-    task.faces = pair->faces + FACE_INTS * pair->b;
-    task.body = body_seen_from(pair->ints + INTS * pair->b, pair->numbers + NUMBERS * pair->b, pair->X_WH, pair->X_WB);
+    task.body = body_seen_from(pair, &vertex);
     task.tolerance = PLACES * (task.body.reach + terrain->dx + terrain->dy);
     within = task.body.reach + terrain->dx + terrain->dy;
     if (pair->margin > within) asked.margin = 0.0;

@@ -28,20 +28,34 @@ struct terrain_facet {
     const double (*walls)[2];
 };
 
+enum { EXTREMES = 14 };
+
+/* A question: the second body is row `b` of tables as `take_table_pair` has them. */
+struct terrain_pair {
+    const struct terrain *terrain;
+    const int64_t *ints, *faces, *extremes; /* extremes : (n, EXTREMES) vertices of large hulls that are farthest along some directions */
+    const double *numbers, *boxes, *X_WH, *X_WB; /* boxes : (n, 6) of hulls: middles and half sides */
+    int64_t b;
+    double margin;
+};
+
 /* A convex body seen from H. */
 struct terrain_body {
     const int64_t *ints;
     const double *numbers;
+    const int64_t *faces;
+    int64_t *vertex; /* of a large hull: where the last search ended */
     double R_HB[9], p_HB[3];
     double low[3], high[3]; /* its box along the axes of H */
     double reach;
-    int is_capsule;
+    int is_capsule, is_large;
     int is_round;           /* a ball or an ellipsoid: it touches at one point */
 };
 
 struct terrain_facet facet_at(const struct terrain *terrain, int64_t i, int64_t j, int t);
 
-struct terrain_body body_seen_from(const int64_t *ints, const double *numbers, const double *X_WH, const double *X_WB);
+/* vertex : a place of its own. */
+struct terrain_body body_seen_from(const struct terrain_pair *pair, int64_t *vertex);
 
 /* The point of a body farthest along a unit vector of H; how far that is. */
 double body_support(const struct terrain_body *body, const double n[3], double point[3]);
@@ -52,10 +66,12 @@ double height_of_next(const struct terrain_body *body, const double n[3]);
 /* The point of a capsule's axis nearest to p. */
 void nearest_on_axis(const struct terrain_body *body, const double p[3], double nearest[3]);
 
+/* How far a body reaches along a unit vector of H, and back along it, at most. */
+void body_extent(const struct terrain_pair *pair, const struct terrain_body *body, const double n[3], double *low, double *high);
+
 /* How far a point is from a body, negative within it, and the unit vector from the point to what is nearest: which way the body has to go;
-   0 where that is not known here, or farther than the limit. faces : of the body. */
-int distance_to_point(const struct terrain_body *body, const int64_t *faces, const double p[3], double limit, double n[3],
-                      double *distance);
+   0 where that is not known here, or farther than the limit. */
+int distance_to_point(const struct terrain_body *body, const double p[3], double limit, double n[3], double *distance);
 
 /* The point of a facet nearest to p. */
 void nearest_on_facet(const struct terrain_facet *facet, const double p[3], double nearest[3]);
@@ -83,15 +99,6 @@ int leaves_terrain(const struct terrain *terrain, const struct terrain_facet *fa
 struct terrain_space;
 struct terrain_space *begin_terrain_space(void); /* NULL where there is no memory */
 void free_terrain_space(struct terrain_space *terrain_space);
-
-/* A question: the second body is row `b` of tables as `take_table_pair` has them. */
-struct terrain_pair {
-    const struct terrain *terrain;
-    const int64_t *ints, *faces;
-    const double *numbers, *X_WH, *X_WB;
-    int64_t b;
-    double margin;
-};
 
 /* Whether the body is proven to be farther from the field than the margin. */
 int is_off_terrain(const struct terrain_pair *pair);

@@ -27,12 +27,12 @@ static int keep_near(struct terrain_space *own, const struct terrain_facet *face
     return 1;
 }
 
-int find_near(const struct terrain *terrain, const struct terrain_body *body, double margin, struct terrain_space *own)
+int find_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own)
 {
+    const struct terrain *terrain = pair->terrain;
     int64_t n_rows = terrain->n_rows - 1, n_columns = terrain->n_columns - 1, i, j, i_first, i_last, j_first, j_last;
-    double length = sqrt(terrain->dx * terrain->dx + terrain->dy * terrain->dy), far[3], highest, lowest, needed;
+    double length = sqrt(terrain->dx * terrain->dx + terrain->dy * terrain->dy), highest, lowest, needed;
     double diagonal[3] = {-terrain->dy / length, terrain->dx / length, 0.0};
-    double back[3] = {terrain->dy / length, -terrain->dx / length, 0.0};
     margin += 1e-9 * (body->reach + terrain->size[0] + terrain->size[1] + terrain->size[2] + terrain->size[3]);
     if (own != NULL) own->n_near = 0;
     if (body->low[0] > terrain->size[0] + margin || body->high[0] < -terrain->size[0] - margin ||
@@ -40,8 +40,7 @@ int find_near(const struct terrain *terrain, const struct terrain_body *body, do
         body->low[2] > terrain->size[2] + margin || body->high[2] < -terrain->size[3] - margin)
         return 0;
     needed = (body->low[2] - margin) / terrain->size[2]; /* a cell that is lower throughout is too low */
-    highest = body_support(body, diagonal, far);
-    lowest = -body_support(body, back, far);
+    body_extent(pair, body, diagonal, &lowest, &highest);
     j_first = cell_at((body->low[0] - margin + terrain->size[0]) / terrain->dx, n_columns);
     j_last = cell_at((body->high[0] + margin + terrain->size[0]) / terrain->dx, n_columns);
     i_first = cell_at((body->low[1] - margin + terrain->size[1]) / terrain->dy, n_rows);
@@ -74,7 +73,7 @@ int find_near(const struct terrain *terrain, const struct terrain_body *body, do
 
 int is_off_terrain(const struct terrain_pair *pair)
 {
-    const int64_t *ints = pair->ints + INTS * pair->b;
-    struct terrain_body body = body_seen_from(ints, pair->numbers + NUMBERS * pair->b, pair->X_WH, pair->X_WB);
-    return find_near(pair->terrain, &body, pair->margin, NULL) == 0;
+    int64_t vertex;
+    struct terrain_body body = body_seen_from(pair, &vertex);
+    return find_near(pair, &body, pair->margin, NULL) == 0;
 }

@@ -23,6 +23,7 @@ struct near_facet {
 /* A contact that is known, in H: a normal, a point of the field, the distance there, the body's least height. */
 struct touch {
     double n[3], p[3], distance, lowest;
+    struct terrain_facet facet; /* one that it was found at */
     int is_point; /* the body has no more than a point within the margin */
 };
 
@@ -46,7 +47,6 @@ struct task {
     collide_workspace *space;
     struct manifold_space *manifold;
     struct terrain_body body;
-    const int64_t *faces; /* of the body */
     double tolerance; /* of places [m] */
 };
 
@@ -85,7 +85,7 @@ static inline void point_from_world(const double *X_WH, const double p[3], doubl
 
 /* host_terrain_near.c: facets that no direction tried there proves to be farther from the body than `margin`, into own->near; where own
    is NULL, 1 at the first of them. -1 where there is no memory. */
-int find_near(const struct terrain *terrain, const struct terrain_body *body, double margin, struct terrain_space *own);
+int find_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own);
 
 /* host_terrain_prisms.c: have the second body, once a question, and the prism below a facet take their places in the workspace. */
 void take_body(const struct task *task);

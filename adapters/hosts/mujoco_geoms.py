@@ -7,6 +7,7 @@ those numbers are taken as they are.
 from __future__ import annotations
 
 import ctypes
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import HEADER
 from collide.contact.support_face import ROUND
 from collide.errors import CollideError, InvalidShape
-from collide.lowering.hull_faces import FACE_INTS, face_table_of
+from collide.lowering.hull_faces import FACE_INTS, HullFaceTable, face_table_of
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RADIUS, REACH, ShapeTable
 
@@ -103,6 +104,22 @@ def _hull_vertices(model, mesh: int) -> np.ndarray:
     return vertices[model.mesh_graph[graph + 2 + n_hull : graph + 2 + 2 * n_hull]]
 
 
+#: Directions in which vertices of hulls are looked up: where a search for another direction begins.
+_DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if np.count_nonzero(d) in (1, 3)], dtype=float)
+
+
+def _boxes_and_extremes(table: ShapeTable, faces: HullFaceTable) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 6) middles and half sides of boxes around hulls, (n, 14) vertices farthest along `_DIRECTIONS`); 0 of others."""
+    boxes, extremes = np.zeros((len(table.packed), 6)), np.zeros((len(table.packed), 14), dtype=np.int64)
+    for k, (packed, of_hull) in enumerate(zip(table.packed, faces.faces)):
+        if of_hull is not None:
+            low, high = packed.points.min(axis=0), packed.points.max(axis=0)
+            boxes[k] = *(0.5 * (low + high)), *(0.5 * (high - low) + packed.radius)
+            ids = of_hull.vertex_ids  # points within faces are no vertices, and have no edges to go on along
+            extremes[k] = ids[(packed.points[ids] @ _DIRECTIONS.T).argmax(axis=0)]
+    return boxes, extremes
+
+
 class Model(ctypes.Structure):
     """`collide_mujoco_model` of native/host_mujoco.h."""
 
@@ -111,7 +128,7 @@ class Model(ctypes.Structure):
         ("is_cull", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in (
             "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "fields", "ints",
-            "numbers", "faces",
+            "numbers", "faces", "boxes", "extremes",
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
         ("max_contacts", ctypes.c_int64 * (N * N)),
@@ -145,6 +162,7 @@ class ModelTables:
             "numbers": table.numbers,
             "faces": faces.ints,
         }
+        arrays["boxes"], arrays["extremes"] = _boxes_and_extremes(table, faces)
         self._held: tuple[Any, ...] = (model, table, faces, arrays)
         counts = max_contacts((int(model.opt.disableflags), int(model.opt.enableflags)))
         self.made = Model(
