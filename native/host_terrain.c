@@ -328,6 +328,6 @@ collide_status terrain_contacts(struct terrain_space *own, collide_workspace *sp
         asked.margin = within < pair->margin ? within : pair->margin;
         status = find_nearest(&task, asked.margin);
     }
-    *n = status == COLLIDE_OK ? take_rows(own, max_contacts, rows) : 0;
+    *n = status == COLLIDE_OK ? take_rows(&task, max_contacts, rows) : 0;
     return status;
 }

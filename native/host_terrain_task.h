@@ -103,6 +103,6 @@ void put_deep_contact(const struct task *task);
 /* host_terrain_rows.c: keep rows that are within the margin and not there yet. */
 void keep_rows(const struct task *task, const collide_contact *rows, int64_t n);
 /* Of the rows kept those that tell most, patch after patch, the deepest first; how many. */
-int64_t take_rows(struct terrain_space *own, int64_t max_contacts, collide_contact *rows);
+int64_t take_rows(const struct task *task, int64_t max_contacts, collide_contact *rows);
 
 #endif
