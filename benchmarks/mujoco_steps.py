@@ -3,9 +3,9 @@
     python benchmarks/mujoco_steps.py [--quick] [--bodies 100 1000 5000] [--scenes NAME …] [--no-csv]
 
 Pits hold spheres, capsules, ellipsoids, cylinders, boxes and hulls in equal numbers, or boxes and hulls alone, which
-fall from a grid; the terrain is a rough height field of 9 cm cells, over which bodies of all kinds, and robots, fall far
-from each other. "falling" are the steps after the first tenth of a second, "resting" those after four hundred steps
-that are damped, until next to nothing moves. Robots are URDF models of example-robot-data, dropped on a floor.
+fall from a grid. The terrain is a rough height field of 9 cm cells, over which bodies of all kinds fall, 22 cm apart.
+"Falling" are the steps after the first tenth of a second, "resting" those after four hundred steps that are damped,
+until next to nothing moves. Robots are URDF models of example-robot-data, dropped on a floor, or on such a terrain.
 
 All contestants step from the same saved state, in turns; a row holds the median, the least and the largest of their
 rounds. "step" is processor time, "collision" what MuJoCo's own timer says of the collision within these steps. Pits are

@@ -243,18 +243,18 @@ static collide_status find_contacts(const struct task *task)
 {
     struct terrain_space *own = task->own;
     collide_status status = COLLIDE_OK;
-    size_t k, left = 0;
+    size_t k, remaining = 0;
     own->n_touches = own->n_rows = 0;
     if (find_near(task->pair, &task->body, task->pair->margin, own) < 0) return COLLIDE_NO_MEMORY;
     if (own->n_near == 0) return COLLIDE_OK;
     take_body(task);
     for (k = 0; k < own->n_near; k++) {
-        if (!put_face_contact(task, own->near + k, &own->near[k].facet)) own->near[left++] = own->near[k];
+        if (!put_face_contact(task, own->near + k, &own->near[k].facet)) own->near[remaining++] = own->near[k];
     }
-    own->n_near = left;
+    own->n_near = remaining;
     put_point_contacts(task);
-    if (left > 1) qsort(own->near, left, sizeof *own->near, by_gap);
-    for (k = 0; k < left && status == COLLIDE_OK; k++) status = ask_facet(task, own->near + k);
+    if (remaining > 1) qsort(own->near, remaining, sizeof *own->near, by_gap);
+    for (k = 0; k < remaining && status == COLLIDE_OK; k++) status = ask_facet(task, own->near + k);
     if (status == COLLIDE_OK) put_deep_contact(task);
     return status;
 }

@@ -7,7 +7,7 @@
 /* Hulls of more faces are not looked through. */
 enum { MAX_FACES = 64 };
 /* From so many vertices on the farthest is looked for along edges. */
-enum { MANY = 48 };
+enum { MIN_VERTICES_TO_CLIMB = 48 };
 
 /* Along m, of a hull's point. */
 static double height_of(const int64_t *ints, int64_t k, const double m[3])
@@ -130,7 +130,7 @@ struct terrain_body body_seen_from(const struct terrain_pair *pair, int64_t *ver
     body.ints = ints;
     body.numbers = numbers;
     body.faces = pair->faces + FACE_INTS * pair->b;
-    body.is_large = ints[KIND] == POINTS && ints[COUNT] > MANY && body.faces[N_FACES] >= 4;
+    body.is_large = ints[KIND] == POINTS && ints[COUNT] > MIN_VERTICES_TO_CLIMB && body.faces[N_FACES] >= 4;
     body.vertex = vertex;
     *vertex = 0;
     for (k = 0; k < 3; k++) away[k] = X_WB[4 * k + 3] - X_WH[4 * k + 3];

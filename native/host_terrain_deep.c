@@ -69,8 +69,8 @@ static struct way_out best_way_out(const struct task *task)
             try_way(task, own->near[k].facet.n, &best);
             try_way(task, own->near[k].n, &best);
         }
-    for (n_tried = 0; n_tried < MAX_HULLS && !own->near[last].is_chosen; n_tried++) {
-        own->near[last].is_chosen = 1;
+    for (n_tried = 0; n_tried < MAX_HULLS && !own->near[last].is_in_hull; n_tried++) {
+        own->near[last].is_in_hull = 1;
         if (!way_out_of_hull(task, n)) break;
         last = try_way(task, n, &best);
     }

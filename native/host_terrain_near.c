@@ -23,7 +23,7 @@ static int keep_near(struct terrain_space *own, const struct terrain_facet *face
     near->gap = gap;
     memcpy(near->support, support, sizeof near->support);
     near->facet = *facet;
-    near->is_hit = near->is_chosen = 0;
+    near->is_hit = near->is_in_hull = 0;
     return 1;
 }
 

@@ -151,7 +151,7 @@ static int64_t put_hull_points(const struct task *task, double *columns)
     int c;
     for (k = 0; k < own->n_near; k++) {
         const struct terrain_facet *facet = &own->near[k].facet;
-        if (!own->near[k].is_chosen) continue;
+        if (!own->near[k].is_in_hull) continue;
         for (c = 0; c < 3; c++) {
             for (i = 0; i < n && memcmp(points[i], facet->v[c], sizeof points[i]) != 0; i++) {}
             if (i < n) continue;

@@ -73,19 +73,19 @@ static int is_carried(const struct spot *spots, const int *around, int count, co
 }
 
 /* Into `out` those of some spots that are farthest from all before, the deepest first; how many. */
-static int64_t spread_out(const collide_contact *rows, const struct spot *spots, const int *chosen, int n, int64_t most, collide_contact *out)
+static int64_t spread_out(const collide_contact *rows, const struct spot *spots, const int *corners, int n, int64_t most, collide_contact *out)
 {
     double away[MAX_ROWS];
     int64_t count = 0;
     int k, best = 0;
     for (k = 1; k < n; k++)
-        if (spots[chosen[k]].distance < spots[chosen[best]].distance) best = k;
+        if (spots[corners[k]].distance < spots[corners[best]].distance) best = k;
     for (k = 0; k < n; k++) away[k] = INFINITE;
     while (count < most && count < n) {
-        const struct spot *spot = spots + chosen[best];
+        const struct spot *spot = spots + corners[best];
         out[count++] = rows[spot->row];
         for (k = 0; k < n; k++) {
-            double du = spots[chosen[k]].u - spot->u, dv = spots[chosen[k]].v - spot->v, square = du * du + dv * dv;
+            double du = spots[corners[k]].u - spot->u, dv = spots[corners[k]].v - spot->v, square = du * du + dv * dv;
             if (square < away[k]) away[k] = square;
         }
         away[best] = -1.0;
@@ -98,20 +98,22 @@ static int64_t spread_out(const collide_contact *rows, const struct spot *spots,
 /* Of rows of one normal those around all others, and those that are deeper than these carry, into `out`; how many. */
 static int64_t reduce_patch(const collide_contact *rows, struct spot *spots, int n, double tolerance, int64_t most, collide_contact *out)
 {
-    int around[MAX_ROWS + 1], chosen[MAX_ROWS], count, k, i, n_chosen;
-    double extent = 0.0, flat;
+    int around[MAX_ROWS + 1], corners[MAX_ROWS], count, k, i, n_corners;
+    double extent = 0.0, flat, slack = 0.0; /* a hundredth of the depth carries nothing */
+    for (k = 0; k < n; k++) slack = -1e-2 * spots[k].distance > slack ? -1e-2 * spots[k].distance : slack;
+    slack += tolerance;
     for (k = 1; k < n; k++) {
         extent = fabs(spots[k].u - spots[0].u) > extent ? fabs(spots[k].u - spots[0].u) : extent;
         extent = fabs(spots[k].v - spots[0].v) > extent ? fabs(spots[k].v - spots[0].v) : extent;
     }
     flat = 1e-3 * tolerance * extent;
-    count = n_chosen = spots_around(spots, n, flat, around);
-    memcpy(chosen, around, (size_t)count * sizeof *chosen);
+    count = n_corners = spots_around(spots, n, flat, around);
+    memcpy(corners, around, (size_t)count * sizeof *corners);
     for (k = 0; k < n; k++) {
         for (i = 0; i < count && around[i] != k; i++) {}
-        if (i == count && !is_carried(spots, around, count, spots + k, 10.0 * flat, tolerance)) chosen[n_chosen++] = k;
+        if (i == count && !is_carried(spots, around, count, spots + k, 10.0 * flat, slack)) corners[n_corners++] = k;
     }
-    return spread_out(rows, spots, chosen, n_chosen, most, out);
+    return spread_out(rows, spots, corners, n_corners, most, out);
 }
 
 /* The same of the rows whose normal is that of the deepest, which are taken away. */
@@ -119,7 +121,7 @@ static int64_t take_patch(collide_contact *rows, int *n_rows, double tolerance, 
 {
     struct spot spots[MAX_ROWS];
     double e[3] = {0.0, 0.0, 0.0}, f[3], normal[3];
-    int n = 0, deepest = 0, k, left = 0, axis;
+    int n = 0, deepest = 0, k, remaining = 0, axis;
     int64_t count;
     for (k = 1; k < *n_rows; k++)
         if (rows[k].distance < rows[deepest].distance) deepest = k;
@@ -138,8 +140,8 @@ static int64_t take_patch(collide_contact *rows, int *n_rows, double tolerance, 
         }
     count = reduce_patch(rows, spots, n, tolerance, most, out);
     for (k = 0; k < *n_rows; k++)
-        if (!(dot3(rows[k].normal, normal) > SAME_NORMAL)) rows[left++] = rows[k];
-    *n_rows = left;
+        if (!(dot3(rows[k].normal, normal) > SAME_NORMAL)) rows[remaining++] = rows[k];
+    *n_rows = remaining;
     return count;
 }
 

@@ -17,7 +17,7 @@ struct near_facet {
     double n[3], p[3], depth; /* where it is hit, the way out of the prism alone, from a point of it */
     struct terrain_facet facet;
     int32_t is_hit;          /* hit : the prism overlaps, along a direction that does not leave the field */
-    int32_t is_chosen;
+    int32_t is_in_hull;
 };
 
 /* A contact that is known, in H: a normal, a point of the field, the distance there, the body's least height. */

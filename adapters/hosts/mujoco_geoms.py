@@ -1,7 +1,7 @@
 """Geoms of a MuJoCo model as shapes, and the tables that the hook reads.
 
-Planes are half-spaces, meshes their convex hulls, as in MuJoCo; height fields reach down to their base. MuJoCo keeps vertices of meshes in single precision:
-those numbers are taken as they are.
+Planes are half-spaces, meshes their convex hulls, height fields reach down to their base, as in MuJoCo. MuJoCo keeps
+vertices and heights in single precision: those numbers are taken as they are.
 """
 
 from __future__ import annotations
@@ -105,11 +105,11 @@ def _hull_vertices(model, mesh: int) -> np.ndarray:
 
 
 #: Directions in which vertices of hulls are looked up: where a search for another direction begins.
-_DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if np.count_nonzero(d) in (1, 3)], dtype=float)
+_DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(d) in (1, 3)])
 
 
 def _boxes_and_extremes(table: ShapeTable, faces: HullFaceTable) -> tuple[np.ndarray, np.ndarray]:
-    """((n, 6) middles and half sides of boxes around hulls, (n, 14) vertices farthest along `_DIRECTIONS`); 0 of others."""
+    """((n, 6) middles and half sides of boxes around hulls, (n, 14) vertices farthest along `_DIRECTIONS`); else 0."""
     boxes, extremes = np.zeros((len(table.packed), 6)), np.zeros((len(table.packed), 14), dtype=np.int64)
     for k, (packed, of_hull) in enumerate(zip(table.packed, faces.faces)):
         if of_hull is not None:
@@ -127,8 +127,8 @@ class Model(ctypes.Structure):
         ("model", ctypes.c_void_p), ("signature", ctypes.c_uint64), ("n_geoms", ctypes.c_int64),
         ("is_cull", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in (
-            "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "fields", "ints",
-            "numbers", "faces", "boxes", "extremes",
+            "rows", "types", "dataids", "sizes", "reaches", "vertices", "vertex_starts", "vertex_counts", "fields",
+            "ints", "numbers", "faces", "boxes", "extremes",
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
         ("max_contacts", ctypes.c_int64 * (N * N)),

@@ -1,4 +1,5 @@
-"""Height fields of MuJoCo on collide: contacts beside those of `collide.HeightField`, and of a naive oracle; bodies that fall, rest, slide.
+"""Height fields of MuJoCo on collide: contacts beside those of `collide.HeightField`, and of a naive oracle; bodies
+that fall, rest, and slide.
 
 Fields stand tilted in the world, so that none of this depends on axes. Skipped where MuJoCo is not installed.
 """
@@ -12,7 +13,7 @@ import pytest
 from separating_axes import Polytope, overlap_depth
 
 import collide
-from collide.adapters.hosts.mujoco import install
+from collide.adapters.hosts.mujoco import install, world
 from collide.adapters.hosts.mujoco_geoms import geom_shapes
 from collide.kernels import mode
 
@@ -114,8 +115,9 @@ def resolved(found: np.ndarray, rounds: int = 200) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_contacts_are_those_of_python(kind):
-    """Shallow overlaps: as deep as `collide.contacts` has them, with its normal and place; or, where both have a normal that clears
-    the overlap, a shorter way. Gaps within the margin: the same to the last digits."""
+    """Shallow overlaps: as deep as `collide.contacts` has them, with its normal and place; or, where both have one
+    normal, a shorter way out along another. Gaps within the margin: the same to the last digits.
+    """
     random = np.random.default_rng(KINDS.index(kind))
     n_same = n_shorter = n_gaps = n_several = 0
     for n_cells, height in ((23, 0.1), (59, 0.05)):
@@ -123,7 +125,7 @@ def test_contacts_are_those_of_python(kind):
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         H, B = shapes_of(model)
-        for case in range(60):
+        for case in range(40):
             is_gap = case % 4 == 0
             model.geom_margin[:] = 1e-3 if is_gap else 0.0
             distance = near_the_surface(model, data, random, -5e-4 if is_gap else 10.0 ** random.uniform(-5, -3))
@@ -148,7 +150,7 @@ def test_contacts_are_those_of_python(kind):
                 n_shorter += 1
                 assert -deepest[0] <= theirs["apart"] * 1.05 + 1e-12, said
     print(f"{kind}: {n_same} the same, {n_shorter} shorter, {n_gaps} gaps, {n_several} of several normals")
-    assert n_same >= 35 and n_gaps >= 15, (n_same, n_shorter, n_gaps, n_several)
+    assert n_same >= 25 and n_gaps >= 10, (n_same, n_shorter, n_gaps, n_several)
 
 
 def prisms_near(model, data, reach: float) -> list[Polytope]:
@@ -162,8 +164,9 @@ def prisms_near(model, data, reach: float) -> list[Polytope]:
     for i in range(n_rows - 1):
         for j in range(n_columns - 1):
             for triangle in (((i, j), (i, j + 1), (i + 1, j + 1)), ((i, j), (i + 1, j + 1), (i + 1, j))):
-                top = np.array([(2 * x * c / (n_columns - 1) - x, 2 * y * r / (n_rows - 1) - y, heights[r, c]) for r, c in triangle])
-                if (np.abs(top[:, :2] - middle[:2]).min(axis=0) < reach + 2 * x / (n_columns - 1)).all():
+                steps = 2 * x / (n_columns - 1), 2 * y / (n_rows - 1)
+                top = np.array([(steps[0] * c - x, steps[1] * r - y, heights[r, c]) for r, c in triangle])
+                if (np.abs(top[:, :2] - middle[:2]).min(axis=0) < reach + steps[0]).all():
                     points = np.concatenate([top, top * [1, 1, 0] - [0, 0, base]])
                     out.append(Polytope(points @ X_WH[:3, :3].T + X_WH[:3, 3]))
     return out
@@ -171,18 +174,19 @@ def prisms_near(model, data, reach: float) -> list[Polytope]:
 
 @pytest.mark.parametrize("kind", ["box", "mesh"])
 def test_overlaps_are_those_of_all_axes(kind):
-    """Up to two centimetres deep, cells of nine and of four: the deepest contact is no less deep than any prism by itself, and moved out of
-    its contacts the body overlaps no prism."""
+    """Up to two centimetres deep, cells of nine and of four: the deepest contact is no less deep than any prism by
+    itself, and moved out of its contacts the body overlaps no prism.
+    """
     random = np.random.default_rng(20 + KINDS.index(kind))
-    points = HULL if kind == "mesh" else [[a, b, c] for a in (-0.06, 0.06) for b in (-0.05, 0.05) for c in (-0.07, 0.07)]
-    points, n_deep, n_shallow = np.array(points), 0, 0
+    points = np.array([[a, b, c] for a in (-0.06, 0.06) for b in (-0.05, 0.05) for c in (-0.07, 0.07)])
+    n_deep = n_shallow = 0
     for n_cells in (23, 50):
         model = model_of(random.random((n_cells, n_cells)), form(kind), size="1 1 .08 .1")
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         if kind == "mesh":  # MuJoCo keeps them about their middle
             points = model.mesh_vert.astype(float)
-        for _ in range(20):
+        for _ in range(20 if kind == "box" else 8):
             depth = 10.0 ** random.uniform(-5, -1.7)
             if near_the_surface(model, data, random, depth) > 0.0:
                 continue
@@ -196,7 +200,7 @@ def test_overlaps_are_those_of_all_axes(kind):
             assert left < 1e-6 * deepest + 1e-8, (left, deepest, said)
             n_deep += deepest > 2e-3
             n_shallow += deepest <= 2e-3
-    assert n_deep >= 6 and n_shallow >= 12, (n_deep, n_shallow)
+    assert n_deep >= 3 and n_shallow >= 5, (n_deep, n_shallow)
 
 
 def test_a_flat_field_is_a_floor():
@@ -308,13 +312,14 @@ def test_bodies_come_to_rest():
 
 
 def test_inner_edges_do_not_kick():
-    """A box slides over two metres of a frictionless flat field, level and then down a slope that runs across the cells, at the speed and
-    height that it has on a plane, to a micrometre."""
+    """A box slides over two metres of a frictionless field, flat or a slope that it goes along and down: nothing turns
+    it, and nothing slows it.
+    """
     for slope in (0.0, 0.1):
         heights = np.add.outer(np.linspace(0, 1, 21), np.zeros(31)) if slope else np.full((21, 31), 0.5)
         model = model_of(
-            heights, form("box", 'condim="1"'), size=f"3 2 {4 * slope or 0.1} .1", pose=LEVEL, option='<option timestep=".002"/>',
-            field='condim="1"',
+            heights, form("box", 'condim="1"'), size=f"3 2 {4 * slope or 0.1} .1", pose=LEVEL,
+            option='<option timestep=".002"/>', field='condim="1"',
         )  # fmt: skip
         data = mujoco.MjData(model)
         tilt = np.arctan(slope)
@@ -322,15 +327,15 @@ def test_inner_edges_do_not_kick():
         X[1:3, 1:3] = [[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]]
         X[:3, 3] = [-1.5, 0.0, 0.2 if slope else 0.05] + 0.0698 * X[:3, 2]
         place(model, data, X)
-        data.qvel[:3] = 2.0, 0.3, 0.0
+        data.qvel[:3] = 2.0, 0.3, 0.3 * slope
         with install(model):
-            for _ in range(50):
+            for _ in range(200):  # the contacts are springs: it sinks a little
                 mujoco.mj_step(model, data)
             lift = data.geom_xpos[1] @ X[:3, 2]
-            for _ in range(450):
+            for _ in range(300):
                 mujoco.mj_step(model, data)
-                assert abs(data.geom_xpos[1] @ X[:3, 2] - lift) < 1e-5, (slope, data.time)
-        assert data.qvel[0] == pytest.approx(2.0, abs=1e-6) and np.abs(data.qvel[3:]).max() < 1e-4, slope
+                assert abs(data.geom_xpos[1] @ X[:3, 2] - lift) < 1e-7, (slope, data.time)
+        assert data.qvel[0] == pytest.approx(2.0, abs=1e-6) and np.abs(data.qvel[3:]).max() < 1e-5, slope
         assert data.qpos[0] == pytest.approx(0.5, abs=1e-5), slope
 
 
@@ -383,3 +388,19 @@ def test_heights_may_change_from_step_to_step():
         place(twin, other, X)
         mujoco.mj_collision(twin, other)
         assert [c.dist for c in other.contact] == [pytest.approx(-0.02, abs=1e-8)]
+
+
+def test_worlds_have_height_fields():
+    """Bodies that meet the field in the World are those that have contacts on it."""
+    model, data = dropped(12)
+    n_met = 0
+    with install(model):
+        for _ in range(100):
+            mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+    pairs = {tuple(sorted(int(g) for g in c.geom)) for c in data.contact if c.dist < 0.0}
+    names = [f"geom {k}" for k in range(model.ngeom)]
+    met = {tuple(sorted((names.index(a), names.index(b)))) for a, b in world(model, data).collisions().names}
+    assert met == pairs
+    n_met += sum(0 in pair for pair in met)
+    assert n_met >= 4, n_met

@@ -16,12 +16,13 @@ class Polytope:
         hull = ConvexHull(np.asarray(points, dtype=float))
         self.points = hull.points[hull.vertices]
         self.normals = _distinct(hull.equations[:, :3])
-        edges = np.concatenate([hull.points[hull.simplices[:, k]] - hull.points[hull.simplices[:, k - 1]] for k in range(3)])
+        corners = hull.points[hull.simplices]
+        edges = (corners - np.roll(corners, 1, axis=1)).reshape(-1, 3)
         self.edges = _distinct(edges / np.linalg.norm(edges, axis=1)[:, None])
 
 
 def _distinct(directions: np.ndarray) -> np.ndarray:
-    """Of unit vectors those that are not the same line, within 1e-9."""
+    """Of unit vectors one for each line."""
     out: list[np.ndarray] = []
     for direction in directions:
         if not any(abs(abs(direction @ other) - 1.0) < 1e-12 for other in out):
