@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_srdf
+from collide import __version__, cli_srdf, cli_sweep
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -187,6 +187,7 @@ def parser() -> argparse.ArgumentParser:
     _add_locality(commands)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
+    cli_sweep.add_arguments(_add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG), _scene_arguments)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)
     return made
 

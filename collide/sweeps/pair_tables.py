@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from collide.reports.number_format import count, lengths
 from collide.reports.tables import Column, Table
 from collide.sweeps.pair_comparison import PairComparison, PairDifference
@@ -40,9 +42,10 @@ def proposal_tables(proposal: Proposal, everything: bool = False) -> list[Table]
                             notes=notes))  # fmt: skip
     rare = [pair for pair in proposal.pairs if pair.searched]
     if rare:
-        rows = [[pair.a, pair.b, proposal_q(proposal, pair.q)] for pair in rare]
-        tables.append(Table("RARE  collide, though in no configuration of the sample",
-                            [*_A_AND_B, Column("for example at", "text")], rows))  # fmt: skip
+        rows = [[pair.a, pair.b] for pair in rare]
+        notes = [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in rare if pair.q is not None]
+        tables.append(Table("RARE  collide, though in no configuration of the sample: tested", list(_A_AND_B), rows,
+                            notes=notes))  # fmt: skip
     if everything:
         rows = [[pair.a, pair.b, pair.reason or "tested", _share(pair), _gap(pair)] for pair in proposal.pairs]
         columns = [*_A_AND_B, Column("reason", "label"), Column("collide in"), Column("least gap", optional=1)]
@@ -73,11 +76,9 @@ def _gap(pair: LinkPair) -> str:
     return "" if pair.nearest is None or pair.searched else lengths([pair.nearest.gap])[0].strip()
 
 
-def proposal_q(proposal: Proposal, q) -> str:
-    """A configuration as words that ``--state`` takes; columns at 0 are left out."""
-    if q is None:
-        return ""
-    return ",".join(f"{name}={value:.6g}" for name, value in zip(proposal.robot.joint_names, q.tolist()) if value)
+def state_words(q: np.ndarray) -> str:
+    """A configuration as ``--state`` takes it."""
+    return f"--state={','.join(f'{value:.5g}' for value in q.tolist())}"
 
 
 def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str) -> list[Table]:
@@ -86,15 +87,15 @@ def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str
     tables = []
     columns = [
         *_A_AND_B, Column("its reason", "label"), Column("collide in", optional=2), Column("depth"),
-        Column("verdict", "label"), Column("for example at", "text", optional=1),
+        Column("verdict", "label"),
     ]  # fmt: skip
     if theirs:
         rows = [
-            [pair.a, pair.b, pair.reason, f"{100 * pair.share:.3g} %", _depth(pair), "wrong" if pair.wrong else "meant",
-             proposal_q(proposal, pair.q)]
+            [pair.a, pair.b, pair.reason, f"{100 * pair.share:.3g} %", _depth(pair), "wrong" if pair.wrong else "meant"]
             for pair in theirs
-        ]  # fmt: skip
+        ]
         notes = ["wrong: it says that they never collide, and within the limits they do."]
+        notes += [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in theirs if pair.q is not None and pair.wrong]
         tables.append(Table(f"ONLY IN {place}", columns, rows, notes=notes))
     if comparison.only_ours:
         rows = [

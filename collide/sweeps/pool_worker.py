@@ -13,6 +13,8 @@ import signal
 import struct
 from typing import Any, BinaryIO
 
+from collide.errors import InvalidArgument
+
 _LENGTH = struct.Struct("<Q")
 
 
@@ -38,7 +40,7 @@ def _read(stream: BinaryIO, length: int) -> bytes:
 
 def answer_frames(incoming: BinaryIO, outgoing: BinaryIO) -> None:
     """Answer until the input ends: ``(True, columns)``, or ``(False, error)`` where answering failed."""
-    question = pickle.loads(read_frame(incoming))
+    question = _question(read_frame(incoming))
     while True:
         chunk = pickle.loads(read_frame(incoming))
         answer: tuple[bool, Any]
@@ -47,6 +49,26 @@ def answer_frames(incoming: BinaryIO, outgoing: BinaryIO) -> None:
         except Exception as error:  # whatever it is, the process that asked tells it
             answer = False, error
         write_frame(outgoing, _pickled(answer))
+
+
+class _Unreadable:
+    """Stands for a question that this process cannot read."""
+
+    def __init__(self, error: Exception):
+        self._error = error
+
+    def answer(self, chunk: Any) -> Any:
+        raise InvalidArgument(
+            f"the processes of a sweep cannot read what they are asked: {self._error}; a checker of a class of your own "
+            "must be of a module that they can import, not of the script itself"
+        )
+
+
+def _question(blob: bytes) -> Any:
+    try:
+        return pickle.loads(blob)
+    except Exception as error:
+        return _Unreadable(error)
 
 
 def _pickled(answer: tuple[bool, Any]) -> bytes:

@@ -32,7 +32,7 @@ class SweepResults:
     outside : int
         Rows that are answered and outside the limits.
     named : list of (int, str)
-        The first rows that are unanswered or outside, and what is to be said of them.
+        The first rows that are unanswered, then those that are outside, and what is to be said of them.
     least : (float, int, str, str) or None
         Of sweeps with distances: the least [m], its row and its two bodies.
     """
@@ -113,11 +113,12 @@ def read_sweep(folder: str | Path) -> SweepResults:
     table = _read(folder, ["row", "collides", "note", *(["distance", "body_a", "body_b"] if with_distances else [])])
     colliding = compute.sum(table["collides"]).as_py() or 0
     unanswered = table["collides"].null_count
-    noted = table.filter(compute.is_valid(table["note"]))
-    first = noted.slice(0, _MAX_NAMED).select(["row", "note"]).to_pydict()
+    noted = table.select(["row", "note"]).filter(compute.is_valid(table["note"]))
+    no_answer = table.select(["row", "note"]).filter(compute.is_null(table["collides"]))
+    first = pyarrow.concat_tables([no_answer.slice(0, _MAX_NAMED), noted.slice(0, 2 * _MAX_NAMED)]).to_pydict()
     return SweepResults(
         folder, manifest["rows"], table.num_rows, colliding, table.num_rows - unanswered - colliding, unanswered,
-        noted.num_rows - unanswered, list(zip(first["row"], first["note"])),
+        noted.num_rows - unanswered, list(dict.fromkeys(zip(first["row"], first["note"])))[:_MAX_NAMED],
         _least(table) if with_distances else None,
     )  # fmt: skip
 
