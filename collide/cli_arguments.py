@@ -187,7 +187,8 @@ def parser() -> argparse.ArgumentParser:
     _add_locality(commands)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
-    cli_sweep.add_arguments(_add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG), _scene_arguments)
+    sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
+    cli_sweep.add_arguments(sweep, _scene_arguments)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)
     return made
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable
 
 from collide.cli_files import check_place, write_json, write_text
@@ -13,7 +14,7 @@ EPILOG = """examples:
   collide srdf robot.urdf --out robot.srdf
   collide srdf robot.urdf --samples 100000 --all
   collide srdf robot.urdf --compare robot.srdf
-  collide srdf panda_workbench --json - | jq '.pairs[] | select(.reason == "Never")'
+  collide srdf panda_workbench --json - | jq '.pairs[] | [.a, .b, .reason]'
 
 Proposes which pairs of a robot's links need no test, as MoveIt's setup
 assistant does, from configurations drawn evenly within the limits:
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compare", metavar="F.srdf", help="an SRDF to be judged")
     parser.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
                         help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
-    parser.add_argument("--missing-meshes", choices=("error", "skip"), help="what to do about mesh files that are missing")
+    parser.add_argument("--missing-meshes", choices=("error", "skip"), help="what to do about missing mesh files")
     parser.add_argument("--package-path", action="append", metavar="DIR", help="where package:// is looked for")
     parser.add_argument("--all", action="store_true", help="list every pair")
     parser.add_argument("--json", metavar="FILE|-", help="write JSON to a .json file, or - for standard output")
@@ -81,9 +82,15 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
 
 def _print(proposal, comparison, args: argparse.Namespace) -> None:
     from collide.reports import terminal
+    from collide.reports.tables import wrapped
     from collide.sweeps import pair_tables
 
-    terminal.write_text(pair_tables.summary(proposal) + "\n")
+    width, _ = terminal.output_width(sys.stdout)
+
+    def say(text: str) -> None:
+        terminal.write_text("\n".join(wrapped(text, width)) + "\n")
+
+    say(pair_tables.summary(proposal))
     tables = pair_tables.proposal_tables(proposal, args.all)
     if comparison is not None:
         tables += pair_tables.comparison_tables(proposal, comparison, os.path.basename(args.compare))
@@ -91,9 +98,10 @@ def _print(proposal, comparison, args: argparse.Namespace) -> None:
         terminal.write_text("\n")
         terminal.show_table(table)
     if comparison is not None:
-        terminal.write_text("\n" + pair_tables.comparison_words(comparison, os.path.basename(args.compare)) + "\n")
-    if proposal.notes and args.all:
-        terminal.write_text("\nNOTES\n" + "".join(f"  - {note}\n" for note in proposal.notes))
+        say("")
+        say(pair_tables.comparison_words(comparison, os.path.basename(args.compare)))
+    for note in proposal.notes if args.all else ():
+        say(f"note: {note}")
 
 
 def _check_out(args: argparse.Namespace) -> None:
@@ -103,7 +111,7 @@ def _check_out(args: argparse.Namespace) -> None:
     if not args.out.lower().endswith(".srdf"):
         raise InvalidArgument(f"--out: {args.out!r} must end in .srdf")
     if os.path.exists(args.out) and not args.force:
-        raise InvalidArgument(f"--out: {args.out} exists already, and may hold groups and states: --force overwrites it")
+        raise InvalidArgument(f"--out: {args.out} exists, and may hold groups and states: --force overwrites it")
     if args.json not in (None, "-"):
         check_place("--json", args.json, ".json")
 

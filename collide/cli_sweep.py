@@ -15,7 +15,7 @@ EPILOG = """examples:
   collide sweep cell.yaml --configurations plan.parquet --distances --out plan
   collide sweep robot.urdf cell.yaml --configurations q.npy --out q --workers 16
   collide sweep scene*.yaml --each --robot panda.urdf --out scenes
-  collide sweep cell.yaml --random 100000000 --out big --scheduler tcp://head:8786
+  collide sweep cell.yaml --random 10000000 --out big --scheduler tcp://hq:8786
 
 Each configuration gets a row: does the robot collide, with itself or with the
 scene? With --distances also the least distance and the two bodies. The rows
@@ -70,12 +70,8 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
         raise InvalidArgument("--state: a sweep takes one state, for what is no joint of the robot asked about")
     if args.each and args.name is not None:
         raise InvalidArgument("--name: with --each every scene has one robot")
-    with progress("reading the scene"):
-        sweep_run = _each(args) if args.each else _together(args)
     try:
-        results = sweep_run.go(
-            workers=args.workers, scheduler=args.scheduler, restart=args.restart, progress=progress
-        )
+        results = (_each if args.each else _together)(args, progress)
     except KeyboardInterrupt:
         print("collide: what is done is kept: the same command goes on", file=sys.stderr)
         raise
@@ -86,48 +82,35 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
     return True
 
 
-def _together(args: argparse.Namespace) -> Any:
+def _together(args: argparse.Namespace, progress: Callable) -> Any:
     """All files are one scene."""
-    from collide.sweeps.configurations import as_configurations
-    from collide.sweeps.scene_checker import SceneWatch
-    from collide.sweeps.sweep import SweepRun
-    from collide.sweeps.sweep_question import OneQuestion
+    from collide.scenes.scene_sweeps import sweep_scene
 
-    watch = SceneWatch(args.scenes, args.name, _load_options(args))
-    question = OneQuestion(watch.checker, args.distances, args.values)
-    asked = _drawn(args) if args.random else as_configurations(args.configurations, question.robot)
-    about = {"scenes": args.scenes, "robot": question.robot.name}
-    return SweepRun(question, 1, asked, args.out, watch.look, chunk=args.chunk, about=about)
+    asked = _drawn(args) if args.random else args.configurations
+    return sweep_scene(args.scenes, asked, args.out, robot=args.name, **_options(args, progress))
 
 
-def _each(args: argparse.Namespace) -> Any:
+def _each(args: argparse.Namespace, progress: Callable) -> Any:
     """Every file is a scene of its own."""
     from collide.scenes import path, shipped
-    from collide.sweeps.configurations import as_configurations
-    from collide.sweeps.scene_checker import FilesWatch, load_checker
-    from collide.sweeps.sweep import SweepRun
-    from collide.sweeps.sweep_question import ScenesQuestion
+    from collide.scenes.scene_sweeps import sweep_scenes
 
     files = [str(path(place)) if place in shipped() else place for place in args.scenes]
-    if len(set(files)) < len(files):
-        raise InvalidArgument("--each: a scene is given twice")
-    options = _load_options(args)
-    question = ScenesQuestion(files, options, load_checker, args.distances, args.values)
-    asked: Any = None
-    if args.random:
-        asked = _drawn(args)
-    elif args.configurations:
-        asked = as_configurations(args.configurations, load_checker(files[0], options)[0].robot)
-    watch = FilesWatch([*files, *filter(None, (args.robot, args.srdf))], options)
-    about = {"scenes": files, "robot": None}
-    return SweepRun(question, len(files), asked, args.out, watch.look, chunk=args.chunk, about=about)
+    asked = _drawn(args) if args.random else args.configurations
+    return sweep_scenes(files, args.out, configurations=asked, **_options(args, progress))
+
+
+def _options(args: argparse.Namespace, progress: Callable) -> dict[str, Any]:
+    """What both are told."""
+    return {
+        "options": _load_options(args), "distances": args.distances, "values": args.values, "chunk": args.chunk,
+        "workers": args.workers, "scheduler": args.scheduler, "restart": args.restart, "progress": progress,
+    }  # fmt: skip
 
 
 def _drawn(args: argparse.Namespace) -> Any:
     from collide.sweeps.configurations import DrawnConfigurations
 
-    if args.seed < 0:
-        raise InvalidArgument(f"--seed: must be 0 or more, got {args.seed}")
     return DrawnConfigurations(args.random, args.seed)
 
 
@@ -139,9 +122,12 @@ def _load_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def _print(results: Any) -> None:
     from collide.reports import terminal
+    from collide.reports.tables import wrapped
     from collide.sweeps.sweep_tables import summary, tables
 
-    terminal.write_text(summary(results) + "\n")
+    width, _ = terminal.output_width(sys.stdout)
+    for sentence in summary(results):
+        terminal.write_text("\n".join(wrapped(sentence, width)) + "\n")
     for table in tables(results):
         terminal.write_text("\n")
         terminal.show_table(table)

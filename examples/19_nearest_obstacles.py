@@ -26,8 +26,8 @@ robot = checker.distances(Q)
 least = robot.distance.reshape(60, 60)
 
 names, counts = np.unique([f"{a} – {b}" for a, b in robot.names], return_counts=True)
-print(f"a slice of {len(points)} points: {(clearance <= 0).mean():.0%} in something, at most {clearance.max():.2f} m from anything")
-print(f"{len(Q)} postures: {robot.hit.mean():.0%} collide; gaps up to {least.max():.2f} m, depths up to {-least.min():.2f} m")
+print(f"{len(points)} points: {(clearance <= 0).mean():.0%} in something, gaps up to {clearance.max():.2f} m")
+print(f"{len(Q)} postures: {robot.hit.mean():.0%} collide, depths up to {-least.min():.2f} m, gaps {least.max():.2f} m")
 for k in counts.argsort()[:-4:-1]:
     print(f"  nearest in {counts[k]:4} of them: {names[k]}")
 
@@ -46,4 +46,4 @@ if len(sys.argv) > 1 and find_spec("matplotlib"):  # python 19_nearest_obstacles
     axes[1].set(xlabel="joint 1 [rad]", ylabel="joint 4 [rad]", title="the panda, two joints turned")
     figure.savefig(sys.argv[1], dpi=110)
 elif len(sys.argv) > 1:  # without matplotlib: a table to be drawn elsewhere
-    np.savetxt(sys.argv[1] + ".csv", np.column_stack([points, space["distance"]]), delimiter=",", header="x,y,z,distance")
+    np.savetxt(sys.argv[1] + ".csv", np.column_stack([points, space["distance"]]), header="x y z distance")

@@ -12,7 +12,7 @@ from collide.scenes import load
 scene = load("panda_workbench", meshes="hull")
 checker = collide.RobotChecker.from_scene(scene)
 robot, n = checker.robot, 200_000
-Q = collide.DrawnConfigurations(n, seed=1).block(0, n).of(robot)
+Q = collide.DrawnConfigurations(n, seed=1).of(robot)
 
 begin = time.perf_counter()
 if find_spec("pyarrow"):  # in processes, to files; the same call goes on where it was stopped: docs/sweeps.md
@@ -39,8 +39,8 @@ def share(rows):
     return len(np.unique(number[rows[inside]])) / shape.prod()
 
 
-print(f"{shape.prod()} cells: {share(np.ones(n, bool)):.0%} within reach, {share(~hit):.0%} free of collision,", end=" ")
-print(f"{share(~hit & points_down):.0%} with the tool pointing down")
+print(f"{shape.prod()} cells: {share(np.ones(n, bool)):.0%} within reach, {share(~hit):.0%} free of collision")
+print(f"with the tool pointing down: {share(~hit & points_down):.0%}; free of collision, layer by layer:")
 layers = np.zeros(shape, dtype=bool)
 layers.reshape(-1)[np.unique(number[(~hit)[inside]])] = True
 for k in range(shape[2]):

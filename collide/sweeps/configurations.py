@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from collide.argument_checks import integer
 from collide.errors import InvalidArgument, MissingExtra, SceneError, brief, listing
 from collide.robot import Robot
 from collide.sweeps.content_digest import digest
@@ -18,17 +19,63 @@ _DIGEST_ROWS = 1_000_000
 
 
 class DrawnConfigurations:
-    """Random configurations of a seed: a block is drawn where it is asked for, and need not be sent there."""
+    """Random configurations of a seed: a block is drawn where it is asked for, and need not be sent there.
+
+    Parameters
+    ----------
+    rows : int
+        How many, at least 1.
+    seed : int
+        Not negative; other seeds draw others. A row is the same however many there are.
+
+    Raises
+    ------
+    InvalidArgument
+        For numbers out of range.
+    """
 
     def __init__(self, rows: int, seed: int = 0):
-        self.rows, self.seed = rows, seed
+        self.rows = integer("DrawnConfigurations: rows", rows, 1)
+        self.seed = integer("DrawnConfigurations: seed", seed, 0)
+
+    def of(self, robot: Robot) -> np.ndarray:
+        """All of them, for a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            Whose limits are kept to.
+
+        Returns
+        -------
+        (rows, dof) float64
+            [rad or m], columns as in `Robot.joint_names`.
+        """
+        return random_configurations(robot, 0, self.rows, self.seed)
 
     def about(self) -> dict[str, Any]:
-        """What a sweep must find unchanged to go on."""
+        """What a sweep must find unchanged to go on.
+
+        Returns
+        -------
+        dict
+            Plain data.
+        """
         return {"random": self.rows, "seed": self.seed}
 
     def block(self, start: int, stop: int) -> DrawnBlock:
-        """Rows start to stop, to be drawn later."""
+        """Rows start to stop, to be drawn later.
+
+        Parameters
+        ----------
+        start, stop : int
+            The first, and the first that is not among them.
+
+        Returns
+        -------
+        DrawnBlock
+            Small: the rows are drawn where it is asked for them.
+        """
         return DrawnBlock(start, stop, self.seed)
 
 
@@ -178,8 +225,7 @@ def _is_number(text: str) -> bool:
 
 def _read_parquet(path: Path, robot: Robot) -> np.ndarray:
     try:
-        import pyarrow.parquet as parquet
-        from pyarrow import ArrowException
+        from pyarrow import ArrowException, parquet
     except ImportError:
         raise MissingExtra("pyarrow", extra="sweep", purpose="read Parquet files") from None
     try:

@@ -31,9 +31,9 @@ class DaskPool:
     def __init__(self, question: Any, scheduler: Any, name: str):
         self._distributed = _distributed()
         self._name, self._blob = name, pickle.dumps(question, protocol=5)
-        self._own = isinstance(scheduler, str)
+        self._connects = isinstance(scheduler, str)
         try:
-            self.client = self._distributed.Client(scheduler) if self._own else scheduler
+            self.client = self._distributed.Client(scheduler) if self._connects else scheduler
         except (OSError, ValueError) as error:
             raise InvalidArgument(f"no Dask scheduler answers at {scheduler}: {error}") from None
         self.n_workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
@@ -91,7 +91,7 @@ class DaskPool:
     def close(self) -> None:
         """Leave the scheduler as it was."""
         self._scattered = None
-        if self._own:
+        if self._connects:
             self.client.close()
 
 

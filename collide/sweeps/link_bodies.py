@@ -35,11 +35,11 @@ class LinkPoses(NamedTuple):
     """Where all links stand: X_WLs (N, links, 4, 4), and the position of each link in it."""
 
     X_WLs: np.ndarray
-    index: dict[str, int]
+    number_of: dict[str, int]
 
     def of(self, body: LinkBody, rows=slice(None)) -> np.ndarray:
         """(n, 4, 4) poses X_WB of a link's shape."""
-        return self.X_WLs[rows, self.index[body.link]] @ body.X_LB
+        return self.X_WLs[rows, self.number_of[body.link]] @ body.X_LB
 
 
 def link_bodies(robot: Robot) -> list[LinkBody]:

@@ -1,4 +1,4 @@
-"""Which pairs of a robot's links need no test: adjacent, in collision always or at the default, or never in a sample."""
+"""Which pairs of links need no test: adjacent, in collision always or at the default, or never in a sample."""
 
 from __future__ import annotations
 
@@ -31,13 +31,22 @@ _Z = 1.6448536269514722
 class LinkPair:
     """Two links and what a sample says of them.
 
-    a, b : names, in the order of the robot's links.
-    reason : "Adjacent", "Default", "Always" or "Never"; None where the pair has to be tested.
-    samples, hits : configurations that were asked, and those in which they collide.
-    fixed : they cannot move against each other, so that one configuration says everything.
-    q : (dof,) a configuration in which they collide, None where none was met.
-    searched : ``q`` was not in the sample but met on the way downhill.
-    nearest : the least gap [m] that was met and its configuration, of pairs that were searched.
+    Parameters
+    ----------
+    a, b : str
+        Names, in the order of the robot's links.
+    reason : str or None
+        "Adjacent", "Default", "Always" or "Never"; None where the pair has to be tested.
+    samples, hits : int
+        Configurations that were asked, and those in which they collide.
+    fixed : bool
+        They cannot move against each other, so that one configuration says everything.
+    q : (dof,) float64 or None
+        A configuration in which they collide, None where none was met.
+    searched : bool
+        ``q`` was not in the sample but met on the way downhill.
+    nearest : (gap, q) or None
+        The least gap [m] that was met and its configuration (dof,), of pairs that were searched.
     """
 
     a: str

@@ -66,9 +66,8 @@ def _share(pair: LinkPair) -> str:
         return ""
     if pair.fixed:
         return "all" if pair.hits else "none"
-    low, high = pair.share_bounds
     if pair.hits == 0:
-        return f"0 % (≤ {100 * high:.2g} %)"
+        return f"0 % (≤ {100 * pair.share_bounds[1]:.2g} %)"
     return f"{100 * pair.hits / pair.samples:.3g} %"
 
 
@@ -95,7 +94,7 @@ def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str
             for pair in theirs
         ]
         notes = ["wrong: it says that they never collide, and within the limits they do."]
-        notes += [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in theirs if pair.q is not None and pair.wrong]
+        notes += [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in comparison.wrong if pair.q is not None]
         tables.append(Table(f"ONLY IN {place}", columns, rows, notes=notes))
     if comparison.only_ours:
         rows = [

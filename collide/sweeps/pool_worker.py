@@ -2,7 +2,8 @@
 
     python -m collide.sweeps.pool_worker
 
-The first frame is the question; then a chunk a frame. It ends with its input. It writes no file, so that it may be killed at any time.
+The first frame is the question; then a chunk a frame. It ends with its input. It writes no file, so that it may be
+killed at any time.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def answer_frames(incoming: BinaryIO, outgoing: BinaryIO) -> None:
         answer: tuple[bool, Any]
         try:
             answer = True, question.answer(chunk)
-        except Exception as error:  # whatever it is, the process that asked tells it
+        except Exception as error:  # noqa: BLE001 - whatever it is, the process that asked tells it
             answer = False, error
         write_frame(outgoing, _pickled(answer))
 
@@ -59,7 +60,7 @@ class _Unreadable:
 
     def answer(self, chunk: Any) -> Any:
         raise InvalidArgument(
-            f"the processes of a sweep cannot read what they are asked: {self._error}; a checker of a class of your own "
+            f"the processes of a sweep cannot read what they are asked: {self._error}; a class of your own "
             "must be of a module that they can import, not of the script itself"
         )
 
@@ -67,14 +68,14 @@ class _Unreadable:
 def _question(blob: bytes) -> Any:
     try:
         return pickle.loads(blob)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - told at each chunk
         return _Unreadable(error)
 
 
 def _pickled(answer: tuple[bool, Any]) -> bytes:
     try:
         return pickle.dumps(answer, protocol=5)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - an error that does not pickle is told in words
         return pickle.dumps((False, RuntimeError(f"{type(answer[1]).__name__}: {answer[1]} ({error})")))
 
 

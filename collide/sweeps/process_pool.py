@@ -84,7 +84,7 @@ class ProcessPool:
                 break
             try:
                 self._answers.put((chunk, self._ask(place, chunk)))
-            except BaseException as error:
+            except BaseException as error:  # noqa: BLE001 - raised where answers are waited for
                 self._answers.put((chunk, error))
         with contextlib.suppress(KeyError):
             _end(self._processes.pop(place))

@@ -27,8 +27,8 @@ def sampled_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     angles = np.array([_is_angle(robot, name) for name in robot.joint_names], dtype=bool)
     for k in range(robot.dof):
         if angles[k] and not upper[k] - lower[k] <= 2 * math.pi:
-            turn = max(lower[k], -math.pi)
-            lower[k], upper[k] = min(turn, upper[k] - 2 * math.pi), min(turn + 2 * math.pi, upper[k])
+            start = max(lower[k], -math.pi)
+            lower[k], upper[k] = min(start, upper[k] - 2 * math.pi), min(start + 2 * math.pi, upper[k])
         elif not angles[k] and not math.isfinite(upper[k] - lower[k]):
             lower[k] = upper[k] = float(np.clip(0.0, lower[k], upper[k]))
     return lower, upper
@@ -47,8 +47,8 @@ def unlimited_lengths(robot: Robot) -> list[str]:
     list of str
         Names of columns.
     """
-    endless = ~np.isfinite(robot.upper - robot.lower)
-    return [name for name, is_endless in zip(robot.joint_names, endless) if is_endless and not _is_angle(robot, name)]
+    unbounded = ~np.isfinite(robot.upper - robot.lower)
+    return [name for name, is_free in zip(robot.joint_names, unbounded) if is_free and not _is_angle(robot, name)]
 
 
 def random_configurations(robot: Robot, start: int, stop: int, seed: int = 0) -> np.ndarray:

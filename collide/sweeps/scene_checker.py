@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.errors import InvalidArgument
 from collide.robot import Robot
-from collide.sweeps.content_digest import digest
-from collide.sweeps.sweep_question import file_digest, question_digest
 from collide.world import World
 
 
@@ -50,80 +47,17 @@ class SceneChecker:
             hit.append(bool(rows["hit"].any())); least.append(float(rows["distance"][k])); pairs.append(rows.names[k])
         return LeastDistances(np.array(hit, bool), np.array(least), pairs)
 
+    @classmethod
+    def from_scene(cls, scene, name=None):
+        """What checks a robot of a scene among all else that is in it, as it stands.
 
-def checker_of(scene: Any, name: str | None = None) -> SceneChecker:
-    """What checks a robot of a scene among all else that is in it, as it stands.
-
-    name : of the robot, where the scene has several.
-    """
-    if name is None and len(scene.placements) == 1:
-        name = next(iter(scene.placements))
-    if name not in scene.placements:
-        what = f"has no robot {name!r}" if name is not None else "has several robots" if scene.placements else "has none"
-        known = f": name one of {', '.join(scene.placements)}" if scene.placements else ": give a robot, or its URDF"
-        raise InvalidArgument(f"scene {scene.name}: a sweep asks about one robot; it {what}{known}")
-    placement = scene.placements[name]
-    return SceneChecker(placement.robot, placement.X_WR, scene.world(), placement.carried)
-
-
-def load_checker(place: str, options: dict[str, Any]) -> tuple[SceneChecker, np.ndarray]:
-    """The checker of a scene file, and the configuration in which its robot is."""
-    from collide.scenes import load
-
-    scene = load(place, **options)
-    checker = checker_of(scene)
-    return checker, next(iter(scene.placements.values())).q
-
-
-class SceneWatch:
-    """A scene from files, and whether it is still the same: they are read again where they were written to.
-
-    places, name, options : files, the robot, and what `collide.scenes.load` is told.
-    """
-
-    def __init__(self, places: list[str], name: str | None, options: dict[str, Any]):
-        self._question = places, name, options
-        self.checker, self._sources = self._load()
-        self._digest, self._stamps = question_digest(self.checker), self._stamps_now()
-
-    def _load(self) -> tuple[SceneChecker, list[str]]:
-        from collide.scenes import load
-
-        places, name, options = self._question
-        scene = load(*places, **options)
-        return checker_of(scene, name), scene.sources
-
-    def _stamps_now(self) -> list[tuple[int, int] | None]:
-        return [_stamp(source) for source in self._sources]
-
-    def look(self, final: bool) -> str:
-        """The digest of the scene as its files are now; meshes are looked at the last time only."""
-        stamps = self._stamps_now()
-        if final or stamps != self._stamps:
-            self._digest, self._stamps = question_digest(self._load()[0]), stamps
-        return self._digest
-
-
-class FilesWatch:
-    """Files by their bytes."""
-
-    def __init__(self, files: list[str], options: dict[str, Any]):
-        self._files, self._options = files, {key: str(value) for key, value in options.items()}
-        self._stamps: list[tuple[int, int] | None] = []
-        self._digest = ""
-
-    def look(self, final: bool) -> str:
-        """The digest of what the files hold now; they are read where they were written to."""
-        stamps = [_stamp(file) for file in self._files]
-        if stamps != self._stamps:
-            self._digest = digest(self._options, [file_digest(file) for file in self._files])
-            self._stamps = stamps
-        return self._digest
-
-
-def _stamp(file: str) -> tuple[int, int] | None:
-    try:
-        status = os.stat(file)
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_size
+        name : of the robot, where the scene has several.
+        """
+        if name is None and len(scene.placements) == 1:
+            name = next(iter(scene.placements))
+        if name not in scene.placements:
+            what = f"has no robot {name!r}" if name is not None else "has several robots" if scene.placements else "has none"
+            known = f": name one of {', '.join(scene.placements)}" if scene.placements else ": give a robot, or its URDF"
+            raise InvalidArgument(f"scene {scene.name}: a sweep asks about one robot; it {what}{known}")
+        placement = scene.placements[name]
+        return SceneChecker(placement.robot, placement.X_WR, scene.world(), placement.carried)

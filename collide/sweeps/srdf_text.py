@@ -43,9 +43,8 @@ def _lines(proposal: Proposal) -> Iterator[str]:
         if pairs:
             yield f"  <!-- {reason}: {about} -->"
         for pair in pairs:
-            yield (
-                f"  <disable_collisions link1={quoteattr(pair.a)} link2={quoteattr(pair.b)} reason={quoteattr(reason)}/>"
-            )
+            links = f"link1={quoteattr(pair.a)} link2={quoteattr(pair.b)}"
+            yield f'  <disable_collisions {links} reason="{reason}"/>'
     yield "</robot>"
 
 
@@ -62,15 +61,15 @@ def never_words(proposal: Proposal) -> Iterator[str]:
         return
     worst = max(pair.share_bounds[1] for pair in never)
     yield (
-        f'A sample is no proof: a pair that is "Never" may still collide in up to 1 of {int(1 / worst):,} configurations '
-        "(Wilson's bound, 95 % for each pair)."
+        f'A sample is no proof: a pair that is "Never" may still collide in up to 1 of {int(1 / worst):,} '
+        "configurations (Wilson's bound, 95 % for each pair)."
     )
     gaps = [(pair.nearest.gap, pair) for pair in never if pair.nearest is not None]
     if gaps:
         gap, pair = min(gaps, key=lambda entry: entry[0])
         yield (
-            f"Each of them was searched downhill from its nearest samples as well; the least gap met is {1e3 * gap:.3g} mm, "
-            f"of {pair.a} and {pair.b}."
+            "Each of them was searched downhill from its nearest samples as well; the least gap met is "
+            f"{1e3 * gap:.3g} mm, of {pair.a} and {pair.b}."
         )
 
 

@@ -11,7 +11,6 @@ from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
-
 from collide import __version__
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument, SceneError

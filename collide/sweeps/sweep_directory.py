@@ -1,4 +1,4 @@
-"""The folder of a sweep: a manifest, a lock, and a Parquet file for each chunk, written once and whole or not at all."""
+"""The folder of a sweep: a manifest, a lock, and a Parquet file for each chunk, written once, whole or not at all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 
 from collide.errors import InvalidArgument, MissingExtra, SceneError, listing
 
-MANIFEST, LOCK = "sweep.json", "sweep.lock"
+#: Readers of Parquet leave out what begins with an underscore, so that the folder is one table to them.
+MANIFEST, LOCK, PARTIAL = "_sweep.json", "_sweep.lock", "_partial-"
 SCHEMA = "collide-sweep/1"
 #: What of a manifest a second run must share, and how a difference is told.
 _COMPARED = {
@@ -28,7 +29,7 @@ def parquet_module():
     """``pyarrow`` and its Parquet module. Raises MissingExtra where it is not installed."""
     try:
         import pyarrow
-        import pyarrow.parquet as parquet
+        from pyarrow import parquet
     except ImportError:
         raise MissingExtra("pyarrow", extra="sweep", purpose="write the results of a sweep") from None
     return pyarrow, parquet
@@ -59,12 +60,12 @@ class SweepDirectory:
         """
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            file = open(self.path / LOCK, "a+b")
+            file = open(self.path / LOCK, "a+b")  # noqa: SIM115 - closed below
         except OSError as error:
             raise InvalidArgument(f"{self.path}: cannot be written to: {error.strerror}") from None
         with file:
             if not _lock(file):
-                raise InvalidArgument(f"{self.path}: another sweep is writing here; wait for it, or choose another folder")
+                raise InvalidArgument(f"{self.path}: another sweep is writing here; wait for it, or take another folder")
             yield
 
     def begin(self, manifest: dict[str, Any], restart: bool) -> list[int]:
@@ -105,7 +106,7 @@ class SweepDirectory:
                     f"{self.path}: {complaint} since this sweep began: choose another folder, or --restart "
                     "(restart=True) to throw away what it has"
                 )
-        for leftover in self.path.glob("*.partial"):  # of a run that was killed while it wrote
+        for leftover in self.path.glob(f"{PARTIAL}*"):  # of a run that was killed while it wrote
             leftover.unlink()
         return [number for number in range(manifest["chunks"]) if self._is_complete(number, manifest)]
 
@@ -143,7 +144,7 @@ class SweepDirectory:
         _write_whole(self.chunk_file(number), sink.getvalue())
 
     def _remove_all(self) -> None:
-        for file in [*self.path.glob("chunk-*.parquet"), *self.path.glob("*.partial"), self.path / MANIFEST]:
+        for file in [*self.path.glob("chunk-*.parquet"), *self.path.glob(f"{PARTIAL}*"), self.path / MANIFEST]:
             file.unlink(missing_ok=True)
 
 
@@ -157,7 +158,7 @@ def _arrow_column(pyarrow, values):
 
 
 def _write_whole(file: Path, content) -> None:
-    partial = file.with_name(file.name + ".partial")
+    partial = file.with_name(PARTIAL + file.name)
     with open(partial, "wb") as stream:
         stream.write(content)
         stream.flush()

@@ -1,4 +1,4 @@
-"""What a sweep asks of each row, as it travels to the process that answers: a robot among bodies, or scene after scene."""
+"""What a sweep asks, as it travels to the process that answers: a robot among bodies, or scene after scene."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ class OneQuestion:
 class ScenesQuestion:
     """Scene files, each asked about every configuration, or about the one that it has.
 
-    paths : files of planning scenes or scenes.   robot : for scenes that name one only, else None.   options : of `load`.
-    digests : of the files as they were when the sweep began.   make_checker : what makes a checker of a scene.
+    paths : scene files.   options : what the loader is told.   make_checker : (path, options) → (checker, (dof,) where
+    its robot stands).
     """
 
     def __init__(
@@ -114,7 +114,8 @@ class ScenesQuestion:
         columns: dict[str, Any] = {"row": np.arange(chunk.start, chunk.stop), "scene": names}
         for key in pieces[0]:
             if any(key not in piece for piece in pieces):
-                raise InvalidArgument(f"{self.paths[chunk.blocks[0][0]]} and others are of different robots: no column {key}")
+                place = self.paths[chunk.blocks[0][0]]
+                raise InvalidArgument(f"{place} and others are of different robots: no column {key}")
             columns[key] = _joined([piece[key] for piece in pieces])
         return columns
 

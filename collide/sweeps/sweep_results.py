@@ -105,7 +105,7 @@ def read_sweep(folder: str | Path) -> SweepResults:
         Where pyarrow is not installed.
     """
     pyarrow, _ = parquet_module()
-    import pyarrow.compute as compute
+    from pyarrow import compute
 
     folder = Path(folder)
     manifest = SweepDirectory(folder).manifest()

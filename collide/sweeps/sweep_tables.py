@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from collide.reports.number_format import brief_length, count
+from collide.reports.number_format import brief_length
 from collide.reports.tables import Column, Table
 from collide.sweeps.sweep_results import SweepResults
 
 SCHEMA = "collide-sweep-summary/1"
 
 
-def summary(results: SweepResults) -> str:
-    """The verdict in a line or two."""
+def summary(results: SweepResults) -> list[str]:
+    """The verdict in a sentence or two."""
     parts = [f"{results.colliding:,} in collision", f"{results.free:,} free"]
     if results.unanswered:
         parts.append(f"{results.unanswered:,} without an answer")
     if results.outside:
         parts.append(f"{results.outside:,} outside the limits")
-    text = f"{count(results.rows, 'row')}: {', '.join(parts)}; in {results.folder}"
+    sentences = [f"{results.rows:,} {'row' if results.rows == 1 else 'rows'}: {', '.join(parts)}"]
     if results.least is not None:
         distance, row, a, b = results.least
-        text += f"\nleast distance {brief_length(distance)}, row {row}, {a} and {b}"
-    return text
+        sentences.append(f"least distance {brief_length(distance)}, row {row:,}, {a} and {b}")
+    return sentences
 
 
 def tables(results: SweepResults) -> list[Table]:

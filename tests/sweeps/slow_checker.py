@@ -65,4 +65,5 @@ if __name__ == "__main__":
     from collide.sweeps.sweep import sweep
 
     folder, diary, rows, seconds = sys.argv[1:]
-    sweep(slow_checker.SlowChecker(float(seconds), diary), DrawnConfigurations(int(rows), 3), folder, workers=2, chunk=100)
+    checker = slow_checker.SlowChecker(float(seconds), diary)
+    sweep(checker, DrawnConfigurations(int(rows), 3), folder, workers=2, chunk=100)

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from plain_robots import box_corners, chain, joint, robot_of
 from reproduction import reproducing
 
 from collide import Box, InvalidArgument, Robot, Sphere
 from collide.adapters.peers import exact
 from collide.sweeps.pair_proposal import adjacent_links, propose_disabled_pairs, wilson_bounds
 from collide.sweeps.random_configurations import random_configurations
-from plain_robots import box_corners, chain, joint, robot_of
 
 
 def reasons(proposal):

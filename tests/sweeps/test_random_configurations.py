@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from plain_robots import joint, robot_of
 
 from collide import Sphere
 from collide.sweeps.random_configurations import random_configurations, sampled_limits, unlimited_lengths
-from plain_robots import joint, robot_of
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from curved_oracle import bracket
+from plain_robots import chain, joint, robot_of
 
 import collide
 from collide import Box, SceneError, Sphere, World, pose
@@ -20,7 +21,6 @@ from collide.scenes.loaders.srdf import read_srdf
 from collide.sweeps.pair_comparison import compare_pairs
 from collide.sweeps.pair_proposal import propose_disabled_pairs
 from collide.sweeps.srdf_text import srdf_text
-from plain_robots import chain, joint, robot_of
 
 ROBOTS = Path(__file__).resolve().parents[3] / "shared" / "data" / "robots"
 
@@ -179,9 +179,11 @@ def test_files_that_say_nothing_about_the_world(tmp_path, text, words):
 def test_gaps_of_pairs_are_not_those_of_hulls():
     """A link in the hollow of another: hulls overlap, the links do not. Judged by the geometry: 0.1 m to each wall."""
     hollow = collide.Compound([(Box((0.1, 1, 1)), pose((s * 0.4, 0, 0))) for s in (-1, 1)])
-    robot = robot_of(["ball", "x", "hollow"], [joint("a", "prismatic", "ball", "x", axis=(0, 0, 1)),
-                                               joint("b", "fixed", "x", "hollow")],
-                     {"hollow": (hollow, (0, 0, 0)), "ball": (Sphere(0.25), (0, 0, 0)), "x": (Sphere(0.01), (0, 0, 9))})  # fmt: skip
+    robot = robot_of(
+        ["ball", "x", "hollow"],
+        [joint("a", "prismatic", "ball", "x", axis=(0, 0, 1)), joint("b", "fixed", "x", "hollow")],
+        {"hollow": (hollow, (0, 0, 0)), "ball": (Sphere(0.25), (0, 0, 0)), "x": (Sphere(0.01), (0, 0, 9))},
+    )
     pair = propose_disabled_pairs(robot, 200).pair("ball", "hollow")
     assert pair.reason == "Never" and pair.nearest.gap == pytest.approx(0.1, abs=1e-9)
     assert np.isfinite(pair.nearest.q).all()

@@ -95,7 +95,7 @@ def test_second_run_asks_what_is_missing_only(tmp_path):
     before = {name: (folder / name).stat().st_mtime_ns for name in chunk_files(folder)}
     (folder / "chunk-00000003.parquet").unlink()
     (folder / "chunk-00000007.parquet").write_bytes(b"torn")  # by a disk
-    (folder / "chunk-00000009.parquet.partial").write_bytes(b"half")  # by a run that was killed
+    (folder / "_partial-chunk-00000009.parquet").write_bytes(b"half")  # by a run that was killed
     results = sweep(SlowChecker(0, str(diary)), DrawnConfigurations(1000, 3), folder, workers=0, chunk=100)
     asked = random_configurations(SlowChecker().robot, 0, 1000, 3)[[300, 700], 0]
     assert [float(line[0].split("(")[-1].rstrip(")")) for line in diary_lines(diary)[10:]] == asked.tolist()
@@ -103,7 +103,7 @@ def test_second_run_asks_what_is_missing_only(tmp_path):
     assert {name for name in before if before[name] != after[name]} == {
         "chunk-00000003.parquet", "chunk-00000007.parquet",
     }  # fmt: skip
-    assert np.array_equal(results.collides(), expected(1000)) and not list(folder.glob("*.partial"))
+    assert np.array_equal(results.collides(), expected(1000)) and not list(folder.glob("_partial*"))
 
 
 @pytest.mark.parametrize(
