@@ -33,7 +33,7 @@ class DaskPool:
         self._name, self._blob = name, pickle.dumps(question, protocol=5)
         self._connects = isinstance(scheduler, str)
         try:
-            self.client = self._distributed.Client(scheduler) if self._connects else scheduler
+            self.client = self._distributed.Client(scheduler, set_as_default=False) if self._connects else scheduler
         except (OSError, ValueError) as error:
             raise InvalidArgument(f"no Dask scheduler answers at {scheduler}: {error}") from None
         self.n_workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
@@ -44,7 +44,8 @@ class DaskPool:
 
         Raises what answering raised, and InvalidArgument naming a chunk that is lost again and again.
         """
-        running = self._distributed.as_completed()
+        # The loop of this client: that of another, which may be the process's default, would wait for ever or fail.
+        running = self._distributed.as_completed(loop=self.client.loop)
         chunk_of: dict[Any, tuple[Any, int]] = {}
         chunks = iter(chunks)
         self._submit_some(chunks, running, chunk_of)
@@ -103,16 +104,12 @@ def _distributed():
     return distributed
 
 
-#: The question that this worker was asked last, and its name.
-_QUESTION: dict[str, Any] = {}
-_LOCK = threading.Lock()
+#: What this thread of a worker was asked last, by its name: checkers are no business of several threads.
+_ASKED = threading.local()
 
 
 def answer_chunk(blob: bytes, name: str, chunk: Any) -> Any:
     """What a worker does: the question is unpickled once."""
-    with _LOCK:
-        if name not in _QUESTION:
-            _QUESTION.clear()
-            _QUESTION[name] = pickle.loads(blob)
-        question = _QUESTION[name]
-    return question.answer(chunk)
+    if getattr(_ASKED, "name", None) != name:
+        _ASKED.name, _ASKED.question = name, pickle.loads(blob)
+    return _ASKED.question.answer(chunk)

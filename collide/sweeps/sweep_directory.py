@@ -65,7 +65,7 @@ class SweepDirectory:
             raise InvalidArgument(f"{self.path}: cannot be written to: {error.strerror}") from None
         with file:
             if not _lock(file):
-                raise InvalidArgument(f"{self.path}: another sweep is writing here; wait for it, or take another folder")
+                raise InvalidArgument(f"{self.path}: another sweep is writing here; wait, or take another folder")
             yield
 
     def begin(self, manifest: dict[str, Any], restart: bool) -> list[int]:

@@ -157,19 +157,20 @@ def answer_rows(checker: Any, Q: np.ndarray, distances: bool, values: bool) -> d
     answered = np.zeros(len(Q), dtype=bool)
     collides = np.zeros(len(Q), dtype=bool)
     least = np.full(len(Q), np.nan)
-    links: list[tuple[str | None, str | None]] = [(None, None)] * len(Q)
+    names: list[tuple[str, str] | None] = [None] * len(Q)
     for rows in _askable(checker, np.flatnonzero(finite), Q, notes):
         answered[rows] = True
         if distances:
-            collides[rows], least[rows], names = _distances(checker, Q[rows])
-            for row, pair in zip(rows.tolist(), names):
-                links[row] = pair
+            nearest = checker.distances(Q[rows])
+            collides[rows], least[rows] = nearest.hit, nearest.distance
+            for row, pair in zip(rows.tolist(), nearest.names):
+                names[row] = pair
         else:
             collides[rows] = checker.collides(Q[rows])
     columns: dict[str, Any] = {"collides": (collides, answered)}
     if distances:
         columns["distance"] = least
-        columns["body_a"], columns["body_b"] = ([pair[k] for pair in links] for k in range(2))
+        columns["body_a"], columns["body_b"] = ([pair and pair[k] for pair in names] for k in range(2))
     columns["note"] = notes
     if values:
         columns.update((name, Q[:, k].copy()) for k, name in enumerate(robot.joint_names))
@@ -211,12 +212,6 @@ def _notes(robot: Robot, Q: np.ndarray) -> list[str | None]:
                 words.append(f"{name} {value:.9g} outside [{robot.lower[k]:g}, {robot.upper[k]:g}]")
         notes[row] = "; ".join(words)
     return notes
-
-
-def _distances(checker: Any, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[tuple[str | None, str | None]]]:
-    """(hit, least distance, names of the two bodies) of every row."""
-    answer = checker.distances(Q)
-    return answer.hit, answer.distance, list(answer.names)
 
 
 def question_digest(checker: Any) -> str:

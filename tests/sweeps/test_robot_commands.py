@@ -59,7 +59,7 @@ def test_srdf_is_written_and_right_about_itself(capsys, tmp_path):
     status, out, _ = run(capsys, "srdf", "workcell", "--samples", 500, "--compare", file)
     assert status == 0 and f"{len(written)} pairs in both, 0 only there (0 wrong), 0 only here" in out
     status, _, err = run(capsys, "srdf", "workcell", "--samples", 5, "--out", file)
-    assert status == 2 and "exists already" in err and "--force" in err
+    assert status == 2 and "exists, and may hold" in err and "--force" in err
     assert run(capsys, "srdf", "workcell", "--samples", 5, "--out", file, "--force", "--quiet")[0] == 0
 
 
@@ -150,7 +150,7 @@ def test_scenes_one_by_one(capsys, tmp_path):
     from pyarrow import parquet
 
     scenes = [_slider_scene(tmp_path / f"scene{k}", x) for k, x in enumerate((0.3, 0.9, 2.0))]
-    status, out, err = run(capsys, "sweep", *scenes, "--each", "--out", tmp_path / "s", "--workers", 0, "--random", 40,
+    status, _, err = run(capsys, "sweep", *scenes, "--each", "--out", tmp_path / "s", "--workers", 0, "--random", 40,
                            "--values", "--chunk", 7)  # fmt: skip
     assert status == 0, err
     table = parquet.read_table(tmp_path / "s").to_pydict()
@@ -245,3 +245,30 @@ def test_help_teaches(capsys, command):
     status, out, _ = run(capsys, command, "--help")
     assert status == 0 and f"collide {command} " in out.split("examples:")[1] and "exit status" in out
     assert max(map(len, out.split("examples:")[1].splitlines())) <= 80
+
+
+@needs_pyarrow
+def test_files_that_change_while_they_are_asked(capsys, monkeypatch, tmp_path):
+    """A scene file that is written anew after the third of ten chunks: the run stops; what is there is of the old one."""
+    from collide.sweeps import sweep as sweep_module
+    from collide.sweeps.sweep_directory import SweepDirectory
+
+    scene = _slider_scene(tmp_path / "scene", 0.5)
+    write_chunk = SweepDirectory.write_chunk
+
+    def write_and_change(directory, number, columns):
+        write_chunk(directory, number, columns)
+        if number == 2:
+            scene.write_text(scene.read_text().replace("[0.5, 0, 0]", "[9.5, 0, 0]"))
+
+    monkeypatch.setattr(SweepDirectory, "write_chunk", write_and_change)
+    monkeypatch.setattr(sweep_module, "_LOOK_EVERY", 0.0)
+    words = ["sweep", scene, "--random", 100, "--out", tmp_path / "s", "--chunk", 10, "--workers", 0]
+    status, _, err = run(capsys, *words)
+    assert status == 2 and "the scene changed while the sweep ran" in err and "--restart" in err
+    assert len(list((tmp_path / "s").glob("chunk-*"))) == 3
+    status, _, err = run(capsys, *words)
+    assert status == 2 and "the scene or the robot changed since this sweep began" in err
+    monkeypatch.undo()
+    status, out, _ = run(capsys, *words, "--restart")
+    assert status == 0 and out.startswith("100 rows: 0 in collision, 100 free")
