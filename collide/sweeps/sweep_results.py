@@ -104,31 +104,51 @@ def read_sweep(folder: str | Path) -> SweepResults:
     MissingExtra
         Where pyarrow is not installed.
     """
-    pyarrow, _ = parquet_module()
-    from pyarrow import compute
-
     folder = Path(folder)
     manifest = SweepDirectory(folder).manifest()
-    with_distances = manifest["columns"]["distances"]
-    table = _read(folder, ["row", "collides", "note", *(["distance", "body_a", "body_b"] if with_distances else [])])
-    colliding = compute.sum(table["collides"]).as_py() or 0
-    unanswered = table["collides"].null_count
-    noted = table.select(["row", "note"]).filter(compute.is_valid(table["note"]))
-    no_answer = table.select(["row", "note"]).filter(compute.is_null(table["collides"]))
-    first = pyarrow.concat_tables([no_answer.slice(0, _MAX_NAMED), noted.slice(0, 2 * _MAX_NAMED)]).to_pydict()
+    counts = _Counts(manifest["columns"]["distances"])
+    for file in sorted(folder.glob("chunk-*.parquet")):
+        counts.add(file)
+    first = [*counts.no_answer, *counts.outside][:_MAX_NAMED]
     return SweepResults(
-        folder, manifest["rows"], table.num_rows, colliding, table.num_rows - unanswered - colliding, unanswered,
-        noted.num_rows - unanswered, list(dict.fromkeys(zip(first["row"], first["note"])))[:_MAX_NAMED],
-        _least(table) if with_distances else None,
+        folder, manifest["rows"], counts.done, counts.colliding, counts.done - counts.n_no_answer - counts.colliding,
+        counts.n_no_answer, counts.n_outside, first, counts.least,
     )  # fmt: skip
 
 
-def _least(table) -> tuple[float, int, str, str] | None:
-    distance = table["distance"].to_numpy()
-    if not np.isfinite(distance).any():
-        return None
-    k = int(np.nanargmin(distance))
-    return float(distance[k]), *(table[name][k].as_py() for name in ("row", "body_a", "body_b"))
+class _Counts:
+    """What a summary says, chunk by chunk: a sweep may be larger than memory."""
+
+    def __init__(self, with_distances: bool):
+        self._columns = ["row", "collides", "note", *(["distance", "body_a", "body_b"] if with_distances else [])]
+        self.done = self.colliding = self.n_no_answer = self.n_outside = 0
+        self.no_answer: list[tuple[int, str]] = []
+        self.outside: list[tuple[int, str]] = []
+        self.least: tuple[float, int, str, str] | None = None
+
+    def add(self, file: Path) -> None:
+        """Count a chunk."""
+        _, parquet = parquet_module()
+        table = parquet.read_table(file, columns=self._columns)
+        is_answer = ~table["collides"].is_null().to_numpy()
+        has_note = ~table["note"].is_null().to_numpy()
+        self.done += table.num_rows
+        self.colliding += int(table["collides"].fill_null(False).to_numpy().sum())
+        self.n_no_answer += int((~is_answer).sum())
+        self.n_outside += int((is_answer & has_note).sum())
+        for named, rows in ((self.no_answer, ~is_answer), (self.outside, is_answer & has_note)):
+            for k in np.flatnonzero(rows)[: _MAX_NAMED - len(named)].tolist():
+                named.append((table["row"][k].as_py(), table["note"][k].as_py()))
+        if "distance" in self._columns:
+            self._look_for_least(table)
+
+    def _look_for_least(self, table) -> None:
+        distance = table["distance"].to_numpy()
+        if np.isfinite(distance).any():
+            k = int(np.nanargmin(distance))
+            if self.least is None or distance[k] < self.least[0]:
+                row, a, b = (table[name][k].as_py() for name in ("row", "body_a", "body_b"))
+                self.least = float(distance[k]), row, a, b
 
 
 def _read(folder: Path, columns: list[str] | None) -> Any:
