@@ -200,15 +200,18 @@ class _Survey:
             elif pair_hits(self.bodies[i], self.bodies[j], at_default)[0]:
                 pair.reason, pair.q = DEFAULT, self.robot.default_configuration()
         self._sample()
-        for place, pair in self.pairs.items():
+        for pair in self.pairs.values():
             if pair.reason == ADJACENT:
                 continue
             if pair.hits >= self.proposal.always_share * pair.samples:
                 pair.reason = ALWAYS  # also of those that collide at the default: it says more
             elif pair.reason is None and pair.hits == 0:
                 pair.reason = NEVER
-                if self.proposal.rounds and not pair.fixed:
-                    self._search(place, pair)
+        rare = [place for place, pair in self.pairs.items() if pair.reason == NEVER and not pair.fixed]
+        for k, place in enumerate(rare if self.proposal.rounds else ()):
+            pair = self.pairs[place]
+            self.rename(f"{self.robot.name}: searching pair {k + 1} of {len(rare)}, {pair.a} and {pair.b}")
+            self._search(place, pair)
 
     def _sample(self) -> None:
         asked = [place for place in self.places if self.pairs[place].reason != ADJACENT]
@@ -228,7 +231,6 @@ class _Survey:
                     pair.q = Q[int(hits.argmax())]
 
     def _search(self, place: tuple[int, int], pair: LinkPair) -> None:
-        self.rename(f"{self.robot.name}: searching, {pair.a} and {pair.b}")
         A, B = self.bodies[place[0]], self.bodies[place[1]]
         Q = random_configurations(self.robot, 0, min(_N_GAPS, self.proposal.samples), self.proposal.seed)
         gaps = pair_gaps(A, B, link_poses(self.robot, Q))
