@@ -185,7 +185,9 @@ def test_scene_that_changes_while_the_sweep_runs(tmp_path):
 
     with pytest.raises(SceneError, match="changed while the sweep ran"):
         sweep(checker, DrawnConfigurations(500, 3), tmp_path / "s", workers=1, chunk=100, progress=calls(move))
-    assert np.array_equal(read_sweep(tmp_path / "s").collides(), expected(500))
+    there = read_sweep(tmp_path / "s").table(["row", "collides"])
+    assert there.num_rows >= 100
+    assert np.array_equal(there["collides"].to_numpy(), expected(500)[there["row"].to_numpy()])
     with pytest.raises(InvalidArgument, match="the scene or the robot changed"):
         sweep(checker, DrawnConfigurations(500, 3), tmp_path / "s", workers=0, chunk=100)
 
