@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidArgument, SceneError, listing
+from collide.scenes.description import Scene
 from collide.scenes.loaders.load_scene import load
+from collide.scenes.loaders.state_words import in_states
 from collide.sweeps.configurations import as_configurations
 from collide.sweeps.content_digest import digest
 from collide.sweeps.scene_checker import SceneChecker as RobotChecker
@@ -21,8 +24,16 @@ from collide.sweeps.sweep_results import SweepResults
 
 def load_checker(place: str, options: dict[str, Any]) -> tuple[RobotChecker, np.ndarray]:
     """The checker of a scene file, and the configuration in which its robot stands (dof,)."""
-    scene = load(place, **options)
+    scene = _load([place], options)
     return RobotChecker.from_scene(scene), next(iter(scene.placements.values())).q
+
+
+def _load(places: Sequence[str], options: dict[str, Any]) -> Scene:
+    """A scene; its state may be values, as ``--state`` takes them."""
+    state = options.get("state")
+    if not isinstance(state, str) or not re.search(r"[,=]|^[-+\d.]", state):
+        return load(*places, **options)
+    return in_states(load(*places, **{**options, "state": None}), [state])[0][1]
 
 
 def sweep_scene(
@@ -114,7 +125,7 @@ class _SceneWatch:
 
     def _load(self) -> tuple[RobotChecker, list[str]]:
         places, name, options = self._question
-        scene = load(*places, **options)
+        scene = _load(places, options)
         return RobotChecker.from_scene(scene, name), scene.sources
 
     def look(self, final: bool) -> str:
