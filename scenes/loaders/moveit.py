@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
