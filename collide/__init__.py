@@ -115,13 +115,14 @@ _RENAMED = {
 }
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone", "Contacts",
-    "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
+    "Contacts", "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
     "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
-    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact",
-    "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts",
-    "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose",
-    "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
+    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "Sphere", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify",
+    "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses",
+    "overlay", "pose", "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact",
+    "verify", "walk",
 ]
 
 

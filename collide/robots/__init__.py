@@ -1,1 +1,1 @@
-"""Robots: links and joints, where links stand for joint values, and whole configurations and motions checked at once."""
+"""Robots: links, joints, where links stand, and configurations and motions checked many at a time."""

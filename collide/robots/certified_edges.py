@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.kernels import address_of
-from collide.robots.certify_motions import COLLIDES_AT, IS_PROVEN, STAYS_OPEN, certify_motions
+from collide.robots.certify_motions import COLLIDES_AT, IS_PROVEN, OPEN_INTERVAL, STAYS_OPEN, certify_motions
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
 from collide.robots.robot_bodies import paths_to_root
 
@@ -21,9 +22,10 @@ _SAMPLED_HALVINGS = 2
 _ROUNDING = 2.0**-40
 
 #: One interval that stays open.
-OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8"), ("a", "i4"), ("b", "i4")])
+OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
 
 
+@dataclass(frozen=True)
 class CertifiedEdges:
     """What is known of straight motions q(t) = Q0 + t (Q1 − Q0), 0 ≤ t ≤ 1: free, colliding, or open.
 
@@ -34,15 +36,18 @@ class CertifiedEdges:
     time : (N,) float64
         A t at which the motion collides, not the first one; NaN where none was met.
     open : (k,) OPEN_DTYPE
-        Intervals of t neither proven free nor hit, at the resolution asked: ``edge``, ``begin``, ``end``, and bodies
-        ``a`` and ``b`` that could not be told apart there (names: `open_names`).
+        Intervals of t neither proven free nor hit, at the resolution asked: ``edge``, ``begin``, ``end``.
+    open_names : list of (str, str)
+        Of each interval two bodies that could not be told apart there.
     n_checked : int
-        Configurations that were asked in all.
+        Configurations that were asked for proofs, samples before not counted.
     """
 
-    def __init__(self, free: np.ndarray, time: np.ndarray, open_: np.ndarray, n_checked: int, bodies, around):
-        self.free, self.time, self.open, self.n_checked = free, time, open_, n_checked
-        self._bodies, self._around = list(bodies), list(around)
+    free: np.ndarray
+    time: np.ndarray
+    open: np.ndarray
+    open_names: list[tuple[str, str]]
+    n_checked: int
 
     @property
     def collides(self) -> np.ndarray:
@@ -54,21 +59,13 @@ class CertifiedEdges:
         """(N,) bool: motions neither proven free nor colliding."""
         return ~self.free & np.isnan(self.time)
 
-    @property
-    def open_names(self) -> list[tuple[str, str]]:
-        """Names of both bodies of each open interval."""
-        return [
-            (self._bodies[a], self._bodies[b] if b >= 0 else self._around[-1 - b])
-            for a, b in zip(self.open["a"].tolist(), self.open["b"].tolist())
-        ]
-
     def __len__(self) -> int:
         return len(self.free)
 
     def __repr__(self) -> str:
         return (
-            f"CertifiedEdges({len(self)} motions: {int(self.free.sum())} proven free, {int(self.collides.sum())} collide, "
-            f"{int(self.is_open.sum())} open)"
+            f"CertifiedEdges({len(self)} motions: {int(self.free.sum())} proven free, {int(self.collides.sum())} "
+            f"collide, {int(self.is_open.sum())} open)"
         )
 
 
@@ -105,10 +102,10 @@ def certify(
 ) -> CertifiedEdges:
     """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
     times = sampled_collision(q0, q1, resolution, lambda q: checker.collides(q, threads=threads), _SAMPLED_HALVINGS)
-    left = np.flatnonzero(np.isnan(times))
-    verdicts, later = np.full(len(left), IS_PROVEN, dtype=np.uint8), np.full(len(left), np.nan)
-    ends = np.ascontiguousarray(q0[left]), np.ascontiguousarray(q1[left])
-    kept: list[np.ndarray] = []
+    remaining = np.flatnonzero(np.isnan(times))
+    verdicts, later = np.full(len(remaining), IS_PROVEN, dtype=np.uint8), np.full(len(remaining), np.nan)
+    ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])
+    rows_of_pieces: list[np.ndarray] = [np.zeros((0, OPEN_INTERVAL))]
     counts: list[int] = []
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
@@ -120,42 +117,38 @@ def certify(
                 space.address, work.address, address_of(ends[0][part]), address_of(ends[1][part]), checker.robot.dof, 0,
                 last - done, address_of(verdicts[part]), address_of(later[part]),
             )  # fmt: skip
-            kept.append(_open_rows(work.open_intervals, left[done:]))
+            intervals = work.open_intervals.copy()
+            intervals[:, 0] = remaining[done + intervals[:, 0].astype(np.int64)]
+            rows_of_pieces.append(intervals)
             if n == 0:
                 work.grow()
             done += n
         counts.append(work.n_checked)
 
-    checker._in_pieces(len(left), threads, progress, on_piece)
-    times[left] = np.where(verdicts == COLLIDES_AT, later, np.nan)
-    free = np.zeros(len(q0), dtype=bool)
-    free[left[verdicts == IS_PROVEN]] = True
-    rows = np.concatenate([np.zeros(0, dtype=OPEN_DTYPE), *kept])
-    is_open = np.zeros(len(q0), dtype=bool)
-    is_open[left[verdicts == STAYS_OPEN]] = True
-    rows = rows[is_open[rows["edge"]]]
-    rows = rows[np.lexsort((rows["begin"], rows["edge"]))]
-    return CertifiedEdges(free, times, rows, sum(counts), checker.bodies, checker.around)
-
-
-def _open_rows(intervals: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    checker._in_pieces(len(remaining), threads, progress, on_piece)
+    times[remaining] = np.where(verdicts == COLLIDES_AT, later, np.nan)
+    free, is_open = np.zeros(len(q0), dtype=bool), np.zeros(len(q0), dtype=bool)
+    free[remaining[verdicts == IS_PROVEN]] = True
+    is_open[remaining[verdicts == STAYS_OPEN]] = True
+    intervals = np.concatenate(rows_of_pieces)
+    intervals = intervals[is_open[intervals[:, 0].astype(np.int64)]]
+    intervals = intervals[np.lexsort((intervals[:, 1], intervals[:, 0]))]
     rows = np.zeros(len(intervals), dtype=OPEN_DTYPE)
-    rows["edge"] = edges[intervals[:, 0].astype(np.int64)]
-    rows["begin"], rows["end"] = intervals[:, 1], intervals[:, 2]
-    rows["a"], rows["b"] = intervals[:, 3], intervals[:, 4]
-    return rows
+    rows["edge"], rows["begin"], rows["end"] = intervals[:, :3].T
+    names = [checker.names_of(int(a), int(b)) for a, b in intervals[:, 3:].tolist()]
+    return CertifiedEdges(free, times, rows, names, sum(counts))
 
 
 def _motion_workspace(checker: RobotChecker, resolution: float) -> MotionWorkspace:
-    robot: Any = checker.robot
+    """Paths of joints from each body to the root, and how many of them stand between the bodies of each pair."""
+    robot, setting = checker.robot, checker.setting
     number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}
-    paths = paths_to_root(robot, [body.link for body in checker._bodies])
-    pairs = checker._filters.self_pairs
-    between = np.zeros((max(len(pairs), 1), 2), dtype=np.int64)
-    for k, (a, b) in enumerate(pairs.tolist()):
+    paths = paths_to_root(robot, [body.link for body in setting.bodies])
+    between = np.zeros((max(len(setting.self_pairs), 1), 2), dtype=np.int64)
+    for k, (a, b) in enumerate(setting.self_pairs.tolist()):
         shared = set(paths[a]) & set(paths[b])
         between[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
-    reach = float(np.abs(checker._tables.body_boxes).sum(axis=1).max()) + float(np.abs(checker._X_WR[:3, 3]).sum())
+    reach = float(np.abs(setting.tables.body_boxes).sum(axis=1).max()) + float(np.abs(setting.base[9:]).sum())
     reach += float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
     return MotionWorkspace(
         [np.array([number[name] for name in path], dtype=np.int64) for path in paths], between, robot.dof,

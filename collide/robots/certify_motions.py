@@ -48,9 +48,9 @@ from collide.robots.forward_kinematics import (
     KIND,
     MULTIPLIER,
     PLANAR,
-    SHIFT,
+    TRANSLATION,
 )
-from collide.robots.part_pairs import CLEAR, HITTING, state_of_parts
+from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, state_of_parts
 
 # Header of motions. For each body its joints that move, from the link to the root, and how many; for each pair of
 # bodies tested, how many of each one's joints stand between them; how many places a body has for joints.
@@ -74,7 +74,7 @@ INTERVAL = 4
 MAX_INTERVALS = 64
 #: Integers of a pair of parts: both, and the pair of bodies: a body and −1 − a body around, or −1 and a tested pair.
 ITEM = 4
-#: Doubles of an interval that stays open: motion, begin, end, body, other (as pairs left to others name it).
+#: Doubles of an interval that stays open: motion, begin, end, body, partner (as pairs left to others name it).
 OPEN_INTERVAL = 5
 #: What is known of a motion: proven free; it collides; parts of it stay open.
 IS_PROVEN, COLLIDES_AT, STAYS_OPEN = range(3)
@@ -83,7 +83,7 @@ IS_PROVEN, COLLIDES_AT, STAYS_OPEN = range(3)
 class Motion(NamedTuple):
     """One straight motion, and the workspace.
 
-    q0, q1 : views of both ends, from ``at`` on.   most : by how much the column moves that moves by most.
+    q0, q1 : views of both ends, from ``at`` on.   max_change : by how much the column moves that moves by most.
     """
 
     scene: Any
@@ -98,7 +98,7 @@ class Motion(NamedTuple):
     items: Any
     resolution: float
     rounding: float
-    most: float
+    max_change: float
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -114,14 +114,14 @@ def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, verdicts
     verdicts, times = view_u8(verdicts_at, n), view_f64(times_at, n)
     words[N_OPEN_INTERVALS] = 0
     for k in range(first, n):
-        most = 0.0
+        max_change = 0.0
         for j in range(dof):
-            most = max(most, abs(q1[dof * k + j] - q0[dof * k + j]))
+            max_change = max(max_change, abs(q1[dof * k + j] - q0[dof * k + j]))
         motion = Motion(
             scene, words, q0, q1, dof * k, dof, view_f64(words[CONFIGURATION_AT], dof),
             view_f64(words[MOVED_AT], scene.words[N_BODIES] * (words[PATH_STRIDE] + 1)),
-            view_f64(words[INTERVALS_AT], INTERVAL * MAX_INTERVALS), view_i64(words[ITEMS_AT], ITEM * words[ITEM_CAPACITY]),
-            settings[0], settings[1], most,
+            view_f64(words[INTERVALS_AT], INTERVAL * MAX_INTERVALS),
+            view_i64(words[ITEMS_AT], ITEM * words[ITEM_CAPACITY]), settings[0], settings[1], max_change,
         )  # fmt: skip
         n_open = words[N_OPEN_INTERVALS]
         verdict, time = _certify(motion, k)
@@ -138,7 +138,7 @@ def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, verdicts
 @kernel
 def _certify(motion, number):
     """(verdict, time of a collision or NaN) of one motion."""
-    words, intervals = motion.words, motion.intervals
+    intervals = motion.intervals
     verdict = IS_PROVEN
     n_stack = 1
     _push(intervals, 0, 0.0, 1.0, 0.0, -1.0)
@@ -157,7 +157,7 @@ def _certify(motion, number):
             return COLLIDES_AT, time
         if state == 0:
             continue
-        if motion.most * (end - begin) <= motion.resolution or n_stack + 2 > MAX_INTERVALS:
+        if motion.max_change * (end - begin) <= motion.resolution or n_stack + 2 > MAX_INTERVALS:
             verdict = STAYS_OPEN
             _leave_interval(motion, number, begin, end, top, state)
             continue
@@ -223,21 +223,21 @@ def _moved_by_joint(motion, joint, c, radius, moved, half):
     kind = joints.ints[JOINT_INTS * joint + KIND]
     child = POSE * joints.ints[JOINT_INTS * joint + CHILD]
     column = joints.ints[JOINT_INTS * joint + COLUMN]
-    turn = _change(motion, column) * abs(joints.doubles[at + MULTIPLIER]) * half
-    if kind == SHIFT:
-        return turn
+    angle = _change(motion, column) * abs(joints.doubles[at + MULTIPLIER]) * half
+    if kind == TRANSLATION:
+        return angle
     arm = sub(c, vec3_at(links, child + 9))
     if kind == FLOATING:
         shift = _change(motion, column) + _change(motion, column + 1) + _change(motion, column + 2)
-        turn = _change(motion, column + 3) + _change(motion, column + 4) + _change(motion, column + 5)
-        return half * (shift + turn * (norm(arm) + radius + moved + half * shift))
+        angle = _change(motion, column + 3) + _change(motion, column + 4) + _change(motion, column + 5)
+        return half * (shift + angle * (norm(arm) + radius + moved + half * shift))
     shift = 0.0
     if kind == PLANAR:
         shift = half * (_change(motion, column) + _change(motion, column + 1))
-        turn = half * _change(motion, column + 2)
+        angle = half * _change(motion, column + 2)
     axis = rotate(links, child, vec3_at(joints.doubles, at + AXIS))
     across = cross(arm, axis)
-    return shift + turn * (math.sqrt(dot(across, across)) + radius + moved + shift)
+    return shift + angle * (math.sqrt(dot(across, across)) + radius + moved + shift)
 
 
 @kernel(inline=True)
@@ -287,19 +287,19 @@ def _gather(motion, top):
 
 @kernel(inline=True)
 def _moved_between(motion, k, a, b):
-    """How far two bodies of the robot, the k-th pair, move towards each other."""
+    """How far two bodies of the robot, the k-th pair, move towards each partner."""
     between = view_i64(motion.words[BETWEEN_AT], 2 * k + 2)
     stride = motion.words[PATH_STRIDE] + 1
     return motion.moved[a * stride + between[2 * k]] + motion.moved[b * stride + between[2 * k + 1]]
 
 
 @kernel(inline=True)
-def _take(motion, top, n, p, q, body, other, margin):
+def _take(motion, top, n, p, q, body, partner, margin):
     """Ask about a pair of parts and write it where it is not done with; how many are, −1, or −2 as of `_gather`."""
-    state = _state(motion, p, q, body, other, margin)
+    state = _state(motion, p, q, body, partner, margin)
     if state == HITTING:
         return -2
-    if state == CLEAR:
+    if state == BEYOND_MARGIN:
         return n
     if top + n + 1 > motion.words[ITEM_CAPACITY]:
         return -1
@@ -307,18 +307,18 @@ def _take(motion, top, n, p, q, body, other, margin):
     motion.items[at] = p
     motion.items[at + 1] = q
     motion.items[at + 2] = body
-    motion.items[at + 3] = other
+    motion.items[at + 3] = partner
     return n + 1
 
 
 @kernel
-def _state(motion, p, q, body, other, margin):
+def _state(motion, p, q, body, partner, margin):
     """`state_of_parts` of a pair in the middle of the interval."""
     scene = motion.scene
     if body >= 0:
         place(scene, p, body)
     else:
-        pair = view_i64(scene.words[SELF_PAIRS_AT] + 16 * other, 2)
+        pair = view_i64(scene.words[SELF_PAIRS_AT] + 16 * partner, 2)
         place(scene, p, pair[0])
         place(scene, q, pair[1])
     return state_of_parts(scene, p, q, margin)
@@ -334,12 +334,12 @@ def _pass_on(motion, first, n_items, top):
     n = 0
     for k in range(first, first + n_items):
         body = items[ITEM * k + 2]
-        other = items[ITEM * k + 3]
+        partner = items[ITEM * k + 3]
         if body >= 0:
             margin = motion.moved[body * stride + lengths[body]]
         else:
-            margin = _moved_between(motion, other, pairs[2 * other], pairs[2 * other + 1])
-        n = _take(motion, top, n, items[ITEM * k], items[ITEM * k + 1], body, other, margin)
+            margin = _moved_between(motion, partner, pairs[2 * partner], pairs[2 * partner + 1])
+        n = _take(motion, top, n, items[ITEM * k], items[ITEM * k + 1], body, partner, margin)
         if n < 0:
             return n
     return n
@@ -362,16 +362,16 @@ def _leave_interval(motion, number, begin, end, top, n_items):
     words[N_OPEN_INTERVALS] += 1
     if words[N_OPEN_INTERVALS] > words[OPEN_INTERVAL_CAPACITY]:
         return
-    body, other = -1, -1
+    body, partner = -1, -1
     if n_items > 0:
         body = motion.items[ITEM * top + 2]
-        other = motion.items[ITEM * top + 3]
+        partner = motion.items[ITEM * top + 3]
     if n_items > 0 and body < 0:
-        pair = view_i64(motion.scene.words[SELF_PAIRS_AT] + 16 * other, 2)
+        pair = view_i64(motion.scene.words[SELF_PAIRS_AT] + 16 * partner, 2)
         body = pair[0]
-        other = pair[1]
+        partner = pair[1]
     out[at] = float(number)
     out[at + 1] = begin
     out[at + 2] = end
     out[at + 3] = float(body)
-    out[at + 4] = float(other)
+    out[at + 4] = float(partner)

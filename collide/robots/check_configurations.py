@@ -5,6 +5,8 @@ Surroundings come first, bodies from the hand to the base: that is where collisi
 
 from __future__ import annotations
 
+import math
+
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE
 from collide.robots.check_scene import (
@@ -18,6 +20,7 @@ from collide.robots.check_scene import (
     OPEN_AT,
     OPEN_CAPACITY,
     OPEN_INTS,
+    OPEN_LOWER,
     PADDED,
     SELF_PAIRS_AT,
     STAMP,
@@ -99,7 +102,7 @@ def _verdict(scene, q, first, number):
 
 
 @kernel(inline=True)
-def _state_of_body(scene, body, part, number, other):
+def _state_of_body(scene, body, part, number, partner):
     """Of a body's padded parts and a part around: HITTING, OPEN (and left to others), or neither."""
     at = BODY_INTS * body
     first = scene.bodies[at + FIRST] + scene.words[PADDED]
@@ -109,7 +112,7 @@ def _state_of_body(scene, body, part, number, other):
         if state == HITTING:
             return HITTING
         if state == OPEN:
-            leave_open(scene, number, body, other)
+            leave_open(scene, number, body, partner, -math.inf)
             return OPEN
     return 0
 
@@ -127,14 +130,17 @@ def _state_of_two(scene, a, b, number):
             if state == HITTING:
                 return HITTING
             if state == OPEN:
-                leave_open(scene, number, a, b)
+                leave_open(scene, number, a, b, -math.inf)
                 return OPEN
     return 0
 
 
 @kernel(inline=True)
-def leave_open(scene, number, body, other):
-    """Note a pair of bodies that is left to others; N_OPEN counts on where there is no space."""
+def leave_open(scene, number, body, partner, lower):
+    """Note a pair of bodies, at least ``lower`` apart [m], that is left to others.
+
+    N_OPEN counts on where there is no space.
+    """
     words = scene.words
     at = OPEN_INTS * words[N_OPEN]
     words[N_OPEN] += 1
@@ -143,4 +149,5 @@ def leave_open(scene, number, body, other):
     out = view_i64(words[OPEN_AT], OPEN_INTS * words[OPEN_CAPACITY])
     out[at] = number
     out[at + 1] = body
-    out[at + 2] = other
+    out[at + 2] = partner
+    view_f64(words[OPEN_AT], OPEN_INTS * words[OPEN_CAPACITY])[at + OPEN_LOWER] = lower

@@ -43,8 +43,9 @@ BODY_INTS = 3
 # Doubles of a box: centre and half its sides.
 CENTRE, HALF = 0, 3
 BOX = 6
-# Integers of a pair that is left to others: the configuration, a body, another body or −1 − a body around.
-OPEN_INTS = 3
+# Words of a pair that is left to others: the configuration, a body, another body or −1 − a body around; and a double,
+# how far apart they are at least.
+OPEN_INTS, OPEN_LOWER = 4, 3
 
 
 class CheckScene(NamedTuple):
@@ -73,7 +74,8 @@ def view_scene(header_at):
     )
     n_bodies, n_parts = words[N_BODIES], words[N_PARTS]
     return CheckScene(
-        words, view_f64(header_at + 8 * SLACK, 1)[0], joints, view_f64(words[LINKS_AT], POSE * words[N_LINKS]), view_i64(words[BODIES_AT], BODY_INTS * n_bodies),
+        words, view_f64(header_at + 8 * SLACK, 1)[0], joints, view_f64(words[LINKS_AT], POSE * words[N_LINKS]),
+        view_i64(words[BODIES_AT], BODY_INTS * n_bodies),
         view_f64(words[BODY_BOXES_AT], BOX * n_bodies), view_f64(words[WORLD_BOXES_AT], BOX * n_bodies),
         view_f64(words[PARTS_AT], PART * words[N_LINK_PARTS]), view_f64(words[PART_BOXES_AT], BOX * n_parts),
         view_f64(words[POSES_AT], POSE * n_parts), view_i64(words[PLACED_AT], n_parts),
@@ -116,7 +118,7 @@ def boxes_meet(scene, a, b, margin):
 @kernel(inline=True)
 def find_parts_around(scene, body, margin):
     """Candidates become the parts around whose boxes come within a margin of a body's; returns how many."""
-    words, boxes, found = scene.words, scene.world_boxes, scene.candidates
+    words, boxes, near = scene.words, scene.world_boxes, scene.candidates
     leaves, n_order = words[LEAVES], words[N_ORDER]
     nodes = view_f64(words[NODES_AT], 12 * leaves)
     order = view_i64(words[ORDER_AT], n_order)
@@ -130,7 +132,7 @@ def find_parts_around(scene, body, margin):
     high2 = boxes[at + 5] + margin
     count = words[N_UNBOUNDED]
     for k in range(count):
-        found[k] = unbounded[k]
+        near[k] = unbounded[k]
     # As `box_tree.meeting_boxes` goes: down to the left while boxes meet, else on to the next subtree to the right.
     node = 1 if n_order > 0 else 0
     while node > 0:
@@ -144,7 +146,7 @@ def find_parts_around(scene, body, margin):
             node = 2 * node
             continue
         if meets and node - leaves < n_order:
-            found[count] = order[node - leaves]
+            near[count] = order[node - leaves]
             count += 1
         while node & 1:
             node >>= 1
@@ -178,9 +180,9 @@ def _put_part(scene, part, link):
     """The row of a part becomes the product of its link's pose, at ``link``, and its own; it knows its rounding."""
     poses, links, parts = scene.poses, scene.links, scene.parts
     to = POSE * part
-    own = PART * part
+    at = PART * part
     poses[to + POSE_TERMS] = -1.0
-    if parts[own + TURNED] == 0.0:
+    if parts[at + TURNED] == 0.0:
         for k in range(12):
             poses[to + k] = links[link + k]
         poses[to + POSE_SLOP] = 0.0
@@ -196,7 +198,7 @@ def _put_part(scene, part, link):
         stretch = max(stretch, abs(x) + abs(y) + abs(z))
         shift = max(shift, abs(t))
         for j in range(3):
-            poses[to + 3 * i + j] = x * parts[own + j] + y * parts[own + 3 + j] + z * parts[own + 6 + j]
-        poses[to + 9 + i] = x * parts[own + 9] + y * parts[own + 10] + z * parts[own + 11] + t
-    poses[to + POSE_SLOP] = PRODUCT_SLOP * (stretch * parts[own + MEASURE] + shift)
+            poses[to + 3 * i + j] = x * parts[at + j] + y * parts[at + 3 + j] + z * parts[at + 6 + j]
+        poses[to + 9 + i] = x * parts[at + 9] + y * parts[at + 10] + z * parts[at + 11] + t
+    poses[to + POSE_SLOP] = PRODUCT_SLOP * (stretch * parts[at + MEASURE] + shift)
     poses[to + POSE_STRETCH] = stretch_of_pose(poses, to)

@@ -85,6 +85,23 @@ class CheckTables(NamedTuple):
     slack: float
 
 
+class Setting(NamedTuple):
+    """A robot among the bodies of a World as it stood.
+
+    bodies : what moves.   base : where the root stands, as `forward_kinematics.LINK_POSE` doubles.
+    self_pairs : (k, 2) int64 of bodies that are tested.   allowed : (bodies, around) uint8, 1 where a pair never is.
+    skipped : {reason: pairs} never tested.
+    """
+
+    bodies: Sequence[RobotBody]
+    base: np.ndarray
+    surroundings: Surroundings
+    tables: CheckTables
+    self_pairs: np.ndarray
+    allowed: np.ndarray
+    skipped: dict[str, int]
+
+
 class _LinkParts(NamedTuple):
     parts: list[Part]
     is_bound: bool
@@ -204,8 +221,9 @@ def _stretches(poses: np.ndarray) -> np.ndarray:
 
 def _slack_of(matrices: np.ndarray, parts: np.ndarray, around: np.ndarray) -> float:
     """By what share boxes may be off: matrices within the tolerance of rotations are used as they are."""
-    own, of_around = parts[:, :9].reshape(-1, 3, 3), around[:, :9].reshape(-1, 3, 3)
-    return _LEAST_SLACK + 8.0 * (_skew(matrices).sum() + _skew(own).max(initial=0.0) + _skew(of_around).max(initial=0.0))
+    of_links, of_around = parts[:, :9].reshape(-1, 3, 3), around[:, :9].reshape(-1, 3, 3)
+    of_parts = _skew(of_links).max(initial=0.0) + _skew(of_around).max(initial=0.0)
+    return _LEAST_SLACK + 8.0 * (_skew(matrices).sum() + of_parts)
 
 
 def _skew(R: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 from collide.robots import certify_motions as motions
 from collide.robots import check_scene as layout
-from collide.robots.check_tables import CheckTables, Surroundings
+from collide.robots.check_tables import Setting
 from collide.robots.forward_kinematics import JointTable
 
 #: Pairs left to others that a call has space for, at least.
@@ -27,11 +27,10 @@ class CheckWorkspace:
     open_pairs : (k, OPEN_INTS) what the last call left to others.   open_intervals : (k, OPEN_INTERVAL).
     """
 
-    def __init__(
-        self, joints: JointTable, base: np.ndarray, tables: CheckTables, around: Surroundings, self_pairs: np.ndarray,
-        allowed: np.ndarray,
-    ):  # fmt: skip
-        self._tables = joints, base, tables, around, self_pairs, allowed
+    def __init__(self, joints: JointTable, setting: Setting):
+        self._setting = joints, setting  # kernels read what they hold
+        tables, around = setting.tables, setting.surroundings
+        self_pairs, allowed = setting.self_pairs, setting.allowed
         n_bodies, n_parts, n_around = len(tables.bodies), len(tables.poses), len(around.packed)
         nothing = np.zeros(1, dtype=np.int64)
         tree = around.tree
@@ -40,11 +39,12 @@ class CheckWorkspace:
         self._open = np.empty((capacity, layout.OPEN_INTS), dtype=np.int64)
         self._buffers = buffers = {
             layout.POSES_AT: tables.poses.copy(), layout.LINKS_AT: np.zeros((joints.n_links, POSE)),
-            layout.WORLD_BOXES_AT: np.zeros((n_bodies, layout.BOX)), layout.PLACED_AT: np.zeros(n_parts, dtype=np.int64),
+            layout.WORLD_BOXES_AT: np.zeros((n_bodies, layout.BOX)),
+            layout.PLACED_AT: np.zeros(n_parts, dtype=np.int64),
             layout.CANDIDATES_AT: np.zeros(n_parts + 1, dtype=np.int64), layout.PAIR_AT: np.zeros(2, dtype=np.int64),
             layout.ROW_AT: np.zeros(1, dtype=PAIR_DTYPE), layout.DOUBLES_AT: np.zeros(DOUBLES),
             layout.INTEGERS_AT: np.zeros(INTEGERS, dtype=np.int64), layout.OPEN_AT: self._open,
-            layout.JOINT_INTS_AT: joints.ints, layout.JOINT_DOUBLES_AT: joints.doubles, layout.BASE_AT: base,
+            layout.JOINT_INTS_AT: joints.ints, layout.JOINT_DOUBLES_AT: joints.doubles, layout.BASE_AT: setting.base,
             layout.BODIES_AT: tables.bodies, layout.BODY_BOXES_AT: tables.body_boxes, layout.SELF_PAIRS_AT: self_pairs,
             layout.PARTS_AT: tables.parts, layout.PART_BOXES_AT: tables.part_boxes, layout.IS_BOUND_AT: tables.is_bound,
             layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.ALLOWED_AT: allowed,

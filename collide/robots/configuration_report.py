@@ -62,9 +62,9 @@ class ConfigurationReport:
     @classmethod
     def of(cls, checker: RobotChecker, q: np.ndarray) -> ConfigurationReport:
         """The report about one configuration (dof,)."""
-        X_WLs = checker.robot.link_poses(q, checker._X_WR)
+        X_WLs = checker.link_poses(q)
         pairs = _tested_pairs(checker)
-        rows = open_pairs.distances(pairs, X_WLs, checker._bodies, checker._around, _NEAR)
+        rows = open_pairs.distances(pairs, X_WLs, checker.setting.bodies, checker.setting.surroundings.bodies, _NEAR)
         rows = rows[~rows["beyond"]]
         rows = rows[np.argsort(rows["distance"], kind="stable")]
         explained = [_explained(checker, row) for row in rows]
@@ -100,16 +100,16 @@ def _line(pair: ExplainedPair) -> str:
 
 
 def _tested_pairs(checker: RobotChecker) -> np.ndarray:
-    """(k, OPEN_INTS) of configuration 0."""
-    a, k = np.nonzero(checker._filters.allowed == 0)
+    """(k, 3) of configuration 0, as `open_pairs.py` takes them."""
+    a, k = np.nonzero(checker.setting.allowed == 0)
     around = np.stack([np.zeros_like(a), a, -1 - k], axis=1)
-    pairs = checker._filters.self_pairs
+    pairs = checker.setting.self_pairs
     return np.concatenate([np.insert(pairs, 0, 0, axis=1), around]).astype(np.int64)
 
 
 def _explained(checker: RobotChecker, row: np.ndarray) -> ExplainedPair:
-    a, b = int(row["a"]), int(row["b"])
+    a, b = checker.names_of(int(row["a"]), int(row["b"]))
     return ExplainedPair(
-        checker.bodies[a], checker.bodies[b] if b >= 0 else checker.around[-1 - b], float(row["distance"]),
-        float(row["lower"]), float(row["upper"]), row["normal"].copy(), row["point_a"].copy(), row["point_b"].copy(),
+        a, b, float(row["distance"]), float(row["lower"]), float(row["upper"]), row["normal"].copy(),
+        row["point_a"].copy(), row["point_b"].copy(),
     )  # fmt: skip

@@ -17,7 +17,7 @@ from collide.numerics.sine_cosine import LARGEST_ANGLE, SineCosine, sine_cosine
 from collide.robots.kinematic_tree import Joint
 
 #: What a joint does. A turn about a coordinate axis of its frame, as nearly all are, mixes two columns of the pose.
-FIXED, TURN, TURN_ABOUT_COORDINATE, SHIFT, PLANAR, FLOATING = range(6)
+FIXED, ROTATION, ROTATION_ABOUT_COORDINATE, TRANSLATION, PLANAR, FLOATING = range(6)
 # Integers of a joint: what it does, parent and child link, its first column of q, and the coordinate it turns about.
 KIND, PARENT, CHILD, COLUMN, COORDINATE = range(5)
 JOINT_INTS = 5
@@ -29,9 +29,10 @@ JOINT_DOUBLES = 23
 LINK_POSE = 12
 
 _KINDS = {
-    "fixed": FIXED, "revolute": TURN, "continuous": TURN, "prismatic": SHIFT, "planar": PLANAR, "floating": FLOATING,
+    "fixed": FIXED, "revolute": ROTATION, "continuous": ROTATION, "prismatic": TRANSLATION, "planar": PLANAR,
+    "floating": FLOATING,
 }  # fmt: skip
-_TURN = 2.0 * math.pi
+_FULL_CIRCLE = 2.0 * math.pi
 
 
 class JointTable(NamedTuple):
@@ -61,10 +62,10 @@ def joint_table(
     for k, joint in enumerate(joints):
         kind, coordinate, multiplier = _KINDS[joint.type], 0, 1.0
         driver, offset = joint.name, 0.0
-        if kind in (TURN, SHIFT):
+        if kind in (ROTATION, TRANSLATION):
             driver, multiplier, offset = drivers[joint.name]
-        if kind == TURN and (np.abs(joint.axis) == 1.0).any():
-            kind, coordinate = TURN_ABOUT_COORDINATE, int(np.argmax(np.abs(joint.axis)))
+        if kind == ROTATION and (np.abs(joint.axis) == 1.0).any():
+            kind, coordinate = ROTATION_ABOUT_COORDINATE, int(np.argmax(np.abs(joint.axis)))
         column = columns[driver] if kind != FIXED else 0
         ints[k] = kind, link_numbers[joint.parent], link_numbers[joint.child], column, coordinate
         doubles[k, X_PJ : X_PJ + 9], doubles[k, 9:12] = joint.X_PJ[:3, :3].ravel(), joint.X_PJ[:3, 3]
@@ -158,16 +159,16 @@ def pose_links(joints, q, first, links, stride):
         if kind == FIXED:
             continue
         value = q[column] * joints.doubles[at + MULTIPLIER] + joints.doubles[at + OFFSET]
-        if kind == TURN_ABOUT_COORDINATE:
+        if kind == ROTATION_ABOUT_COORDINATE:
             coordinate = joints.ints[JOINT_INTS * j + COORDINATE]
-            _turn_columns(links, child, coordinate, joints.doubles[at + AXIS + coordinate], value)
-        elif kind == SHIFT:
-            _shift(links, child, joints.doubles, at + AXIS, value)
-        elif kind == TURN:
-            _turn(links, child, joints.doubles, at + AXIS, value)
+            _rotate_columns(links, child, coordinate, joints.doubles[at + AXIS + coordinate], value)
+        elif kind == TRANSLATION:
+            _translate(links, child, joints.doubles, at + AXIS, value)
+        elif kind == ROTATION:
+            _rotate(links, child, joints.doubles, at + AXIS, value)
         elif kind == PLANAR:
-            _shift_across(links, child, joints.doubles, at + ACROSS, q[column], q[column + 1])
-            _turn(links, child, joints.doubles, at + AXIS, q[column + 2])
+            _translate_across(links, child, joints.doubles, at + ACROSS, q[column], q[column + 1])
+            _rotate(links, child, joints.doubles, at + AXIS, q[column + 2])
         else:
             _float(links, child, q, column)
 
@@ -188,14 +189,16 @@ def _put_product(A, a, B, b, out, to):
 def _sine_cosine(angle):
     """`sine_cosine` of any angle; beyond LARGEST_ANGLE of one reduced in doubles, which lie as far apart there."""
     size = abs(angle)
+    if not size < math.inf:
+        return SineCosine(math.nan, math.nan)
     if size > LARGEST_ANGLE:
-        size = min(max(size - math.floor(size / _TURN) * _TURN, 0.0), _TURN)
+        size = min(max(size - math.floor(size / _FULL_CIRCLE) * _FULL_CIRCLE, 0.0), _FULL_CIRCLE)
     pair = sine_cosine(size)
     return SineCosine(-pair.sine if angle < 0.0 else pair.sine, pair.cosine)
 
 
 @kernel(inline=True)
-def _turn_columns(links, at, coordinate, sign, angle):
+def _rotate_columns(links, at, coordinate, sign, angle):
     """Turn the pose at ``at`` about one of its own coordinate axes, or against it: two columns are mixed."""
     sine, cosine = _sine_cosine(angle)
     sine *= sign
@@ -209,7 +212,7 @@ def _turn_columns(links, at, coordinate, sign, angle):
 
 
 @kernel(cold=True)
-def _turn(links, at, axes, axis, angle):
+def _rotate(links, at, axes, axis, angle):
     """Turn the pose at ``at`` about any unit axis of its frame: Rodrigues' formula.
 
     The diagonal is a² + cos·(1 − a²), so that what does not turn keeps exact zeros and ones.
@@ -232,7 +235,7 @@ def _turn(links, at, axes, axis, angle):
 
 
 @kernel(inline=True)
-def _shift(links, at, axes, axis, length):
+def _translate(links, at, axes, axis, length):
     """Shift the pose at ``at`` along an axis of its frame."""
     x = length * axes[axis]
     y = length * axes[axis + 1]
@@ -243,10 +246,10 @@ def _shift(links, at, axes, axis, length):
 
 
 @kernel(cold=True)
-def _shift_across(links, at, axes, across, u, v):
+def _translate_across(links, at, axes, across, u, v):
     """Shift the pose at ``at`` by u and v along the two axes at ``across``."""
-    _shift(links, at, axes, across, u)
-    _shift(links, at, axes, across + 3, v)
+    _translate(links, at, axes, across, u)
+    _translate(links, at, axes, across + 3, v)
 
 
 @kernel(cold=True)
@@ -261,4 +264,4 @@ def _float(links, at, q, column):
             links[r] * q[column] + links[r + 1] * q[column + 1] + links[r + 2] * q[column + 2] + links[at + 9 + i]
         )
     for k in range(3):
-        _turn_columns(links, at, 2 - k, 1.0, q[column + 5 - k])
+        _rotate_columns(links, at, 2 - k, 1.0, q[column + 5 - k])

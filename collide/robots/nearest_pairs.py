@@ -117,13 +117,13 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
             return limit
     row = ask(scene, p, q, d, False, within)
     if is_undecided_or_refused(row):
-        leave_open(scene, number, a, b)
+        leave_open(scene, number, a, b, -math.inf)
         return limit
     if row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
         return limit
     is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
     if is_bound[p] != 0 or is_bound[q] != 0:
-        leave_open(scene, number, a, b)
+        leave_open(scene, number, a, b, row.doubles[LOWER])
         return limit
     out = view_row(row_at)
     if out.words[_BODY_A] != NONE and not row.doubles[DISTANCE] < out.doubles[DISTANCE]:

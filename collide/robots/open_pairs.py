@@ -21,7 +21,7 @@ def are_hits(
 ) -> np.ndarray:
     """(k,) bool: which pairs meet, a body swollen by its padding where the other is around.
 
-    pairs : (k, OPEN_INTS), configurations as rows of X_WLs (N, links, 4, 4).
+    pairs : (k, 3 or more), configurations as rows of X_WLs (N, links, 4, 4).
     """
     out = np.zeros(len(pairs), dtype=bool)
     for rows, A, B, X_WA, X_WB, padding in _batches(pairs, X_WLs, bodies, around):
@@ -53,13 +53,13 @@ def _batches(
 ) -> Iterator[tuple]:
     """(rows of pairs, A, B, X_WA, X_WB, padding) of those of the same two bodies."""
     order = np.lexsort((pairs[:, 2], pairs[:, 1]))
-    starts = np.flatnonzero((np.diff(pairs[order, 1:], axis=0, prepend=pairs[order[:1], 1:] - 1) != 0).any(axis=1))
+    starts = np.flatnonzero((np.diff(pairs[order, 1:3], axis=0, prepend=pairs[order[:1], 1:3] - 1) != 0).any(axis=1))
     for rows in np.split(order, starts[1:]):
-        _, a, b = pairs[rows[0]].tolist()
+        a, b = pairs[rows[0], 1:3].tolist()
         A, k = bodies[a], pairs[rows, 0]
         X_WA = np.ascontiguousarray(X_WLs[k, A.link])
         if b >= 0:
             yield rows, A.shape, bodies[b].shape, X_WA, np.ascontiguousarray(X_WLs[k, bodies[b].link]), 0.0
         else:
-            other = around[-1 - b]
-            yield rows, A.shape, other.shape, X_WA, other.X_WB[None], A.padding
+            B = around[-1 - b]
+            yield rows, A.shape, B.shape, X_WA, B.X_WB[None], A.padding

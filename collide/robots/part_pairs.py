@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import kernel, native_call, view_f64, view_i64, view_u8
+from collide.kernels import kernel, native_call, view_i64, view_u8
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
@@ -27,24 +27,24 @@ from collide.robots.check_scene import (
 )
 
 #: What is known of two parts: proven farther apart than the margin; nearer, and apart; they meet; left to others.
-CLEAR, NEAR, HITTING, OPEN = range(4)
+BEYOND_MARGIN, NEAR, HITTING, OPEN = range(4)
 
 _answer_pairs_at = native_call(SIGNATURE)
 
 
 @kernel(inline=True)
 def state_of_parts(scene, p, q, margin):
-    """CLEAR, NEAR, HITTING or OPEN of two parts whose poses are written; without a margin [m], NEAR does not come."""
+    """BEYOND_MARGIN, NEAR, HITTING or OPEN of two parts whose poses are written; without a margin [m] never NEAR."""
     d = Vec3(0.0, 0.0, 0.0)
     if is_bounded(scene, p) and is_bounded(scene, q):
         d = sub(middle(scene, q), middle(scene, p))
         if boxes_are_apart(scene, p, q, d, margin):
-            return CLEAR
+            return BEYOND_MARGIN
     row = ask(scene, p, q, d, True, margin)
     if is_undecided_or_refused(row):
         return OPEN
     if row.doubles[LOWER] > margin:
-        return CLEAR
+        return BEYOND_MARGIN
     is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
     if is_bound[p] != 0 or is_bound[q] != 0:
         return OPEN
@@ -96,21 +96,21 @@ def boxes_are_apart(scene, p, q, d, margin):
     d : from the centre of p's box to that of q's.   A face's axis is tested by the other box's extent along it.
     """
     poses, boxes = scene.poses, scene.part_boxes
-    P = POSE * p
-    Q = POSE * q
+    at_p = POSE * p
+    at_q = POSE * q
     a = vec3_at(boxes, BOX * p + HALF)
     b = vec3_at(boxes, BOX * q + HALF)
     # Columns of a pose are its box's axes; entry (i, j) is axis i of p along axis j of q.
-    x = rotate_back(poses, Q, Vec3(poses[P], poses[P + 3], poses[P + 6]))
-    y = rotate_back(poses, Q, Vec3(poses[P + 1], poses[P + 4], poses[P + 7]))
-    z = rotate_back(poses, Q, Vec3(poses[P + 2], poses[P + 5], poses[P + 8]))
+    x = rotate_back(poses, at_q, Vec3(poses[at_p], poses[at_p + 3], poses[at_p + 6]))
+    y = rotate_back(poses, at_q, Vec3(poses[at_p + 1], poses[at_p + 4], poses[at_p + 7]))
+    z = rotate_back(poses, at_q, Vec3(poses[at_p + 2], poses[at_p + 5], poses[at_p + 8]))
     x = Vec3(abs(x.x), abs(x.y), abs(x.z))
     y = Vec3(abs(y.x), abs(y.y), abs(y.z))
     z = Vec3(abs(z.x), abs(z.y), abs(z.z))
-    u = rotate_back(poses, P, d)
-    v = rotate_back(poses, Q, d)
+    u = rotate_back(poses, at_p, d)
+    v = rotate_back(poses, at_q, d)
     sizes = abs(d.x) + abs(d.y) + abs(d.z) + a.x + a.y + a.z + b.x + b.y + b.z + margin
-    least = margin + scene.slack * (sizes + _far(poses, P) + _far(poses, Q))
+    least = margin + scene.slack * (sizes + _far(poses, at_p) + _far(poses, at_q))
     return (
         abs(u.x) - a.x - dot(x, b) > least
         or abs(u.y) - a.y - dot(y, b) > least

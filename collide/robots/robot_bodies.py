@@ -51,15 +51,15 @@ def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotB
     """
     number = {link: k for k, link in enumerate(robot.links)}
     objects: dict[str, Attached] = {}
-    for item in attached:
-        one = _checked_object(robot, number, item)
-        if one.name in number or one.name in objects:
-            raise InvalidArgument(f'attached: the name "{cut(one.name)}" is used twice; give the object another name')
-        objects[one.name] = one
+    for values in attached:
+        item = _checked_object(robot, number, values)
+        if item.name in number or item.name in objects:
+            raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
+        objects[item.name] = item
     swelling = _padding_of(padding, {*number, *objects})
     bodies = [
-        RobotBody(one.name, number[one.link], Compound([(one.shape, one.X_LS)]), swelling.get(one.name, 0.0))
-        for one in objects.values()
+        RobotBody(item.name, number[item.link], Compound([(item.shape, item.X_LS)]), swelling.get(item.name, 0.0))
+        for item in objects.values()
     ]
     for link in reversed(robot.links):
         if link in robot.geometry:
@@ -73,23 +73,23 @@ def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotB
     return bodies, objects
 
 
-def _checked_object(robot: Robot, number: Mapping[str, int], item) -> Attached:
+def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached:
     try:
-        one = Attached(*item)
+        item = Attached(*values)
     except TypeError:
         raise InvalidArgument(
-            "attached must be objects (name, link, shape, X_LS, touch), the last two optional; got " + brief(item)
+            "attached must be objects (name, link, shape, X_LS, touch), the last two optional; got " + brief(values)
         ) from None
-    if not isinstance(one.name, str) or not one.name:
-        raise InvalidArgument(f"attached: a name must be a non-empty string, got {checks.describe(one.name)}")
-    if one.link not in number:
+    if not isinstance(item.name, str) or not item.name:
+        raise InvalidArgument(f"attached: a name must be a non-empty string, got {checks.describe(item.name)}")
+    if item.link not in number:
         raise InvalidArgument(
-            f'attached "{cut(one.name)}": {robot.name} has no link {brief(one.link)}; it has {listing(robot.links)}'
+            f'attached "{cut(item.name)}": {robot.name} has no link {brief(item.link)}; it has {listing(robot.links)}'
         )
-    if not isinstance(one.shape, Shape):
-        raise InvalidArgument(f'attached "{cut(one.name)}": not a shape but {checks.describe(one.shape)}')
-    X_LS = np.eye(4) if one.X_LS is None else as_pose(one.X_LS, f'attached "{cut(one.name)}": X_LS').copy()
-    return one._replace(X_LS=X_LS, touch=tuple([one.touch] if isinstance(one.touch, str) else one.touch))
+    if not isinstance(item.shape, Shape):
+        raise InvalidArgument(f'attached "{cut(item.name)}": not a shape but {checks.describe(item.shape)}')
+    X_LS = np.eye(4) if item.X_LS is None else as_pose(item.X_LS, f'attached "{cut(item.name)}": X_LS').copy()
+    return item._replace(X_LS=X_LS, touch=tuple([item.touch] if isinstance(item.touch, str) else item.touch))
 
 
 def _padding_of(padding, names: set[str]) -> dict[str, float]:
@@ -109,16 +109,10 @@ def _checked_padding(what: str, value) -> float:
     return length
 
 
-def bodies_around(world: World, robot: Robot) -> tuple[list[BodyAround], list[str]]:
-    """(bodies of a World that are not the robot's own, names of those that are: they are named like its links)."""
-    own, around = [], []
-    for identity, name in world.names.items():
-        if name in robot.geometry:
-            own.append(name)
-        else:
-            body = world.body(identity)
-            around.append(BodyAround(name, body.shape, body.X_WB))
-    return around, own
+def bodies_around(world: World, robot: Robot) -> list[BodyAround]:
+    """Bodies of a World that are not the robot's own; those are named like its links."""
+    names = [name for name in world.names.values() if name not in robot.geometry]
+    return [BodyAround(name, world.body(name).shape, world.body(name).X_WB) for name in names]
 
 
 def filters_of(
@@ -147,12 +141,12 @@ def filters_of(
                 self_pairs.append((i, j))
     base = set() if mobile else {robot.links.index(link) for link in robot.base_links}
     matrix = np.zeros((len(bodies), len(around)), dtype=np.uint8)
-    for k, other in enumerate(around):
-        body = world.body(other.name)
+    for k, B in enumerate(around):
+        body = world.body(B.name)
         masked = "filtered by group and mask" if not (body.mask & 1 and body.group & 0xFFFF) else None
         for i, A in enumerate(bodies):
             fixed = "static–static" if body.static and A.link in base else None
-            matrix[i, k] = is_skipped(A.name, other.name, masked or fixed)
+            matrix[i, k] = is_skipped(A.name, B.name, masked or fixed)
     return Filters(np.array(self_pairs, dtype=np.int64).reshape(-1, 2), matrix, skipped)
 
 
@@ -164,9 +158,9 @@ def _named_pairs(
     names = world.names
     for (i, j), reason in world.allowed.items():
         reasons.setdefault((names[i], names[j]), reason)
-    for one in objects.values():
-        for name in (one.link, *one.touch):
-            reasons.setdefault((one.name, name), "attached object may touch")
+    for item in objects.values():
+        for name in (item.link, *item.touch):
+            reasons.setdefault((item.name, name), "attached object may touch")
     for pair in allowed:
         if not (isinstance(pair, (tuple, list)) and len(pair) in (2, 3)):
             raise InvalidArgument(f"allowed must be pairs of names, got {brief(pair)}")

@@ -9,18 +9,14 @@ import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument, brief, listing
-from collide.kernels import address_of
-from collide.results import PAIR_DTYPE
-from collide.robots import open_pairs
 from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
-from collide.robots.check_configurations import COLLIDES, IS_OPEN, check_configurations
-from collide.robots.check_tables import check_tables, surroundings_of
+from collide.robots.check_tables import Setting, check_tables, surroundings_of
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.configuration_batches import check_piece, measure_piece
 from collide.robots.configuration_report import ConfigurationReport
-from collide.robots.nearest_pairs import nearest_pairs
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import bodies_around, filters_of, robot_bodies
-from collide.robots.robot_distances import NEAREST_DTYPE, RobotDistances, gradients
+from collide.robots.robot_distances import NEAREST_DTYPE, RobotDistances
 from collide.threads import check_threads, pieces_of, share
 from collide.transforms import as_poses
 from collide.world import World
@@ -84,7 +80,7 @@ class RobotChecker:
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
         self._asked, self._mobile = [tuple(pair) for pair in allowed], bool(mobile)
         self._seen: tuple | None = None
-        self._free_workspaces: list[CheckWorkspace] = []
+        self._spare: list[CheckWorkspace] = []
         self._prepare()
 
     @classmethod
@@ -112,7 +108,8 @@ class RobotChecker:
         if robot is None and len(scene.placements) == 1:
             robot = next(iter(scene.placements))
         if robot not in scene.placements:
-            raise InvalidArgument(f"scene {scene.name}: robot={brief(robot)}; it has {listing(scene.placements) or 'none'}")
+            known = listing(scene.placements) or "none"
+            raise InvalidArgument(f"scene {scene.name}: robot={brief(robot)}; its robots: {known}")
         placement, world = scene.placements[robot], World()
         attached = []
         for body in scene.bodies:
@@ -157,7 +154,7 @@ class RobotChecker:
         """
         q, is_single = self._configurations(Q)
         out = np.zeros(len(q), dtype=bool)
-        self._in_pieces(len(q), threads, progress, lambda work, piece: self._check_piece(work, q[piece], out[piece]))
+        self._in_pieces(len(q), threads, progress, lambda space, piece: check_piece(self, space, q[piece], out[piece]))
         return bool(out[0]) if is_single else out
 
     def distances(
@@ -188,7 +185,7 @@ class RobotChecker:
         rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
         self._in_pieces(
             len(q), threads, progress,
-            lambda work, piece: self._measure_piece(work, q[piece], rows[piece], gradient[piece], limit),
+            lambda space, piece: measure_piece(self, space, q[piece], rows[piece], gradient[piece], limit),
         )  # fmt: skip
         return RobotDistances(rows, gradient, self.bodies, self.around)
 
@@ -255,6 +252,11 @@ class RobotChecker:
         -------
         ConfigurationReport
             ``collisions``, ``nearest``, ``notes`` about limits, and ``str()`` of it.
+
+        Raises
+        ------
+        InvalidArgument
+            For anything but one configuration.
         """
         q, is_single = self._configurations(q)
         if not is_single:
@@ -286,37 +288,64 @@ class RobotChecker:
     @property
     def around(self) -> list[str]:
         """Bodies of the World that the robot is tested against."""
-        return [body.name for body in self._around]
+        return [body.name for body in self.setting.surroundings.bodies]
 
     @property
     def n_pairs(self) -> int:
         """Pairs of bodies that are tested."""
-        return len(self._filters.self_pairs) + int((self._filters.allowed == 0).sum())
+        return len(self.setting.self_pairs) + int((self.setting.allowed == 0).sum())
 
     @property
     def skipped(self) -> dict[str, int]:
         """Pairs of bodies that are never tested, by reason."""
-        return dict(self._filters.skipped)
+        return dict(self.setting.skipped)
+
+    def names_of(self, a: int, b: int) -> tuple[str, str]:
+        """Names of two bodies by the numbers that results have for them.
+
+        Parameters
+        ----------
+        a : int
+            Number of a body.
+        b : int
+            Number of a body, or −1 − the number of one around.
+
+        Returns
+        -------
+        (str, str)
+        """
+        return self.bodies[a], self.bodies[b] if b >= 0 else self.around[-1 - b]
+
+    def link_poses(self, q) -> np.ndarray:
+        """`Robot.link_poses` of the robot where it stands.
+
+        Parameters
+        ----------
+        q : (N, dof) or (dof,) array_like
+            Configurations [rad or m].
+
+        Returns
+        -------
+        (N, links, 4, 4) float64
+            Poses X_WL [m].
+        """
+        return self.robot.link_poses(q, self._X_WR)
 
     def _prepare(self) -> None:
-        """Tables of the World as it stands now; nothing is made again while it stays."""
+        """The setting of the World as it stands now; nothing is made again while it stays."""
         packed = self.world._pack()
-        seen = packed.roster, self.world.allowed, packed.X_WBs
-        if self._seen is not None and self._seen[0] is seen[0] and self._seen[1] == seen[1]:
-            if np.array_equal(self._seen[2], seen[2]):
-                return
-        self._seen = seen[0], seen[1], seen[2].copy()
-        self._around, self.own_bodies = bodies_around(self.world, self.robot)
-        self._filters = filters_of(
-            self.robot, self._bodies, self._objects, self.world, self._around, self._asked, self._mobile
-        )
-        self._surroundings = surroundings_of(self._around)
-        table = self.robot.joint_table
-        matrices = np.concatenate([table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]])
-        self._tables = check_tables(self._bodies, self._surroundings, matrices)
-        every = np.arange(len(self._tables.poses))
-        self._tables.table.build_trees(every)
-        self._free_workspaces = []
+        before, now = self._seen, (packed.roster, self.world.allowed, packed.X_WBs)
+        if before is not None and before[0] is now[0] and before[1] == now[1] and np.array_equal(before[2], now[2]):
+            return
+        self._seen = now[0], now[1], now[2].copy()
+        around = bodies_around(self.world, self.robot)
+        filters = filters_of(self.robot, self._bodies, self._objects, self.world, around, self._asked, self._mobile)
+        surroundings = surroundings_of(around)
+        matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
+        base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
+        tables = check_tables(self._bodies, surroundings, np.concatenate(matrices))
+        self.setting = Setting(self._bodies, base, surroundings, tables, *filters)
+        self._spare = []
 
     def _configurations(self, Q) -> tuple[np.ndarray, bool]:
         """((N, dof) C-contiguous, whether a single one was given). Raises InvalidArgument."""
@@ -328,26 +357,15 @@ class RobotChecker:
         n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
         return tuple(np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))  # type: ignore
 
-    def _workspace(self) -> CheckWorkspace:
-        """One that no thread is using."""
-        try:
-            return self._free_workspaces.pop()
-        except IndexError:
-            base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
-            return CheckWorkspace(
-                self.robot.joint_table, base, self._tables, self._surroundings, self._filters.self_pairs,
-                self._filters.allowed,
-            )  # fmt: skip
-
     def _in_pieces(self, n: int, threads: int, progress, work: Callable[[CheckWorkspace, slice], None]) -> None:
         """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""
         threads = check_threads(threads)
         self._prepare()
-        spare, done = self._free_workspaces, 0
+        spare, setting, done = self._spare, self.setting, 0
 
         def on_piece(piece: slice) -> None:
             nonlocal done
-            space = self._workspace()
+            space = spare.pop() if spare else CheckWorkspace(self.robot.joint_table, setting)
             work(space, piece)
             spare.append(space)
             done += piece.stop - piece.start
@@ -359,56 +377,6 @@ class RobotChecker:
                 on_piece(slice(0, n))
         else:
             share(pieces_of(n, max(threads, 8 if progress else 1), _LEAST_PIECE), on_piece, threads)
-
-    def _check_piece(self, space: CheckWorkspace, q: np.ndarray, out: np.ndarray) -> None:
-        verdicts = np.empty(len(q), dtype=np.uint8)
-        done = 0
-        while done < len(q):
-            done = check_configurations(
-                space.address, address_of(q), self.robot.dof, done, len(q), address_of(verdicts)
-            )
-            pairs = space.open_pairs
-            if len(pairs):
-                pairs = pairs[verdicts[pairs[:, 0]] == IS_OPEN].copy()
-                hits = open_pairs.are_hits(*self._posed(pairs, q), self._bodies, self._around)
-                verdicts[pairs[hits, 0]] = COLLIDES
-        out[:] = verdicts == COLLIDES
-
-    def _measure_piece(self, space, q: np.ndarray, out: np.ndarray, gradient: np.ndarray, limit: float) -> None:
-        rows = np.zeros(len(q), dtype=PAIR_DTYPE)
-        done = 0
-        while done < len(q):
-            done = nearest_pairs(
-                space.address, address_of(q), self.robot.dof, done, len(q), limit, address_of(rows)
-            )
-            if len(space.open_pairs):
-                self._take_nearer(rows, space.open_pairs.copy(), q, limit)
-        for field in NEAREST_DTYPE.names or ():
-            out[field] = rows[field]
-        far = rows["a"] < 0
-        out["beyond"], out["certified"] = far, rows["certified"] | far
-        out["distance"][far] = out["upper"][far] = np.inf
-        out["lower"][far] = limit
-        X_WLs = self.robot.link_poses(q, self._X_WR)
-        link_of = np.array([body.link for body in self._bodies])
-        gradient[:] = gradients(self.robot.joint_table, self.robot.moves, q, X_WLs, out, link_of)
-
-    def _take_nearer(self, rows: np.ndarray, pairs: np.ndarray, q: np.ndarray, limit: float) -> None:
-        """Where a pair left to others is nearer than what a row tells, the row becomes its."""
-        posed, X_WLs = self._posed(pairs, q)
-        found = open_pairs.distances(posed, X_WLs, self._bodies, self._around, limit)
-        order = np.lexsort((np.arange(len(found)), found["distance"]))
-        for k in order[::-1].tolist():
-            row = int(pairs[k, 0])
-            if not found["beyond"][k] and (rows["a"][row] < 0 or found["distance"][k] < rows["distance"][row]):
-                rows[row] = found[k]
-
-    def _posed(self, pairs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(pairs whose configurations are rows of the poses, (k, links, 4, 4) poses): links are posed where asked."""
-        asked, inverse = np.unique(pairs[:, 0], return_inverse=True)
-        pairs = pairs.copy()
-        pairs[:, 0] = inverse.reshape(-1)
-        return pairs, self.robot.link_poses(q[asked], self._X_WR)
 
 
 def _positive(what: str, value) -> float:

@@ -11,11 +11,12 @@ from collide.robots.forward_kinematics import (
     AXIS,
     CHILD,
     COLUMN,
+    FIXED,
     FLOATING,
     KIND,
     MULTIPLIER,
     PLANAR,
-    SHIFT,
+    TRANSLATION,
     JointTable,
 )
 
@@ -35,13 +36,14 @@ class RobotDistances:
     ----------
     rows : (N,) NEAREST_DTYPE
         ``distance`` [m], signed, with ``lower ≤ truth ≤ upper`` proven; ``normal`` (3,) a unit vector in W from A, on
-        the robot, towards B; ``point_a`` and ``point_b`` [m]; ``hit``, ``certified``; ``beyond`` where nothing tested is
-        within the ``max_distance`` asked: distance and upper are infinite then.
+        the robot, towards B; ``point_a``, ``point_b`` (3,) in W [m]; ``hit``, ``certified``; ``beyond`` where nothing
+        tested is within the ``max_distance`` asked: distance and upper are infinite then. ``a`` is the number of a
+        body, −1 for none; ``b`` of another, or −1 − the number of one around.
     gradient : (N, dof) float64
         How ``distance`` changes with each column of q [m/rad or m/m]; NaN where it has no derivative: touching, beyond.
         Where two pairs are equally near, it is that of the pair named.
-    names : sequence of (str, str)
-        Of both bodies, made when asked for: `names[k]`; None where there is none.
+    bodies, around : sequence of str
+        Names of what moves, and of what is around.
     """
 
     def __init__(self, rows: np.ndarray, gradient: np.ndarray, bodies: Sequence[str], around: Sequence[str]):
@@ -83,7 +85,7 @@ def gradients(
     link_a = link_of[np.maximum(a, 0)]
     link_b = np.where(b >= 0, link_of[np.maximum(b, 0)], -1)
     for j in range(len(table.ints)):
-        if not moves[j].any():
+        if table.ints[j, KIND] == FIXED:
             continue
         moves_a = has_pair & moves[j, link_a]
         moves_b = has_pair & (link_b >= 0) & moves[j, np.maximum(link_b, 0)]
@@ -102,7 +104,7 @@ def _velocities(table: JointTable, j: int, q: np.ndarray, X_WLs: np.ndarray, p_W
     column, X_WC = int(ints[COLUMN]), X_WLs[:, ints[CHILD]]
     R, arm = X_WC[:, :3, :3], p_W - X_WC[:, :3, 3]
     axis = R @ doubles[AXIS : AXIS + 3]
-    if ints[KIND] == SHIFT:
+    if ints[KIND] == TRANSLATION:
         yield column, doubles[MULTIPLIER] * axis
     elif ints[KIND] == PLANAR:
         # The shift comes before the turn: its axes are those of the frame not yet turned.

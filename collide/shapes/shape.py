@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_convex_parts", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial",
-        "_surface", "_topology", "_union", "_walk",
+        "__weakref__", "_bounds", "_convex_parts", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared",
+        "_serial", "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).

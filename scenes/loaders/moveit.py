@@ -7,6 +7,7 @@ states "start" and "goal". The robot's URDF is not in these files: it is given, 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -84,7 +85,7 @@ def find_robot(model: str, scene_path: Path) -> Path:
     folders = [folder for folder in dict.fromkeys(place / "robots" for place in places) if folder.is_dir()]
     for folder in folders:
         for candidate in (folder / model / f"{model}.urdf", folder / model / "urdf" / f"{model}.urdf"):
-            if candidate.is_file():
+            if os.path.isfile(candidate):  # which says no to names that are too long, where Path raises
                 return candidate
     for folder in folders:
         matching = [file for file in sorted(folder.glob("*/*.urdf")) if _described_robot(file) == model]
