@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidArgument, SceneError, listing
+from collide.robots.robot_checker import RobotChecker
 from collide.scenes.description import Scene
 from collide.scenes.loaders.load_scene import load
 from collide.scenes.loaders.state_words import in_states
 from collide.sweeps.configurations import as_configurations
 from collide.sweeps.content_digest import digest
-from collide.sweeps.scene_checker import SceneChecker as RobotChecker
 from collide.sweeps.sweep import SweepRun
 from collide.sweeps.sweep_question import OneQuestion, ScenesQuestion, file_digest, question_digest
 from collide.sweeps.sweep_results import SweepResults

@@ -9,7 +9,7 @@ import numpy as np
 
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument, MissingExtra, SceneError, brief, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.sweeps.content_digest import digest
 from collide.sweeps.random_configurations import random_configurations
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from collide.kinematic_tree import Joint
-from collide.robot import Robot
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import Robot
 from collide.shapes.shape import Shape
 from collide.world import World
 

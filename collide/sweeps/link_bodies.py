@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.query import collide, distance
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.shape import Shape

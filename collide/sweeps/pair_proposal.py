@@ -12,7 +12,7 @@ import numpy as np
 
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument, brief
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.sweeps.link_bodies import LinkBody, link_bodies, link_poses, moving_columns, pair_gaps, pair_hits
 from collide.sweeps.pair_search import N_STARTS, Nearest, search_downhill
 from collide.sweeps.random_configurations import random_configurations, unlimited_lengths

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.sweeps.link_bodies import LinkBody, link_poses, pair_gaps
 from collide.sweeps.random_configurations import sampled_limits
 

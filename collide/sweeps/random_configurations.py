@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from collide.robot import Robot
+from collide.robots.robot import Robot
 
 
 def sampled_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from collide.errors import CollideError, InvalidArgument, SceneError
-from collide.robot import Robot
+from collide.robots.robot import Robot
+from collide.robots.robot_checker import RobotChecker
 from collide.sweeps.content_digest import digest
 
 #: Scenes that a worker keeps loaded.
@@ -216,4 +217,9 @@ def _notes(robot: Robot, Q: np.ndarray) -> list[str | None]:
 
 def question_digest(checker: Any) -> str:
     """What of a checker decides its answers. Asked again while a sweep runs, it says whether the scene changed."""
-    return digest(checker.robot, *checker.state())
+    if not isinstance(checker, RobotChecker):
+        return digest(checker.robot, *checker.state())
+    checker.collides(np.zeros((0, checker.robot.dof)))  # so that it looks at its World
+    setting = checker.setting
+    around = [(body.name, body.shape, body.X_WB) for body in setting.surroundings.bodies]
+    return digest(checker.robot, setting.bodies, setting.base, around, setting.self_pairs, setting.allowed)

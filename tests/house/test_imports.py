@@ -217,6 +217,7 @@ ROOMS = {
     "joint_motions": set(),
     "robot": {"errors", "transforms", "shapes", "kinematic_tree", "joint_motions"},
     "sweeps": {"errors", "argument_checks", "query", "shapes", "kinematic_tree", "robot", "world", "reports", ""},
+    "sweeps": {"errors", "argument_checks", "query", "shapes", "robots", "world", "reports", ""},
     "reports": {"errors", "lowering", "results", "shapes", "cache_folder", "kernels", ""},
     "cli_files": {"errors", "reports"},
     "cli_srdf": {"cli_files", "errors", "reports", "sweeps"},

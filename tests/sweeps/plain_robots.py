@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 
 from collide import Box, Robot, pose
-from collide.kinematic_tree import Joint
-from collide.robot import LinkShape
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape
 
 
 def joint(name, kind, parent, child, *, axis=(1, 0, 0), at=(0, 0, 0), lower=None, upper=None) -> Joint:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide import InvalidArgument, Robot
-from collide.kinematic_tree import Joint
+from collide.robots.kinematic_tree import Joint
 
 
 class Least(NamedTuple):

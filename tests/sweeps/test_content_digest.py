@@ -8,11 +8,11 @@ import sys
 
 import numpy as np
 import pytest
+from plain_robots import chain, joint, robot_of
 
 import collide
 from collide import Box, Compound, Sphere, World, pose
 from collide.sweeps.content_digest import digest
-from plain_robots import chain, joint, robot_of
 
 MESH = collide.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
