@@ -249,7 +249,7 @@ def test_help_teaches(capsys, command):
 
 @needs_pyarrow
 def test_files_that_change_while_they_are_asked(capsys, monkeypatch, tmp_path):
-    """A scene file is written anew after the third of ten chunks: the run stops, and what is there is of the old one."""
+    """A scene file is written anew after the third of ten chunks: the run stops; what is there is of the old one."""
     from collide.sweeps import sweep as sweep_module
     from collide.sweeps.sweep_directory import SweepDirectory
 
