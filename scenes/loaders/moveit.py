@@ -7,6 +7,7 @@ states "start" and "goal". The robot's URDF is not in these files: it is given, 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
@@ -84,7 +85,7 @@ def find_robot(model: str, scene_path: Path) -> Path:
     folders = [folder for folder in dict.fromkeys(place / "robots" for place in places) if folder.is_dir()]
     for folder in folders:
         for candidate in (folder / model / f"{model}.urdf", folder / model / "urdf" / f"{model}.urdf"):
-            if candidate.is_file():
+            if os.path.isfile(candidate):  # which says no to names that are too long, where Path raises
                 return candidate
     for folder in folders:
         matching = [file for file in sorted(folder.glob("*/*.urdf")) if _described_robot(file) == model]
@@ -375,7 +376,7 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
         fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
     )
     if matrix is not None and matrix.get("entry_names"):
-        pairs.update({pair: ALLOWED for pair in _matrix_pairs(matrix, names)})
+        pairs.update({pair: ALLOWED for pair in matrix_pairs(matrix, names)})
         named = {*matrix.words("entry_names"), *matrix.words("default_entry_names")}
         strangers = [link for link in robot.links if link in robot.geometry and link not in named]
         disabled_pairs = [(a, b, reason) for a, b, reason in disabled_pairs if a in strangers or b in strangers]
@@ -390,7 +391,7 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
     scene.allowed += [(a, b, reason) for (a, b), reason in pairs.items()]
 
 
-def _matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
+def matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
     """Pairs of bodies, in the order of ``names``, that the matrix allows.
 
     An entry for the pair decides; else the defaults of its members, of which a False wins.
