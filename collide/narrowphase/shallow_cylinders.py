@@ -2,9 +2,9 @@
 
 A point of one body that lies d deep within the other proves a depth of d at least: the ball around it is in A ⊖ B. The
 support along any normal bounds the depth from above. Where a corner, a rim or a line of one body has sunk into a flat
-face or into the side of a cylinder, both are the same number: the normal of that face, or the line from the axis to that
-point. Normals are tried in the order of what they bound the depth by; each is proven or refuted by itself. Two rims, or
-a rim and an edge, have no such point; they are left to EPA.
+face or into the side of a cylinder, both are the same number, along the normal of that face, or along the line from the
+axis to that point. The normal of a face, or across the cylinder and a line, along which the bodies overlap least is
+tried first, then the lines from both axes. Two rims, or a rim and an edge, have no such point: they are left to EPA.
 """
 
 from __future__ import annotations
@@ -137,11 +137,12 @@ def shallow_cylinders(pair, points, ids, weights, size, tolerance):
 
 @kernel(inline=True)
 def _on_face(pair, points, ids, weights, of_a, nhat, tolerance):
-    """What a flat face of A (or of B) proves: with the other body's lowest point, or, where that lies beyond the face, the
-    middle of what is level with it."""
+    """What a flat face of A (or of B) proves with the other body's lowest point.
+
+    Where that lies beyond the face: with what of the body is level with the face, and nearest to its middle.
+    """
     difference_point(pair, points, ids, 0, nhat)
     n = nhat if of_a else neg(nhat)
-    O = pair.A if of_a else pair.B
     Q = pair.B if of_a else pair.A
     t = pair.t if of_a else neg(pair.t)
     b = add(vec3_at(points, POINT_OF_B if of_a else POINT_OF_A), t)
@@ -211,8 +212,10 @@ def _on_line(pair, O, Q, t, best, of_a):
 
 @kernel(inline=True)
 def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
-    """What the side of cylinder A (or B) proves with a corner of the other body, or a point of its rim or side, by Newton's
-    method on the angle around the axis."""
+    """What the side of cylinder A (or B) proves with a corner of the other body, or a point of its rim or side.
+
+    By Newton's method on the angle around the axis.
+    """
     O = pair.A if of_a else pair.B
     Q = pair.B if of_a else pair.A
     t = pair.t if of_a else neg(pair.t)
@@ -271,8 +274,8 @@ def _beside(pair, O, Q, t, n, u):
 def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
     """The `ShallowDepth` of a normal and of a point of one body within the other, A if ``of_a``, seen from its origin.
 
-    The point's depth is measured in that body's own coordinates. A matrix off a rotation by δ stretches by less than 2δ,
-    and moves what its transpose takes back by δ of the reach.
+    The point's depth is measured in that body's own coordinates. A matrix off a rotation by δ stretches by less than
+    2δ, and moves what its transpose takes back by δ of the reach.
     """
     O = pair.A if of_a else pair.B
     x, y, z = _column(pair, O, 0), _column(pair, O, 1), _column(pair, O, 2)

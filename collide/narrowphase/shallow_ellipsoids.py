@@ -1,14 +1,13 @@
-"""Shallow overlaps with an ellipsoid, without a polytope: a ball that rolls within one body, and the nearest point of the
-other.
+"""Shallow overlaps with an ellipsoid, without a polytope: a ball that rolls within it, and a point of the other body.
 
-An ellipsoid is a smaller convex set, its core here, swept by a ball as large as its sharpest curvature (Blaschke's rolling
-theorem): ρ = c²/a of its least and greatest radius. Bodies that overlap by less than ρ are apart without that ball, and
-their depth is ρ less the distance of what is left: a gap, which has no local minima and needs no proof from all
-around. That the core's point c and the other body's point x are |x − c| apart proves a depth of ρ − |x − c| at least;
-the support along their line bounds it from above, as everywhere.
+An ellipsoid is a smaller convex set, its core here, swept by a ball as large as its sharpest curvature (Blaschke's
+rolling theorem): ρ = c²/a of its least and greatest radius. Bodies that overlap by less than ρ are apart without that
+ball, and their depth is ρ less the distance of what is left: a gap, which has no local minima and needs no proof from
+all around. That the core's point c and the other body's point x are |x − c| apart proves a depth of ρ − |x − c| at
+least; the support along their line bounds it from above, as everywhere.
 
-The search is Newton's on the direction: the nearest point x of the other body gives the direction, and the feature it lies
-on says how the direction may turn. Overlaps that are deeper, or whose bracket does not close, are left to EPA.
+The search is Newton's on the direction: the nearest point x of the other body gives the direction, and the feature it
+lies on says how the direction may turn. Overlaps that are deeper, or whose bracket does not close, are left to EPA.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.lowering.packed_convex import CYLINDER, ELLIPSOID, POINTS
-from collide.narrowphase.gjk.minkowski_difference import POINT, POINT_OF_A, POINT_OF_B, difference_point, height
+from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, POINT_OF_B, difference_point, height
 from collide.numerics.vec3 import (
     Vec3,
     add,
@@ -47,8 +46,8 @@ _LEAST_EIGENVALUE = 0.5
 #: The ball is made smaller by its own roundings.
 _ROUNDED = 1.0 - 2.0**-40
 
-#: How the nearest points of a body may turn with the direction: not told (the point lies within the body, or the body is of
-#: another kind); on a face, an edge or a line of a side, or at a corner or a rim.
+#: Where the nearest point of a body lies, which tells how it moves with the direction: within the body, where nothing is
+#: told; on a face; on an edge or a line of a side; at a corner or on a rim.
 _NOT_TOLD, _FACE, _EDGE, _CORNER = range(4)
 
 
@@ -81,7 +80,10 @@ class _Symmetric(NamedTuple):
 
 
 class _RollingBall(NamedTuple):
-    """An ellipsoid in the world's axes.   square : R D² Rᵀ, D its radii.   radius : of a ball that rolls within it [m]."""
+    """An ellipsoid in the world's axes.
+
+    square : R D² Rᵀ, D its radii.   radius : of a ball that rolls within it [m].
+    """
 
     square: _Symmetric
     radius: float
@@ -102,7 +104,8 @@ class _Nearest(NamedTuple):
 @kernel(inline=True)
 def is_ellipsoid_pair(pair):
     """Whether `shallow_ellipsoids` takes the two cores of a pair."""
-    return (pair.A.kind == ELLIPSOID and _is_known(pair, pair.B)) or (pair.B.kind == ELLIPSOID and _is_known(pair, pair.A))
+    A, B = pair.A, pair.B
+    return (A.kind == ELLIPSOID and _is_known(pair, B)) or (B.kind == ELLIPSOID and _is_known(pair, A))
 
 
 @kernel(inline=True)
