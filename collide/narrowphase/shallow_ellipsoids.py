@@ -46,8 +46,8 @@ _LEAST_EIGENVALUE = 0.5
 #: The ball is made smaller by its own roundings.
 _ROUNDED = 1.0 - 2.0**-40
 
-#: Where the nearest point of a body lies, which tells how it moves with the direction: within the body, where nothing is
-#: told; on a face; on an edge or a line of a side; at a corner or on a rim.
+#: Where the nearest point of a body lies, which tells how it moves with the direction: within the body, where nothing
+#: is told; on a face; on an edge or a line of a side; at a corner or on a rim.
 _NOT_TOLD, _FACE, _EDGE, _CORNER = range(4)
 
 

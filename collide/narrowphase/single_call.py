@@ -91,7 +91,7 @@ def collide_single(header_at, XA_at, XB_at):
 
 @entry(prepared.ROW, nogil=False)
 def within_single(header_at, XA_at, XB_at, _unused_at, _unused, limit):
-    """Whether the pair is at most so far apart, 0 or 1; −1 as of `collide_single`, and where the bracket is too wide."""
+    """Whether the pair is at most so far apart, 0 or 1; −1 as `collide_single`, and where the bracket is too wide."""
     rows_at = view_i64(header_at, HEADER)[ROWS_AT]
     row = view_row(rows_at)
     clear_rows(rows_at, 1)
