@@ -226,7 +226,7 @@ _of_thread = _OfThread()
 
 
 @cache
-def _space_of_single_calls() -> BlockWorkspace:
+def space_of_single_calls() -> BlockWorkspace:
     """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
     is good as long as it is held."""
     return BlockWorkspace()
@@ -244,7 +244,7 @@ class SinglePair:
 
     def __init__(self, table: ShapeTable):
         table.build_trees(np.arange(2))
-        self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
+        self.table, self._space = table, space_of_single_calls()  # held, since kernels use their buffers
         header = self.header = self._space.header_of(table)
         self.of_contacts: Any = None  # `contact.convex_contacts.SingleContacts`, once contacts are asked for
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)

@@ -67,7 +67,7 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
     exact_numbers = ordered.exact_numbers and not curved
     if query.depths and curved:
         shallow = _shallow_depth(pair, work, ordered.size)
-        if shallow.found:
+        if shallow.is_proven:
             depth, proven, nhat = shallow.depth, shallow.proven, shallow.nhat
             return CoreDistance(depth, -depth, -proven, -math.inf, math.inf, nhat, 1, 1, shallow.iterations)
     run = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)

@@ -19,8 +19,8 @@ from collide.narrowphase.posed_pair import reach_of
 from collide.narrowphase.shallow_ellipsoids import NOTHING, ShallowDepth
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
-#: Turns of the direction around a cylinder.
-_TURNS = 8
+#: Directions tried around a cylinder.
+_STEPS = 8
 #: Axes whose sine is below this are parallel.
 _PARALLEL = 2.0**-20
 #: A face or a line counts as level with another one up to this sine: it may have been meant to be.
@@ -80,13 +80,13 @@ def _height_of(pair, body, n):
 
 
 @kernel(inline=True)
-def _least_face(pair, body, other, towards_b, best):
+def _least_face(pair, body, partner, towards_b, best):
     """``best``, or a flat face of a body along which the overlap is less."""
     for axis in range(2 if body.kind == CYLINDER else 0, 3):
         n = _column(pair, body, axis)
         along = dot(n, pair.t)
         n = scale(1.0 if along > 0.0 else -1.0, n)
-        depth = _half(pair, body, axis) + _height_of(pair, other, n) - abs(along)
+        depth = _half(pair, body, axis) + _height_of(pair, partner, n) - abs(along)
         if depth < best.depth:
             best = _Normal(n, depth, _FACE_OF_A if towards_b else _FACE_OF_B, axis)
     return best
@@ -97,9 +97,9 @@ def _least_side(pair, best):
     """``best``, or a normal across a cylinder and a line of the other body along which the overlap is less."""
     A, B = pair.A, pair.B
     u = _column(pair, A if A.kind == CYLINDER else B, 2)
-    other = B if A.kind == CYLINDER else A
-    for axis in range(2 if other.kind == CYLINDER else 0, 3):
-        n = cross(u, _column(pair, other, axis))
+    partner = B if A.kind == CYLINDER else A
+    for axis in range(2 if partner.kind == CYLINDER else 0, 3):
+        n = cross(u, _column(pair, partner, axis))
         length = norm(n)
         if length > _PARALLEL:
             along = dot(n, pair.t)
@@ -129,8 +129,8 @@ def shallow_cylinders(pair, points, ids, weights, size, tolerance):
         nearest = _on_face(pair, points, ids, weights, of_a, best.n, tolerance)
     for side in range(2):
         of_a = side == 0
-        O = A if of_a else B
-        if not nearest.found and O.kind == CYLINDER:
+        owner = A if of_a else B
+        if not nearest.is_proven and owner.kind == CYLINDER:
             nearest = _on_side(pair, points, ids, weights, of_a, best.n, tolerance)
     return nearest
 
@@ -147,7 +147,7 @@ def _on_face(pair, points, ids, weights, of_a, nhat, tolerance):
     t = pair.t if of_a else neg(pair.t)
     b = add(vec3_at(points, POINT_OF_B if of_a else POINT_OF_A), t)
     shallow = _proven(pair, points, ids, weights, of_a, nhat, b, tolerance)
-    if shallow.found:
+    if shallow.is_proven:
         return shallow
     g = rotate_back(pair.poses, Q.pose_at, n)
     to_o = rotate_back(pair.poses, Q.pose_at, neg(t))
@@ -182,13 +182,13 @@ def _lowest(slope, half, wanted):
 
 
 @kernel(inline=True)
-def _on_line(pair, O, Q, t, best, of_a):
-    """The point of a line of Q, an edge of a box or one on a cylinder's side, that lies deepest within the cylinder O.
+def _on_line(pair, owner, Q, t, best, of_a):
+    """The point of a line of Q, an edge of a box or one on a cylinder's side, that lies deepest within a cylinder.
 
-    Seen from O's origin, as t is: from there to Q's.
+    Seen from the cylinder's origin, as t is: from there to Q's.
     """
     n = best.n if of_a else neg(best.n)
-    u = _column(pair, O, 2)
+    u = _column(pair, owner, 2)
     e = _column(pair, Q, best.axis)
     g = rotate_back(pair.poses, Q.pose_at, n)
     at = Q.params_at
@@ -216,10 +216,10 @@ def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
 
     By Newton's method on the angle around the axis.
     """
-    O = pair.A if of_a else pair.B
+    owner = pair.A if of_a else pair.B
     Q = pair.B if of_a else pair.A
     t = pair.t if of_a else neg(pair.t)
-    u, u_q = _column(pair, O, 2), _column(pair, Q, 2)
+    u, u_q = _column(pair, owner, 2), _column(pair, Q, 2)
     n = t
     n = sub(n, scale(dot(n, u), u))
     length = norm(n)
@@ -228,25 +228,25 @@ def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
     n = scale(1.0 / length, n)
     curvature = pair.numbers[Q.params_at] if Q.kind == CYLINDER else 0.0
     is_parallel = Q.kind == CYLINDER and norm(cross(u, u_q)) < _LEVEL
-    for turn in range(_TURNS):
+    for k in range(_STEPS):
         difference_point(pair, points, ids, 0, n if of_a else neg(n))
         b = add(vec3_at(points, POINT_OF_B if of_a else POINT_OF_A), t)
         if is_parallel:
-            b = _beside(pair, O, Q, t, n, u)
+            b = _beside(pair, owner, Q, t, n, u)
         across = cross(u, n)
         miss, depth = dot(b, across), dot(b, n)
         if not depth > 0.0:
             return NOTHING
-        if abs(miss) <= 2.0**-26 * depth or turn == _TURNS - 1:
+        if abs(miss) <= 2.0**-26 * depth or k == _STEPS - 1:
             break
-        step = depth
+        stiffness = depth
         if curvature > 0.0:
             m = cross(u_q, n)
             square = dot(m, m)
             if square > 0.0:
                 along = dot(across, m)
-                step += curvature * along * along / (square * math.sqrt(square))
-        n = add(n, scale(miss / step, across))
+                stiffness += curvature * along * along / (square * math.sqrt(square))
+        n = add(n, scale(miss / stiffness, across))
         n = scale(1.0 / norm(n), n)
     # The line from the axis to the point: where a corner is the lowest point, it does not turn with the normal.
     radial = sub(b, scale(dot(b, u), u))
@@ -255,12 +255,12 @@ def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
 
 
 @kernel(inline=True)
-def _beside(pair, O, Q, t, n, u):
-    """The point lowest along n of the side of cylinder Q, beside the middle of cylinder O, whose axis is parallel.
+def _beside(pair, owner, Q, t, n, u):
+    """The point lowest along n of the side of cylinder Q, beside the middle of cylinder owner, whose axis is parallel.
 
-    n, t : seen from O.
+    n, t : seen from owner.
     """
-    half, half_q = _half(pair, O, 2), _half(pair, Q, 2)
+    half, half_q = _half(pair, owner, 2), _half(pair, Q, 2)
     middle = dot(t, u)
     wanted = 0.5 * (max(-half, middle - half_q) + min(half, middle + half_q)) - middle
     g = rotate_back(pair.poses, Q.pose_at, n)
@@ -277,18 +277,18 @@ def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
     The point's depth is measured in that body's own coordinates. A matrix off a rotation by δ stretches by less than
     2δ, and moves what its transpose takes back by δ of the reach.
     """
-    O = pair.A if of_a else pair.B
-    x, y, z = _column(pair, O, 0), _column(pair, O, 1), _column(pair, O, 2)
+    owner = pair.A if of_a else pair.B
+    x, y, z = _column(pair, owner, 0), _column(pair, owner, 1), _column(pair, owner, 2)
     off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
     off = 3.0 * (max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 4.0 * _U)
-    p = rotate_back(pair.poses, O.pose_at, b)
-    at = O.params_at
+    p = rotate_back(pair.poses, owner.pose_at, b)
+    at = owner.params_at
     p0, p1 = pair.numbers[at], pair.numbers[at + 1]
-    if O.kind == CYLINDER:
+    if owner.kind == CYLINDER:
         inner = min(p0 - math.sqrt(p.x * p.x + p.y * p.y), p1 - abs(p.z))
     else:
         inner = min(min(p0 - abs(p.x), p1 - abs(p.y)), pair.numbers[at + 2] - abs(p.z))
-    proven = inner - 4.0 * off * reach_of(pair, O)
+    proven = inner - 4.0 * off * reach_of(pair, owner)
     difference_point(pair, points, ids, 0, nhat)
     depth = height(points, 0, nhat)
     if not (off < _FAR_OFF and 0.0 < depth <= proven + tolerance):

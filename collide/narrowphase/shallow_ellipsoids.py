@@ -48,16 +48,17 @@ _ROUNDED = 1.0 - 2.0**-40
 
 #: Where the nearest point of a body lies, which tells how it moves with the direction: within the body, where nothing
 #: is told; on a face; on an edge or a line of a side; at a corner or on a rim.
-_NOT_TOLD, _FACE, _EDGE, _CORNER = range(4)
+_WITHIN, _FACE, _EDGE, _CORNER = range(4)
 
 
 class ShallowDepth(NamedTuple):
-    """found : whether the bracket closed.   depth : the support along nhat; upper bound of the depth, before ``error``.
+    """is_proven : whether the bracket closed.
 
+    depth : the support along nhat: an upper bound, before ``error``.
     proven : lower bound of the depth, before ``error``.   nhat : from A to B.   iterations : directions tried.
     """
 
-    found: bool
+    is_proven: bool
     depth: float
     proven: float
     nhat: Vec3
@@ -161,7 +162,7 @@ def _nearest(pair, X, t, c):
     p = rotate_back(pair.poses, X.pose_at, sub(c, t))
     along = Vec3(0.0, 0.0, 1.0)
     curvature = 0.0
-    feature = _NOT_TOLD
+    feature = _WITHIN
     if X.kind == CYLINDER:
         radius, half = pair.numbers[at], pair.numbers[at + 1]
         aside = math.sqrt(p.x * p.x + p.y * p.y)
@@ -171,7 +172,7 @@ def _nearest(pair, X, t, c):
             feature = _EDGE if -half < z < half else _CORNER
             curvature = radius
         else:
-            feature = _NOT_TOLD if -half < z < half else _FACE
+            feature = _WITHIN if -half < z < half else _FACE
             p = Vec3(p.x, p.y, z)
     elif X.n <= 2:
         first, last = column_at(X.coords, X.padded, 0), column_at(X.coords, X.padded, X.n - 1)
@@ -265,21 +266,21 @@ def shallow_ellipsoids(pair, points, ids, weights, size, tolerance):
     t = pair.t if of_a else neg(pair.t)
     both = X.kind == ELLIPSOID
     ball = _rolling_ball(pair, E)
-    other = _rolling_ball(pair, X) if both else _RollingBall(ball.square, 0.0)
-    radius = ball.radius + other.radius
+    second_ball = _rolling_ball(pair, X) if both else _RollingBall(ball.square, 0.0)
+    radius = ball.radius + second_ball.radius
     length = norm(t)
-    if not length > 2.0**-20 * size or not ball.radius > 0.0 or (both and not other.radius > 0.0):
+    if not length > 2.0**-20 * size or not ball.radius > 0.0 or (both and not second_ball.radius > 0.0):
         return NOTHING
     n = scale(1.0 / length, t)
     for step in range(1, _ROUNDS):
         s, _ = _support_of(ball.square, n)
         c = sub(s, scale(ball.radius, n))
         if both:
-            s_x, height_x = _support_of(other.square, n)
-            nearest = _Nearest(sub(add(t, scale(other.radius, n)), s_x), _CORNER, n, 0.0)
+            s_x, height_x = _support_of(second_ball.square, n)
+            nearest = _Nearest(sub(add(t, scale(second_ball.radius, n)), s_x), _CORNER, n, 0.0)
         else:
             nearest = _nearest(pair, X, t, c)
-            if nearest.feature == _NOT_TOLD:
+            if nearest.feature == _WITHIN:
                 return NOTHING
         q = sub(nearest.x, c)
         length = norm(q)
@@ -289,18 +290,18 @@ def shallow_ellipsoids(pair, points, ids, weights, size, tolerance):
         s, height_s = _support_of(ball.square, direction)
         x = nearest.x
         if both:
-            s_x, height_x = _support_of(other.square, direction)
+            s_x, height_x = _support_of(second_ball.square, direction)
             x = sub(t, s_x)
         w = sub(s, x)
         h = dot(w, direction)
         if not 0.0 < h < _DEEP * radius:
             return NOTHING
         if h + length - radius <= 0.5 * tolerance:
-            return _accept(pair, points, ids, weights, E, X, of_a, t, n, nearest.x, ball, other, step, tolerance)
+            return _accept(pair, points, ids, weights, E, X, of_a, t, n, nearest.x, ball, second_ball, step, tolerance)
         g = sub(w, scale(h, direction))
         M = _curvature(ball.square, s, height_s)
         if both:
-            M = _sum_of(M, _curvature(other.square, s_x, height_x))
+            M = _sum_of(M, _curvature(second_ball.square, s_x, height_x))
             n = _turned(direction, _newton_step(M, direction, g, h))
         else:
             n = _step_on_feature(nearest, M, direction, g, h)
@@ -308,16 +309,16 @@ def shallow_ellipsoids(pair, points, ids, weights, size, tolerance):
 
 
 @kernel(inline=True)
-def _accept(pair, points, ids, weights, E, X, of_a, t, n, x, ball, other, step, tolerance):
+def _accept(pair, points, ids, weights, E, X, of_a, t, n, x, ball, second_ball, step, tolerance):
     """The bracket along n from supports as exact as any; arguments as in `shallow_ellipsoids`.
 
     x : the other body's nearest point, where it is no ellipsoid.
     """
-    radius = ball.radius + other.radius
+    radius = ball.radius + second_ball.radius
     s = _exact_support(pair, E, n)
     c = sub(s, scale(ball.radius, n))
     if X.kind == ELLIPSOID:
-        x = add(add(_exact_support(pair, X, neg(n)), t), scale(other.radius, n))
+        x = add(add(_exact_support(pair, X, neg(n)), t), scale(second_ball.radius, n))
     q = sub(x, c)
     length = norm(q)
     direction = scale(1.0 / length, q)
@@ -326,7 +327,7 @@ def _accept(pair, points, ids, weights, E, X, of_a, t, n, x, ball, other, step, 
     depth = height(points, 0, nhat)
     proven = radius - length
     a = add(c, scale(ball.radius, direction))
-    b = sub(sub(x, scale(other.radius, direction)), t)
+    b = sub(sub(x, scale(second_ball.radius, direction)), t)
     put_vec3(points, POINT_OF_A, a if of_a else b)
     put_vec3(points, POINT_OF_B, b if of_a else a)
     put_vec3(points, 0, sub(sub(vec3_at(points, POINT_OF_A), vec3_at(points, POINT_OF_B)), pair.t))
