@@ -19,8 +19,9 @@ from collide.narrowphase.posed_pair import reach_of
 from collide.narrowphase.shallow_ellipsoids import NOTHING, ShallowDepth
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, rotate, rotate_back, scale, sub, vec3_at
 
-#: Directions tried around a cylinder.
-_STEPS = 8
+#: Directions tried around a cylinder, for the point of a rim or for a corner; after so many, a point beyond the
+#: cylinder's end ends the search.
+_STEPS, _STEPS_OF_CORNERS, _HOPELESS = 20, 5, 3
 #: Axes whose sine is below this are parallel.
 _PARALLEL = 2.0**-20
 #: A face or a line counts as level with another one up to this sine: it may have been meant to be.
@@ -214,7 +215,8 @@ def _on_line(pair, owner, Q, t, best, of_a):
 def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
     """What the side of cylinder A (or B) proves with a corner of the other body, or a point of its rim or side.
 
-    By Newton's method on the angle around the axis.
+    By Newton's method on the angle around the axis, within what is known to hold the root: a rim that is nearly level
+    has its lowest point here or there.
     """
     owner = pair.A if of_a else pair.B
     Q = pair.B if of_a else pair.A
@@ -228,30 +230,42 @@ def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
     n = scale(1.0 / length, n)
     curvature = pair.numbers[Q.params_at] if Q.kind == CYLINDER else 0.0
     is_parallel = Q.kind == CYLINDER and norm(cross(u, u_q)) < _LEVEL
-    for k in range(_STEPS):
+    first, aside = n, cross(u, n)
+    turned, low, high = 0.0, -math.inf, math.inf  # tangents of angles
+    last = math.inf
+    n_steps = _STEPS if Q.kind == CYLINDER else _STEPS_OF_CORNERS
+    for k in range(n_steps):
         difference_point(pair, points, ids, 0, n if of_a else neg(n))
         b = add(vec3_at(points, POINT_OF_B if of_a else POINT_OF_A), t)
         if is_parallel:
             b = _beside(pair, owner, Q, t, n, u)
         across = cross(u, n)
         miss, depth = dot(b, across), dot(b, n)
-        if not depth > 0.0:
+        if not depth > 0.0 or (k >= _HOPELESS and abs(dot(b, u)) > _half(pair, owner, 2)):
             return NOTHING
-        if abs(miss) <= 2.0**-26 * depth or k == _STEPS - 1:
+        if abs(miss) <= 2.0**-26 * depth or k == n_steps - 1:
             break
-        stiffness = depth
-        if curvature > 0.0:
-            m = cross(u_q, n)
-            square = dot(m, m)
-            if square > 0.0:
-                along = dot(across, m)
-                stiffness += curvature * along * along / (square * math.sqrt(square))
-        n = add(n, scale(miss / stiffness, across))
+        low, high = (turned, high) if miss > 0.0 else (low, turned)
+        step = (1.0 + turned * turned) * miss / (depth + _curvature_around(u_q, n, across, curvature))
+        middle = 0.5 * (low + high)
+        is_slow = abs(miss) > 0.5 * last and abs(middle) < math.inf
+        turned = middle if is_slow or not low < turned + step < high else turned + step
+        last = abs(miss)
+        n = add(first, scale(turned, aside))
         n = scale(1.0 / norm(n), n)
     # The line from the axis to the point: where a corner is the lowest point, it does not turn with the normal.
     radial = sub(b, scale(dot(b, u), u))
     n = scale(1.0 / norm(radial), radial)
     return _proven(pair, points, ids, weights, of_a, n if of_a else neg(n), b, tolerance)
+
+
+@kernel(inline=True)
+def _curvature_around(u, n, across, radius):
+    """How far the lowest point of a rim moves as n turns, a metre a radian.   u : its axis.   radius : 0 of a box."""
+    m = cross(u, n)
+    square = dot(m, m)
+    along = dot(across, m)
+    return radius * along * along / (square * math.sqrt(square)) if square > 0.0 else 0.0
 
 
 @kernel(inline=True)
