@@ -21,7 +21,7 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, ro
 
 #: Directions tried around a cylinder, for the point of a rim or for a corner; after so many, a point beyond the
 #: cylinder's end ends the search.
-_STEPS, _STEPS_OF_CORNERS, _HOPELESS = 20, 5, 3
+_STEPS, _STEPS_OF_CORNERS, _MIN_STEPS = 20, 5, 3
 #: Axes whose sine is below this are parallel.
 _PARALLEL = 2.0**-20
 #: A face or a line counts as level with another one up to this sine: it may have been meant to be.
@@ -241,7 +241,7 @@ def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
             b = _beside(pair, owner, Q, t, n, u)
         across = cross(u, n)
         miss, depth = dot(b, across), dot(b, n)
-        if not depth > 0.0 or (k >= _HOPELESS and abs(dot(b, u)) > _half(pair, owner, 2)):
+        if not depth > 0.0 or (k >= _MIN_STEPS and abs(dot(b, u)) > _half(pair, owner, 2)):
             return NOTHING
         if abs(miss) <= 2.0**-26 * depth or k == n_steps - 1:
             break
