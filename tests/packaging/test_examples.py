@@ -19,11 +19,15 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 NEEDS = {
     "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
     "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
+    **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
 }
 #: What hosts print when they are imported.
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
 #: What each example's output must hold.
 SHOWS = {
+    "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
+    "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],
+    "20_reachable_positions": ["200000 postures", "free of collision, layer by layer", "m above the floor"],
     "17_newton_solver": ["newton: ", "collide: ", "of 500 pairs: Newton 20, collide 0"],
     "16_pybullet_arm": ["Bullet says otherwise in", "finger over the table: +0.800 mm, Bullet -0.200 mm", "a World of"],
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
