@@ -250,6 +250,8 @@ static int answer_on_field(const struct collide_mujoco_model *made, const struct
     }
     put_pose(data, g1, X_WH);
     put_pose(data, g2, X_WB);
+    for (k = 0; k < 12; k++)
+        if (!(fabs(X_WH[k]) < LARGEST && fabs(X_WB[k]) < LARGEST)) return -1; /* a state that diverged: MuJoCo notices, and resets it */
     if (made->is_cull) {
         pair.margin += 1e-3 * B->reach + 1e-5;
         if (is_off_terrain(&pair)) return 0;

@@ -163,7 +163,7 @@ static int leaves_upwards(const struct terrain *terrain, const struct terrain_fa
 int64_t line_at(double x, int64_t n)
 {
     double up = ceil(x);
-    return up < 0.0 ? 0 : up >= (double)n ? n : (int64_t)up;
+    return !(up > 0.0) ? 0 : up >= (double)n ? n : (int64_t)up;
 }
 
 int leaves_terrain(const struct terrain *terrain, const struct terrain_facet *facet, const double p[3], const double n[3],

@@ -7,7 +7,7 @@
 
 static int64_t cell_at(double x, int64_t n_cells)
 {
-    return x < 0.0 ? 0 : x >= (double)n_cells ? n_cells - 1 : (int64_t)x;
+    return !(x > 0.0) ? 0 : x >= (double)n_cells ? n_cells - 1 : (int64_t)x;
 }
 
 static int keep_near(struct terrain_space *own, const struct terrain_facet *facet, double gap, const double support[3])

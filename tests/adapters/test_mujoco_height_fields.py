@@ -404,3 +404,17 @@ def test_worlds_have_height_fields():
     assert met == pairs
     n_met += sum(0 in pair for pair in met)
     assert n_met >= 4, n_met
+
+
+def test_a_diverged_state_is_mujocos():
+    """Poses that are no numbers end nothing, in either mode."""
+    model, data = dropped(6)
+    for mode_of_hook in ("contacts", "cull"):
+        with install(model, mode_of_hook):
+            mujoco.mj_forward(model, data)
+            data.geom_xpos[1:4] = np.nan
+            data.geom_xpos[4:] = np.inf
+            mujoco.mj_collision(model, data)
+            data.qvel[:] = np.nan
+            mujoco.mj_step(model, data)
+    assert np.isfinite(data.qpos).all()
