@@ -233,7 +233,7 @@ class RobotChecker:
         Notes
         -----
         Distances in the middle of an interval against how far anything can move within half of it
-        (`certify_motions.py` says how it is bounded). Mimicking, prismatic, planar and floating joints move straight in
+        (`motion_bounds.py` says how it is bounded). Mimicking, prismatic, planar and floating joints move straight in
         their columns as well.
         """
         q0, q1 = self._edges(Q0, Q1)
