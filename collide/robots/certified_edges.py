@@ -112,10 +112,10 @@ def certify(
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
         work = _motion_workspace(checker, resolution)
-        part = tuple(q[piece] for q in ends)
-        intervals, meshes = _certify_piece(space, work, *part, later[piece])
-        intervals = [intervals, *settle_meshes(checker, space, work, *part, meshes, later[piece], resolution)]
-        rows = np.concatenate(intervals)
+        begin, end, hit_at = ends[0][piece], ends[1][piece], later[piece]
+        intervals, meshes = _certify_piece(space, work, begin, end, hit_at)
+        of_meshes = settle_meshes(checker, space, work, begin, end, meshes, hit_at, resolution)
+        rows = np.concatenate([intervals, *of_meshes])
         rows[:, 0] += piece.start
         open_rows.append(rows)
         counts.append(work.n_checked)

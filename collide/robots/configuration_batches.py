@@ -73,7 +73,8 @@ def _take_nearer(checker: RobotChecker, rows: np.ndarray, pairs: np.ndarray, q: 
         order = np.lexsort((lowers, pairs[:, 0]))
         is_first = np.zeros(len(pairs), dtype=bool)
         is_first[order[np.flatnonzero(np.diff(pairs[order, 0], prepend=-1))]] = True
-        measured = open_pairs.distances(*_asked_poses(checker, pairs[is_first], q), *_both(checker), limit)
+        numbered, X_WLs = _asked_poses(checker, pairs[is_first], q)
+        measured = open_pairs.distances(numbered, X_WLs, *_both(checker), limit=limit)
         at = pairs[is_first, 0]
         better = ~measured["beyond"] & ((rows["a"][at] < 0) | (measured["distance"] < rows["distance"][at]))
         rows[at[better]] = measured[better]

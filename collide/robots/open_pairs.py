@@ -30,7 +30,7 @@ def are_hits(
 
 
 def distances(
-    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], limit
+    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit
 ) -> np.ndarray:
     """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` a limit [m].
 

@@ -78,7 +78,7 @@ class RobotChecker:
         self.robot, self.world = robot, World() if world is None else world
         self._X_WR = np.eye(4) if X_WR is None else as_poses(X_WR, "RobotChecker: X_WR")[0].copy()
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
-        self._asked, self._mobile = [tuple(pair) for pair in allowed], bool(mobile)
+        self._asked, self._mobile = list(allowed), bool(mobile)
         self._seen: tuple | None = None
         self._spare: list[CheckWorkspace] = []
         self._prepare()
