@@ -406,8 +406,9 @@ def test_worlds_have_height_fields():
     assert n_met >= 4, n_met
 
 
-def test_a_diverged_state_is_mujocos():
-    """Poses that are no numbers end nothing, in either mode."""
+def test_a_diverged_state_is_mujocos(tmp_path, monkeypatch):
+    """Poses that are no numbers end nothing, in either mode. MuJoCo writes its warnings into the current folder."""
+    monkeypatch.chdir(tmp_path)
     model, data = dropped(6)
     for mode_of_hook in ("contacts", "cull"):
         with install(model, mode_of_hook):
