@@ -33,7 +33,7 @@ _FIRST_CHUNK = 8
 #: Pairs of bodies that a thread takes at once; booleans that stop at a hit look whether there was one after so many.
 _PAIRS_AT_ONCE = 2048
 #: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most.
-_MANY, _LIKELIEST = 512, 32
+_MIN_SORTED, _LIKELIEST = 512, 32
 
 
 class Answer(NamedTuple):
@@ -74,7 +74,7 @@ class PackedWorld:
         self.tree: BoxTree | None = None
         self._shape_set: ShapeSet | None = None
         self._part_trees = PartTrees(self.parts)
-        self._room = np.zeros(0)
+        self._inflation = np.zeros(0)
         self._work = {"added": 0, "removed": 0, "moved": 0}
         self._any_dead = self.has_margins = self._any_meshed = False
         self._append(roster, X_WBs)
@@ -99,7 +99,7 @@ class PackedWorld:
             self._work["removed"] += len(dead)
             self._take_sleep(before, roster)
             if (before.margin != roster.margin[:n]).any() or roster.margin[n:].any():
-                self._make_room()
+                self._inflate()
             moved = moved[moved < n]
         if self._any_dead:
             moved = moved[roster.alive[moved]]
@@ -116,7 +116,7 @@ class PackedWorld:
         if not len(new):
             return
         self.parts.append(roster.shapes[n : len(roster.ids)], X_WBs)
-        self._room = np.append(self._room, np.zeros(len(new)))
+        self._inflation = np.append(self._inflation, np.zeros(len(new)))
         self._shape_set, self._any_meshed = None, bool(self.parts.meshed.any())
         boxes = self.parts.body_boxes(new)
         if self.tree is None:
@@ -138,15 +138,15 @@ class PackedWorld:
         self.filters = filters
         if self.tree is not None:
             self.tree.set_allowed(filters.allowed)
-            self._make_room()
+            self._inflate()
 
-    def _make_room(self) -> None:
+    def _inflate(self) -> None:
         """Boxes in the tree have room for margins: two of them meet where the bodies' are within their margin."""
-        room = self.roster.margin.copy()
+        inflation = self.roster.margin.copy()
         pairs = np.stack([self.filters.margin_keys >> 32, self.filters.margin_keys & 0xFFFFFFFF], axis=1)
-        np.maximum.at(room, pairs, 0.5 * self.filters.margins[:, None])
-        changed = np.flatnonzero((room != self._room) & self.roster.alive)
-        self._room, self.has_margins = room, bool(room.any())
+        np.maximum.at(inflation, pairs, 0.5 * self.filters.margins[:, None])
+        changed = np.flatnonzero((inflation != self._inflation) & self.roster.alive)
+        self._inflation, self.has_margins = inflation, bool(inflation.any())
         if len(changed):
             assert self.tree is not None
             self.tree.move(changed, self._tree_boxes(changed))
@@ -156,9 +156,9 @@ class PackedWorld:
         boxes = self.parts.body_boxes(bodies)
         if not self.has_margins:
             return boxes
-        room = self._room[bodies, None]
-        room = room + (np.abs(boxes).max(axis=1, keepdims=True) + room) * 2.0**-50 * (room > 0.0)
-        return np.hstack([boxes[:, :3] - room, boxes[:, 3:] + room])
+        inflation = self._inflation[bodies, None]
+        inflation = inflation + (np.abs(boxes).max(axis=1, keepdims=True) + inflation) * 2.0**-50 * (inflation > 0.0)
+        return np.hstack([boxes[:, :3] - inflation, boxes[:, 3:] + inflation])
 
     # --- what there is --------------------------------------------------------------------------
 
@@ -194,8 +194,8 @@ class PackedWorld:
         """(all parts, (parts,) the body of each, (n + 1,) the first part of each body and the number of all)."""
         parts = self.parts
         parts.table.build_trees(parts.row_of)
-        posed = PosedParts(parts.table, parts.poses, parts.row_of, parts.X_WBs[parts.body_of], parts.X_BP)
-        return posed, parts.body_of, parts.first
+        all_parts = PosedParts(parts.table, parts.poses, parts.row_of, parts.X_WBs[parts.body_of], parts.X_BP)
+        return all_parts, parts.body_of, parts.first
 
     def candidates(self, margin: float) -> np.ndarray:
         """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m], and the
@@ -242,7 +242,7 @@ class PackedWorld:
         boolean : rows tell no more than ``hit``, ``how`` and ``iterations``, in no order.
         threads : at most so many answer; the answers are the same bits, whatever is missing with ``stop_at_hit``, too.
         """
-        if stop_at_hit and len(candidates) > _MANY:
+        if stop_at_hit and len(candidates) > _MIN_SORTED:
             first = self._likeliest(candidates)
             answer = self._answer_in_pieces(candidates[first], limit, boolean, True, 1)
             if answer.rows["hit"].any():

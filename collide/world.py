@@ -69,7 +69,7 @@ class World(WorldPairs):
         """
         limit, threads = checks.limit("World.query: max_distance", max_distance), check_threads(threads)
         shapes = [shape] if isinstance(shape, Shape) else list(shape) if isinstance(shape, (list, tuple)) else None
-        if shapes is None or not all(isinstance(one, Shape) for one in shapes):
+        if shapes is None or not all(isinstance(item, Shape) for item in shapes):
             raise InvalidArgument(
                 f"World.query: shape must be a shape or a list of shapes, got {checks.describe(shape)}"
             )

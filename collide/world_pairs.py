@@ -147,11 +147,11 @@ class WorldPairs(WorldScene):
         if not len(pairs):
             return WorldContacts(no_rows(), packed.bodies_named(pairs))
         counts = np.zeros(len(pairs), dtype=np.int64)
-        found = []
+        of_groups = []
         for some, limit in _by_margin(packed, pairs, margin):
             rows, counts[some] = world_contacts.contacts_in_pieces(packed, pairs[some], limit, max_contacts, threads)
-            found.append(rows)
-        rows = found[0] if len(found) == 1 else _sorted_by_pair(np.concatenate(found), CONTACT_DTYPE)
+            of_groups.append(rows)
+        rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
         return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
@@ -202,7 +202,7 @@ class WorldPairs(WorldScene):
         ready = time.perf_counter()
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
-        told: list[np.ndarray] = []
+        wanted: list[np.ndarray] = []
         answers: list[Answer] = []
         for some, reach in _by_margin(packed, candidates, limit) if margins else [(slice(None), limit)]:
             is_boolean = boolean and not reach
@@ -210,8 +210,8 @@ class WorldPairs(WorldScene):
                 candidates[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads
             )
             answers.append(answer)
-            told.append(_told(packed, answer.rows, reach, boolean, margins))
-            if boolean and told[-1].any():
+            wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
+            if boolean and wanted[-1].any():
                 break
         ended = time.perf_counter()
         all_rows = np.concatenate([answer.rows for answer in answers]) if len(answers) > 1 else answers[0].rows
@@ -221,8 +221,8 @@ class WorldPairs(WorldScene):
             packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )  # fmt: skip
-        return told[0] if len(told) == 1 else np.concatenate(told) if boolean else _sorted_by_pair(
-            np.concatenate(told), PAIR_DTYPE
+        return wanted[0] if len(wanted) == 1 else np.concatenate(wanted) if boolean else _sorted_by_pair(
+            np.concatenate(wanted), PAIR_DTYPE
         )
 
     def _result(self, rows: np.ndarray) -> WorldResult:
@@ -241,7 +241,7 @@ def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterato
         yield np.flatnonzero(which.reshape(-1) == k), limit
 
 
-def _told(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
+def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
     """The rows that a question wants, or of booleans which of all are hits."""
     if not margins:
         return rows[~(rows["lower"] > limit)]  # what is not proven farther, also where the bracket holds the limit

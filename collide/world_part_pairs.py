@@ -12,7 +12,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.world_parts import WorldParts, runs
 
 #: Two bodies with fewer pairs of parts than this are compared part by part.
-_MANY_PAIRS = 1024
+_MIN_BY_TREE = 1024
 #: Relative: far more than what a sum of a coordinate and a margin is off.
 _ROUNDING = 2.0**-40
 
@@ -34,14 +34,14 @@ class PartTrees:
         if parts.all_of_one_part:
             return candidates, np.arange(len(candidates))
         n_pairs = parts.counts[candidates].prod(axis=1)
-        many = np.flatnonzero(n_pairs >= _MANY_PAIRS)
-        few = np.flatnonzero(n_pairs < _MANY_PAIRS)
-        all_pairs, owners = self._all_pairs(candidates[few])
-        found, owner = [all_pairs], [few[owners]]
-        for k in many.tolist():
-            found.append(self._by_tree(*candidates[k].tolist(), margin))
-            owner.append(np.full(len(found[-1]), k))
-        pairs, owners = np.concatenate(found), np.concatenate(owner)
+        by_tree = np.flatnonzero(n_pairs >= _MIN_BY_TREE)
+        by_part = np.flatnonzero(n_pairs < _MIN_BY_TREE)
+        all_pairs, owners = self._all_pairs(candidates[by_part])
+        pairs_found, owner = [all_pairs], [by_part[owners]]
+        for k in by_tree.tolist():
+            pairs_found.append(self._by_tree(*candidates[k].tolist(), margin))
+            owner.append(np.full(len(pairs_found[-1]), k))
+        pairs, owners = np.concatenate(pairs_found), np.concatenate(owner)
         near = self._are_near(pairs, margin)
         pairs, owners = pairs[near], owners[near]
         has_pair = np.zeros(len(candidates), dtype=bool)
@@ -73,14 +73,14 @@ class PartTrees:
         is_flipped = bool(parts.counts[a] > parts.counts[b])
         if is_flipped:
             a, b = b, a
-        own = np.arange(parts.first[a], parts.first[a + 1])
+        parts_a = np.arange(parts.first[a], parts.first[a + 1])
         around = parts.body_boxes(np.array([b]))[0]
-        boxes = parts.boxes[own]
+        boxes = parts.boxes[parts_a]
         meets = (boxes[:, :3] - margin <= around[3:]) & (around[:3] - margin <= boxes[:, 3:])
-        own, boxes = own[meets.all(axis=1)], boxes[meets.all(axis=1)]
+        parts_a, boxes = parts_a[meets.all(axis=1)], boxes[meets.all(axis=1)]
         outwards = margin + _ROUNDING * (margin + float(np.abs(around).max())) if 0.0 < margin < np.inf else margin
         met = self._tree_of(b).boxes_met(boxes, outwards)
-        pairs = np.stack([own[met[:, 0]], parts.first[b] + met[:, 1]], axis=1)
+        pairs = np.stack([parts_a[met[:, 0]], parts.first[b] + met[:, 1]], axis=1)
         return pairs[:, ::-1] if is_flipped else pairs
 
     def _tree_of(self, body: int) -> BoxTree:

@@ -76,11 +76,11 @@ class WorldScene:
         """
         identity = self._bodies.id_of(body)
         self._bodies.remove(identity)
-        for other in self._partners.pop(identity, ()):
-            pair = min(identity, other), max(identity, other)
+        for partner in self._partners.pop(identity, ()):
+            pair = min(identity, partner), max(identity, partner)
             self._allowed.pop(pair, None)
             self._pair_margins.pop(pair, None)
-            self._partners[other].discard(identity)
+            self._partners[partner].discard(identity)
 
     def set_pose(self, body: int | str, X_WB) -> None:
         """Move a body. About 2 µs.
@@ -138,7 +138,7 @@ class WorldScene:
         """
         self._bodies.set_sleeping(bodies, False)
 
-    def set_margin(self, body: int | str, margin: float | None, *, other: int | str | None = None) -> None:
+    def set_margin(self, body: int | str, margin: float | None, *, partner: int | str | None = None) -> None:
         """Count a body as hit already at a distance.
 
         A pair hits in `collides` and `collisions`, and has contacts in `contacts`, where it is at most its margin
@@ -147,8 +147,8 @@ class WorldScene:
         Parameters
         ----------
         body : id or name.
-        margin : [m], 0 or within 1e-50 … 1e50; None, with ``other``: the pair has none of its own any more.
-        other : id or name of another body: the margin is that of the pair.
+        margin : [m], 0 or within 1e-50 … 1e50; None, with ``partner``: the pair has none of its own any more.
+        partner : id or name of another body: the margin is that of the pair.
 
         Raises
         ------
@@ -157,12 +157,12 @@ class WorldScene:
         identity = self._bodies.id_of(body)
         if margin is not None:
             margin = checked_margin("World.set_margin: margin", margin)
-        if other is None:
+        if partner is None:
             if margin is None:
                 raise InvalidArgument("World.set_margin: margin of a body must be a number [m], ≥ 0, got None")
             self._bodies.set_margin(identity, margin)
             return
-        pair = self._pair("World.set_margin", identity, self._bodies.id_of(other))
+        pair = self._pair("World.set_margin", identity, self._bodies.id_of(partner))
         if margin is None:
             self._pair_margins.pop(pair, None)
         else:
@@ -200,8 +200,8 @@ class WorldScene:
 
     def _note_partners(self, pair: tuple[int, int]) -> None:
         """Who is named together, so that removing a body looks at its own pairs alone."""
-        for own, other in (pair, pair[::-1]):
-            self._partners.setdefault(own, set()).add(other)
+        for i, j in (pair, pair[::-1]):
+            self._partners.setdefault(i, set()).add(j)
 
     def _allow_matrix(self, matrix: np.ndarray, reason: str) -> None:
         n = len(self)

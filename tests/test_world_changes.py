@@ -1,5 +1,5 @@
-"""A World under any order of changes: added to, removed from, moved, filtered, with margins, asleep. Every answer is that
-of balls in numpy, which share no code with the engine; a hundred thousand changes leave no drift and no leak.
+"""A World under any order of changes: added to, removed from, moved, filtered, with margins, asleep. Every answer is
+that of balls in numpy, which share no code with the engine; a hundred thousand changes leave no drift and no leak.
 """
 
 from __future__ import annotations
@@ -73,10 +73,10 @@ class Model:
                 world.allow(j, i)
             elif what == "pair" and rng.random() < 0.5:
                 self.pair_margins[i, j] = margin
-                world.set_margin(i, margin, other=j)
+                world.set_margin(i, margin, partner=j)
             elif what == "pair":
                 self.pair_margins.pop((i, j), None)
-                world.set_margin(j, None, other=i)
+                world.set_margin(j, None, partner=i)
         elif what == "margin":
             (identity,) = self.some(1)
             margin = float(rng.choice([0.0, 0.0, 0.1]))
@@ -116,7 +116,7 @@ class Model:
             )
         lines += [f"world.sleep([ids[{k}]])" for k, body in self.bodies.items() if body["asleep"]]
         lines += [f"world.allow(ids[{i}], ids[{j}])" for i, j in sorted(self.allowed)]
-        lines += [f"world.set_margin(ids[{i}], {m}, other=ids[{j}])" for (i, j), m in self.pair_margins.items()]
+        lines += [f"world.set_margin(ids[{i}], {m}, partner=ids[{j}])" for (i, j), m in self.pair_margins.items()]
         return "\n".join(lines)
 
     def check(self) -> tuple[int, int]:
@@ -168,7 +168,7 @@ def test_any_order_of_changes_equals_brute_force(seed):
 
 def test_a_hundred_thousand_changes_leave_no_drift_and_no_leak():
     model, held = Model(99), []
-    for lap in range(10):
+    for _ in range(10):
         for _ in range(200):
             for _ in range(50):
                 model.change()
@@ -189,7 +189,7 @@ def test_a_hundred_thousand_changes_leave_no_drift_and_no_leak():
     for i, j in model.allowed:
         fresh.allow(ids[i], ids[j])
     for (i, j), margin in model.pair_margins.items():
-        fresh.set_margin(ids[i], margin, other=ids[j])
+        fresh.set_margin(ids[i], margin, partner=ids[j])
     rows, other = model.world.distances(0.3), fresh.distances(0.3)
     fields = [field for field in naive.ANSWER_FIELDS if field != "iterations"]
     assert len(rows) == len(other) > 0 and not naive.same_bits(rows.rows, other.rows, fields)

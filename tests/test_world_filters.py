@@ -77,11 +77,11 @@ def test_margins_of_bodies_add_up_and_those_of_pairs_replace_them():
     assert rows.names == [("ball 0", "ball 1")] and not rows["hit"][0] and rows["distance"][0] == 0.25
     assert world.collides() and len(world.contacts()) == 1 and world.contacts()["distance"][0] == 0.25
     assert len(world.distances(0.125)) == 0, "distances are what they are"
-    world.set_margin("ball 0", 0.0, other="ball 1")
+    world.set_margin("ball 0", 0.0, partner="ball 1")
     assert not world.collides() and not len(world.contacts())
-    world.set_margin(0, None, other=1)
+    world.set_margin(0, None, partner=1)
     assert world.collides()
-    world.set_margin(2, 0.3, other=1)
+    world.set_margin(2, 0.3, partner=1)
     assert world.collisions().names == [("ball 0", "ball 1"), ("ball 1", "ball 2")]
     world.remove(1)
     world.add(collide.Sphere(0.5), pose(t=(1.25, 0, 0)), margin=0.125, name="again")
@@ -106,9 +106,9 @@ def test_margins_that_are_none_are_refused():
     with pytest.raises(InvalidArgument, match="None"):
         world.set_margin(0, None)
     with pytest.raises(InvalidArgument, match="twice"):
-        world.set_margin(0, 0.1, other=0)
+        world.set_margin(0, 0.1, partner=0)
     with pytest.raises(UnknownBody):
-        world.set_margin(0, 0.1, other=9)
+        world.set_margin(0, 0.1, partner=9)
     assert len(world) == 3 and not world.collides()
 
 
@@ -119,7 +119,7 @@ def test_copies_take_sleep_and_margins_along():
     world = row_of_balls(-0.1)
     world.sleep([0, 1])
     world.set_margin(2, 0.5)
-    world.set_margin(0, 2.0, other=2)
+    world.set_margin(0, 2.0, partner=2)
     wanted = world.collisions().rows.tobytes()
     for other in (copy.deepcopy(world), pickle.loads(pickle.dumps(world))):
         assert other.collisions().rows.tobytes() == wanted and other.body(0).sleeping
@@ -304,7 +304,7 @@ def test_parts_by_trees_are_those_of_all_parts(monkeypatch):
         for margin in (0.0, 0.2):
             answers = []
             for many_pairs in (0, 1 << 60):
-                monkeypatch.setattr("collide.world_part_pairs._MANY_PAIRS", many_pairs)
+                monkeypatch.setattr("collide.world_part_pairs._MIN_BY_TREE", many_pairs)
                 answers.append([found.tolist() for found in PartTrees(parts).near(candidates, margin)])
             assert answers[0] == answers[1], (seed, margin)
             assert 50 < len(answers[0][0]) < 4000

@@ -223,7 +223,7 @@ class _Tree(BoxTree):
     def _among_first(self, n_leaves: int, margin: float) -> np.ndarray:
         """(k, 2) pairs of rows, one of which is at the first leaves."""
         leaves = np.flatnonzero(self.links[: self.n_nodes, BODY] >= 0)[:n_leaves]
-        return self.found(pairs_among, 0, int(leaves.max(initial=-1)) + 1, margin, False)
+        return self.walk_pairs(pairs_among, 0, int(leaves.max(initial=-1)) + 1, margin, False)
 
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""

@@ -19,20 +19,20 @@ _SPARE_WORDS = 4
 
 
 @kernel(inline=True)
-def is_allowed(rows, at, other):
+def is_allowed(rows, at, body):
     """Whether a body's row, which begins at ``at``, holds another body."""
     first, n = rows[at + _FIRST], rows[at + _WORDS]
     if rows[at + _IS_LIST] == 0:
-        bit = other - first
+        bit = body - first
         return 0 <= bit < 64 * n and ((rows[at + _HEAD + (bit >> 6)] >> (bit & 63)) & 1) != 0
     low, high = 0, n
     while low < high:
         middle = (low + high) >> 1
-        if rows[at + _HEAD + middle] < other:
+        if rows[at + _HEAD + middle] < body:
             low = middle + 1
         else:
             high = middle
-    return low < n and rows[at + _HEAD + low] == other
+    return low < n and rows[at + _HEAD + low] == body
 
 
 def allowed_rows(pairs: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -48,14 +48,14 @@ _GROWN = 1.5
 _MIN_PATHS, _SHARE_OF_PATHS = 64, 8
 #: Pairs are kept from query to query of so many bodies or more, where at most one in so many has changed, and there are
 #: at most so many of them a body.
-_MIN_KEPT, _SHARE_OF_KEPT, _MAX_KEPT = 128, 8, 16
+_MIN_CACHED, _SHARE_OF_CACHED, _MAX_CACHED = 128, 8, 16
 _NO_BODIES = np.empty(0, dtype=np.int64)
 _NO_WORK = {"trees made": 0, "nodes fitted": 0, "leaves changed": 0}
 #: A box that meets nothing.
 _NOTHING = np.array([np.inf] * 3 + [-np.inf] * 3)
 
 
-class _Kept(NamedTuple):
+class _CachedPairs(NamedTuple):
     """Pairs (k, 2) whose leaves' boxes are within the margin, but for those of bodies that have changed since."""
 
     margin: float
@@ -84,7 +84,7 @@ class BoxTree:
         self._columns = [GrowingRows(column) for column in columns]
         self._take_columns()
         self._allowed = np.zeros(1, dtype=np.int64)
-        self._kept: _Kept | None = None
+        self._cached: _CachedPairs | None = None
         self._changed: list[np.ndarray] = []
         self._n_holes = 0
         self._work = dict(_NO_WORK)
@@ -266,13 +266,13 @@ class BoxTree:
     def set_groups(self, bodies: np.ndarray, group: np.ndarray, mask: np.ndarray) -> None:
         """Groups and masks (k,) of bodies: pairs with ``(group_i & mask_j) == 0`` either way are not found."""
         self.traits[bodies, GROUP], self.traits[bodies, MASK] = group, mask
-        self._kept = None
+        self._cached = None
 
     def set_allowed(self, allowed: np.ndarray) -> None:
         """Pairs (k, 2) of bodies, each once, that are not found."""
         row_at, self._allowed = allowed_rows(allowed, len(self.boxes))
         self.traits[:, ALLOWED_AT] = row_at
-        self._kept = None
+        self._cached = None
 
     def set_asleep(self, bodies: np.ndarray, asleep: bool) -> None:
         """Pairs of which both are fixed or asleep are not found."""
@@ -297,33 +297,33 @@ class BoxTree:
     def _bounded_pairs(self, margin: float) -> np.ndarray:
         n = len(self.boxes)
         changed = self._changed[0] if len(self._changed) == 1 else np.concatenate([_NO_BODIES, *self._changed])
-        few_changed = n >= _MIN_KEPT and _SHARE_OF_KEPT * len(changed) <= n
-        if not few_changed or (self._kept is not None and self._kept.margin < margin):
-            self._kept = None
-        if self._kept is not None and len(changed):
-            self._kept = self._brought_up_to_date(self._kept, changed)
-        elif few_changed and self._kept is None:
+        is_little_changed = n >= _MIN_CACHED and _SHARE_OF_CACHED * len(changed) <= n
+        if not is_little_changed or (self._cached is not None and self._cached.margin < margin):
+            self._cached = None
+        if self._cached is not None and len(changed):
+            self._cached = self._brought_up_to_date(self._cached, changed)
+        elif is_little_changed and self._cached is None:
             among = (self.n_fixed, self.n_nodes, margin, True)
-            pairs = self._found_if_few(pairs_among, *among, limit=_MAX_KEPT * n + 64)
-            self._kept = None if pairs is None else _Kept(margin, pairs)
+            pairs = self._walk_if_few(pairs_among, *among, limit=_MAX_CACHED * n + 64)
+            self._cached = None if pairs is None else _CachedPairs(margin, pairs)
         if len(changed):
             self.traits[changed, FLAGS] &= ~CHANGED_BIT
             self._changed.clear()
-        if self._kept is not None:
-            return self._tested(self._kept.pairs, margin)
-        return self.found(pairs_among, self.n_fixed, self.n_nodes, margin, False)
+        if self._cached is not None:
+            return self._tested(self._cached.pairs, margin)
+        return self.walk_pairs(pairs_among, self.n_fixed, self.n_nodes, margin, False)
 
-    def _brought_up_to_date(self, kept: _Kept, changed: np.ndarray) -> _Kept | None:
+    def _brought_up_to_date(self, cached: _CachedPairs, changed: np.ndarray) -> _CachedPairs | None:
         """What is kept, with other pairs of the bodies that have changed."""
         flags = self.traits[:, FLAGS] & CHANGED_BIT
-        remaining = kept.pairs[(flags[kept.pairs[:, 0]] | flags[kept.pairs[:, 1]]) == 0]
+        remaining = cached.pairs[(flags[cached.pairs[:, 0]] | flags[cached.pairs[:, 1]]) == 0]
         leaves = np.unique(self.leaf_of[changed])
         leaves = leaves[leaves >= 0]
-        limit = _MAX_KEPT * len(self.boxes) + 64
-        new = self._found_if_few(pairs_of_leaves, address_of(leaves), len(leaves), kept.margin, limit=limit)
+        limit = _MAX_CACHED * len(self.boxes) + 64
+        new = self._walk_if_few(pairs_of_leaves, address_of(leaves), len(leaves), cached.margin, limit=limit)
         if new is None or len(new) + len(remaining) > limit:
             return None
-        return _Kept(kept.margin, np.concatenate([remaining, new]))
+        return _CachedPairs(cached.margin, np.concatenate([remaining, new]))
 
     def header(self) -> np.ndarray:
         """The tree as kernels take it, until it changes."""
@@ -335,13 +335,13 @@ class BoxTree:
             dtype=np.int64,
         )  # fmt: skip
 
-    def found(self, walk: Callable[..., int], *arguments) -> np.ndarray:
+    def walk_pairs(self, walk: Callable[..., int], *arguments) -> np.ndarray:
         """(k, 2) pairs of a walk (`walk_boxes.py`), in no order.   arguments : of it, between tree and ``pairs``."""
-        pairs = self._found_if_few(walk, *arguments, limit=1 << 60)
+        pairs = self._walk_if_few(walk, *arguments, limit=1 << 60)
         assert pairs is not None
         return pairs
 
-    def _found_if_few(self, walk: Callable[..., int], *arguments, limit: int) -> np.ndarray | None:
+    def _walk_if_few(self, walk: Callable[..., int], *arguments, limit: int) -> np.ndarray | None:
         """The same; None where they are more than a limit."""
         header, capacity = self.header(), 64 + 4 * len(self.boxes)
         while True:
@@ -371,9 +371,9 @@ class BoxTree:
     @property
     def nbytes(self) -> int:
         """Memory that is held [bytes]."""
-        kept = 0 if self._kept is None else self._kept.pairs.nbytes
+        cached = 0 if self._cached is None else self._cached.pairs.nbytes
         columns = sum(column.nbytes for column in self._columns)
-        return self.nodes.nbytes + self.links.nbytes + self._allowed.nbytes + columns + kept
+        return self.nodes.nbytes + self.links.nbytes + self._allowed.nbytes + columns + cached
 
     def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
         """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
@@ -382,7 +382,7 @@ class BoxTree:
     def bounded_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
         """(k, 2) outside boxes (n, 6), by number, and bodies that have an end whose boxes come within ``margin``."""
         boxes = np.ascontiguousarray(boxes, dtype=np.float64)
-        return self.found(boxes_met, address_of(boxes), len(boxes), margin)
+        return self.walk_pairs(boxes_met, address_of(boxes), len(boxes), margin)
 
     def boxes_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
         """The same, with bodies without end, in no order."""

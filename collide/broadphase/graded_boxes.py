@@ -33,7 +33,7 @@ MAX_CHILDREN = 9
 #: The most edges from a root to a leaf: of control cubes, of splits, and of halves of up to 2^30 bodies.
 MAX_DEPTH = DEEPEST + _MAX_SPLITS + 30
 #: Room for so many steps of a body that moves, unless that is more than this share of its largest side.
-_STEPS, _MAX_ROOM = 4.0, 0.125
+_STEPS, _MAX_SLACK = 4.0, 0.125
 #: Ranges that wait: at most so many a level.
 STACK = MAX_CHILDREN * MAX_DEPTH * _RANGE
 
@@ -341,10 +341,10 @@ def place_leaves(bodies_at, n, moved_at, boxes_at, n_boxes, leaf_of_at, nodes_at
             return -1
         if leaf < 0 or is_within:
             continue
-        room = _STEPS * step if _STEPS * step <= _MAX_ROOM * side else 0.0
+        slack = _STEPS * step if _STEPS * step <= _MAX_SLACK * side else 0.0
         for axis in range(3):
-            nodes[leaf + axis] = boxes[at + axis] - room
-            nodes[leaf + 3 + axis] = boxes[at + 3 + axis] + room
+            nodes[leaf + axis] = boxes[at + axis] - slack
+            nodes[leaf + 3 + axis] = boxes[at + 3 + axis] + slack
         escaped[count] = bodies[k]
         count += 1
     return count
