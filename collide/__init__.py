@@ -42,7 +42,10 @@ if TYPE_CHECKING:
     from collide.motion.impact_rows import TimeOfImpact
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
-    from collide.robot import Robot
+    from collide.robots.certified_edges import CertifiedEdges
+    from collide.robots.robot import Robot
+    from collide.robots.robot_checker import RobotChecker
+    from collide.robots.robot_distances import RobotDistances
     from collide.shapes import (
         Box,
         Capsule,
@@ -90,7 +93,10 @@ _HOMES = {
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
-    "collide.robot": ("Robot",),
+    "collide.robots.certified_edges": ("CertifiedEdges",),
+    "collide.robots.robot": ("Robot",),
+    "collide.robots.robot_checker": ("RobotChecker",),
+    "collide.robots.robot_distances": ("RobotDistances",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
         "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
@@ -109,13 +115,14 @@ _RENAMED = {
 }
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CollideError", "Compound", "Cone", "Contacts",
-    "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
+    "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
+    "Contacts", "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
     "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
-    "Robot", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "TimeOfImpact",
-    "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts",
-    "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose",
-    "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact", "verify", "walk",
+    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "Sphere", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify",
+    "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses",
+    "overlay", "pose", "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact",
+    "verify", "walk",
 ]
 
 

@@ -23,13 +23,15 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial",
-        "_surface", "_topology", "_union", "_walk",
+        "__weakref__", "_bounds", "_convex_parts", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared",
+        "_serial", "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple
     _bounds: tuple
+    #: The same with meshes that are convex as what they are (`robots/check_tables.py`).
+    _convex_parts: Any
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int

@@ -12,7 +12,7 @@ import numpy as np
 
 from collide import scenes
 from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import moveit, scene_yaml, states, urdf

@@ -7,6 +7,7 @@ states "start" and "goal". The robot's URDF is not in these files: it is given, 
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
@@ -84,7 +85,7 @@ def find_robot(model: str, scene_path: Path) -> Path:
     folders = [folder for folder in dict.fromkeys(place / "robots" for place in places) if folder.is_dir()]
     for folder in folders:
         for candidate in (folder / model / f"{model}.urdf", folder / model / "urdf" / f"{model}.urdf"):
-            if candidate.is_file():
+            if os.path.isfile(candidate):  # which says no to names that are too long, where Path raises
                 return candidate
     for folder in folders:
         matching = [file for file in sorted(folder.glob("*/*.urdf")) if _described_robot(file) == model]

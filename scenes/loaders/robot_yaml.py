@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from collide.errors import SceneError, brief, listing
-from collide.kinematic_tree import COLUMNS, Joint, Mimic
-from collide.robot import LinkShape, Robot
+from collide.robots.kinematic_tree import COLUMNS, Joint, Mimic
+from collide.robots.robot import LinkShape, Robot
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
 from collide.scenes.loaders.shape_yaml import read_shape
 from collide.scenes.loaders.states import state_of

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from collide.errors import InvalidArgument, SceneError, brief, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document

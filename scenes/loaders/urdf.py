@@ -18,8 +18,8 @@ from typing import NoReturn
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
-from collide.kinematic_tree import Joint, Mimic
-from collide.robot import LinkShape, Robot
+from collide.robots.kinematic_tree import Joint, Mimic
+from collide.robots.robot import LinkShape, Robot
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.fields import placed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide import Box, Robot, Sphere, pose
-from collide.kinematic_tree import Joint
-from collide.robot import LinkShape
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape
 from collide.scenes import Scene, SceneBody
 
 #: The slider is a cube of 0.2 m; it meets the post at 0.5 m.

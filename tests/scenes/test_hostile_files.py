@@ -22,7 +22,7 @@ import pytest
 
 from collide.cli import main
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes import load
 from collide.scenes import mesh_cache as cache
 from collide.scenes.description import Scene, SceneBody, free_name

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from collide.errors import CollideError, SceneError
-from collide.robot import Robot
+from collide.robots.robot import Robot
 from collide.scenes import load
 from collide.scenes.loaders import resources
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Sphere

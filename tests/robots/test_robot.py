@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError
-from collide.kinematic_tree import Joint, Mimic
-from collide.robot import LinkShape, Robot
+from collide.robots.kinematic_tree import Joint, Mimic
+from collide.robots.robot import LinkShape, Robot
 from collide.shapes import Sphere
 from collide.transforms import pose
 

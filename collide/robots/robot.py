@@ -22,8 +22,8 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
-from collide.joint_motions import floating_motion, planar_motion, product, rotation, translation
-from collide.kinematic_tree import (
+from collide.robots.forward_kinematics import joint_table, link_poses_of
+from collide.robots.kinematic_tree import (
     COLUMNS,
     Joint,
     broken_mimics,
@@ -123,6 +123,9 @@ class Robot:
         self.root, self._order = tree_of(self.links, self.joints)
         self._drivers = resolve_mimics(self.joints)
         self._set_columns()
+        self.joint_table = joint_table(
+            self._order, self._index, self._columns, self._drivers, self.root, self.dof
+        )
         self.geometry = {link: tuple(elements) for link, elements in (geometry or {}).items() if elements}
         for link in self.geometry:
             if link not in self._index:
@@ -310,6 +313,44 @@ class Robot:
                 )
         return notes
 
+    def within_limits(self, q) -> np.ndarray:
+        """Whether configurations keep the limits of all joints, mimicking ones included.
+
+        Parameters
+        ----------
+        q : (dof,) or (N, dof) array_like
+            [rad or m]. A billionth beyond a limit is within it, as in `limit_notes`.
+
+        Returns
+        -------
+        (N,) bool
+        """
+        q = self.checked_configurations(q)
+        within = np.ones(len(q), dtype=bool)
+        for joint in self.joints:
+            if joint.type in ("revolute", "prismatic"):
+                driver, multiplier, offset = self._drivers[joint.name]
+                value = multiplier * q[:, self._columns[driver]] + offset
+                slack = 1e-9 * np.maximum(1.0, np.abs(value))
+                within &= (joint.lower - slack <= value) & (value <= joint.upper + slack)
+        return within
+
+    @property
+    def sorted_joints(self) -> tuple[Joint, ...]:
+        """Joints with parents before children, in the order of `joint_table`."""
+        return tuple(self._order)
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(joints, links) bool, joints as `sorted_joints`: whether a joint moves a link."""
+        out = np.zeros((len(self._order), len(self.links)), dtype=bool)
+        above: dict[str, list[int]] = {self.root: []}
+        for k, joint in enumerate(self._order):
+            above[joint.child] = [*above[joint.parent], k]
+        for link, joints in above.items():
+            out[joints, self._index[link]] = True
+        return out
+
     # --- kinematics ------------------------------------------------------------------------------
 
     def link_poses(self, q, X_WR=None) -> np.ndarray:
@@ -337,15 +378,9 @@ class Robot:
         InvalidPose
             Naming file, link and joint, where a link leaves the range of coordinates that poses may have.
         """
-        q = self._as_configurations(q)
-        X_WLs = np.empty((len(q), len(self.links), 4, 4))
-        X_WLs[:, self._index[self.root]] = np.eye(4) if X_WR is None else as_poses(X_WR, "X_WR")[0]
-        with np.errstate(over="ignore", invalid="ignore"):  # looked at below
-            for joint in self._order:
-                X_WJ = product(X_WLs[:, self._index[joint.parent]], joint.X_PJ[None])
-                X_JL = self._motion(joint, q)
-                X_WLs[:, self._index[joint.child]] = X_WJ if X_JL is None else product(X_WJ, X_JL)
-            within = np.abs(X_WLs[:, :, :3]) <= LARGEST
+        q = np.ascontiguousarray(self.checked_configurations(q))
+        X_WLs = link_poses_of(self.joint_table, q, np.eye(4) if X_WR is None else as_poses(X_WR, "X_WR")[0])
+        within = np.abs(X_WLs[:, :, :3]) <= LARGEST
         if not within.all():
             self._refuse_pose(X_WLs, within, q)
         return X_WLs
@@ -363,7 +398,23 @@ class Robot:
             f'look at the origin of joint "{cut(joint.name)}"{follows} and at its value{value}'
         )
 
-    def _as_configurations(self, q) -> np.ndarray:
+    def checked_configurations(self, q) -> np.ndarray:
+        """Configurations as an array.
+
+        Parameters
+        ----------
+        q : (dof,) or (N, dof) array_like
+            [rad or m].
+
+        Returns
+        -------
+        (N, dof) float64
+
+        Raises
+        ------
+        InvalidArgument
+            For another number of columns; for values that are not finite, naming row and joint.
+        """
         try:
             array = np.asarray(q, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -381,20 +432,6 @@ class Robot:
             row, col = bad[0]
             raise InvalidArgument(f"q[{row}], joint {self.joint_names[col]}, is {array[row, col]}: it must be finite")
         return array
-
-    def _motion(self, joint: Joint, q: np.ndarray) -> np.ndarray | None:
-        """X_JL of a joint, (N, 4, 4), or None where it is the identity."""
-        if joint.type == "fixed":
-            return None
-        if joint.type == "floating":
-            return floating_motion(q[:, self._columns[joint.name] :][:, :6])
-        if joint.type == "planar":
-            return planar_motion(joint.axis, q[:, self._columns[joint.name] :][:, :3])
-        driver, multiplier, offset = self._drivers[joint.name]
-        value = q[:, self._columns[driver]] * multiplier + offset
-        if joint.type == "prismatic":
-            return translation(value[:, None] * joint.axis)
-        return rotation(joint.axis, value)
 
     # --- pairs -----------------------------------------------------------------------------------
 

@@ -1,0 +1,156 @@
+"""Straight motions sampled and certified: from a checker's questions to one verdict each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.robots.certify_motions import COLLIDES_AT, IS_PROVEN, OPEN_INTERVAL, STAYS_OPEN, certify_motions
+from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
+from collide.robots.robot_bodies import paths_to_root
+
+if TYPE_CHECKING:
+    from collide.robots.robot_checker import RobotChecker
+
+#: Before anything is proven, motions are asked at their ends and, so many times halved, in between.
+_SAMPLED_HALVINGS = 2
+#: Roundings of forward kinematics, as a share of where links are and how far they reach.
+_ROUNDING = 2.0**-40
+
+#: One interval that stays open.
+OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
+
+
+@dataclass(frozen=True)
+class CertifiedEdges:
+    """What is known of straight motions q(t) = Q0 + t (Q1 − Q0), 0 ≤ t ≤ 1: free, colliding, or open.
+
+    Parameters
+    ----------
+    free : (N,) bool
+        Proven: no tested pair meets at any t.
+    time : (N,) float64
+        A t at which the motion collides, not the first one; NaN where none was met.
+    open : (k,) OPEN_DTYPE
+        Intervals of t neither proven free nor hit, at the resolution asked: ``edge``, ``begin``, ``end``.
+    open_names : list of (str, str)
+        Of each interval two bodies that could not be told apart there.
+    n_checked : int
+        Configurations that were asked for proofs, samples before not counted.
+    """
+
+    free: np.ndarray
+    time: np.ndarray
+    open: np.ndarray
+    open_names: list[tuple[str, str]]
+    n_checked: int
+
+    @property
+    def collides(self) -> np.ndarray:
+        """(N,) bool: motions for which `time` is one of a collision."""
+        return ~np.isnan(self.time)
+
+    @property
+    def is_open(self) -> np.ndarray:
+        """(N,) bool: motions neither proven free nor colliding."""
+        return ~self.free & np.isnan(self.time)
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    def __repr__(self) -> str:
+        return (
+            f"CertifiedEdges({len(self)} motions: {int(self.free.sum())} proven free, {int(self.collides.sum())} "
+            f"collide, {int(self.is_open.sum())} open)"
+        )
+
+
+def sampled_collision(
+    q0: np.ndarray, q1: np.ndarray, step: float, collides: Callable[[np.ndarray], np.ndarray],
+    n_halvings: int | None = None,
+) -> np.ndarray:  # fmt: skip
+    """(N,) a t at which each motion collides, NaN where none of its samples does.
+
+    Ends first, then the middle, then quarters, …, until no column changes by more than ``step``; motions that were
+    hit are not asked again.   n_halvings : at most so often.
+    """
+    times = np.full(len(q0), np.nan)
+    change = np.abs(q1 - q0).max(axis=1, initial=0.0)
+    needed = np.ceil(np.log2(np.maximum(change / step, 1.0))).astype(np.int64)
+    if n_halvings is not None:
+        needed = np.minimum(needed, n_halvings)
+    for level in range(-1, int(needed.max(initial=-1)) + 1):
+        alive = np.flatnonzero(np.isnan(times) & (needed >= level))
+        ts = np.array([0.0, 1.0]) if level < 0 else (np.arange(2 ** max(level - 1, 0)) + 0.5) / 2 ** max(level - 1, 0)
+        if level == 0:
+            continue  # the ends are all of a motion that is not halved
+        for t in ts.tolist():
+            alive = alive[np.isnan(times[alive])]
+            if not len(alive):
+                break
+            q = q0[alive] + t * (q1[alive] - q0[alive]) if t < 1.0 else q1[alive]
+            times[alive[collides(np.ascontiguousarray(q))]] = t
+    return times
+
+
+def certify(
+    checker: RobotChecker, q0: np.ndarray, q1: np.ndarray, resolution: float, threads: int, progress
+) -> CertifiedEdges:
+    """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
+    times = sampled_collision(q0, q1, resolution, lambda q: checker.collides(q, threads=threads), _SAMPLED_HALVINGS)
+    remaining = np.flatnonzero(np.isnan(times))
+    verdicts, later = np.full(len(remaining), IS_PROVEN, dtype=np.uint8), np.full(len(remaining), np.nan)
+    ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])
+    rows_of_pieces: list[np.ndarray] = [np.zeros((0, OPEN_INTERVAL))]
+    counts: list[int] = []
+
+    def on_piece(space: CheckWorkspace, piece: slice) -> None:
+        work = _motion_workspace(checker, resolution)
+        done, last = piece.start, piece.stop
+        while done < last:
+            part = slice(done, last)
+            n = certify_motions(
+                space.address, work.address, address_of(ends[0][part]), address_of(ends[1][part]), checker.robot.dof, 0,
+                last - done, address_of(verdicts[part]), address_of(later[part]),
+            )  # fmt: skip
+            intervals = work.open_intervals.copy()
+            intervals[:, 0] = remaining[done + intervals[:, 0].astype(np.int64)]
+            rows_of_pieces.append(intervals)
+            if n == 0:
+                work.grow()
+            done += n
+        counts.append(work.n_checked)
+
+    checker._in_pieces(len(remaining), threads, progress, on_piece)
+    times[remaining] = np.where(verdicts == COLLIDES_AT, later, np.nan)
+    free, is_open = np.zeros(len(q0), dtype=bool), np.zeros(len(q0), dtype=bool)
+    free[remaining[verdicts == IS_PROVEN]] = True
+    is_open[remaining[verdicts == STAYS_OPEN]] = True
+    intervals = np.concatenate(rows_of_pieces)
+    intervals = intervals[is_open[intervals[:, 0].astype(np.int64)]]
+    intervals = intervals[np.lexsort((intervals[:, 1], intervals[:, 0]))]
+    rows = np.zeros(len(intervals), dtype=OPEN_DTYPE)
+    rows["edge"], rows["begin"], rows["end"] = intervals[:, :3].T
+    names = [checker.names_of(int(a), int(b)) for a, b in intervals[:, 3:].tolist()]
+    return CertifiedEdges(free, times, rows, names, sum(counts))
+
+
+def _motion_workspace(checker: RobotChecker, resolution: float) -> MotionWorkspace:
+    """Paths of joints from each body to the root, and how many of them stand between the bodies of each pair."""
+    robot, setting = checker.robot, checker.setting
+    number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}
+    paths = paths_to_root(robot, [body.link for body in setting.bodies])
+    between = np.zeros((max(len(setting.self_pairs), 1), 2), dtype=np.int64)
+    for k, (a, b) in enumerate(setting.self_pairs.tolist()):
+        shared = set(paths[a]) & set(paths[b])
+        between[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
+    reach = float(np.abs(setting.tables.body_boxes).sum(axis=1).max()) + float(np.abs(setting.base[9:]).sum())
+    reach += float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
+    return MotionWorkspace(
+        [np.array([number[name] for name in path], dtype=np.int64) for path in paths], between, robot.dof,
+        checker.n_pairs, resolution, _ROUNDING * reach,
+    )  # fmt: skip

@@ -1,0 +1,153 @@
+"""Whether configurations collide: for each, links are placed, boxes compared, and pairs asked until one is hit.
+
+Surroundings come first, bodies from the hand to the base: that is where collisions are likeliest.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.lowering.shape_table import POSE
+from collide.robots.check_scene import (
+    BODY_INTS,
+    COUNT,
+    FIRST,
+    N_BODIES,
+    N_LINK_PARTS,
+    N_OPEN,
+    N_SELF_PAIRS,
+    OPEN_AT,
+    OPEN_CAPACITY,
+    OPEN_INTS,
+    OPEN_LOWER,
+    PADDED,
+    SELF_PAIRS_AT,
+    STAMP,
+    body_of_part,
+    boxes_meet,
+    find_parts_around,
+    is_allowed,
+    place,
+    put_world_boxes,
+    view_scene,
+)
+from collide.robots.forward_kinematics import pose_links
+from collide.robots.part_pairs import HITTING, OPEN, state_of_parts
+
+#: What is known of a configuration: free; it collides; free but for the pairs left to others.
+IS_FREE, COLLIDES, IS_OPEN = range(3)
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
+    """Verdicts, a byte each, of configurations from ``first`` on, of n; returns the first one without.
+
+    It ends early where there may be no space for what one more leaves to others.
+    """
+    scene = view_scene(header_at)
+    words = scene.words
+    q = view_f64(q_at, dof * n)
+    verdicts = view_u8(verdicts_at, n)
+    words[N_OPEN] = 0
+    # A configuration leaves each pair of bodies to others once, and once more for what stands in between.
+    for k in range(first, n):
+        n_open = words[N_OPEN]
+        verdicts[k] = _verdict(scene, q, dof * k, k)
+        if words[N_OPEN] > words[OPEN_CAPACITY]:
+            words[N_OPEN] = n_open
+            return k
+        if verdicts[k] == COLLIDES:
+            words[N_OPEN] = n_open
+    return n
+
+
+@kernel(inline=True)
+def begin_configuration(scene, q, first):
+    """Place links and boxes of bodies for the configuration at ``first`` of q."""
+    scene.words[STAMP] += 1
+    pose_links(scene.joints, q, first, scene.links, POSE)
+    put_world_boxes(scene)
+
+
+@kernel(inline=True)
+def _verdict(scene, q, first, number):
+    words = scene.words
+    begin_configuration(scene, q, first)
+    verdict = IS_FREE
+    for body in range(words[N_BODIES]):
+        n = find_parts_around(scene, body, 0.0)
+        for k in range(n):
+            part = scene.candidates[k]
+            around = body_of_part(scene, part)
+            if is_allowed(scene, body, around):
+                continue
+            state = _state_of_body(scene, body, words[N_LINK_PARTS] + part, number, -1 - around)
+            if state == HITTING:
+                return COLLIDES
+            if state == OPEN:
+                verdict = IS_OPEN
+    pairs = view_i64(words[SELF_PAIRS_AT], 2 * words[N_SELF_PAIRS])
+    for k in range(words[N_SELF_PAIRS]):
+        a = pairs[2 * k]
+        b = pairs[2 * k + 1]
+        if not boxes_meet(scene, a, b, 0.0):
+            continue
+        state = _state_of_two(scene, a, b, number)
+        if state == HITTING:
+            return COLLIDES
+        if state == OPEN:
+            verdict = IS_OPEN
+    return verdict
+
+
+@kernel(inline=True)
+def _state_of_body(scene, body, part, number, partner):
+    """Of a body's padded parts and a part around: HITTING, OPEN (and left to others), or neither."""
+    at = BODY_INTS * body
+    first = scene.bodies[at + FIRST] + scene.words[PADDED]
+    for p in range(first, first + scene.bodies[at + COUNT]):
+        place(scene, p, body)
+        state = state_of_parts(scene, p, part, 0.0)
+        if state == HITTING:
+            return HITTING
+        if state == OPEN:
+            leave_open(scene, number, body, partner, -math.inf)
+            return OPEN
+    return 0
+
+
+@kernel(inline=True)
+def _state_of_two(scene, a, b, number):
+    """The same of two bodies of the robot."""
+    first_a = scene.bodies[BODY_INTS * a + FIRST]
+    first_b = scene.bodies[BODY_INTS * b + FIRST]
+    for p in range(first_a, first_a + scene.bodies[BODY_INTS * a + COUNT]):
+        place(scene, p, a)
+        for r in range(first_b, first_b + scene.bodies[BODY_INTS * b + COUNT]):
+            place(scene, r, b)
+            state = state_of_parts(scene, p, r, 0.0)
+            if state == HITTING:
+                return HITTING
+            if state == OPEN:
+                leave_open(scene, number, a, b, -math.inf)
+                return OPEN
+    return 0
+
+
+@kernel(inline=True)
+def leave_open(scene, number, body, partner, lower):
+    """Note a pair of bodies, at least ``lower`` apart [m], that is left to others.
+
+    N_OPEN counts on where there is no space.
+    """
+    words = scene.words
+    at = OPEN_INTS * words[N_OPEN]
+    words[N_OPEN] += 1
+    if words[N_OPEN] > words[OPEN_CAPACITY]:
+        return
+    out = view_i64(words[OPEN_AT], OPEN_INTS * words[OPEN_CAPACITY])
+    out[at] = number
+    out[at + 1] = body
+    out[at + 2] = partner
+    view_f64(words[OPEN_AT], OPEN_INTS * words[OPEN_CAPACITY])[at + OPEN_LOWER] = lower

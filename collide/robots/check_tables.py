@@ -1,0 +1,233 @@
+"""A robot and its surroundings in the tables that kernels read: bodies, parts, boxes, filters.
+
+Made once a checker and World; nothing here looks at a configuration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.box_tree import BoxTree
+from collide.lowering.compound_table import lay_out
+from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_points
+from collide.lowering.parts import Part, bounding_parts_of, parts_of
+from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
+from collide.mesh.convex_surface import is_own_hull
+from collide.robots.check_scene import BODY_INTS, BOX
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import Shape, kept_with_shape
+
+#: Boxes are moved outwards by this share of all that went into them, far more than roundings are.
+_LEAST_SLACK = 2.0**-40
+
+
+class RobotBody(NamedTuple):
+    """What moves with one link.
+
+    name : of the link, or of the object attached to it.   link : number of the link.   shape : in the link's frame.
+    padding : by how much it is swollen against the surroundings [m].
+    """
+
+    name: str
+    link: int
+    shape: Shape
+    padding: float
+
+
+class BodyAround(NamedTuple):
+    """One body of the surroundings.   X_WB : (4, 4)."""
+
+    name: str
+    shape: Shape
+    X_WB: np.ndarray
+
+
+class Surroundings(NamedTuple):
+    """The surroundings' part of `CheckTables`.
+
+    bodies : by number.   packed : of the parts.   poses : (parts, POSE).   body_of : (parts,) int64.
+    is_bound : (parts,) bool.   tree : over the parts.
+    """
+
+    bodies: Sequence[BodyAround]
+    packed: list[PackedConvex]
+    poses: np.ndarray
+    body_of: np.ndarray
+    is_bound: np.ndarray
+    tree: BoxTree | None
+
+
+class CheckTables(NamedTuple):
+    """Everything that stays while configurations are checked.
+
+    bodies : (n, BODY_INTS) int64.   body_boxes : (n, BOX), in their links.   parts : (twins of) parts in their links.
+    padded : how many numbers on the padded twin of a part stands, 0 where there are none.
+    part_boxes : (all parts, BOX), in their own frames.   is_bound : (all parts,) uint8.
+    table, shape_of : shapes of all parts.   poses : (all parts, POSE), written of the surroundings.
+    slack : share by which boxes are moved outwards.
+    """
+
+    bodies: np.ndarray
+    body_boxes: np.ndarray
+    parts: np.ndarray
+    padded: int
+    part_boxes: np.ndarray
+    is_bound: np.ndarray
+    table: ShapeTable
+    shape_of: np.ndarray
+    poses: np.ndarray
+    slack: float
+
+
+class Setting(NamedTuple):
+    """A robot among the bodies of a World as it stood.
+
+    bodies : what moves.   base : where the root stands, as `forward_kinematics.LINK_POSE` doubles.
+    self_pairs : (k, 2) int64 of bodies that are tested.   allowed : (bodies, around) uint8, 1 where a pair never is.
+    skipped : {reason: pairs} never tested.
+    """
+
+    bodies: Sequence[RobotBody]
+    base: np.ndarray
+    surroundings: Surroundings
+    tables: CheckTables
+    self_pairs: np.ndarray
+    allowed: np.ndarray
+    skipped: dict[str, int]
+
+
+class _LinkParts(NamedTuple):
+    parts: list[Part]
+    is_bound: bool
+
+
+def surroundings_of(bodies: Sequence[BodyAround]) -> Surroundings:
+    """Parts of the bodies around, posed, and a tree over them."""
+    of_bodies = [convex_parts_of(body.shape) for body in bodies]
+    counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
+    body_of = np.repeat(np.arange(len(bodies)), counts)
+    packed = [packed for of_body in of_bodies for packed, _ in of_body.parts]
+    is_bound = np.repeat(np.array([of_body.is_bound for of_body in of_bodies], dtype=bool), counts)
+    X_BP = np.array([X for of_body in of_bodies for _, X in of_body.parts]).reshape(-1, 4, 4)
+    X_WB = np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4)[body_of]
+    poses = pose_table(X_WB, X_BP, np.array([part.reach for part in packed])).rows
+    poses[:, POSE_TERMS] = -1.0  # what products of poses lost is in their slop
+    poses[:, POSE_STRETCH] = _stretches(poses)
+    tree = None
+    if packed:
+        tree = BoxTree(boxes_of(ShapeTable(packed), poses, np.arange(len(packed))))
+    return Surroundings(bodies, packed, poses, body_of, is_bound, tree)
+
+
+def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np.ndarray) -> CheckTables:
+    """The `CheckTables` of a robot's bodies and what is around them.
+
+    matrices : (k, 3, 3) every matrix that poses of links are products of.
+    """
+    of_bodies = [convex_parts_of(body.shape) for body in bodies]
+    counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
+    rows = np.zeros((len(bodies), BODY_INTS), dtype=np.int64)
+    rows[:, 0], rows[:, 1], rows[:, 2] = [body.link for body in bodies], np.cumsum(counts) - counts, counts
+    packed = [packed for of_body in of_bodies for packed, _ in of_body.parts]
+    parts = np.concatenate([lay_out(of_body.parts).parts for of_body in of_bodies])
+    is_bound = np.repeat([of_body.is_bound for of_body in of_bodies], counts)
+    padding = np.repeat([body.padding for body in bodies], counts)
+    padded = len(packed) if padding.any() else 0
+    if padded:
+        packed = packed + [swollen(part, by) for part, by in zip(packed, padding.tolist())]
+        parts, is_bound = np.concatenate([parts, parts]), np.concatenate([is_bound, is_bound])
+    table_of = ShapeTable([*packed, *around.packed])
+    part_boxes = np.array([box_of(part) for part in (*packed, *around.packed)]).reshape(-1, BOX)
+    poses = np.concatenate([np.zeros((len(packed), POSE)), around.poses])
+    return CheckTables(
+        rows, _body_boxes(rows, parts, part_boxes, padded), parts, padded, part_boxes,
+        np.concatenate([is_bound, around.is_bound]).astype(np.uint8), table_of, np.arange(len(poses)), poses,
+        _slack_of(matrices, parts, around.poses),
+    )  # fmt: skip
+
+
+@kept_with_shape("_convex_parts")
+def convex_parts_of(shape: Shape) -> _LinkParts:
+    """The convex parts that a shape is, or, with ``is_bound``, parts that hold it: those of a mesh that is not convex.
+
+    A solid mesh that is its own convex hull is that.
+    """
+    if not shape.meshed:
+        return _LinkParts(list(parts_of(shape)), False)
+    items = shape.items if isinstance(shape, Compound) else ((shape, np.eye(4)),)
+    hulls = [(_as_hull(item), X) for item, X in items]
+    if all(hull is not None for hull, _ in hulls):
+        return _LinkParts(list(parts_of(Compound(hulls))), False)  # type: ignore[arg-type]
+    return _LinkParts(list(bounding_parts_of(shape)), True)
+
+
+def _as_hull(shape: Shape) -> Shape | None:
+    """A shape without meshes that is the same set; None where there is none."""
+    if not shape.meshed:
+        return shape
+    if isinstance(shape, Mesh) and shape.solid and is_own_hull(shape.vertices, shape.faces):
+        return ConvexHull(shape.vertices[np.unique(shape.faces)])
+    return None
+
+
+def swollen(packed: PackedConvex, by: float) -> PackedConvex:
+    """A convex set and all that is at most so far from it [m]."""
+    if packed.kind == POINTS:
+        return pack_points(packed.points, packed.radius + by, packed.slop, packed.prepared.with_tree)
+    radius = packed.radius + by
+    return packed._replace(radius=radius, content=packed.content + np.float64(radius).tobytes())
+
+
+def box_of(packed: PackedConvex) -> np.ndarray:
+    """(BOX,) centre and half sides of a box in the set's own frame that holds it; infinite for a half-space."""
+    if packed.kind == HALFSPACE:
+        return np.array([0.0, 0.0, 0.0, np.inf, np.inf, np.inf])
+    if packed.kind == POINTS:
+        low, high = packed.points.min(axis=0), packed.points.max(axis=0)
+        return np.concatenate([0.5 * (low + high), 0.5 * (high - low) + packed.radius + packed.slop])
+    return np.concatenate([np.zeros(3), _curved_half(packed) + packed.radius + packed.slop])
+
+
+def _curved_half(packed: PackedConvex) -> np.ndarray:
+    """Half sides of a curved core's box: three radii of an ellipsoid, else a radius and half a length."""
+    from_radii = packed.params[:3]
+    return from_radii if packed.params[2] > 0.0 else np.array([from_radii[0], from_radii[0], from_radii[1]])
+
+
+def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, padded: int) -> np.ndarray:
+    """(n, BOX) boxes of bodies in their links, around padded parts where there are such."""
+    out = np.empty((len(rows), BOX))
+    for k, (_, first, count) in enumerate(rows.tolist()):
+        which = slice(first + padded, first + padded + count)
+        R, t = parts[which, :9].reshape(-1, 3, 3), parts[which, 9:12]
+        centre = (R @ part_boxes[which, :3, None])[:, :, 0] + t
+        half = (np.abs(R) @ part_boxes[which, 3:, None])[:, :, 0]
+        low, high = (centre - half).min(axis=0), (centre + half).max(axis=0)
+        out[k] = *(0.5 * (low + high)), *(0.5 * (high - low))
+    return out
+
+
+def _stretches(poses: np.ndarray) -> np.ndarray:
+    """(k,) by how much each matrix lengthens a vector at most: the root of the largest row sum of |RᵀR|."""
+    R = poses[:, :9].reshape(-1, 3, 3)
+    return np.sqrt(np.abs(np.swapaxes(R, 1, 2) @ R).sum(axis=2).max(axis=1, initial=0.0)) * (1 + 1e-15)
+
+
+def _slack_of(matrices: np.ndarray, parts: np.ndarray, around: np.ndarray) -> float:
+    """By what share boxes may be off: matrices within the tolerance of rotations are used as they are."""
+    of_links, of_around = parts[:, :9].reshape(-1, 3, 3), around[:, :9].reshape(-1, 3, 3)
+    of_parts = _skew(of_links).max(initial=0.0) + _skew(of_around).max(initial=0.0)
+    return _LEAST_SLACK + 8.0 * (_skew(matrices).sum() + of_parts)
+
+
+def _skew(R: np.ndarray) -> np.ndarray:
+    """(k,) how far matrices are from rotations; roundings of rotations count as none."""
+    off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).sum(axis=(1, 2))
+    return np.where(off < 1e-13, 0.0, off)
+

@@ -1,0 +1,142 @@
+"""The nearest pair of each configuration: signed distance, witness points, and which bodies they belong to.
+
+Limits that grow are tried one after another: what is near is met first, and bounds all that lies beyond it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.narrowphase.rows import BEYOND, BODY_B, DISTANCE, LOWER, ROW, UPPER, is_undecided_or_refused, view_row
+from collide.numerics.vec3 import Vec3, sub
+from collide.robots.check_configurations import begin_configuration, leave_open
+from collide.robots.check_scene import (
+    BODY_INTS,
+    COUNT,
+    FIRST,
+    IS_BOUND_AT,
+    N_BODIES,
+    N_LINK_PARTS,
+    N_OPEN,
+    N_PARTS,
+    N_SELF_PAIRS,
+    OPEN_CAPACITY,
+    PADDED,
+    ROW_AT,
+    SELF_PAIRS_AT,
+    body_of_part,
+    boxes_meet,
+    find_parts_around,
+    is_allowed,
+    place,
+    view_scene,
+)
+from collide.robots.part_pairs import ask, boxes_are_apart, is_bounded, middle
+
+#: The first distance looked within [m], and by how much more each time.
+_FIRST_LIMIT, _GROWTH = 0.05, 8.0
+#: The largest that is tried before all pairs are.
+_LAST_LIMIT = 10.0
+#: `a` of a row where there is no pair.
+NONE = -1
+_BODY_A = BODY_B - 1
+
+
+@entry("int64(int64, int64, int64, int64, int64, float64, int64)")
+def nearest_pairs(header_at, q_at, dof, first, n, max_distance, rows_at):
+    """Rows of PAIR_DTYPE, zeroed, of configurations from ``first`` on, of n; returns the first one without.
+
+    A row's ``a`` is a body, or NONE where nothing is within max_distance [m]; ``b`` is another one, or −1 − the number
+    of a body around. Pairs left to others may be nearer.
+    """
+    scene = view_scene(header_at)
+    words = scene.words
+    q = view_f64(q_at, dof * n)
+    words[N_OPEN] = 0
+    for k in range(first, n):
+        n_open = words[N_OPEN]
+        begin_configuration(scene, q, dof * k)
+        row = view_row(rows_at + ROW * k)
+        limit = min(_FIRST_LIMIT, max_distance)
+        while True:
+            words[N_OPEN] = n_open
+            row.words[_BODY_A] = NONE
+            _find_nearest(scene, row, rows_at + ROW * k, k, limit)
+            if row.words[_BODY_A] != NONE or words[N_OPEN] > n_open or limit >= max_distance:
+                break
+            limit = min(limit * _GROWTH, max_distance) if limit < _LAST_LIMIT else max_distance
+        if words[N_OPEN] > words[OPEN_CAPACITY]:
+            words[N_OPEN] = n_open
+            return k
+    return n
+
+
+@kernel(inline=True)
+def _find_nearest(scene, row, row_at, number, limit):
+    """Make ``row`` that of the nearest pair within the limit."""
+    words = scene.words
+    for body in range(words[N_BODIES]):
+        at = BODY_INTS * body
+        first = scene.bodies[at + FIRST] + words[PADDED]
+        n = find_parts_around(scene, body, limit)
+        for k in range(n):
+            part = scene.candidates[k]
+            around = body_of_part(scene, part)
+            if is_allowed(scene, body, around):
+                continue
+            for p in range(first, first + scene.bodies[at + COUNT]):
+                place(scene, p, body)
+                limit = _take_nearer(scene, p, words[N_LINK_PARTS] + part, body, -1 - around, number, row_at, limit)
+    pairs = view_i64(words[SELF_PAIRS_AT], 2 * words[N_SELF_PAIRS])
+    for k in range(words[N_SELF_PAIRS]):
+        a = pairs[2 * k]
+        b = pairs[2 * k + 1]
+        if not boxes_meet(scene, a, b, limit):
+            continue
+        first_a = scene.bodies[BODY_INTS * a + FIRST]
+        first_b = scene.bodies[BODY_INTS * b + FIRST]
+        for p in range(first_a, first_a + scene.bodies[BODY_INTS * a + COUNT]):
+            place(scene, p, a)
+            for r in range(first_b, first_b + scene.bodies[BODY_INTS * b + COUNT]):
+                place(scene, r, b)
+                limit = _take_nearer(scene, p, r, a, b, number, row_at, limit)
+
+
+@kernel
+def _take_nearer(scene, p, q, a, b, number, row_at, limit):
+    """Copy the row of two parts of bodies a and b if it is nearer; returns the limit from then on.
+
+    What is left open, or belongs to a part that only holds what is meant, is left to others where it may be nearer.
+    """
+    within = max(limit, 0.0)
+    d = Vec3(0.0, 0.0, 0.0)
+    if is_bounded(scene, p) and is_bounded(scene, q):
+        d = sub(middle(scene, q), middle(scene, p))
+        if boxes_are_apart(scene, p, q, d, within):
+            return limit
+    row = ask(scene, p, q, d, False, within)
+    if is_undecided_or_refused(row):
+        leave_open(scene, number, a, b, -math.inf)
+        return limit
+    if row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
+        return limit
+    is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
+    if is_bound[p] != 0 or is_bound[q] != 0:
+        leave_open(scene, number, a, b, row.doubles[LOWER])
+        return limit
+    out = view_row(row_at)
+    if out.words[_BODY_A] != NONE and not row.doubles[DISTANCE] < out.doubles[DISTANCE]:
+        return limit
+    _copy_row(scene, row_at)
+    out.words[_BODY_A] = a
+    out.words[BODY_B] = b
+    return min(limit, out.doubles[UPPER]) if out.doubles[UPPER] > -math.inf else limit
+
+
+@kernel(inline=True)
+def _copy_row(scene, row_at):
+    source = view_i64(scene.words[ROW_AT], ROW // 8)
+    target = view_i64(row_at, ROW // 8)
+    for k in range(ROW // 8):
+        target[k] = source[k]

@@ -1,0 +1,127 @@
+"""A pair of posed parts of a robot that is checked: their boxes first, then the narrowphase."""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import kernel, native_call, view_i64, view_u8
+from collide.lowering.shape_table import POSE
+from collide.narrowphase.pair_kernel import SIGNATURE
+from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
+from collide.numerics.vec3 import Vec3, dot, put_vec3, rotate, rotate_back, sub, vec3_at
+from collide.robots.check_scene import (
+    BOX,
+    CORE,
+    DOUBLES_AT,
+    HALF,
+    INTEGERS_AT,
+    INTS_AT,
+    IS_BOUND_AT,
+    N_PARTS,
+    NUMBERS_AT,
+    PAIR_AT,
+    POSES_AT,
+    ROW_AT,
+    SHAPE_OF_AT,
+    TERMS_AT,
+)
+
+#: What is known of two parts: proven farther apart than the margin; nearer, and apart; they meet; left to others.
+BEYOND_MARGIN, NEAR, HITTING, OPEN = range(4)
+
+_answer_pairs_at = native_call(SIGNATURE)
+
+
+@kernel(inline=True)
+def state_of_parts(scene, p, q, margin):
+    """BEYOND_MARGIN, NEAR, HITTING or OPEN of two parts whose poses are written; without a margin [m] never NEAR."""
+    d = Vec3(0.0, 0.0, 0.0)
+    if is_bounded(scene, p) and is_bounded(scene, q):
+        d = sub(middle(scene, q), middle(scene, p))
+        if boxes_are_apart(scene, p, q, d, margin):
+            return BEYOND_MARGIN
+    row = ask(scene, p, q, d, True, margin)
+    if is_undecided_or_refused(row):
+        return OPEN
+    if row.doubles[LOWER] > margin:
+        return BEYOND_MARGIN
+    is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
+    if is_bound[p] != 0 or is_bound[q] != 0:
+        return OPEN
+    return HITTING if row.flags[HIT] != 0 else NEAR
+
+
+@kernel
+def ask(scene, p, q, d, boolean, limit):
+    """The row of `answer_pairs` about two parts.   d : a direction from p to q to begin with, or zeros."""
+    words = scene.words
+    row_at = words[ROW_AT]
+    blank = view_i64(row_at, ROW // 8)
+    for k in range(ROW // 8):
+        blank[k] = 0
+    row = view_row(row_at)
+    if boolean:
+        put_vec3(row.doubles, NORMAL, d)
+    pair = view_i64(words[PAIR_AT], 2)
+    pair[0] = p
+    pair[1] = q
+    _answer_pairs_at(
+        words[CORE],
+        (
+            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], words[TERMS_AT], words[SHAPE_OF_AT], words[PAIR_AT], 1,
+            boolean, not boolean, boolean, limit, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+        ),
+    )  # fmt: skip
+    return row
+
+
+@kernel(inline=True)
+def is_bounded(scene, part):
+    return scene.part_boxes[BOX * part + HALF] < math.inf
+
+
+@kernel(inline=True)
+def middle(scene, part):
+    """The centre of a part's box in the world."""
+    poses = scene.poses
+    at = POSE * part
+    c = rotate(poses, at, vec3_at(scene.part_boxes, BOX * part))
+    return Vec3(c.x + poses[at + 9], c.y + poses[at + 10], c.z + poses[at + 11])
+
+
+@kernel(inline=True)
+def boxes_are_apart(scene, p, q, d, margin):
+    """Whether a face of one of two turned boxes is farther than the margin from the other.
+
+    d : from the centre of p's box to that of q's.   A face's axis is tested by the other box's extent along it.
+    """
+    poses, boxes = scene.poses, scene.part_boxes
+    at_p = POSE * p
+    at_q = POSE * q
+    a = vec3_at(boxes, BOX * p + HALF)
+    b = vec3_at(boxes, BOX * q + HALF)
+    # Columns of a pose are its box's axes; entry (i, j) is axis i of p along axis j of q.
+    x = rotate_back(poses, at_q, Vec3(poses[at_p], poses[at_p + 3], poses[at_p + 6]))
+    y = rotate_back(poses, at_q, Vec3(poses[at_p + 1], poses[at_p + 4], poses[at_p + 7]))
+    z = rotate_back(poses, at_q, Vec3(poses[at_p + 2], poses[at_p + 5], poses[at_p + 8]))
+    x = Vec3(abs(x.x), abs(x.y), abs(x.z))
+    y = Vec3(abs(y.x), abs(y.y), abs(y.z))
+    z = Vec3(abs(z.x), abs(z.y), abs(z.z))
+    u = rotate_back(poses, at_p, d)
+    v = rotate_back(poses, at_q, d)
+    sizes = abs(d.x) + abs(d.y) + abs(d.z) + a.x + a.y + a.z + b.x + b.y + b.z + margin
+    least = margin + scene.slack * (sizes + _far(poses, at_p) + _far(poses, at_q))
+    return (
+        abs(u.x) - a.x - dot(x, b) > least
+        or abs(u.y) - a.y - dot(y, b) > least
+        or abs(u.z) - a.z - dot(z, b) > least
+        or abs(v.x) - b.x - (x.x * a.x + y.x * a.y + z.x * a.z) > least
+        or abs(v.y) - b.y - (x.y * a.x + y.y * a.y + z.y * a.z) > least
+        or abs(v.z) - b.z - (x.z * a.x + y.z * a.y + z.z * a.z) > least
+    )
+
+
+@kernel(inline=True)
+def _far(poses, at):
+    """How far from the world's origin a part stands, coordinates added up: centres are rounded by that."""
+    return abs(poses[at + 9]) + abs(poses[at + 10]) + abs(poses[at + 11])

@@ -1,0 +1,186 @@
+"""What a robot is to a checker: bodies that move with its links, and which pairs of them are tested."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from collide import argument_checks as checks
+from collide.errors import InvalidArgument, brief, cut, listing
+from collide.robots.check_tables import BodyAround, RobotBody
+from collide.robots.kinematic_tree import COLUMNS
+from collide.robots.robot import Robot
+from collide.shapes.compound import Compound
+from collide.shapes.shape import Shape
+from collide.transforms import as_pose
+from collide.world import World
+
+
+class Attached(NamedTuple):
+    """An object that moves with a link, such as a grasped part.
+
+    name : unique among links and attached objects.   link : the link it moves with.   shape : in its own frame S.
+    X_LS : (4, 4) pose of S in the link [m].   touch : links, and bodies of the World, that it may touch.
+    """
+
+    name: str
+    link: str
+    shape: Shape
+    X_LS: Any = None
+    touch: tuple[str, ...] = ()
+
+
+class Filters(NamedTuple):
+    """Which pairs are tested.
+
+    self_pairs : (k, 2) int64 of bodies.   allowed : (bodies, around) uint8, 1 where a pair is never tested.
+    skipped : {reason: pairs}.
+    """
+
+    self_pairs: np.ndarray
+    allowed: np.ndarray
+    skipped: dict[str, int]
+
+
+def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotBody], dict[str, Attached]]:
+    """Bodies from the last link to the root, attached objects before all, and these by name.
+
+    Raises InvalidArgument, InvalidPose: unknown links, names used twice, a padding that is none.
+    """
+    number = {link: k for k, link in enumerate(robot.links)}
+    objects: dict[str, Attached] = {}
+    for values in attached:
+        item = _checked_object(robot, number, values)
+        if item.name in number or item.name in objects:
+            raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
+        objects[item.name] = item
+    swelling = _padding_of(padding, {*number, *objects})
+    bodies = [
+        RobotBody(item.name, number[item.link], Compound([(item.shape, item.X_LS)]), swelling.get(item.name, 0.0))
+        for item in objects.values()
+    ]
+    for link in reversed(robot.links):
+        if link in robot.geometry:
+            shape = Compound([(element.shape, element.X_LG) for element in robot.geometry[link]])
+            bodies.append(RobotBody(link, number[link], shape, swelling.get(link, 0.0)))
+    if not bodies:
+        raise InvalidArgument(
+            f"RobotChecker: {robot.place} has no collision geometry, so nothing can be tested; look at its <collision> "
+            "elements"
+        )
+    return bodies, objects
+
+
+def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached:
+    try:
+        item = Attached(*values)
+    except TypeError:
+        raise InvalidArgument(
+            "attached must be objects (name, link, shape, X_LS, touch), the last two optional; got " + brief(values)
+        ) from None
+    if not isinstance(item.name, str) or not item.name:
+        raise InvalidArgument(f"attached: a name must be a non-empty string, got {checks.describe(item.name)}")
+    if item.link not in number:
+        raise InvalidArgument(
+            f'attached "{cut(item.name)}": {robot.name} has no link {brief(item.link)}; it has {listing(robot.links)}'
+        )
+    if not isinstance(item.shape, Shape):
+        raise InvalidArgument(f'attached "{cut(item.name)}": not a shape but {checks.describe(item.shape)}')
+    X_LS = np.eye(4) if item.X_LS is None else as_pose(item.X_LS, f'attached "{cut(item.name)}": X_LS').copy()
+    return item._replace(X_LS=X_LS, touch=tuple([item.touch] if isinstance(item.touch, str) else item.touch))
+
+
+def _padding_of(padding, names: set[str]) -> dict[str, float]:
+    """Body → by how much it is swollen [m]."""
+    if not isinstance(padding, Mapping):
+        return dict.fromkeys(names, _checked_padding("padding", padding))
+    for name in padding:
+        if name not in names:
+            raise InvalidArgument(f"padding: no link or attached object is called {brief(name)}")
+    return {name: _checked_padding(f'padding of "{cut(name)}"', value) for name, value in padding.items()}
+
+
+def _checked_padding(what: str, value) -> float:
+    length = checks.number(value)
+    if length is None or not 0.0 <= length < 1e6:
+        raise InvalidArgument(f"{what} must be a length [m], 0 or more, got {checks.describe(value)}")
+    return length
+
+
+def bodies_around(world: World, robot: Robot) -> list[BodyAround]:
+    """Bodies of a World that are not the robot's own; those are named like its links."""
+    names = [name for name in world.names.values() if name not in robot.geometry]
+    return [BodyAround(name, world.body(name).shape, world.body(name).X_WB) for name in names]
+
+
+def filters_of(
+    robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World, around: list[BodyAround],
+    allowed: Iterable[tuple[str, str]], mobile: bool,
+) -> Filters:  # fmt: skip
+    """Pairs that are tested, and how many are not, by reason.
+
+    Never tested: pairs that the robot disables, that ``allowed`` or the World name, links of a fixed base against
+    static bodies, and what groups and masks exclude.
+    """
+    reasons = _named_pairs(robot, objects, world, allowed, {body.name for body in (*bodies, *around)})
+    skipped: dict[str, int] = {}
+
+    def is_skipped(a: str, b: str, why: str | None = None) -> bool:
+        why = why or reasons.get((a, b)) or reasons.get((b, a))
+        if why:
+            skipped[why] = skipped.get(why, 0) + 1
+        return bool(why)
+
+    self_pairs = []
+    for i, A in enumerate(bodies):
+        for j in range(i + 1, len(bodies)):
+            same = "moves with the same link" if A.link == bodies[j].link else None
+            if not is_skipped(A.name, bodies[j].name, same):
+                self_pairs.append((i, j))
+    base = set() if mobile else {robot.links.index(link) for link in robot.base_links}
+    matrix = np.zeros((len(bodies), len(around)), dtype=np.uint8)
+    for k, B in enumerate(around):
+        body = world.body(B.name)
+        masked = "filtered by group and mask" if not (body.mask & 1 and body.group & 0xFFFF) else None
+        for i, A in enumerate(bodies):
+            fixed = "static–static" if body.static and A.link in base else None
+            matrix[i, k] = is_skipped(A.name, B.name, masked or fixed)
+    return Filters(np.array(self_pairs, dtype=np.int64).reshape(-1, 2), matrix, skipped)
+
+
+def _named_pairs(
+    robot: Robot, objects: dict[str, Attached], world: World, allowed: Iterable[tuple[str, str]], known: set[str]
+) -> dict[tuple[str, str], str]:
+    """(name, name) → why the pair is never tested."""
+    reasons = {(a, b): reason for a, b, reason in robot.disabled_pairs}
+    names = world.names
+    for (i, j), reason in world.allowed.items():
+        reasons.setdefault((names[i], names[j]), reason)
+    for item in objects.values():
+        for name in (item.link, *item.touch):
+            reasons.setdefault((item.name, name), "attached object may touch")
+    for pair in allowed:
+        if not (isinstance(pair, (tuple, list)) and len(pair) in (2, 3)):
+            raise InvalidArgument(f"allowed must be pairs of names, got {brief(pair)}")
+        for name in pair[:2]:
+            if name not in known and name not in robot.links:
+                raise InvalidArgument(f"allowed: no link, attached object or body is called {brief(name)}")
+        reasons.setdefault((pair[0], pair[1]), pair[2] if len(pair) == 3 else "allowed")
+    return reasons
+
+
+def paths_to_root(robot: Robot, links: list[int]) -> list[list[str]]:
+    """Of each link, the joints that move, from the link to the root."""
+    above = {joint.child: joint for joint in robot.joints}
+    paths = []
+    for link in links:
+        path, name = [], robot.links[link]
+        while name in above:
+            joint = above[name]
+            if COLUMNS[joint.type]:
+                path.append(joint.name)
+            name = joint.parent
+        paths.append(path)
+    return paths

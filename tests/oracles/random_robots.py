@@ -1,0 +1,112 @@
+"""Seeded robots with joints of every kind, and where their links stand by a plain computation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from naive import pose, random_pose, rotation, unit
+
+import collide
+from collide.robots.kinematic_tree import Joint, Mimic
+from collide.robots.robot import LinkShape, Robot
+
+TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
+
+
+def random_robot(rng, n_links: int = 6, types=TYPES, shape=None, size: float = 0.1) -> Robot:
+    """A tree whose links come in a shuffled order, a third of its single joints following others."""
+    names = [f"link{k}" for k in rng.permutation(n_links)]
+    joints, geometry = [], {}
+    for k in range(1, n_links):
+        kind = str(rng.choice(types))
+        parent = names[int(rng.integers(max(k - 2, 0), k))]
+        axis = np.eye(3)[int(rng.integers(3))] * rng.choice([-1, 1]) if rng.random() < 0.5 else rng.normal(size=3)
+        X_PJ = pose(rotation(rng) if rng.random() < 0.5 else None, rng.uniform(-0.3, 0.3, 3))
+        followed = [j.name for j in joints if j.type in ("revolute", "continuous", "prismatic")]
+        mimic = None
+        if kind in ("revolute", "prismatic") and followed and rng.random() < 0.6:
+            mimic = Mimic(str(rng.choice(followed)), float(rng.uniform(-2, 2)), float(rng.uniform(-0.3, 0.3)))
+        joints.append(Joint(f"joint{k}", kind, parent, names[k], X_PJ, axis, -2.0, 2.0, mimic))
+    for name in names:
+        made = (shape or random_link_shape)(rng, size)
+        geometry[name] = [LinkShape(made, random_pose(rng, size) if rng.random() < 0.5 else np.eye(4), None, "test")]
+    order = rng.permutation(len(joints))
+    return Robot("random", [names[k] for k in rng.permutation(n_links)], [joints[k] for k in order], geometry)
+
+
+def random_link_shape(rng, size: float) -> collide.Shape:
+    r = size * float(rng.uniform(0.5, 1.0))
+    kind = int(rng.integers(7))
+    if kind == 0:
+        return collide.Sphere(r)
+    if kind == 1:
+        return collide.Box(2 * r * rng.uniform(0.3, 1.0, 3))
+    if kind == 2:
+        return collide.Capsule(0.5 * r, r)
+    if kind == 3:
+        return collide.Cylinder(0.5 * r, r)
+    if kind == 4:
+        return collide.ConvexHull(r * np.array([unit(p) for p in rng.normal(size=(20, 3))]))
+    if kind == 5:
+        return collide.Ellipsoid(r * rng.uniform(0.4, 1.0, 3))
+    ball, block = collide.Sphere(0.4 * r), collide.Box((r, r, r))
+    return collide.Compound([(ball, pose(t=(r, 0, 0))), (block, random_pose(rng, r))])
+
+
+def plain_link_poses(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
+    """Link → (4, 4) pose by matrix products and `math`, from the joints as they were given."""
+    column = {name: k for k, name in enumerate(robot.joint_names)}
+    by_name = {joint.name: joint for joint in robot.joints}
+
+    def value(joint: Joint) -> float:
+        if joint.mimic is None:
+            return float(q[column[joint.name]])
+        return joint.mimic.multiplier * value(by_name[joint.mimic.joint]) + joint.mimic.offset
+
+    def motion(joint: Joint) -> np.ndarray:
+        if joint.type == "fixed":
+            return np.eye(4)
+        if joint.type == "prismatic":
+            return pose(t=value(joint) * np.array(joint.axis))
+        if joint.type == "planar":
+            return planar(joint, *(float(q[column[joint.name + s]]) for s in ("/x", "/y", "/yaw")))
+        if joint.type == "floating":
+            x, y, z, roll, pitch, yaw = (
+                float(q[column[joint.name + s]]) for s in ("/x", "/y", "/z", "/roll", "/pitch", "/yaw")
+            )
+            R = turned((0, 0, 1), yaw) @ turned((0, 1, 0), pitch) @ turned((1, 0, 0), roll)
+            return pose(R, (x, y, z))
+        return pose(turned(joint.axis, value(joint)))
+
+    poses = {robot.root: np.eye(4)}
+    remaining = list(robot.joints)
+    while remaining:
+        for joint in remaining[:]:
+            if joint.parent in poses:
+                poses[joint.child] = poses[joint.parent] @ joint.X_PJ @ motion(joint)
+                remaining.remove(joint)
+    return poses
+
+
+def turned(axis, angle: float) -> np.ndarray:
+    """(3, 3) of a turn, by how it acts on vectors along and across the axis."""
+    n = unit(np.array(axis, dtype=float))
+    columns = []
+    for e in np.eye(3):
+        along = (e @ n) * n
+        columns.append(along + math.cos(angle) * (e - along) + math.sin(angle) * np.cross(n, e))
+    return np.array(columns).T
+
+
+def planar(joint: Joint, x: float, y: float, yaw: float) -> np.ndarray:
+    """A shift across the normal, then a turn about it; axes as `Robot` says: farthest coordinate axis first."""
+    n = unit(np.array(joint.axis, dtype=float))
+    first = np.eye(3)[int(np.argmin(np.abs(n)))]
+    first = unit(first - (first @ n) * n)
+    return pose(turned(n, yaw), x * first + y * np.cross(n, first))
+
+
+def random_configurations(rng, robot: Robot, n: int) -> np.ndarray:
+    low, high = np.maximum(robot.lower, -2.0), np.minimum(robot.upper, 2.0)
+    return rng.uniform(low, high, (n, robot.dof))

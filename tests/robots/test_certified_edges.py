@@ -1,0 +1,132 @@
+"""Straight motions: what is said to be free has no collision anywhere, and what is between samples is not missed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from naive import pose, rng_of
+from random_robots import plain_link_poses, random_configurations, random_link_shape, random_robot
+
+import collide
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape, Robot
+
+
+def scattered(rng, n: int) -> collide.World:
+    world = collide.World()
+    for k in range(n):
+        world.add(random_link_shape(rng, 0.2), pose(t=rng.uniform(-0.7, 0.7, 3)), name=f"body{k}")
+    return world
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_free_motions_have_no_sample_that_collides_and_times_do(seed):
+    rng = rng_of("edges", seed)
+    robot = random_robot(rng, n_links=5)
+    checker = collide.RobotChecker(robot, scattered(rng, 25))
+    Q0 = random_configurations(rng, robot, 60)
+    Q0 = Q0[~checker.collides(Q0)][:20]
+    Q1 = Q0 + rng.normal(size=Q0.shape)
+    edges = checker.certify_edges(Q0, Q1)
+    assert (edges.free.astype(int) + edges.collides + edges.is_open == 1).all()
+    for k in np.flatnonzero(edges.free):
+        ts = rng.random(300)[:, None]
+        hits = checker.collides(Q0[k] + ts * (Q1[k] - Q0[k]))
+        assert not hits.any(), f"seed {seed}, edge {k}: proven free, and hits at {ts[hits][:3].ravel().tolist()}"
+    for k in np.flatnonzero(edges.collides):
+        assert checker.collides(Q0[k] + edges.time[k] * (Q1[k] - Q0[k])), f"seed {seed}, edge {k}: {edges.time[k]}"
+    assert set(edges.open["edge"]) == set(np.flatnonzero(edges.is_open))
+    assert len(edges.open_names) == len(edges.open) and (edges.open["begin"] < edges.open["end"]).all()
+
+
+def test_of_random_motions_most_are_decided_and_both_verdicts_come():
+    free = collides = total = 0
+    for seed in range(10):
+        rng = rng_of("edges", seed)
+        robot = random_robot(rng, n_links=5)
+        checker = collide.RobotChecker(robot, scattered(rng, 25))
+        Q0 = random_configurations(rng, robot, 60)
+        Q0 = Q0[~checker.collides(Q0)][:20]
+        edges = checker.certify_edges(Q0, Q0 + rng.normal(size=Q0.shape))
+        free, collides, total = free + edges.free.sum(), collides + edges.collides.sum(), total + len(edges)
+    assert total >= 100 and free >= 0.2 * total and collides >= 0.2 * total and free + collides >= 0.9 * total
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_speck_on_the_way_is_never_overlooked(seed):
+    """A ball of a hundredth of a millimetre stands where a link's surface is at one moment of the motion."""
+    rng = rng_of("specks", seed)
+    robot = random_robot(rng, n_links=6, shape=lambda rng, size: collide.Sphere(size), size=0.05)
+    robot.semantic_pairs = [(a, b, "test") for a in robot.links for b in robot.links if a < b]
+    q0, q1 = random_configurations(rng, robot, 2)
+    t = float(rng.uniform(0.02, 0.98))
+    before, after = plain_link_poses(robot, q0), plain_link_poses(robot, q1)
+    link = max(robot.links, key=lambda name: np.abs(after[name] - before[name]).max())
+    element = robot.geometry[link][0]
+    X_WG = plain_link_poses(robot, q0 + t * (q1 - q0))[link] @ element.X_LG
+    direction = rng.normal(size=3)
+    p = X_WG[:3, 3] + direction / np.linalg.norm(direction) * element.shape.radius
+    world = collide.World()
+    world.add(collide.Sphere(1e-5), pose(t=p), name="speck")
+    edges = collide.RobotChecker(robot, world).certify_edges(q0, q1, resolution=1e-4)
+    assert not edges.free[0], f"seed {seed}: the speck is met at t = {t}"
+
+
+def pendulum(length: float = 1.0) -> Robot:
+    """base -turn(z)-> rod, thin and long along x."""
+    z_along_x = pose(np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]), (length / 2, 0, 0))
+    rod = [LinkShape(collide.Capsule(0.001, length), z_along_x, None, "test")]
+    turn = Joint("turn", "continuous", "base", "rod", np.eye(4), (0, 0, 1.0))
+    return Robot("pendulum", ["base", "rod"], [turn], {"rod": rod})
+
+
+def test_what_samples_miss_is_met():
+    world = collide.World()
+    world.add(collide.Sphere(0.001), pose(t=(0.9 * np.cos(0.505), 0.9 * np.sin(0.505), 0)), name="pin")
+    checker = collide.RobotChecker(pendulum(), world)
+    assert not checker.edge_collides([0.0], [1.0], resolution=0.02)[0]
+    edges = checker.certify_edges([0.0], [1.0])
+    assert edges.collides[0] and abs(edges.time[0] - 0.505) < 0.003
+    assert checker.edge_collides([0.0], [1.0], resolution=0.002)[0]
+
+
+def test_what_is_passed_closely_is_proven_and_what_is_grazed_stays_open():
+    world = collide.World()
+    pin = world.add(collide.Sphere(0.01), pose(t=(1.0135, 0.0, 0)), name="pin")
+    checker = collide.RobotChecker(pendulum(), world)
+    edges = checker.certify_edges([-1.0], [1.0])
+    assert edges.free[0] and edges.n_checked < 400 and len(edges.open) == 0
+    world.set_pose(pin, pose(t=(1.011 + 1e-9, 0.0, 0)))  # a nanometre away
+    edges = checker.certify_edges([-1.0], [1.0], resolution=1e-2)
+    assert edges.is_open[0] and edges.open_names == [("rod", "pin")] * len(edges.open)
+    assert (edges.open["begin"] < 0.5).any() and (edges.open["end"] - edges.open["begin"] < 0.03).all()
+
+
+def test_motions_that_stay_are_configurations():
+    world = collide.World()
+    world.add(collide.Sphere(0.1), pose(t=(0.5, 0.0, 0)), name="ball")
+    checker = collide.RobotChecker(pendulum(), world)
+    edges = checker.certify_edges([[0.0], [1.0]], [[0.0], [1.0]])
+    assert edges.time[0] == 0.0 and edges.free.tolist() == [False, True]
+
+
+def test_samples_are_no_farther_apart_than_asked():
+    world = collide.World()
+    world.add(collide.Sphere(0.006), pose(t=(0.9, 0.0, 0)), name="pin")
+    checker = collide.RobotChecker(pendulum(), world)
+    rng = rng_of("samples")
+    start = rng.uniform(-2, 0, (200, 1))
+    assert checker.edge_collides(start - 0.01, start + 2.01, resolution=0.014).all()
+    assert checker.edge_collides(start - 0.01, start + 2.01, resolution=0.5).mean() < 0.5
+
+
+def test_threads_give_the_same():
+    rng = rng_of("threads of edges")
+    robot = random_robot(rng, n_links=5)
+    checker = collide.RobotChecker(robot, scattered(rng, 25))
+    Q = random_configurations(rng, robot, 2001)
+    one, two = checker.certify_edges(Q[:-1], Q[1:], resolution=0.05), checker.certify_edges(
+        Q[:-1], Q[1:], resolution=0.05, threads=2)
+    for field in ("free", "time", "open"):
+        assert getattr(one, field).tobytes() == getattr(two, field).tobytes()
+    assert one.n_checked == two.n_checked
