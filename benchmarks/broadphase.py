@@ -43,7 +43,7 @@ RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (100, 1000, 10_000, 100_000)
 LAYOUTS = ("uniform", "clustered", "a few huge", "all sizes", "few move")
 #: Seconds that the turns of one size and layout may take, and how many there are.
-SECONDS, TURNS = 12.0, 15
+SECONDS, TURNS = 5.0, 15
 
 
 def layout(kind: str, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -32,8 +32,9 @@ mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 _FIRST_CHUNK = 8
 #: Pairs of bodies that a thread takes at once; booleans that stop at a hit look whether there was one after so many.
 _PAIRS_AT_ONCE = 2048
-#: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most.
-_MIN_SORTED, _LIKELIEST = 512, 32
+#: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most, of at most
+#: so many, evenly taken: to look at all would take half as long as to ask them.
+_MIN_SORTED, _LIKELIEST, _MAX_COMPARED = 512, 32, 2048
 
 
 class Answer(NamedTuple):
@@ -253,14 +254,13 @@ class PackedWorld:
 
     def _likeliest(self, candidates: np.ndarray) -> np.ndarray:
         """Numbers of the candidates whose boxes overlap most, in sides of the smaller one."""
-        boxes = self.parts.body_boxes(np.arange(len(self.roster.ids)))
-        low, high = boxes[:, :3], boxes[:, 3:]
-        sides = (high - low).max(axis=1)
-        a, b = candidates.T
+        some = np.arange(0, len(candidates), -(-len(candidates) // _MAX_COMPARED))
+        a, b = (self.parts.body_boxes(bodies) for bodies in candidates[some].T)
         with np.errstate(invalid="ignore", divide="ignore"):
-            overlap = (np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])).min(axis=1)
-            overlap = np.nan_to_num(overlap / np.minimum(sides[a], sides[b]), nan=0.0)
-        return np.sort(np.argpartition(-overlap, _LIKELIEST)[:_LIKELIEST])
+            overlap = (np.minimum(a[:, 3:], b[:, 3:]) - np.maximum(a[:, :3], b[:, :3])).min(axis=1)
+            sides = np.minimum((a[:, 3:] - a[:, :3]).max(axis=1), (b[:, 3:] - b[:, :3]).max(axis=1))
+            overlap = np.nan_to_num(overlap / sides, nan=0.0)
+        return np.sort(some[np.argpartition(-overlap, _LIKELIEST)[:_LIKELIEST]])
 
     def _answer_in_pieces(
         self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool, threads: int
@@ -347,6 +347,8 @@ class PackedWorld:
         rows = run_pairs(
             parts.table, parts.poses, parts.row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
         )
+        if boolean and parts.all_of_one_part:
+            return Answer(rows, len(rows), len(rows), 0)
         pairs, owner = pairs[: len(rows)], owner[: len(rows)]
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
         if boolean:
@@ -364,7 +366,8 @@ def _joined(answers: list[Answer], boolean: bool) -> Answer:
     rows = np.concatenate([np.zeros(0, dtype=PAIR_DTYPE), *(answer.rows for answer in answers)])
     if not boolean:
         rows = rows[np.lexsort((rows["b"], rows["a"]))]
-    return Answer(rows, *(sum(answer[k] for answer in answers) for k in (1, 2, 3)))
+    n_parts, n_bodies = sum(answer.convex_pairs for answer in answers), sum(answer.body_pairs for answer in answers)
+    return Answer(rows, n_parts, n_bodies, sum(answer.mesh_pairs for answer in answers))
 
 
 def batches_of_shapes(

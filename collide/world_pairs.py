@@ -217,7 +217,8 @@ class WorldPairs(WorldScene):
         all_rows = np.concatenate([answer.rows for answer in answers]) if len(answers) > 1 else answers[0].rows
         self._last_query = QueryRecord(
             packed, packed.roster, packed.filters, len(candidates), all_rows["hit"].copy(), all_rows["how"].copy(),
-            all_rows["iterations"].copy(), *(sum(answer[k] for answer in answers) for k in (1, 2, 3)),
+            all_rows["iterations"].copy(), sum(answer.convex_pairs for answer in answers),
+            sum(answer.body_pairs for answer in answers), sum(answer.mesh_pairs for answer in answers),
             packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )  # fmt: skip

@@ -39,7 +39,7 @@ class PartTrees:
         all_pairs, owners = self._all_pairs(candidates[by_part])
         pairs_found, owner = [all_pairs], [by_part[owners]]
         for k in by_tree.tolist():
-            pairs_found.append(self._by_tree(*candidates[k].tolist(), margin))
+            pairs_found.append(self._by_tree(int(candidates[k, 0]), int(candidates[k, 1]), margin))
             owner.append(np.full(len(pairs_found[-1]), k))
         pairs, owners = np.concatenate(pairs_found), np.concatenate(owner)
         near = self._are_near(pairs, margin)

@@ -42,8 +42,10 @@ class QueryRecord:
         allowed = self.filters.allowed
         is_there = alive[allowed].all(axis=1)
         reasons = [self.filters.reasons[k] for k in np.flatnonzero(is_there).tolist()]
-        columns = (column[alive] for column in (roster.static, roster.group, roster.mask, roster.sleeping))
-        skipped = count_skipped(*columns, place[allowed[is_there]], reasons)
+        skipped = count_skipped(
+            roster.static[alive], roster.group[alive], roster.mask[alive], roster.sleeping[alive],
+            place[allowed[is_there]], reasons,
+        )  # fmt: skip
         pairs = n * (n - 1) // 2
         skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
         return {

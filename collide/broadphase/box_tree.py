@@ -88,6 +88,8 @@ class BoxTree:
         self._changed: list[np.ndarray] = []
         self._n_holes = 0
         self._work = dict(_NO_WORK)
+        self.sections = [0]
+        self.nodes, self.links = np.empty((0, 6)), np.empty((0, LINK), dtype=np.int64)
         self._make()
 
     # --- making ---------------------------------------------------------------------------------
@@ -104,9 +106,11 @@ class BoxTree:
         """All trees anew, of the bodies that there are."""
         is_bounded = np.isfinite(self.boxes).all(axis=1) & self._alive
         self.unbounded = np.flatnonzero(self._alive & ~is_bounded)
+        self.sections = [0]
         self._resize(2 * int(is_bounded.sum()))
         self.leaf_of[:] = -1
-        self.sections, self._sides, self._n_holes = [0], [], 0
+        self._sides: list[float] = []
+        self._n_holes = 0
         for bodies in (np.flatnonzero(is_bounded & self._fixed), np.flatnonzero(is_bounded & ~self._fixed)):
             if len(bodies):
                 self._add_section(bodies)
@@ -117,9 +121,8 @@ class BoxTree:
     def _resize(self, capacity: int) -> None:
         """Memory for so many nodes."""
         nodes, links = np.empty((max(capacity, 2), 6)), np.empty((max(capacity, 2), LINK), dtype=np.int64)
-        if hasattr(self, "sections"):
-            used = min(self.sections[-1], capacity)
-            nodes[:used], links[:used] = self.nodes[:used], self.links[:used]
+        used = min(self.sections[-1], capacity)
+        nodes[:used], links[:used] = self.nodes[:used], self.links[:used]
         self.nodes, self.links = nodes, links
 
     def _add_section(self, bodies: np.ndarray) -> None:
@@ -147,7 +150,8 @@ class BoxTree:
         sides = sum(self._sides)
         if not self._sides:
             return 0.0, 0.0
-        extent = math.fsum(abs(x) for x in (self.around[3:] - self.around[:3]).tolist())
+        x0, y0, z0, x1, y1, z1 = self.around.tolist()
+        extent = (x1 - x0) + (y1 - y0) + (z1 - z0)
         return sides, sides / extent if 0.0 < extent < math.inf else 0.0
 
     @property
@@ -237,9 +241,9 @@ class BoxTree:
             bodies = np.append(bodies, in_last[in_last >= 0])
             del self.sections[-1], self._sides[-1]
         self._add_section(bodies)
-        added = 1.0 - before / max(sum(self._sides), 1e-300)
+        growth = 1.0 - before / max(sum(self._sides), 1e-300)
         sides, relative = self._quality()
-        self._least = self._least[0] + added * sides, self._least[1] + added * relative
+        self._least = self._least[0] + growth * sides, self._least[1] + growth * relative
         self._note_changed(new[is_bounded])
 
     def remove(self, bodies: np.ndarray) -> None:

@@ -25,7 +25,8 @@ def count_skipped(
     """
     traits = np.stack([static.astype(np.int64), group, mask, (asleep | (static != 0)).astype(np.int64)], axis=1)
     classes, inverse, sizes = np.unique(traits, axis=0, return_inverse=True, return_counts=True)
-    inverse, skipped = inverse.reshape(-1), Counter()
+    inverse = inverse.reshape(-1)
+    skipped: Counter[str] = Counter()
     for start in range(0, len(classes), _BLOCK):
         block = np.arange(start, min(start + _BLOCK, len(classes)))
         pairs = sizes[block, None] * sizes[None]
