@@ -66,6 +66,10 @@ if TYPE_CHECKING:
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
+    from collide.sweeps.configurations import DrawnConfigurations
+    from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
+    from collide.sweeps.sweep import sweep
+    from collide.sweeps.sweep_results import SweepResults, read_sweep
     from collide.transforms import pose
     from collide.world import World
     from collide.world_hits import WorldHits
@@ -102,6 +106,10 @@ _HOMES = {
         "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.shapes.tessellation": ("tessellate",),
+    "collide.sweeps.configurations": ("DrawnConfigurations",),
+    "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
+    "collide.sweeps.sweep": ("sweep",),
+    "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
     "collide.world_hits": ("WorldHits",),
@@ -116,13 +124,14 @@ _RENAMED = {
 
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
-    "Contacts", "ConvexHull", "Cylinder", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
-    "InvalidArgument", "InvalidPose", "InvalidShape", "Mesh", "MissingExtra", "Overlay", "PairResult", "RayHits",
-    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "Sphere", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify",
-    "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses",
-    "overlay", "pose", "poses_in_motion", "raycast", "self_collisions", "shape_cast", "tessellate", "time_of_impact",
-    "verify", "walk",
+    "Contacts", "ConvexHull", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace",
+    "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Mesh", "MissingExtra",
+    "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError",
+    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults", "TimeOfImpact", "UnknownBody",
+    "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance",
+    "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion",
+    "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast", "sweep", "tessellate",
+    "time_of_impact", "verify", "walk",
 ]
 
 

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
+from collide import cli_srdf, cli_sweep
 from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
@@ -392,4 +393,6 @@ def _write_reports(made: list, place: str | None) -> None:
 _COMMANDS: dict[str, Callable] = {
     "report": _report, "check": _check, "compare": _compare, "stress": _stress, "locality": _locality,
     "scenes": _scenes, "doctor": _doctor,
+    "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,
+    "sweep": lambda args: FREE if cli_sweep.run(args, _progress(args.quiet)) else YES,
 }  # fmt: skip

@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__
+from collide import __version__, cli_srdf, cli_sweep
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -186,6 +186,9 @@ def parser() -> argparse.ArgumentParser:
     _add_stress(commands)
     _add_locality(commands)
     _add_scenes(commands)
+    cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
+    sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
+    cli_sweep.add_arguments(sweep, _scene_arguments)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)
     return made
 

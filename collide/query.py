@@ -112,6 +112,13 @@ def collide(
             pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
         return _batched(A, B, X_WA, X_WB, check_poses, threads)
     margin = checked_margin("security_margin", security_margin)
+    if margin and algorithm is None and axes is None and type(threads) is int and threads == 1:
+        try:
+            hit = A._prepared[B._serial].within(X_WA, X_WB, margin)
+            if hit is not None:
+                return hit
+        except (AttributeError, KeyError, TypeError):
+            pass  # as above
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
     answer = named_algorithm("collide", algorithm)
@@ -134,7 +141,8 @@ def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
 
 def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    rows = answer_batch(A, B, X_WA, X_WB, Question(False, margin, depths=False, check=check_poses), threads)
+    question = Question(False, margin, depths=False, check=check_poses)
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
 
@@ -225,9 +233,9 @@ def distance(
         if limit != math.inf or check_threads(threads) != 1:
             raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')
         return answer(A, B, X_WA, X_WB, check_poses, signed)
-    if limit == math.inf and threads.__class__ is int and threads == 1:
+    if threads.__class__ is int and threads == 1:
         try:
-            rows = A._prepared[B._serial].distance(X_WA, X_WB, signed)
+            rows = A._prepared[B._serial].distance(X_WA, X_WB, signed, limit)
             if rows is not None:
                 return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
         except (AttributeError, KeyError, TypeError):

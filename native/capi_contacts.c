@@ -83,9 +83,9 @@ collide_status contacts_of_pair(collide_workspace *space, struct manifold_space 
     collide_status status = COLLIDE_OK;
     rounding given = round_as_kernels_do();
     *n = 0;
-    memcpy(&header[F_MARGIN], &margin, sizeof margin);
     header[F_MAX_CONTACTS] = max_contacts;
-    if (space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows), 0) < 0)
+    if (space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows), 0,
+                                        margin) < 0)
         status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, max_contacts, flags, rows, n);
     else
         *n = header[F_ROWS_DONE];

@@ -129,7 +129,8 @@ collide_status collide_mesh_distance(collide_workspace *workspace, const collide
     if ((status = check_pair(workspace, A, B, X_WA, X_WB, flags)) != COLLIDE_OK) return status;
     given = round_as_kernels_do();
     take_meshes(workspace->mesh, A, B);
-    if (workspace->kernels->gap_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB), address_of(pair), 1) < 0) {
+    if (workspace->kernels->gap_single(address_of(workspace->mesh->header), address_of(X_WA), address_of(X_WB), address_of(pair), 1,
+                                       INFINITE) < 0) {
         memset(pair, 0, sizeof *pair);
         status = why(workspace, X_WA, X_WB, flags);
     }

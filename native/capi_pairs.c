@@ -226,16 +226,15 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
 {
     collide_status status = COLLIDE_OK;
     rounding given;
-    int64_t result = -1;
+    int64_t result;
     if (pair == NULL) return COLLIDE_INVALID_ARGUMENT;
     memset(pair, 0, sizeof *pair);
     if (workspace == NULL || A == NULL || B == NULL || X_WA == NULL || X_WB == NULL || are_none(flags) || !(max_distance >= 0.0))
         return COLLIDE_INVALID_ARGUMENT;
     given = round_as_kernels_do();
     take_pair(workspace, A, B);
-    if (max_distance == INFINITE)
-        result = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
-                                                   address_of(pair), !(flags & COLLIDE_UNSIGNED));
+    result = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
+                                                 address_of(pair), !(flags & COLLIDE_UNSIGNED), max_distance);
     if (result < 0) {
         struct question asked = single(workspace, X_WA, X_WB, flags, 0);
         size_t failed;

@@ -66,7 +66,7 @@ def python_functions(entries) -> str:
         lines += ["    Py_RETURN_NONE;" if result == "void" else f"    return {_TO_PYTHON[result]};", "}"]
         text += lines
     singles = [(name, len(_parsed(signature)[1])) for name, signature, nogil in entries if not nogil]
-    macros = {3: "SINGLE_BOOLEAN", 5: "SINGLE_ROW"}  # collide/kernels/prepared.py
+    macros = {3: "SINGLE_BOOLEAN", 6: "SINGLE_ROW"}  # collide/kernels/prepared.py
     text.append("#define SINGLES " + " ".join(f"{macros[count]}({name})" for name, count in singles))
     text.append("#define SINGLE_METHODS " + " ".join(f"SINGLE_METHOD({name})" for name, _ in singles))
     text.append("#define ENTRIES \\")

@@ -87,8 +87,9 @@ static PyObject *answer_of(int64_t result)
     static PyObject *single_##name(PyObject *self, PyObject *const *given, Py_ssize_t n)                                 \
     {                                                                                                                    \
         void *A, *B, *out;                                                                                               \
+        double limit;                                                                                                    \
         uint8_t flag;                                                                                                    \
-        if (n != 4) return wrong_count(#name, 4, n);                                                                     \
+        if (n != 5) return wrong_count(#name, 5, n);                                                                     \
         A = matrix_of(given[0]);                                                                                         \
         B = matrix_of(given[1]);                                                                                         \
         if (A == NULL || B == NULL) Py_RETURN_NONE;                                                                      \
@@ -97,8 +98,9 @@ static PyObject *answer_of(int64_t result)
             return NULL;                                                                                                 \
         }                                                                                                                \
         out = PyArray_DATA((PyArrayObject *)given[2]);                                                                   \
-        if (truth_of(given[3], &flag) < 0) return NULL;                                                                  \
-        return answer_of(kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B, (int64_t)(intptr_t)out, flag)); \
+        if (truth_of(given[3], &flag) < 0 || double_of(given[4], &limit) < 0) return NULL;                               \
+        return answer_of(                                                                                                \
+            kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B, (int64_t)(intptr_t)out, flag, limit)); \
     }
 
 SINGLES

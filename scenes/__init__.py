@@ -20,13 +20,15 @@ from collide.errors import SceneError, brief
 if TYPE_CHECKING:
     from collide.scenes.description import Scene, SceneBody
     from collide.scenes.generators import generate
+    from collide.scenes.loaders.allowed_pairs import allow_pairs
     from collide.scenes.loaders.load_scene import load
 
-__all__ = ["Scene", "SceneBody", "generate", "load", "path", "shipped"]
+__all__ = ["Scene", "SceneBody", "allow_pairs", "generate", "load", "path", "shipped"]
 
 _HOME = {
     "Scene": "collide.scenes.description",
     "SceneBody": "collide.scenes.description",
+    "allow_pairs": "collide.scenes.loaders.allowed_pairs",
     "generate": "collide.scenes.generators",
     "load": "collide.scenes.loaders.load_scene",
 }

@@ -236,14 +236,13 @@ class SingleContacts:
         self._of_manifold[:PAIRS_DONE] = _addresses(
             table, self._faces, self._space, self._space.poses, self._space.shape_of
         )
-        self._margin = self._of_manifold[MARGIN : MARGIN + 1].view(np.float64)
         self._ask = prepared_row(contacts_single, self._header)
 
     def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
         """Rows; None where more than doubles, or an error, is called for."""
         rows = zeroed_rows(min(max_contacts, self.max_rows), CONTACT_DTYPE)
-        self._margin[0], self._of_manifold[MAX_CONTACTS] = margin, max_contacts
-        if self._ask(X_WA, X_WB, rows, False) is None:
+        self._of_manifold[MAX_CONTACTS] = max_contacts
+        if self._ask(X_WA, X_WB, rows, False, margin) is None:
             return None
         return rows[: self._of_manifold[ROWS_DONE]]
 

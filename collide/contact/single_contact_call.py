@@ -7,7 +7,6 @@ from collide.contact.closed_form_rows import has_closed_form, put_closed_form
 from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
 from collide.contact.convex_manifolds import (
     INTS_AT,
-    MARGIN,
     MAX_CONTACTS,
     NUMBERS_AT,
     ROWS_DONE,
@@ -40,7 +39,7 @@ SINGLE_HEADER = HEADER + MANIFOLD_HEADER
 
 
 @entry(prepared.ROW, nogil=False)
-def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
+def contacts_single(header_at, XA_at, XB_at, out_at, _unused, margin):
     """The contacts of one pair of poses; 0, or −1 where the caller has to ask as of a batch.
 
     header : of SINGLE_HEADER integers; how many contacts there are is left at its ROWS_DONE.
@@ -49,7 +48,6 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused):
     """
     manifold_at = header_at + 8 * HEADER
     header = view_i64(manifold_at, MANIFOLD_HEADER)
-    margin = view_f64(manifold_at + 8 * MARGIN, 1)[0]
     X_WA, X_WB = view_f64(XA_at, 16), view_f64(XB_at, 16)
     block = block_of(header_at)
     rows_at = block.header[ROWS_AT]

@@ -13,10 +13,10 @@ import numpy as np
 from collide.kernels import address_of
 from collide.kernels.mode import COMPILED, MODE
 
-#: Signatures: addresses of the header and of two matrices; of rows, where they go, and a flag of the kernel's own. They
-#: return −1 where the answer is left to the long way.
+#: Signatures: addresses of the header and of two matrices; of rows, where they go, a flag of the kernel's own, and how
+#: far apart bodies may be for it to matter [m]. They return −1 where the answer is left to the long way.
 BOOLEAN = "int64(int64, int64, int64)"
-ROW = "int64(int64, int64, int64, int64, boolean)"
+ROW = "int64(int64, int64, int64, int64, boolean, float64)"
 
 if MODE == COMPILED:
     from collide.kernels.library import glue
@@ -29,7 +29,7 @@ if MODE == COMPILED:
         return glue.prepared(entry.__name__, header)
 
     def prepared_row(entry, header: np.ndarray) -> Callable:
-        """A function of two poses, an array that becomes the answer, and a flag: the kernel's boolean, or None."""
+        """A function of two poses, an array for the answer, a flag and a limit: the kernel's boolean, or None."""
         return glue.prepared(entry.__name__, header)
 else:
 
@@ -43,10 +43,10 @@ else:
         return asked
 
     def prepared_row(entry, header: np.ndarray) -> Callable:
-        def asked(X_WA, X_WB, out, flag):
+        def asked(X_WA, X_WB, out, flag, limit):
             if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
                 return None
-            status = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag)
+            status = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag, limit)
             return None if status < 0 else bool(status)
 
         return asked

@@ -20,7 +20,7 @@ from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
-from collide.narrowphase.single_call import collide_single, distance_single
+from collide.narrowphase.single_call import collide_single, distance_single, within_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, zeroed_rows
 from collide.transforms import SMALLEST
 
@@ -226,10 +226,14 @@ _of_thread = _OfThread()
 
 
 @cache
-def _space_of_single_calls() -> BlockWorkspace:
+def space_of_single_calls() -> BlockWorkspace:
     """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
     is good as long as it is held."""
     return BlockWorkspace()
+
+
+#: Where a row would go.
+_NO_ROW = np.zeros(1)
 
 
 class SinglePair:
@@ -240,12 +244,17 @@ class SinglePair:
 
     def __init__(self, table: ShapeTable):
         table.build_trees(np.arange(2))
-        self.table, self._space = table, _space_of_single_calls()  # held, since kernels use their buffers
+        self.table, self._space = table, space_of_single_calls()  # held, since kernels use their buffers
         header = self.header = self._space.header_of(table)
         self.of_contacts: Any = None  # `contact.convex_contacts.SingleContacts`, once contacts are asked for
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
+        self._within = prepared_row(within_single, header)
 
-    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
         rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows
+        return None if self._distance(X_WA, X_WB, rows, depths, limit) is None else rows
+
+    def within(self, X_WA, X_WB, margin: float) -> bool | None:
+        """Whether the bodies are at most so far apart [m]; None as there, and where the bracket does not say."""
+        return self._within(X_WA, X_WB, _NO_ROW, False, margin)

@@ -18,6 +18,8 @@ from collide.narrowphase.epa.refine_depth import refine
 from collide.narrowphase.gjk.gjk import APART, ENCLOSED, NEAREST, gjk
 from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, weighted_sum
 from collide.narrowphase.gjk.simplex import nearest_of_all, weigh_enclosed
+from collide.narrowphase.shallow_cylinders import is_cylinder_pair, shallow_cylinders
+from collide.narrowphase.shallow_ellipsoids import NOTHING, is_ellipsoid_pair, shallow_ellipsoids
 from collide.numerics.vec3 import Vec3, neg, norm, norm1, scale, sub, vec3_at
 
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
@@ -63,6 +65,11 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
     pair = ordered.pair
     points, weights, ids = work.points, work.weights, work.ids
     exact_numbers = ordered.exact_numbers and not curved
+    if query.depths and curved:
+        shallow = _shallow_depth(pair, work, ordered.size)
+        if shallow.is_proven:
+            depth, proven, nhat = shallow.depth, shallow.proven, shallow.nhat
+            return CoreDistance(depth, -depth, -proven, -math.inf, math.inf, nhat, 1, 1, shallow.iterations)
     run = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)
     n = run.n_points
     distance = norm(vec3_at(weights, NEAREST_POINT))
@@ -79,6 +86,16 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
                 nearest_of_all(points, 4, weights, 15)
         return _common_point(upper, n, run.iterations)
     return _by_epa(ordered, query, work, run, upper, radius, error, curved)
+
+
+@kernel
+def _shallow_depth(pair, work, size):
+    """The `ShallowDepth` of two cores, one of them curved."""
+    if is_ellipsoid_pair(pair):
+        return shallow_ellipsoids(pair, work.points, work.ids, work.weights, size, TOLERANCE_CURVED * size)
+    if is_cylinder_pair(pair):
+        return shallow_cylinders(pair, work.points, work.ids, work.weights, size, TOLERANCE_CURVED * size)
+    return NOTHING
 
 
 @kernel(inline=True)

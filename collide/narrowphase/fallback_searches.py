@@ -101,6 +101,13 @@ def _take_sign(row, result, limit):
         doubles[UPPER] = math.inf
     else:
         doubles[DISTANCE] = min(max(doubles[DISTANCE], doubles[LOWER]), doubles[UPPER]) + 0.0
+    lay_row_apart(row)
+
+
+@kernel
+def lay_row_apart(row):
+    """Lay the points of a row as far apart along its normal as it says; they stay about their middle."""
+    doubles = row.doubles
     p_a, p_b = vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B)
     gap = scale(doubles[DISTANCE], vec3_at(doubles, NORMAL))
     missing = scale(0.5, sub(gap, sub(p_b, p_a)))

@@ -43,6 +43,10 @@ def _prepare_facets(A: Shape, B: Shape) -> Any:
     return mesh_batches.single_pair(A, B)
 
 
+def _prepare_curved(A: Shape, B: Shape) -> Any:
+    return mesh_batches.curved_pair(A, B)
+
+
 def _unprepared(A: Shape, B: Shape) -> None:
     return None
 
@@ -50,6 +54,7 @@ def _unprepared(A: Shape, B: Shape) -> None:
 _SETS = Answer(answer_sets, prepare_sets, False)
 _PARTS = Answer(answer_parts, prepare_parts, False)
 _FACETS = Answer(_answer_meshes, _prepare_facets, True)
+_CURVED = Answer(_answer_meshes, _prepare_curved, True)
 _MESHES = Answer(_answer_meshes, _unprepared, True)
 
 ANSWERS: dict[Method, Answer] = {
@@ -59,7 +64,7 @@ ANSWERS: dict[Method, Answer] = {
     Method.CONVEX: _SETS,
     Method.PARTS: _PARTS,
     Method.FACETS: _FACETS,
-    Method.CURVED: _MESHES,
+    Method.CURVED: _CURVED,
     Method.HULL: _MESHES,
     Method.MESH_PARTS: _MESHES,
 }

@@ -23,6 +23,7 @@ from collide.narrowphase.pose_batches import (
     SHAPE_OF_AT,
     answer_block,
     block_of,
+    clear_rows,
     set_pose,
 )
 from collide.narrowphase.rows import (
@@ -31,7 +32,8 @@ from collide.narrowphase.rows import (
     DISTANCE,
     HIT,
     HOW,
-    ROW,
+    LOWER,
+    UPPER,
     is_undecided,
     is_undecided_or_refused,
     view_row,
@@ -42,10 +44,10 @@ _settle_hulls_at = native_call(SIGNATURE)
 
 
 @kernel
-def _answer(header_at, XA_at, XB_at, boolean, depths, row_at):
+def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than this, or an error has to be raised.
 
-    header : of `pose_batches.py`.
+    header : of `pose_batches.py`.   limit : of gaps beyond it no more is said than that [m].
     What doubles leave open of two hulls, boxes that touch for example, is settled here, as `exact_stage.settle_rows`
     does first; a depth that takes more than that is left to the long way.
     """
@@ -54,7 +56,6 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, row_at):
     good_b = set_pose(block.poses, BLOCK * POSE, view_f64(XB_at, 16), True)
     if not (good_a and good_b):
         return -1
-    limit = 0.0 if boolean else math.inf
     answer_block(block.header, 1, boolean, depths, limit, row_at)
     row = view_row(row_at)
     if is_undecided(row):
@@ -84,17 +85,32 @@ def collide_single(header_at, XA_at, XB_at):
     All threads share its workspace: it keeps Python's lock.
     """
     rows_at = view_i64(header_at, HEADER)[ROWS_AT]
-    row = view_i64(rows_at, ROW // 8)
-    for k in range(ROW // 8):
-        row[k] = 0
-    return _answer(header_at, XA_at, XB_at, True, False, rows_at)
+    clear_rows(rows_at, 1)
+    return _answer(header_at, XA_at, XB_at, True, False, 0.0, rows_at)
 
 
 @entry(prepared.ROW, nogil=False)
-def distance_single(header_at, XA_at, XB_at, row_at, depths):
+def within_single(header_at, XA_at, XB_at, _unused_at, _unused, limit):
+    """Whether the pair is at most so far apart, 0 or 1; −1 as `collide_single`, and where the bracket is too wide."""
+    rows_at = view_i64(header_at, HEADER)[ROWS_AT]
+    row = view_row(rows_at)
+    clear_rows(rows_at, 1)
+    hit = _answer(header_at, XA_at, XB_at, False, False, limit, rows_at)
+    if hit != 0:
+        return hit
+    if row.doubles[LOWER] > limit:
+        return 0
+    return 1 if row.doubles[UPPER] <= limit else -1
+
+
+@entry(prepared.ROW, nogil=False)
+def distance_single(header_at, XA_at, XB_at, row_at, depths, limit):
     """ROW zero bytes become the pair's row, without a depth unless those are wanted; returns as `collide_single`. −1,
-    too, where the depth is infinite."""
-    hit = _answer(header_at, XA_at, XB_at, False, depths, row_at)
+    too, where the depth is infinite.
+
+    limit : the query's max_distance [m].
+    """
+    hit = _answer(header_at, XA_at, XB_at, False, depths, limit, row_at)
     row = view_row(row_at)
     row.words[BODY_B] = 1
     if not depths and hit >= 0:

@@ -32,6 +32,8 @@ OPTIONAL = (
     ("numba", "jit", "changing kernels: COLLIDE_JIT=1"),
     ("coacd", "decompose", "meshes as unions of convex pieces"),
     ("matplotlib", "plots", "collide locality --plot"),
+    ("pyarrow", "sweep", "collide sweep"),
+    ("distributed", "sweep", "collide sweep --scheduler"),
     ("mujoco", "mujoco", "MuJoCo's steps with collide's contacts"),
     ("coal", "peers", "collide compare"),
     ("python-fcl", "peers", "collide compare"),

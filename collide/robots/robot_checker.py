@@ -127,6 +127,14 @@ class RobotChecker:
             f"{self.n_pairs} pairs tested)"
         )
 
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle takes along. What holds addresses is made again."""
+        return {name: value for name, value in vars(self).items() if name not in ("setting", "_seen", "_spare")}
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state, _seen=None, _spare=[])
+        self._prepare()
+
     # --- questions ------------------------------------------------------------------------------
 
     def collides(self, Q, *, threads: int = 1, progress: Callable[[int, int], None] | None = None):

@@ -376,7 +376,7 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
         fields.sub("allowed_collision_matrix", ()) if isinstance(fields.get("allowed_collision_matrix"), dict) else None
     )
     if matrix is not None and matrix.get("entry_names"):
-        pairs.update({pair: ALLOWED for pair in _matrix_pairs(matrix, names)})
+        pairs.update({pair: ALLOWED for pair in matrix_pairs(matrix, names)})
         named = {*matrix.words("entry_names"), *matrix.words("default_entry_names")}
         strangers = [link for link in robot.links if link in robot.geometry and link not in named]
         disabled_pairs = [(a, b, reason) for a, b, reason in disabled_pairs if a in strangers or b in strangers]
@@ -391,7 +391,7 @@ def _allow_pairs(fields: Fields, scene: Scene, robot: Robot) -> None:
     scene.allowed += [(a, b, reason) for (a, b), reason in pairs.items()]
 
 
-def _matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
+def matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
     """Pairs of bodies, in the order of ``names``, that the matrix allows.
 
     An entry for the pair decides; else the defaults of its members, of which a False wins.

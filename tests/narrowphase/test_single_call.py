@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from itertools import combinations_with_replacement
 
 import naive
@@ -72,6 +73,76 @@ def test_touching_boxes_take_the_one_call():
             if single_calls_are_safe():
                 pair = prepared_pair(A, B)
                 assert pair.collide(np.eye(4), X) == (gap.max() <= 0.0)
-                assert pair.distance(np.eye(4), X, False).tobytes() == row.tobytes()
+                assert pair.distance(np.eye(4), X, False, np.inf).tobytes() == row.tobytes()
         signs.append(np.sign(gap.max()))
     assert min(signs.count(sign) for sign in (-1.0, 0.0, 1.0)) >= 5
+
+
+def test_single_limits_and_margins_have_the_bits_of_a_batch(monkeypatch):
+    """Of all kinds of shapes, within the limit and beyond it; most take the one call, of meshes none."""
+    rng = rng_of("single limits")
+    kinds = [kind for kind in naive.KINDS if kind != "Halfspace"]
+    beyond, long_way, asked = [], [], 0
+    answer_batch = query.answer_batch
+    monkeypatch.setattr(
+        query, "answer_batch", lambda *args, **named: (long_way.append(1), answer_batch(*args, **named))[1]
+    )
+    for kind_a, kind_b in combinations_with_replacement(kinds, 2):
+        A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
+        X, Y = (np.array([random_pose(rng, 0.8) for _ in range(6)]) for _ in range(2))
+        limit = float(rng.choice([1e-3, 0.05, 0.2]))
+        for signed in (True, False):
+            rows = collide.distance(A, B, X, Y, max_distance=limit, signed=signed).rows
+            for k in range(len(X)):
+                with naive.reproducible(Case(A, B, X[k], Y[k])):
+                    single = collide.distance(A, B, X[k], Y[k], max_distance=limit, signed=signed)
+                    assert single.rows.tobytes() == rows[k].tobytes()
+        within = collide.collide(A, B, X, Y, security_margin=limit)
+        long_way.clear()
+        for k in range(len(X)):
+            with naive.reproducible(Case(A, B, X[k], Y[k])):
+                told = collide.collide(A, B, X[k], Y[k], security_margin=limit)
+                assert told is bool(within[k])
+        if kind_a != "Mesh" and kind_b != "Mesh":
+            beyond.extend(rows["beyond"])
+            asked += len(X) - len(long_way)
+    assert 0.1 < naive.share(beyond) < 0.9
+    if single_calls_are_safe():
+        assert asked > 0.9 * len(beyond), "margins go the long way"
+
+
+def test_single_margins_of_exactly_the_gap_go_the_long_way():
+    """The margin lies within the bracket: integers say, on grown bodies; one call leaves it to them."""
+    A, B, X = collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), collide.pose((1.3, 0, 0))
+    gap = collide.distance(A, B, np.eye(4), X)
+    answers = set()
+    for margin in (np.nextafter(gap.lower, 0.0), gap.lower, gap.distance, gap.upper, np.nextafter(gap.upper, 1.0)):
+        for _ in range(2):  # the second time prepared
+            answers.add((float(margin), collide.collide(A, B, np.eye(4), X, security_margin=float(margin))))
+    assert len({margin for margin, _ in answers}) == len(answers), "an answer depends on what was asked before"
+    assert {told for _, told in answers} == {True, False}
+    if single_calls_are_safe():
+        assert prepared_pair(A, B).within(np.eye(4), X, 0.5) is True
+        assert prepared_pair(A, B).within(np.eye(4), X, 0.1) is False
+
+
+def test_threads_that_ask_with_limits_of_their_own():
+    """The limit and the margin come with the call: threads that share a prepared pair do not share them."""
+    A, B, X = collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), collide.pose((1.25, 0, 0))
+    collide.distance(A, B, np.eye(4), X)
+    collide.contacts(A, B, np.eye(4), X)
+    wrong = []
+
+    def ask(limit: float) -> None:
+        for _ in range(400):
+            if bool(collide.distance(A, B, np.eye(4), X, max_distance=limit).beyond) is not (limit < 0.25):
+                wrong.append(limit)
+            if len(collide.contacts(A, B, np.eye(4), X, margin=limit)) != (0 if limit < 0.25 else 4):
+                wrong.append(limit)
+
+    threads = [threading.Thread(target=ask, args=(limit,)) for limit in (0.0, 0.1, 0.3, 1.0)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong

@@ -19,11 +19,15 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 NEEDS = {
     "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
     "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
+    **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
 }
 #: What hosts print when they are imported.
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
 #: What each example's output must hold.
 SHOWS = {
+    "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
+    "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],
+    "20_reachable_positions": ["200000 postures", "free of collision, layer by layer", "m above the floor"],
     "17_newton_solver": ["newton: ", "collide: ", "of 500 pairs: Newton 20, collide 0"],
     "16_pybullet_arm": ["Bullet says otherwise in", "finger over the table: +0.800 mm, Bullet -0.200 mm", "a World of"],
     "01_two_shapes": ["gap [m]:", "certified: True", "by exact arithmetic"],
@@ -130,6 +134,17 @@ def test_python_in_the_readme_runs():
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
     done = run("-c", "\n".join(blocks))
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(find_spec("yaml") is None, reason="PyYAML is not installed: the scene cannot be read")
+def test_example_of_planning_proves_all_of_its_path():
+    """Each run has a path of several motions, every one of them proven, and most of the time goes into checks."""
+    done = run(str(ROOT / "examples" / "18_certified_planning.py"))
+    (free, motions), (share,) = (
+        re.search(pattern, done.stdout).groups()
+        for pattern in (r"(\d+) of its (\d+) motions are proven free", r"(\d+) % of it in collision checks")
+    )
+    assert int(free) == int(motions) >= 2 and 10 <= int(share) <= 100
 
 
 @pytest.mark.skipif(find_spec("pinocchio") is None, reason="Pinocchio (pin) is not installed")

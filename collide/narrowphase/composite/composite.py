@@ -139,10 +139,20 @@ class CompoundPair:
         self.collide = prepared_boolean(collide_single_compound, words)
         self._distance = prepared_row(distance_single_compound, words)
 
-    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
+    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
         """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
         rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._distance(X_WA, X_WB, rows, depths) is None else rows
+        return None if self._distance(X_WA, X_WB, rows, depths, limit) is None else rows
+
+    def within(self, X_WA, X_WB, margin: float) -> bool | None:
+        """As `run.SinglePair` has it."""
+        rows = self.distance(X_WA, X_WB, False, margin)
+        if rows is None:
+            return None
+        row = rows[0]
+        if row["hit"] or row["upper"] <= margin:
+            return True
+        return False if row["lower"] > margin else None
 
 
 #: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.

@@ -18,7 +18,7 @@ SINGLE_HEADER = _HEADER + HEADER
 
 
 @kernel
-def _answer(header_at, XA_at, XB_at, boolean, depths, out_at):
+def _answer(header_at, XA_at, XB_at, boolean, depths, limit, out_at):
     """Answer one pair of poses; false where it takes more than doubles, or an error has to be raised."""
     header = view_i64(header_at, SINGLE_HEADER)
     for k in range(_HEADER + N_DONE, SINGLE_HEADER):
@@ -26,9 +26,7 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, out_at):
     status = answer_compounds_at(
         header[_KERNEL],
         (
-            header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, 0.0 if boolean else math.inf, True,
-            False,
-            out_at,
+            header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, limit, True, False, out_at,
         ),
     )  # fmt: skip
     return status == 0
@@ -41,16 +39,16 @@ def collide_single_compound(header_at, XA_at, XB_at):
     All threads share its workspace: it keeps Python's lock.
     """
     byte_at = view_i64(header_at, SINGLE_HEADER)[_BYTE_AT]
-    if not _answer(header_at, XA_at, XB_at, True, False, byte_at):
+    if not _answer(header_at, XA_at, XB_at, True, False, 0.0, byte_at):
         return -1
     return int(view_u8(byte_at, 1)[0])
 
 
 @entry(prepared.ROW, nogil=False)
-def distance_single_compound(header_at, XA_at, XB_at, row_at, depths):
+def distance_single_compound(header_at, XA_at, XB_at, row_at, depths, limit):
     """ROW zero bytes become the pair's row, without a depth unless those are wanted; −1 as there, else 0. −1, too,
-    where the depth is infinite."""
-    if not _answer(header_at, XA_at, XB_at, False, depths, row_at):
+    where the depth is infinite.   limit : the query's max_distance [m]."""
+    if not _answer(header_at, XA_at, XB_at, False, depths, limit, row_at):
         return -1
     row = view_row(row_at)
     row.words[BODY_B] = 1

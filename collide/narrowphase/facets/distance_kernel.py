@@ -301,7 +301,7 @@ def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, depths, hull_at,
 
 
 @entry(prepared.ROW, nogil=False)
-def gap_single(header_at, XA_at, XB_at, row_at, depths):
+def gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
     """1 with the row of PAIR_DTYPE, zeroed before, of bodies that are apart or without depths; −1: the long way is
     taken."""
     if not (is_rigid(XA_at, True) and is_rigid(XB_at, True)):

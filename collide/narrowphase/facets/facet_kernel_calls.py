@@ -326,10 +326,16 @@ class SinglePair:
         """Whether single calls are short enough to keep Python's lock."""
         return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
-    def distance(self, X_WA, X_WB, depths: bool) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, bytes as of a batch; None of depths, and of what kernels do not complete."""
+    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, bytes as of a batch; None of depths, limits, and what kernels do not complete."""
+        if limit < math.inf:
+            return None
         if not self._has_slabs:
             _make_slabs(*self._held[:2])
             self._has_slabs = True
         rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._gap(X_WA, X_WB, rows, depths) is None else rows
+        return None if self._gap(X_WA, X_WB, rows, depths, limit) is None else rows
+
+    def within(self, X_WA, X_WB, margin: float) -> bool | None:
+        """Whether they are at most so far apart [m]: left to the long way."""
+        return None

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
@@ -19,6 +20,7 @@ from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.collide_kernel import APART, OPEN
+from collide.narrowphase.facets.curved_gap_calls import CurvedPair, serves
 from collide.narrowphase.facets.facet_kernel_calls import SinglePair, balls_farther
 from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -120,6 +122,15 @@ def single_pair(A: Shape, B: Shape) -> SinglePair | None:
     """
     bodies = body_of(A), body_of(B)
     return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
+
+
+def curved_pair(A: Shape, B: Shape) -> CurvedPair | None:
+    """A mesh and a curved shape, in either order, made ready for single gaps; None where these are batches of one."""
+    exchanged = kind_of(A) is not Kind.MESH
+    if exchanged:
+        A, B = B, A
+    E = enclosure_of(B)
+    return CurvedPair(body_of(A), E, exchanged) if serves(E.packed) else None
 
 
 def _has_compound(A: Shape, B: Shape) -> bool:

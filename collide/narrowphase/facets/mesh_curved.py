@@ -18,6 +18,7 @@ from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
+from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
@@ -209,6 +210,22 @@ def _first_facets(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, r
 
 def _nearest(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets: np.ndarray) -> np.ndarray:
     """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
+
+    Exact poses go through one kernel each; what that leaves is asked about round by round.
+    """
+    exact = np.flatnonzero((PA.slop == 0.0) & (PB.slop == 0.0)) if serves(E.packed) else np.zeros(0, dtype=np.int64)
+    rows, remaining = np.zeros(len(facets), dtype=PAIR_DTYPE), np.ones(len(facets), dtype=bool)
+    if len(exact):
+        rows[exact], is_written = gap_rows(A, E, PA.X[exact], PB.X[exact])
+        remaining[exact] = ~is_written
+    some = np.flatnonzero(remaining)
+    if len(some):
+        rows[some] = _nearest_by_rounds(A, E, PA.of(some), PB.of(some), facets[some])
+    return rows
+
+
+def _nearest_by_rounds(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets: np.ndarray) -> np.ndarray:
+    """The same in rounds of many facets of all poses.
 
     Gaps alone are asked for: where a facet's sign is open, the points of a gap lie on the bodies, those of a depth need
     not.

@@ -1,0 +1,108 @@
+"""Gaps of meshes and cylinders, cones and ellipsoids from Python: batches of poses, and pairs for single calls."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_row
+from collide.lowering.enclosures import Enclosure
+from collide.lowering.facet_bodies import Body, reach_of
+from collide.lowering.facet_table import FacetTable
+from collide.lowering.packed_convex import POINTS, PackedConvex
+from collide.lowering.shape_table import POSE
+from collide.mesh.bvh import WIDTH
+from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_calls
+from collide.narrowphase.facets.curved_gap_kernel import (
+    EXCHANGED,
+    HEADER,
+    REACH_OF_MESH,
+    STACK_AT,
+    curved_gap_single,
+    curved_gaps,
+)
+from collide.narrowphase.facets.facet_queries import points_in_solid
+from collide.narrowphase.facets.winding_numbers import OUTSIDE
+from collide.narrowphase.pair_kernel import answer_pairs
+from collide.results import PAIR_DTYPE, zeroed_rows
+
+
+def serves(packed: PackedConvex) -> bool:
+    """Whether the kernel takes a shape: not polytopes of rounded corners."""
+    return packed.kind != POINTS
+
+
+class GapQuestion:
+    """A mesh and a shape as the kernel reads them, and what it writes into.
+
+    workspace : addresses of doubles and integers that `answer_pairs` works in.
+    """
+
+    def __init__(self, A: Body, E: Enclosure, workspace: tuple[int, int]):
+        self.table = FacetTable(np.zeros((1, 3, 3)), E.packed)
+        n_stack = WIDTH * (A.tree.depth + 2)
+        self.poses, self.rows = np.zeros((2, POSE)), np.zeros(2, dtype=PAIR_DTYPE)
+        self.numbers = np.array([0, 1])
+        self.stack, self.bounds = np.zeros(n_stack, dtype=np.int64), np.zeros(n_stack)
+        self.header = np.zeros(HEADER, dtype=np.int64)
+        buffers = self.table.coordinates, self.poses, self.numbers, self.numbers, self.rows
+        self.header[:STACK_AT] = (
+            code_of(answer_pairs), A.tree.address, *self.table.addresses, *map(address_of, buffers), *workspace,
+        )  # fmt: skip
+        self.header[STACK_AT:EXCHANGED] = address_of(self.stack), address_of(self.bounds)
+        self.header.view(np.float64)[REACH_OF_MESH] = reach_of(A)
+
+
+def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, (n,) bool whether they are written) of a mesh and a shape at n poses (n, 4, 4) at which they are apart.
+
+    Rows that are not written are to be asked about in another way.
+    """
+    n = len(X_WA)
+    rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)
+    X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
+    question = GapQuestion(A, E, scratch())
+    curved_gaps(
+        address_of(question.header), address_of(X_WA), address_of(X_WB), n, address_of(rows), address_of(is_written)
+    )
+    return rows, is_written
+
+
+class CurvedPair:
+    """A mesh and a shape prepared for single gaps without a limit; everything else is left to the long way.
+
+    exchanged : the shape stands first.
+    """
+
+    def __init__(self, A: Body, E: Enclosure, exchanged: bool):
+        self._space = space_of_single_calls()  # held: all threads use it, one after the other, with Python's lock
+        self._question = GapQuestion(A, E, self._space.addresses)
+        self._question.header[EXCHANGED] = exchanged
+        self._bodies, self._exchanged = (A, E), exchanged
+        self._ask = prepared_row(curved_gap_single, self._question.header)
+
+    def collide(self, X_WA, X_WB) -> bool | None:
+        """False where the bodies are apart; None where they may meet: the long way says."""
+        return None if self.distance(X_WA, X_WB, False, math.inf) is None else False
+
+    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
+        """One row of `PAIR_DTYPE`, bytes as of a batch; None where the bodies may meet, and of limits."""
+        if limit < math.inf:
+            return None
+        rows = zeroed_rows(1, PAIR_DTYPE)
+        apart = self._ask(X_WA, X_WB, rows, depths, limit)
+        if apart is False and self._bodies[0].solid:
+            A, E = self._bodies
+            X_WM, X_WS = (X_WB, X_WA) if self._exchanged else (X_WA, X_WB)
+            apart = True if points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE else None
+        return None if apart is None else rows
+
+    def within(self, X_WA, X_WB, margin: float) -> bool | None:
+        """Whether they are at most so far apart [m]; None as there, and where the bracket does not say."""
+        rows = self.distance(X_WA, X_WB, False, math.inf)
+        if rows is None:
+            return None
+        lower, upper = rows["lower"][0], rows["upper"][0]
+        return True if upper <= margin else False if lower > margin else None

@@ -1,0 +1,339 @@
+"""The gap of a mesh and a cylinder, cone or ellipsoid: a walk down the box-tree, the convex engine at the facets.
+
+Facets are taken nearest first, by the gaps between boxes along the mesh's axes and along the normal of the nearest
+facet so far; what is farther than the least upper bound is left out. The mesh's bracket is the least of the facets'.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
+from collide.lowering.packed_convex import BLOCK
+from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, RADIUS, REACH, SLOP
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, NOTHING, WIDTH, TreeView, float_column_at, link_of, open_tree
+from collide.mesh.bvh import REACH as TREE_REACH
+from collide.narrowphase.bounds import PROMISE_CURVED
+from collide.narrowphase.fallback_searches import lay_row_apart
+from collide.narrowphase.pair_kernel import SIGNATURE
+from collide.narrowphase.pose_batches import clear_rows, set_pose
+from collide.narrowphase.rows import (
+    BEYOND,
+    BODY_B,
+    CERTIFIED,
+    COUNT,
+    DISTANCE,
+    HIT,
+    ITERATIONS,
+    LOWER,
+    NORMAL,
+    PART_A,
+    PART_B,
+    POINT_A,
+    POINT_B,
+    ROW,
+    UPPER,
+    VERTICES_A,
+    VERTICES_B,
+    is_undecided_or_refused,
+    view_row,
+)
+from collide.numerics.vec3 import Vec3, absolute, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.support.support_mapping import curved_support
+
+_answer_pairs_at = native_call(SIGNATURE)
+
+# Header: addresses of `answer_pairs`, of the tree, of two rows of the `ShapeTable` (a facet, the shape), of the facet's
+# coordinates, of two poses, their shape rows, one pair, a row, the workspace, and two stacks of so many places; whether
+# the shape stands first in single calls; the reach of the mesh's facets from its origin (a double).
+(
+    CORE, TREE_AT, INTS_AT, NUMBERS_AT, COORDINATES_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROW_AT, DOUBLES_AT,
+    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, REACH_OF_MESH,
+) = range(15)  # fmt: skip
+HEADER = 15
+#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh.
+LONG_WAY, SURFACES_APART, MAYBE_INSIDE = -1, 1, 0
+
+#: A matrix farther off a rotation is left to the long way.
+_FAR_OFF = 2.0**-40
+#: Of the pair's size, what rounding takes off a gap between boxes.
+_ROUNDING = 2.0**-44
+_U = 2.0**-53
+
+
+class _Walk(NamedTuple):
+    """What a walk works on: the tree, the header's words, rows of the tables, the poses.
+
+    t : p_WB − p_WA.   low, high : the shape's box along the mesh's axes, from the mesh's origin [m].
+    slack : what rounding takes off every gap [m].
+    """
+
+    header_at: int
+    tree: TreeView
+    words: Any
+    ints: Any
+    numbers: Any
+    poses: Any
+    t: Vec3
+    low: Vec3
+    high: Vec3
+    slack: float
+
+
+class _Nearest(NamedTuple):
+    """Of the facets asked about so far.
+
+    key, place : of the best row, which stands first among the rows.   lower, upper : least of all [m].
+    open_lower : least of those that are not certified.   along, above : the mesh's direction in which the shape is
+    looked for, and how high its lowest point is.   failed : a facet has no proven gap.
+    """
+
+    key: float
+    place: int
+    lower: float
+    upper: float
+    open_lower: float
+    along: Vec3
+    above: float
+    failed: bool
+
+
+@kernel(inline=True)
+def _height(walk, d):
+    """How far the shape reaches along a direction of the world, from its own origin."""
+    g = rotate_back(walk.poses, POSE, d)
+    kind = walk.ints[INTS + KIND]
+    return dot(g, curved_support(kind, walk.numbers, NUMBERS + PARAMS, g)) + walk.numbers[NUMBERS + RADIUS]
+
+
+@kernel(inline=True)
+def _column(R, axis):
+    return Vec3(R[axis], R[3 + axis], R[6 + axis])
+
+
+@kernel(inline=True)
+def _gap_of_box(walk, nearest, centre, half):
+    """A lower bound of the distance of the shape from a box of the mesh's frame; below 0 where none is known."""
+    x = max(centre.x - half.x - walk.high.x, walk.low.x - centre.x - half.x)
+    y = max(centre.y - half.y - walk.high.y, walk.low.y - centre.y - half.y)
+    z = max(centre.z - half.z - walk.high.z, walk.low.z - centre.z - half.z)
+    x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+    gap = math.sqrt(x * x + y * y + z * z) * (1.0 - 2.0**-38)
+    along = nearest.above - dot(nearest.along, centre) - dot(absolute(nearest.along), half)
+    return max(gap, along) - walk.slack
+
+
+@kernel(inline=True)
+def _box_of_facet(tree, place):
+    """(centre, half lengths) of a facet's box."""
+    p, q, r = vec3_at(tree.triangles, 9 * place), vec3_at(tree.triangles, 9 * place + 3), vec3_at(
+        tree.triangles, 9 * place + 6
+    )
+    low = Vec3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
+    high = Vec3(max(p.x, q.x, r.x), max(p.y, q.y, r.y), max(p.z, q.z, r.z))
+    return scale(0.5, Vec3(low.x + high.x, low.y + high.y, low.z + high.z)), scale(0.5, sub(high, low))
+
+
+@kernel
+def _ask_facet(walk, place):
+    """The row of one facet and the shape, written behind the best one."""
+    words, tree = walk.words, walk.tree
+    coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
+    reach = 0.0
+    for corner in range(3):
+        x, y, z = tree.triangles[9 * place + 3 * corner], tree.triangles[9 * place + 3 * corner + 1], tree.triangles[
+            9 * place + 3 * corner + 2
+        ]
+        coordinates[corner] = x
+        coordinates[BLOCK + corner] = y
+        coordinates[2 * BLOCK + corner] = z
+        reach = max(reach, x * x + y * y + z * z)
+    for k in range(3, BLOCK):
+        coordinates[k] = coordinates[0]
+        coordinates[BLOCK + k] = coordinates[BLOCK]
+        coordinates[2 * BLOCK + k] = coordinates[2 * BLOCK]
+    walk.numbers[REACH] = math.sqrt(reach) * (1 + 1e-15)
+    row_at = words[ROW_AT] + ROW
+    clear_rows(row_at, 1)
+    _answer_pairs_at(
+        words[CORE],
+        (
+            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False, False,
+            False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+        ),
+    )  # fmt: skip
+    return view_row(row_at)
+
+
+@kernel
+def _with_facet(walk, nearest, place):
+    """The `_Nearest` with one facet more."""
+    row = _ask_facet(walk, place)
+    lower, upper = row.doubles[LOWER], row.doubles[UPPER]
+    failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
+    key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
+    own_key = 2.0 * upper - lower
+    if own_key < key or (own_key == key and place < best):
+        key, best = own_key, place
+        source, target = view_i64(walk.words[ROW_AT] + ROW, ROW // 8), view_i64(walk.words[ROW_AT], ROW // 8)
+        for k in range(ROW // 8):
+            target[k] = source[k]
+        n = scale(1.0 - 2.0**-40, vec3_at(row.doubles, NORMAL))
+        along = rotate_back(walk.poses, 0, n)
+        above = dot(n, walk.t) - _height(walk, neg(n))
+    open_lower = nearest.open_lower if row.flags[CERTIFIED] != 0 else min(nearest.open_lower, lower)
+    return _Nearest(
+        key, best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above, failed
+    )
+
+
+@kernel
+def _push_children(walk, nearest, node, top):
+    """Put what may be near enough of a node's boxes on the stack, the nearest on top; returns its height."""
+    tree = walk.tree
+    stack, bounds = view_i64(walk.words[STACK_AT], top + WIDTH), view_f64(walk.words[BOUNDS_AT], top + WIDTH)
+    unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
+    middle = vec3_at(tree.numbers, CENTRE)
+    first = top
+    for slot in range(WIDTH):
+        at = NODE * node + slot
+        half = float_column_at(tree.boxes, at + 3 * WIDTH)
+        if not half.x > NOTHING / 2:
+            continue
+        centre = float_column_at(tree.boxes, at)
+        centre = Vec3(middle.x + unit * centre.x, middle.y + unit * centre.y, middle.z + unit * centre.z)
+        bound = _gap_of_box(walk, nearest, centre, scale(unit, half))
+        if bound > nearest.upper:
+            continue
+        k = top
+        while k > first and bounds[k - 1] < bound:
+            bounds[k] = bounds[k - 1]
+            stack[k] = stack[k - 1]
+            k -= 1
+        bounds[k] = bound
+        stack[k] = 8 * node + slot
+        top += 1
+    return top
+
+
+@kernel
+def _walk_down(walk):
+    """The `_Nearest` of all facets that may be nearest."""
+    tree, words = walk.tree, walk.words
+    zero = Vec3(0.0, 0.0, 0.0)
+    nearest = _Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, False)
+    top = _push_children(walk, nearest, 0, 0)
+    while top > 0 and not nearest.failed:
+        top -= 1
+        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
+            continue
+        link = link_of(tree.links, view_i64(words[STACK_AT], top + 1)[top])
+        if link >= 0:
+            top = _push_children(walk, nearest, link, top)
+            continue
+        run = ~link
+        for place in range(run >> 3, (run >> 3) + (run & 7)):
+            centre, half = _box_of_facet(tree, place)
+            if not _gap_of_box(walk, nearest, centre, half) > nearest.upper:
+                nearest = _with_facet(walk, nearest, place)
+    return nearest
+
+
+@kernel(inline=True)
+def _off_rotation(R):
+    """How far a matrix is off a rotation: the largest entry of RᵀR − I, and rounding."""
+    x, y, z = _column(R, 0), _column(R, 1), _column(R, 2)
+    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
+    return max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 4.0 * _U
+
+
+@kernel
+def _gap(header_at, XA_at, XB_at, check, row_at):
+    """The row of one pair of poses, the mesh's first; LONG_WAY, SURFACES_APART or MAYBE_INSIDE."""
+    words = view_i64(header_at, HEADER)
+    ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
+    poses = view_f64(words[POSES_AT], 2 * POSE)
+    if not (set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)):
+        return LONG_WAY
+    off = _off_rotation(poses)
+    if not off < _FAR_OFF:
+        return LONG_WAY
+    tree = open_tree(words[TREE_AT])
+    t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
+    reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
+    slack = (_ROUNDING + 8.0 * off) * reach + numbers[NUMBERS + SLOP]
+    walk = _Walk(header_at, tree, words, ints, numbers, poses, t, t, t, slack)
+    x, y, z = _column(poses, 0), _column(poses, 1), _column(poses, 2)
+    low = Vec3(
+        dot(x, t) - _height(walk, neg(x)), dot(y, t) - _height(walk, neg(y)), dot(z, t) - _height(walk, neg(z))
+    )
+    high = Vec3(dot(x, t) + _height(walk, x), dot(y, t) + _height(walk, y), dot(z, t) + _height(walk, z))
+    walk = _Walk(header_at, tree, words, ints, numbers, poses, t, low, high, slack)
+    nearest = _walk_down(walk)
+    if nearest.failed or nearest.place < 0:
+        return LONG_WAY
+    _write_gap(walk, nearest, row_at)
+    centre = scale(0.5, Vec3(low.x + high.x, low.y + high.y, low.z + high.z))
+    reach_a = vec3_at(tree.numbers, TREE_REACH)
+    inside = abs(centre.x) <= reach_a.x + slack and abs(centre.y) <= reach_a.y + slack
+    return MAYBE_INSIDE if inside and abs(centre.z) <= reach_a.z + slack else SURFACES_APART
+
+
+@kernel
+def _write_gap(walk, nearest, row_at):
+    """The mesh's row from the best facet's and the least of all brackets."""
+    source, target = view_i64(walk.words[ROW_AT], ROW // 8), view_i64(row_at, ROW // 8)
+    for k in range(ROW // 8):
+        target[k] = source[k]
+    row = view_row(row_at)
+    of_best = row.doubles[DISTANCE]
+    distance = min(max(of_best, nearest.lower), nearest.upper)
+    row.doubles[LOWER], row.doubles[UPPER], row.doubles[DISTANCE] = nearest.lower, nearest.upper, distance
+    if distance != of_best:
+        lay_row_apart(row)
+    numbers = walk.numbers
+    reach = view_f64(walk.header_at + 8 * REACH_OF_MESH, 1)[0]
+    size = reach + numbers[NUMBERS + REACH] + norm(walk.t)
+    certified = nearest.open_lower > nearest.upper or nearest.upper - nearest.lower <= PROMISE_CURVED * size
+    row.flags[CERTIFIED] = 1 if certified else 0
+    row.flags[HIT] = row.flags[BEYOND] = row.flags[COUNT] = 0
+    row.words[PART_A], row.words[PART_B], row.words[ITERATIONS] = walk.tree.ids[nearest.place], 0, 0
+    for k in range(4):
+        row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def curved_gaps(header_at, XA_at, XB_at, n, rows_at, states_at):
+    """Rows of a mesh and a shape at n pairs of checked poses that are apart; returns how many are written.
+
+    header : of HEADER integers.   XA, XB : 16 doubles a pose.   rows : of PAIR_DTYPE.   states : a byte a pose, 1 where
+    its row is written.
+    """
+    states, n_written = view_u8(states_at, n), 0
+    for k in range(n):
+        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, rows_at + ROW * k)
+        states[k] = 0 if status == LONG_WAY else 1
+        n_written += int(states[k])
+    return n_written
+
+
+@entry(prepared.ROW, nogil=False)
+def curved_gap_single(header_at, XA_at, XB_at, row_at, _unused, _unlimited):
+    """ROW zero bytes become the row of bodies whose surfaces are apart; LONG_WAY, SURFACES_APART, or MAYBE_INSIDE.
+
+    header : its [EXCHANGED] says that the shape stands first.
+    """
+    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
+    status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, row_at)
+    if status == LONG_WAY:
+        return LONG_WAY
+    row = view_row(row_at)
+    row.words[BODY_B] = 1
+    if exchanged:
+        normal, p_a = vec3_at(row.doubles, NORMAL), vec3_at(row.doubles, POINT_A)
+        put_vec3(row.doubles, NORMAL, sub(Vec3(0.0, 0.0, 0.0), normal))
+        put_vec3(row.doubles, POINT_A, vec3_at(row.doubles, POINT_B))
+        put_vec3(row.doubles, POINT_B, p_a)
+        row.words[PART_A], row.words[PART_B] = row.words[PART_B], row.words[PART_A]
+    return status

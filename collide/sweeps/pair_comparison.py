@@ -1,0 +1,107 @@
+"""A proposal beside the disabled pairs of an SRDF: what both have, what only one has, and who is right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.query import distance
+from collide.sweeps.link_bodies import link_bodies, link_poses
+from collide.sweeps.pair_proposal import NEVER, Proposal
+
+
+class PairDifference(NamedTuple):
+    """A pair that only one of the two disables.
+
+    reason : of the one that does.   share : of the sample in which it collides.
+    wrong : the SRDF says that the pair never collides, and it does.
+    q, depth : a configuration in which it does, and how deep [m]; None where none is known.
+    gap : the least gap [m] met, None where it was not searched.
+    """
+
+    a: str
+    b: str
+    reason: str
+    share: float
+    wrong: bool
+    q: np.ndarray | None
+    depth: float | None
+    gap: float | None
+
+
+@dataclass
+class PairComparison:
+    """Disabled pairs of a proposal and of an SRDF.
+
+    both : (a, b, our reason, their reason).
+    only_theirs, only_ours : pairs of one of them.
+    not_comparable : pairs of the SRDF of which a link has no collision geometry.
+    """
+
+    both: list[tuple[str, str, str, str]] = field(default_factory=list)
+    only_theirs: list[PairDifference] = field(default_factory=list)
+    only_ours: list[PairDifference] = field(default_factory=list)
+    not_comparable: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def wrong(self) -> list[PairDifference]:
+        """Pairs that the SRDF disables as never colliding, and that collide within the limits."""
+        return [pair for pair in self.only_theirs if pair.wrong]
+
+
+def compare_pairs(proposal: Proposal, theirs: Iterable[tuple[str, str, str]]) -> PairComparison:
+    """A proposal beside (link, link, reason) of an SRDF.
+
+    Parameters
+    ----------
+    proposal : Proposal
+        Of the same robot.
+    theirs : iterable of (str, str, str)
+        As of `Robot.semantic_pairs`; reasons with or without "SRDF: " before them.
+
+    Returns
+    -------
+    PairComparison
+        Every pair of either of them once.
+    """
+    result, seen = PairComparison(), set()
+    depth_of = _Depths(proposal)
+    for a, b, reason in theirs:
+        reason = reason.removeprefix("SRDF: ")
+        pair = proposal.pair(a, b)
+        if pair is None:
+            result.not_comparable.append((a, b))
+        elif (pair.a, pair.b) not in seen:
+            seen.add((pair.a, pair.b))
+            if pair.reason is not None:
+                result.both.append((pair.a, pair.b, pair.reason, reason))
+            else:
+                # By any other reason, or none, a person may have meant it.
+                wrong = pair.q is not None and reason.lower() == NEVER.lower()
+                result.only_theirs.append(_difference(pair, reason, wrong, depth_of))
+    for pair in proposal.disabled:
+        if (pair.a, pair.b) not in seen:
+            result.only_ours.append(_difference(pair, pair.reason or "", False, depth_of))
+    return result
+
+
+def _difference(pair, reason: str, wrong: bool, depth_of: _Depths) -> PairDifference:
+    depth = None if pair.q is None else depth_of(pair.a, pair.b, pair.q)
+    gap = None if pair.nearest is None else pair.nearest.gap
+    share = pair.hits / pair.samples if pair.samples else 0.0
+    return PairDifference(pair.a, pair.b, reason, share, wrong, pair.q, depth, gap)
+
+
+class _Depths:
+    """How deep two links are in each other at a configuration: minus their signed distance."""
+
+    def __init__(self, proposal: Proposal):
+        self.robot = proposal.robot
+        self.bodies = {body.link: body for body in link_bodies(proposal.robot)}
+
+    def __call__(self, a: str, b: str, q: np.ndarray) -> float:
+        A, B, poses = self.bodies[a], self.bodies[b], link_poses(self.robot, q[None])
+        return -float(distance(A.shape, B.shape, poses.of(A)[0], poses.of(B)[0]).distance)

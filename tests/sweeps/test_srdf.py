@@ -1,0 +1,189 @@
+"""SRDF that is written, read back by readers of others; SRDF that is compared with; and Worlds that take SRDF and
+MoveIt's matrices."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from curved_oracle import bracket
+from plain_robots import chain, joint, robot_of
+
+import collide
+from collide import Box, SceneError, Sphere, World, pose
+from collide.scenes import allow_pairs
+from collide.scenes.loaders.allowed_pairs import read_allowed_pairs
+from collide.scenes.loaders.srdf import read_srdf
+from collide.sweeps.pair_comparison import compare_pairs
+from collide.sweeps.pair_proposal import propose_disabled_pairs
+from collide.sweeps.srdf_text import srdf_text
+
+ROBOTS = Path(__file__).resolve().parents[3] / "shared" / "data" / "robots"
+
+
+def disabled(text: str) -> set[tuple[str, str, str]]:
+    """What the standard library's XML reader finds in an SRDF."""
+    root = ET.fromstring(text)
+    return {(e.get("link1"), e.get("link2"), e.get("reason")) for e in root.iter("disable_collisions")}
+
+
+def test_written_pairs_are_read_back(tmp_path):
+    proposal = propose_disabled_pairs(chain(6, length=0.25, width=0.06), 500, always_share=0.5)
+    text = srdf_text(proposal)
+    expected = {(pair.a, pair.b, pair.reason) for pair in proposal.disabled}
+    assert disabled(text) == expected and len(expected) >= 5
+    file = tmp_path / "chain.srdf"
+    file.write_text(text, encoding="utf-8")
+    read = read_srdf(file, list(proposal.robot.links), [])
+    assert {(a, b, reason.removeprefix("SRDF: ")) for a, b, reason in read.pairs} == expected and not read.notes
+    assert "500 random configurations" in text and "A sample is no proof" in text
+
+
+def test_names_that_xml_must_escape():
+    hostile = ['a"<&>', "b--c", "d'e", "f-"]
+    robot = robot_of(
+        hostile, [joint(f"j{k}", "revolute", hostile[k], hostile[k + 1], at=(0, 0, 1)) for k in range(3)],
+        {link: (Sphere(0.1), (0, 0, 0)) for link in hostile},
+    )  # fmt: skip
+    proposal = propose_disabled_pairs(robot, 50)
+    assert disabled(srdf_text(proposal)) == {(pair.a, pair.b, pair.reason) for pair in proposal.disabled}
+    assert {name for pair in disabled(srdf_text(proposal)) for name in pair[:2]} == set(hostile)
+
+
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")
+@pytest.mark.skipif(find_spec("pinocchio") is None, reason="Pinocchio (pin), the other reader, is not installed")
+def test_pinocchio_reads_what_is_written(tmp_path):
+    import pinocchio
+
+    urdf = ROBOTS / "panda" / "panda.urdf"
+    proposal = propose_disabled_pairs(collide.Robot.load(urdf, meshes="hull"), 1000)
+    file = tmp_path / "panda.srdf"
+    file.write_text(srdf_text(proposal), encoding="utf-8")
+    model = pinocchio.buildModelFromUrdf(str(urdf))
+    shapes = pinocchio.buildGeomFromUrdf(model, str(urdf), pinocchio.COLLISION, package_dirs=[str(ROBOTS / "panda")])
+    shapes.addAllCollisionPairs()
+    link_of = [shape.name.rsplit("_", 1)[0] for shape in shapes.geometryObjects]
+
+    def pairs():
+        return {frozenset((link_of[pair.first], link_of[pair.second])) for pair in shapes.collisionPairs}
+
+    before = pairs()
+    pinocchio.removeCollisionPairs(model, shapes, str(file), False)
+    assert pairs() == before - {frozenset((pair.a, pair.b)) for pair in proposal.disabled}
+    assert 15 <= len(pairs()) < len(before) - 15
+
+
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")
+@pytest.mark.parametrize(
+    "name, wrong",
+    [
+        ("panda", {("panda_link2", "panda_link6")}),
+        ("fetch", {("shoulder_pan_link", "forearm_roll_link"), ("head_pan_link", "shoulder_lift_link"),
+                   ("shoulder_pan_link", "wrist_flex_link")}),
+        ("ur5", set()),
+    ],
+)  # fmt: skip
+def test_shipped_srdf_are_judged(name, wrong):
+    """Pairs that they say never collide, in configurations in which a bracket proven in 80 digits says they do."""
+    robot = collide.Robot.load(ROBOTS / name / f"{name}.urdf", meshes="hull", missing_meshes="skip")
+    comparison = compare_pairs(propose_disabled_pairs(robot, 3000), robot.semantic_pairs)
+    assert {(pair.a, pair.b) for pair in comparison.wrong} == wrong
+    for pair in comparison.wrong:
+        assert (pair.q >= robot.lower - 1e-12).all() and (pair.q <= robot.upper + 1e-12).all()
+        X_WLs = robot.link_poses(pair.q)[0]
+        (element_a,), (element_b,) = robot.geometry[pair.a], robot.geometry[pair.b]
+        X_WA = X_WLs[robot.links.index(pair.a)] @ element_a.X_LG
+        X_WB = X_WLs[robot.links.index(pair.b)] @ element_b.X_LG
+        proven = bracket(element_a.shape, element_b.shape, X_WA, X_WB)
+        assert proven.upper < 0 and float(proven.lower) - 1e-9 <= -pair.depth <= float(proven.upper) + 1e-9
+        assert pair.depth > 1e-3
+
+
+def test_comparison_by_hand():
+    proposal = propose_disabled_pairs(chain(5, length=0.2, width=0.15), 500)
+    by_reason = {reason: [p for p in proposal.pairs if p.reason == reason] for reason in ("Adjacent", None)}
+    adjacent, tested = by_reason["Adjacent"][0], by_reason[None][0]
+    strangers = ("nobody", "l0", "SRDF: Never")
+    for reason, wrong in (("Never", True), ("never", True), ("User", False), ("no reason given", False)):
+        theirs = [(adjacent.b, adjacent.a, "SRDF: Adjacent"), (tested.b, tested.a, f"SRDF: {reason}"), strangers]
+        result = compare_pairs(proposal, [*theirs, *theirs])
+        assert result.both == [(adjacent.a, adjacent.b, "Adjacent", "Adjacent")]
+        assert [(d.a, d.b, d.reason, d.wrong) for d in result.only_theirs] == [(tested.a, tested.b, reason, wrong)]
+        assert len(result.only_ours) == len(proposal.disabled) - 1
+        assert result.not_comparable[0] == ("nobody", "l0")
+        assert result.only_theirs[0].depth > 0 and len(result.wrong) == wrong
+
+
+# --- into a World ---------------------------------------------------------------------------------
+
+
+def world_of(names) -> World:
+    world = World()
+    for k, name in enumerate(names):
+        world.add(Box((1, 1, 1)), pose((0.1 * k, 0, 0)), name=name)
+    return world
+
+
+def pairs_of(world) -> set[tuple[str, str]]:
+    return {(world.names[a], world.names[b]) for a, b in world.allowed}
+
+
+def test_srdf_into_a_world(tmp_path):
+    file = tmp_path / "r.srdf"
+    file.write_text('<robot name="r"><disable_collisions link1="b" link2="a" reason="Never"/>'
+                    '<disable_collisions link1="c" link2="elsewhere" reason="User"/></robot>')  # fmt: skip
+    world = world_of("abc")
+    assert allow_pairs(world, file) == [("b", "a", "SRDF: Never")]
+    assert pairs_of(world) == {("a", "b")} and len(world.collisions()) == 2
+    twin = world_of(["left_a", "left_b", "a", "c"])
+    allow_pairs(twin, file, prefix="left_")
+    assert pairs_of(twin) == {("left_a", "left_b")}
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_matrix_into_a_world(tmp_path, whole):
+    """By the definition: an entry decides, else the defaults of both, of which a False wins."""
+    matrix = {
+        "entry_names": ["a", "b", "c"],
+        "entry_values": [[True, True, False], {"enabled": [True, True, False]}, [False, False, True]],
+        "default_entry_names": ["d", "c"], "default_entry_values": [True, False],
+    }  # fmt: skip
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps({"robot_model_name": "r", "allowed_collision_matrix": matrix} if whole else matrix))
+    world = world_of("abcd")
+    allow_pairs(world, file)
+    assert pairs_of(world) == {("a", "b"), ("a", "d"), ("b", "d")}
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("<robot><disable_collisions link1='x' link2='y'/></robot>", "names none of the bodies: a, b"),
+        ("<robot><disable_collisions link1='a'/></robot>", "needs link1 and link2"),
+        ('{"entry_names": ["x"], "entry_values": [[true]]}', "names none of the bodies"),
+        ('{"entry_names": ["a", "b"], "entry_values": [[true]]}', "2 rows of 2 values"),
+        ('{"joints": {}}', "no allowed_collision_matrix"),
+    ],
+)
+def test_files_that_say_nothing_about_the_world(tmp_path, text, words):
+    file = tmp_path / ("f.srdf" if text.startswith("<") else "f.json")
+    file.write_text(text)
+    with pytest.raises(SceneError, match=words):
+        read_allowed_pairs(file, ["a", "b"])
+
+
+def test_gaps_of_pairs_are_not_those_of_hulls():
+    """A link in the hollow of another: hulls overlap, the links do not. Judged by the geometry: 0.1 m to each wall."""
+    hollow = collide.Compound([(Box((0.1, 1, 1)), pose((s * 0.4, 0, 0))) for s in (-1, 1)])
+    robot = robot_of(
+        ["ball", "x", "hollow"],
+        [joint("a", "prismatic", "ball", "x", axis=(0, 0, 1)), joint("b", "fixed", "x", "hollow")],
+        {"hollow": (hollow, (0, 0, 0)), "ball": (Sphere(0.25), (0, 0, 0)), "x": (Sphere(0.01), (0, 0, 9))},
+    )
+    pair = propose_disabled_pairs(robot, 200).pair("ball", "hollow")
+    assert pair.reason == "Never" and pair.nearest.gap == pytest.approx(0.1, abs=1e-9)
+    assert np.isfinite(pair.nearest.q).all()
