@@ -21,7 +21,7 @@ from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.threads import share
 from collide.world_bodies import BodiesAsTheyStood, Roster
-from collide.world_part_pairs import PartTrees
+from collide.world_part_pairs import PartTrees, updating
 from collide.world_parts import WorldParts
 
 #: Half of the engine, which scenes without meshes never load.
@@ -202,7 +202,8 @@ class PackedWorld:
         """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m], and the
         margins of bodies and pairs.
         """
-        return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
+        with updating():  # what the tree keeps of pairs
+            return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
 
     def margins_of(self, pairs: np.ndarray) -> np.ndarray:
         """(k,) the margins [m] of pairs (k, 2), i < j: their own, or the sum of both bodies'."""

@@ -9,12 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from collide.broadphase.box_tree import BoxTree
+from collide.fork_safe_lock import ForkSafeLock
 from collide.world_parts import WorldParts, runs
 
 #: Two bodies with fewer pairs of parts than this are compared part by part.
 _MIN_BY_TREE = 1024
 #: Relative: far more than what a sum of a coordinate and a margin is off.
 _ROUNDING = 2.0**-40
+
+
+#: Held while trees are made or brought up to date, of bodies and of their parts: threads may ask one World at once.
+updating = ForkSafeLock()
 
 
 class PartTrees:
@@ -86,9 +91,10 @@ class PartTrees:
     def _tree_of(self, body: int) -> BoxTree:
         """The tree over the parts of a body, where they are now."""
         boxes = self._parts.boxes[self._parts.first[body] : self._parts.first[body + 1]]
-        tree = self._trees.get(body)
-        if tree is None:
-            tree = self._trees[body] = BoxTree(boxes)
-        elif not np.array_equal(tree.boxes, boxes):
-            tree.refit(boxes)
-        return tree
+        with updating():
+            tree = self._trees.get(body)
+            if tree is None:
+                tree = self._trees[body] = BoxTree(boxes)
+            elif not np.array_equal(tree.boxes, boxes):
+                tree.refit(boxes)
+            return tree

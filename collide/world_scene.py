@@ -15,6 +15,7 @@ from collide.packed_world import PackedWorld, PairFilters
 from collide.security_margin import checked_margin
 from collide.shapes.shape import Shape
 from collide.world_bodies import BodiesAsTheyStood, Body, Roster, WorldBodies
+from collide.world_part_pairs import updating
 
 
 class WorldScene:
@@ -253,6 +254,10 @@ class WorldScene:
     # --- as queries see them --------------------------------------------------------------------
 
     def _pack(self) -> PackedWorld:
+        with updating():
+            return self._brought_up_to_date()
+
+    def _brought_up_to_date(self) -> PackedWorld:
         moved = self._bodies.take_moved()
         roster, X_WBs = self._bodies.roster(), self._bodies.poses()
         packed = self._packed

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from naive import one_of_each, pose, random_pose, rng_of
@@ -113,9 +117,6 @@ def test_margins_that_are_none_are_refused():
 
 
 def test_copies_take_sleep_and_margins_along():
-    import copy
-    import pickle
-
     world = row_of_balls(-0.1)
     world.sleep([0, 1])
     world.set_margin(2, 0.5)
@@ -267,6 +268,18 @@ def test_threads_give_the_same_bits():
     for threads in (0, 1.5, "2"):
         with pytest.raises(InvalidArgument, match="threads"):
             world.collides(threads=threads)
+
+
+def test_threads_of_the_caller_may_ask_one_world_at_once():
+    """Moved, then asked by four threads: what is brought up to date is so once, and kept pairs are whole."""
+    world, rng = many(400, "callers"), rng_of("callers")
+    for _ in range(12):
+        moved = rng.choice(world.ids[:-1], 20, replace=False).tolist()
+        world.set_poses(moved, np.array([random_pose(rng, 3.0) for _ in moved]))
+        with ThreadPoolExecutor(4) as pool:
+            answers = list(pool.map(lambda _: world.distances(0.1).rows.tobytes(), range(8)))
+        fresh = pickle.loads(pickle.dumps(world))
+        assert set(answers) == {fresh.distances(0.1).rows.tobytes()}
 
 
 def test_a_boolean_looks_first_where_boxes_overlap_most():

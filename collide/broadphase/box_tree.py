@@ -15,15 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.broadphase.allowed_rows import allowed_rows
-from collide.broadphase.graded_boxes import (
-    BODY,
-    LINK,
-    STACK,
-    fit_inner_nodes,
-    fit_paths,
-    grow_graded,
-    place_leaves,
-)
+from collide.broadphase.graded_boxes import BODY, LINK, STACK, fit_inner_nodes, fit_paths, grow_graded, place_leaves
 from collide.broadphase.growing_rows import GrowingRows
 from collide.broadphase.walk_boxes import (
     ALLOWED_AT,

@@ -180,7 +180,7 @@ ROOMS = {
     "world_bodies": {"errors", "argument_checks", "transforms", "shapes", "broadphase"},
     "world_hits": set(),
     "world_parts": {"shapes", "lowering", "broadphase"},
-    "world_part_pairs": {"broadphase", "world_parts"},
+    "world_part_pairs": {"broadphase", "fork_safe_lock", "world_parts"},
     "packed_world": {
         "broadphase",
         "casts",
@@ -219,7 +219,16 @@ ROOMS = {
         "world_parts",
     },
     "world_record": {"broadphase", "packed_world", "results", "world_bodies"},
-    "world_scene": {"errors", "argument_checks", "log", "security_margin", "shapes", "world_bodies", "packed_world"},
+    "world_scene": {
+        "errors",
+        "argument_checks",
+        "log",
+        "packed_world",
+        "security_margin",
+        "shapes",
+        "world_bodies",
+        "world_part_pairs",
+    },
     "world_pairs": {
         "argument_checks",
         "certificates",
