@@ -10,10 +10,7 @@ import numpy as np
 
 from collide.query import distance
 from collide.sweeps.link_bodies import link_bodies, link_poses
-from collide.sweeps.pair_proposal import Proposal
-
-#: Reasons by which an SRDF disables pairs although they collide: links meant to touch, or judged by a person.
-_BY_INTENT = {"adjacent", "default", "always", "user"}
+from collide.sweeps.pair_proposal import NEVER, Proposal
 
 
 class PairDifference(NamedTuple):
@@ -82,7 +79,8 @@ def compare_pairs(proposal: Proposal, theirs: Iterable[tuple[str, str, str]]) ->
             if pair.reason is not None:
                 result.both.append((pair.a, pair.b, pair.reason, reason))
             else:
-                wrong = pair.q is not None and reason.lower() not in _BY_INTENT
+                # By any other reason, or none, a person may have meant it.
+                wrong = pair.q is not None and reason.lower() == NEVER.lower()
                 result.only_theirs.append(_difference(pair, reason, wrong, depth_of))
     for pair in proposal.disabled:
         if (pair.a, pair.b) not in seen:

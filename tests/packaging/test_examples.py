@@ -136,6 +136,17 @@ def test_python_in_the_readme_runs():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.skipif(find_spec("yaml") is None, reason="PyYAML is not installed: the scene cannot be read")
+def test_example_of_planning_proves_all_of_its_path():
+    """Each run has a path of several motions, every one of them proven, and most of the time goes into checks."""
+    done = run(str(ROOT / "examples" / "18_certified_planning.py"))
+    (free, motions), (share,) = (
+        re.search(pattern, done.stdout).groups()
+        for pattern in (r"(\d+) of its (\d+) motions are proven free", r"(\d+) % of it in collision checks")
+    )
+    assert int(free) == int(motions) >= 2 and 10 <= int(share) <= 100
+
+
 @pytest.mark.skipif(find_spec("pinocchio") is None, reason="Pinocchio (pin) is not installed")
 def test_example_of_pinocchio_finds_what_is_missed():
     done = run(str(ROOT / "examples" / "15_coal_and_pinocchio.py"))

@@ -108,7 +108,7 @@ def test_comparison_by_hand():
     by_reason = {reason: [p for p in proposal.pairs if p.reason == reason] for reason in ("Adjacent", None)}
     adjacent, tested = by_reason["Adjacent"][0], by_reason[None][0]
     strangers = ("nobody", "l0", "SRDF: Never")
-    for reason, wrong in (("Never", True), ("never", True), ("User", False), ("Default", False)):
+    for reason, wrong in (("Never", True), ("never", True), ("User", False), ("no reason given", False)):
         theirs = [(adjacent.b, adjacent.a, "SRDF: Adjacent"), (tested.b, tested.a, f"SRDF: {reason}"), strangers]
         result = compare_pairs(proposal, [*theirs, *theirs])
         assert result.both == [(adjacent.a, adjacent.b, "Adjacent", "Adjacent")]

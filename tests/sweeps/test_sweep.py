@@ -17,7 +17,9 @@ import pytest
 import slow_checker
 from slow_checker import SlowChecker, diary_lines
 
-from collide import InvalidArgument, SceneError
+import collide
+from collide import InvalidArgument, RobotChecker, SceneError
+from collide.scenes import load
 from collide.sweeps import process_pool
 from collide.sweeps.configurations import DrawnConfigurations
 from collide.sweeps.random_configurations import random_configurations
@@ -83,6 +85,30 @@ def test_rows_that_are_not_numbers_and_rows_outside(tmp_path):
     assert np.isnan(table["distance"].to_numpy()[[1, 4, 5]]).all()
     with pytest.raises(InvalidArgument, match="3 rows have no answer"):
         results.collides()
+
+
+def test_robot_checker_in_processes(tmp_path):
+    """A RobotChecker that was asked before travels to processes; each row is what a World of posed bodies says."""
+    scene = load("workcell")
+    checker = RobotChecker.from_scene(scene)
+    Q = DrawnConfigurations(400, 5).of(checker.robot)
+    checker.collides(Q), checker.distances(Q[:5])  # it holds workspaces now
+    results = sweep(checker, Q, tmp_path / "s", workers=2, chunk=100, distances=True)
+    placement, hits = scene.placements["arm"], []
+    for q in Q[:60]:
+        world = scene.with_state(dict(zip(placement.robot.joint_names, q))).world()
+        links = {identity for identity, name in world.names.items() if name in placement.carried}
+        rows = world.collisions()
+        hits.append(any(a in links or b in links for a, b in zip(rows["a"].tolist(), rows["b"].tolist())))
+    table = results.table().to_pydict()
+    assert table["collides"][:60] == hits and 15 < sum(hits) < 45
+    assert np.array_equal(results.collides(), checker.collides(Q))
+    nearest = checker.distances(Q)
+    assert table["distance"] == nearest.distance.tolist()
+    assert list(zip(table["body_a"], table["body_b"])) == nearest.names
+    checker.world.set_pose("bench", collide.pose((0, 0, 5)))
+    with pytest.raises(InvalidArgument, match="the scene or the robot changed"):
+        sweep(checker, Q, tmp_path / "s", workers=0, chunk=100, distances=True)
 
 
 # --- going on --------------------------------------------------------------------------------------
