@@ -1,10 +1,11 @@
-"""Steps of MuJoCo with its own contacts, with collide's, and culled by collide: pits of bodies, and robots.
+"""Steps of MuJoCo with its own contacts, with collide's, and culled by collide: pits, a terrain, and robots.
 
-    python benchmarks/mujoco_steps.py [--quick] [--bodies 100 1000 5000] [--no-csv]
+    python benchmarks/mujoco_steps.py [--quick] [--bodies 100 1000 5000] [--scenes NAME …] [--no-csv]
 
 Pits hold spheres, capsules, ellipsoids, cylinders, boxes and hulls in equal numbers, or boxes and hulls alone, which
-fall from a grid: "falling" are the steps after the first tenth of a second, "resting" those after four hundred steps
-that are damped, until next to nothing moves. Robots are URDF models of example-robot-data, dropped on a floor.
+fall from a grid. The terrain is a rough height field of 9 cm cells, over which bodies of all kinds fall, 22 cm apart.
+"Falling" are the steps after the first tenth of a second, "resting" those after four hundred steps that are damped,
+until next to nothing moves. Robots are URDF models of example-robot-data, dropped on a floor, or on such a terrain.
 
 All contestants step from the same saved state, in turns; a row holds the median, the least and the largest of their
 rounds. "step" is processor time, "collision" what MuJoCo's own timer says of the collision within these steps. Pits are
@@ -36,6 +37,7 @@ from collide.scenes.loaders.resources import find
 
 MIXED = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 SCENES = {"mixed": MIXED, "boxes and hulls": ("box", "mesh")}
+TERRAIN, ON_TERRAIN = "terrain", " on terrain"
 CONTESTANTS = (None, "contacts", "cull")
 ROBOTS = {
     "a1": "a1_description/urdf/a1.urdf",
@@ -50,11 +52,57 @@ _TIMER = int(mujoco.mjtTimer.mjTIMER_POS_COLLISION)
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
+def form_of(kind: str, random: np.random.Generator) -> str:
+    """A geom of 5 to 7 cm."""
+    size = " ".join(f"{length:.4f}" for length in random.uniform(0.05, 0.07, 3))
+    if kind in ("capsule", "cylinder"):
+        size = "0.05 0.04"
+    return 'type="mesh" mesh="hull"' if kind == "mesh" else f'type="{kind}" size="{size}"'
+
+
+def hull_asset(random: np.random.Generator) -> str:
+    points = random.normal(size=(12, 3))
+    points *= 0.08 / np.linalg.norm(points, axis=1)[:, None]
+    vertices = " ".join(f"{v:.6f}" for v in points.ravel())
+    return f'<mesh name="hull" vertex="{vertices}"/>'
+
+
+def elevation(n: int, random: np.random.Generator) -> np.ndarray:
+    """(n, n) heights of hills of a metre and a half, and a hundredth of noise, from 0 to 1."""
+    x = np.linspace(0.0, 0.09 * (n - 1), n)
+    hills = np.sin(4.2 * x)[:, None] * np.cos(3.9 * x)[None, :]
+    heights = 0.1 * hills + 0.02 * random.random((n, n))
+    return (heights - heights.min()) / np.ptp(heights)
+
+
+def field_asset(n: int, random: np.random.Generator) -> str:
+    """A height field of n x n points, 9 cm apart, and 0.2 m from its lowest to its highest."""
+    numbers = " ".join(f"{v:.5f}" for v in elevation(n, random).ravel())
+    half = 0.045 * (n - 1)
+    return f'<hfield name="hills" nrow="{n}" ncol="{n}" size="{half} {half} 0.2 0.1" elevation="{numbers}"/>'
+
+
+def terrain(n: int, seed: int = 0) -> mujoco.MjModel:
+    """Bodies of all kinds a hand above hills, a hand apart."""
+    random = np.random.default_rng(seed)
+    side = int(np.ceil(np.sqrt(n)))
+    parts = ['<geom type="hfield" hfield="hills"/>']
+    for k in range(n):
+        x, y = 0.22 * (np.array([k % side, k // side]) - (side - 1) / 2) + random.uniform(-0.02, 0.02, 2)
+        q = " ".join(f"{v:.4f}" for v in random.normal(size=4))
+        form = form_of(MIXED[k % len(MIXED)], random)
+        parts.append(f'<body pos="{x:.4f} {y:.4f} 0.3" quat="{q}"><freejoint/><geom {form}/></body>')
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{TIMESTEP}" solver="CG"/><size memory="1G"/>'
+        f"<asset>{hull_asset(random)}{field_asset(round(0.22 * side / 0.09) + 12, random)}</asset>"
+        f"<worldbody>{''.join(parts)}</worldbody></mujoco>"
+    )
+
+
 def pit(n: int, kinds: tuple[str, ...], seed: int = 0) -> mujoco.MjModel:
     """Bodies of 5 to 7 cm in eight layers of a grid above a floor within four walls."""
     random = np.random.default_rng(seed)
-    points = random.normal(size=(12, 3))
-    points *= 0.08 / np.linalg.norm(points, axis=1)[:, None]
+    asset = hull_asset(random)
     side = max(3, int(np.ceil(np.sqrt(n / 8))))
     wall = 0.07 * side + 0.05
     parts = ['<geom type="plane" size="9 9 1"/>']
@@ -62,25 +110,19 @@ def pit(n: int, kinds: tuple[str, ...], seed: int = 0) -> mujoco.MjModel:
         parts.append(f'<geom type="plane" size="9 9 1" pos="{wall * x} {wall * y} 0" zaxis="{-x} {-y} 0"/>')
     for k in range(n):
         place = 0.14 * (np.array([k % side, k // side % side, k // side**2]) - [(side - 1) / 2, (side - 1) / 2, -0.6])
-        kind = kinds[k % len(kinds)]
-        size = " ".join(f"{length:.4f}" for length in random.uniform(0.05, 0.07, 3))
-        if kind in ("capsule", "cylinder"):
-            size = "0.05 0.04"
-        form = 'type="mesh" mesh="hull"' if kind == "mesh" else f'type="{kind}" size="{size}"'
+        form = form_of(kinds[k % len(kinds)], random)
         q = " ".join(f"{v:.4f}" for v in random.normal(size=4))
         p = " ".join(f"{v:.4f}" for v in place + random.uniform(-0.005, 0.005, 3))
         parts.append(f'<body pos="{p}" quat="{q}"><freejoint/><geom {form}/></body>')
-    vertices = " ".join(f"{v:.6f}" for v in points.ravel())
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{TIMESTEP}" solver="CG"/><size memory="1G"/>'
-        f'<asset><mesh name="hull" vertex="{vertices}"/></asset>'
-        f"<worldbody>{''.join(parts)}</worldbody></mujoco>"
+        f"<asset>{asset}</asset><worldbody>{''.join(parts)}</worldbody></mujoco>"
     )
 
 
 def robot(name: str) -> mujoco.MjModel:
-    """A robot on a floor, free to fall. Raises SceneError where example-robot-data is not installed."""
-    file = find(f"package://example-robot-data/robots/{ROBOTS[name]}", Path(__file__))
+    """A robot on a floor, or on hills, free to fall. Raises SceneError where example-robot-data is not installed."""
+    file = find(f"package://example-robot-data/robots/{ROBOTS[name.removesuffix(ON_TERRAIN)]}", Path(__file__))
     text = file.read_text(encoding="utf-8")
     assets = {}
     for mesh in set(re.findall(r'filename="([^"]+)"', text)):
@@ -91,7 +133,12 @@ def robot(name: str) -> mujoco.MjModel:
     compiler = '<compiler strippath="true" balanceinertia="true" discardvisual="true" fusestatic="false"/>'
     spec = mujoco.MjSpec.from_string(f"{text[:end]}<mujoco>{compiler}</mujoco>{text[end:]}", assets=assets)
     spec.worldbody.first_body().add_freejoint()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 1])
+    if name.endswith(ON_TERRAIN):
+        heights = elevation(33, np.random.default_rng(0))
+        spec.add_hfield(name="hills", nrow=33, ncol=33, size=[1.44, 1.44, 0.2, 0.1], userdata=heights.ravel())
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hills")
+    else:
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 1])
     spec.option.timestep = TIMESTEP / 2
     return spec.compile()
 
@@ -104,6 +151,8 @@ def lowest(model: mujoco.MjModel, data: mujoco.MjData) -> float:
 
 @cache
 def scene(name: str, n: int) -> mujoco.MjModel:
+    if name == TERRAIN:
+        return terrain(n)
     return pit(n, SCENES[name]) if name in SCENES else robot(name)
 
 
@@ -112,9 +161,9 @@ def saved_state(name: str, n: int, when: str) -> np.ndarray:
     """Where all contestants begin."""
     model = scene(name, n)
     data = mujoco.MjData(model)
-    if name in ROBOTS:
+    if name.removesuffix(ON_TERRAIN) in ROBOTS:
         mujoco.mj_kinematics(model, data)
-        data.qpos[2] += 0.05 - lowest(model, data)
+        data.qpos[2] += 0.05 - lowest(model, data) + (0.2 if model.nhfield else 0.0)
     solver, iterations = model.opt.solver, model.opt.iterations
     if when == "falling":
         for _ in range(round(0.1 / model.opt.timestep)):
@@ -190,11 +239,15 @@ def rest(name: str, n: int, mode: str | None, seconds: float = 1.0) -> tuple[flo
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bodies", type=int, nargs="+", default=[100, 1000, 5000])
+    parser.add_argument("--scenes", nargs="+", help="these alone; robots are named, too")
     parser.add_argument("--quick", action="store_true", help="100 bodies, one robot and few rounds; writes nothing")
     parser.add_argument("--no-csv", action="store_true")
     arguments = parser.parse_args()
     asked = [(name, n) for name in SCENES for n in ([100] if arguments.quick else arguments.bodies)]
-    asked += [(name, 1) for name in (list(ROBOTS)[:1] if arguments.quick else ROBOTS)]
+    asked += [(TERRAIN, n) for n in ([100] if arguments.quick else arguments.bodies)]
+    robots = [*ROBOTS, *(name + ON_TERRAIN for name in ROBOTS)]
+    asked += [(name, 1) for name in (robots[:1] if arguments.quick and not arguments.scenes else robots)]
+    asked = [(name, n) for name, n in asked if not arguments.scenes or name in arguments.scenes]
     rows = []
     print(f"MuJoCo {mujoco.__version__}")
     print(f"{'scene':16}{'bodies':>7} {'when':8}{'what':10}{'mode':>13}{'contacts':>9}{'ms':>9}{'ratio':>7}")

@@ -4,26 +4,13 @@
    added are left to the function that stood in the table before. */
 #include "host_mujoco.h"
 
-#include "capi_contacts.h"
+#include "host_slots.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#if defined(_MSC_VER)
-#include <intrin.h>
-typedef volatile long lock;
-#define TAKEN(place) (_InterlockedExchange((place), 1) != 0)
-#define GIVE_BACK(place) _InterlockedExchange((place), 0)
-#define PUBLISH() _ReadWriteBarrier()
-#else
-typedef volatile int lock;
-#define TAKEN(place) (__sync_lock_test_and_set((place), 1) != 0)
-#define GIVE_BACK(place) __sync_lock_release(place)
-#define PUBLISH() __sync_synchronize()
-#endif
-
-enum { KINDS = COLLIDE_MUJOCO_KINDS, PAIRS = KINDS * KINDS, MAX_MODELS = 256, SLOTS = 128, MAX_CONTACTS = 50, MESH = 7 };
+enum { KINDS = COLLIDE_MUJOCO_KINDS, PAIRS = KINDS * KINDS, MAX_MODELS = 256, FIELD = 1, MESH = 7 };
 
 typedef int collision_function(const void *, void *, void *, int, int, double);
 
@@ -51,14 +38,6 @@ static struct {
     void *held;
 } models[MAX_MODELS];
 static volatile int n_models; /* places used so far */
-
-/* Workspaces: a thread takes one that is free for the length of a call. */
-static struct slot {
-    lock taken;
-    collide_workspace *space;
-    struct manifold_space manifold;
-    collide_contact rows[MAX_CONTACTS];
-} slots[SLOTS];
 
 /* Directions that parted two geoms when they were last asked about, under a hash. Threads write them as they come: any direction
    proves what it proves, so that one of other geoms, or half of one, costs time alone. */
@@ -132,34 +111,6 @@ static int model_of(const void *model, int g1, int g2, int *changed)
             return k;
     }
     return -1;
-}
-
-/* --- workspaces ---------------------------------------------------------------------------------------------------- */
-
-/* A workspace nobody else has; NULL where there is no memory. Threads begin looking at different places. */
-static struct slot *take_slot(int64_t largest)
-{
-    int local;
-    size_t k = ((uintptr_t)&local >> 16) % SLOTS;
-    struct slot *slot;
-    while (TAKEN(&slots[k].taken)) k = (k + 1) % SLOTS;
-    slot = &slots[k];
-    if (slot->space == NULL && collide_workspace_create(&slot->space) == COLLIDE_OK) begin_manifolds(&slot->manifold, slot->space);
-    if (slot->space != NULL && fit_manifolds(&slot->manifold, largest)) return slot;
-    GIVE_BACK(&slot->taken);
-    return NULL;
-}
-
-static void free_slots(void)
-{
-    int k;
-    for (k = 0; k < SLOTS; k++) {
-        if (TAKEN(&slots[k].taken)) continue; /* a thread is still at work: its memory stays */
-        collide_workspace_free(slots[k].space);
-        slots[k].space = NULL;
-        free_manifolds(&slots[k].manifold);
-        GIVE_BACK(&slots[k].taken);
-    }
 }
 
 /* --- a pair -------------------------------------------------------------------------------------------------------- */
@@ -264,7 +215,61 @@ static int answer(const struct collide_mujoco_model *made, const struct geom *A,
         for (k = 0; k < n; k++)
             if (slot->rows[k].distance <= margin) put_contact(&slot->rows[k], out + hook.layout.contact_size * count++);
     }
-    GIVE_BACK(&slot->taken);
+    give_slot_back(slot);
+    return count;
+}
+
+/* The height field of a geom as it stands in MuJoCo's memory now: heights may change from step to step. */
+static struct terrain terrain_of(const struct collide_mujoco_model *made, const void *model, const struct geom *geom)
+{
+    const int64_t *of_field = made->fields + 3 * geom->dataid; /* rows, columns, where its heights begin */
+    struct terrain terrain;
+    memcpy(terrain.size, (const double *)pointer_at(model, hook.layout.hfield_size) + 4 * geom->dataid, sizeof terrain.size);
+    terrain.n_rows = of_field[0];
+    terrain.n_columns = of_field[1];
+    terrain.heights = (const float *)pointer_at(model, hook.layout.hfield_data) + of_field[2];
+    lay_out_terrain(&terrain);
+    return terrain;
+}
+
+/* The same as `answer`, of a height field and a convex geom. */
+static int answer_on_field(const struct collide_mujoco_model *made, const struct geom *A, const struct geom *B,
+                           volatile struct kept_axis *kept, const void *model, const void *data, char *out, int g1, int g2,
+                           double margin, collide_status *status)
+{
+    double X_WH[16], X_WB[16];
+    struct terrain terrain = terrain_of(made, model, A);
+    struct terrain_pair pair = {&terrain, made->ints, made->faces, made->extremes, made->numbers, made->boxes, X_WH, X_WB, B->row,
+                                margin > 0.0 ? margin < LARGEST ? margin : LARGEST : 0.0};
+    int64_t n = 0, k;
+    int count = 0;
+    struct slot *slot;
+    if (made->is_cull && kept->pause > 0) {
+        kept->pause--;
+        return -1;
+    }
+    put_pose(data, g1, X_WH);
+    put_pose(data, g2, X_WB);
+    if (made->is_cull) {
+        pair.margin += 1e-3 * B->reach + 1e-5;
+        if (is_off_terrain(&pair)) return 0;
+        kept->pause = PAUSE;
+        return -1;
+    }
+    if ((slot = take_slot(made->largest)) == NULL || !has_terrain_space(slot)) {
+        if (slot != NULL) give_slot_back(slot);
+        *status = COLLIDE_NO_MEMORY;
+        return -1;
+    }
+    *status = terrain_contacts(slot->terrain, slot->space, &slot->manifold, &pair, made->max_contacts[KINDS * A->type + B->type],
+                               slot->rows, &n);
+    if (*status == COLLIDE_INVALID_POSE) {
+        *status = COLLIDE_OK;
+        count = -1;
+    }
+    for (k = 0; k < n; k++)
+        if (slot->rows[k].distance <= margin) put_contact(&slot->rows[k], out + hook.layout.contact_size * count++);
+    give_slot_back(slot);
     return count;
 }
 
@@ -279,10 +284,13 @@ static int contacts_of_geoms(const void *model, void *data, void *contacts, int 
         return 0;
     }
     /* Culling wins nothing where MuJoCo has a formula for two kinds: others share its search with meshes. */
-    if (number < 0 || A->ints == NULL || B->ints == NULL ||
+    if (number < 0 || (A->ints == NULL && A->type != FIELD) || B->ints == NULL ||
         (models[number].made.is_cull && hook.before[KINDS * A->type + B->type] != hook.before[KINDS * MESH + MESH]))
         return left_to_mujoco(model, data, contacts, g1, g2, margin);
-    count = answer(&models[number].made, A, B, kept_axis_of(data, g1, g2), data, contacts, g1, g2, margin, &status);
+    if (A->type == FIELD)
+        count = answer_on_field(&models[number].made, A, B, kept_axis_of(data, g1, g2), model, data, contacts, g1, g2, margin, &status);
+    else
+        count = answer(&models[number].made, A, B, kept_axis_of(data, g1, g2), data, contacts, g1, g2, margin, &status);
     if (status != COLLIDE_OK) {
         hook.error("collide: contacts of geoms %d and %d: %s", g1, g2, collide_status_text(status));
         return 0;

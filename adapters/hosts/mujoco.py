@@ -6,7 +6,7 @@
 
 MuJoCo finds the contacts of each pair of kinds of geoms by a function of a table. While installed, compiled functions
 of libcollide stand in that table: no Python runs in a step, in however many threads MuJoCo steps. Geoms of other
-models, and height fields and signed distance fields, go to the functions that stood there before.
+models, and signed distance fields, go to the functions that stood there before.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     thread may step.
 
     A pair has at most as many contacts as MuJoCo has room for, and 8: the deepest, and those that span the greatest
-    area. `mj_geomDistance` asks the same functions. Changing sizes or kinds of geoms while installed makes the next
-    step raise ``mujoco.FatalError``; after that, or a change of a mesh's vertices or of the flag MULTICCD, call
-    `Installed.refresh`.
+    area; one with a height field has up to 50. `mj_geomDistance` asks the same functions. Changing sizes or kinds of
+    geoms while installed makes the next step raise ``mujoco.FatalError``; after that, or a change of a mesh's vertices
+    or of the flag MULTICCD, call `Installed.refresh`. Heights of a field may change freely.
     """
     if mode not in MODES:
         raise InvalidArgument(f"install: mode must be one of {', '.join(map(repr, MODES))}, got {mode!r}")
@@ -219,8 +219,8 @@ def world(model: Any, data: Any = None) -> World:
     Returns
     -------
     World : bodies named as the geoms, or "geom 7"; those that are fixed to the world are static. Pairs that MuJoCo
-    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity. Height
-    fields and signed distance fields are left out.
+    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity. Signed
+    distance fields are left out.
 
     Raises
     ------

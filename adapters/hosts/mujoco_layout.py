@@ -22,10 +22,10 @@ from collide.errors import MissingExtra, UnsupportedQuery
 
 #: Kinds of geoms (mjtGeom): the table has a function for every two, the smaller number first.
 KINDS = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
-PLANE, BOX = KINDS.index("plane"), KINDS.index("box")
+PLANE, FIELD, BOX = KINDS.index("plane"), KINDS.index("hfield"), KINDS.index("box")
 N = len(KINDS)
 #: Kinds that are ours.
-OURS = tuple(KINDS.index(name) for name in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"))
+OURS = tuple(KINDS.index(name) for name in KINDS if name != "sdf")
 #: Bytes that a structure is looked through for at most.
 _MODEL_BYTES, _DATA_BYTES = 1 << 16, 1 << 20
 
@@ -33,9 +33,14 @@ _FUNCTION = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_double
 )
 
-TRIAL = """<mujoco><asset><mesh name="t" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/></asset><worldbody>
+TRIAL = """<mujoco><asset><mesh name="t" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/>
+<hfield name="t" nrow="2" ncol="2" size="1 1 1 1"/></asset><worldbody>
 <geom type="plane" size="1 1 1"/><body pos=".3 .1 .09"><freejoint/><geom type="box" size=".1 .12 .1"/></body>
 <body pos="0 5 5"><freejoint/><geom type="mesh" mesh="t"/></body></worldbody></mujoco>"""
+
+
+#: Arrays of a model that are read in a step.
+ARRAYS = ("geom_type", "geom_dataid", "geom_size", "mesh_vert", "hfield_size", "hfield_data")
 
 
 class Layout(ctypes.Structure):
@@ -44,7 +49,7 @@ class Layout(ctypes.Structure):
     _fields_ = [
         (name, ctypes.c_int64)
         for name in (
-            "geom_type", "geom_dataid", "geom_size", "mesh_vert", "signature", "geom_xpos", "geom_xmat", "contact_size",
+            *ARRAYS, "signature", "geom_xpos", "geom_xmat", "contact_size",
         )
     ]  # fmt: skip
 
@@ -150,10 +155,10 @@ def _offsets(mujoco) -> Layout:
         data = mujoco.MjData(model)
         if not (hasattr(model, "_address") and hasattr(data, "_address") and hasattr(model, "signature")):
             raise refused(mujoco, "its models tell no address or no signature")
-        if model.geom_size.dtype != np.float64 or model.geom_type.dtype != np.int32:
-            raise refused(mujoco, "its numbers are no doubles")
-        arrays = ("geom_type", "geom_dataid", "geom_size", "mesh_vert")
-        wanted = {name: getattr(model, name).ctypes.data for name in arrays} | {"signature": model.signature}
+        types = [getattr(model, name).dtype for name in ("geom_size", "hfield_size", "geom_type", "hfield_data")]
+        if types != [np.float64, np.float64, np.int32, np.float32]:
+            raise refused(mujoco, "its numbers are of other types")
+        wanted = {name: getattr(model, name).ctypes.data for name in ARRAYS} | {"signature": model.signature}
         of_data = {name: getattr(data, name).ctypes.data for name in ("geom_xpos", "geom_xmat")}
         layouts.append(
             _where(mujoco, model._address, _MODEL_BYTES, wanted)
@@ -167,7 +172,7 @@ def _offsets(mujoco) -> Layout:
 def check_model(model) -> None:
     """Raises UnsupportedQuery where arrays of a model do not stand where they were found."""
     layout = host().layout
-    for name in ("geom_type", "geom_dataid", "geom_size", "mesh_vert"):
+    for name in ARRAYS:
         array = getattr(model, name)
         (stands,) = struct.unpack("<Q", ctypes.string_at(model._address + getattr(layout, name), 8))
         if array.size and stands != array.ctypes.data:

@@ -14,10 +14,10 @@ from functools import cache
 
 import numpy as np
 
-from collide.adapters.hosts.mujoco_layout import KINDS, OURS, PLANE, TRIAL, N, host, instead, refused
+from collide.adapters.hosts.mujoco_layout import FIELD, KINDS, OURS, PLANE, TRIAL, N, host, instead, refused
 
-#: Contacts of a pair where MuJoCo sets no limit of its own below that.
-_MAX_CONTACTS = 8
+#: Contacts of a pair where MuJoCo sets no limit of its own below that; of a height field, which has many patches.
+_MAX_CONTACTS, _MAX_ON_FIELD = 8, 50
 #: Seconds that the child may take: it imports MuJoCo and makes a hundred models of two geoms.
 _SECONDS = 120.0
 
@@ -43,7 +43,7 @@ def _bits() -> tuple[int, int]:
 def _all_limits() -> dict[tuple[bool, bool], np.ndarray]:
     """By whether each of the flags is set."""
     if not host().has_limits:
-        counts = _counts(lambda i, j: _MAX_CONTACTS)
+        counts = _counts(lambda i, j: int(host().mujoco.mjMAXCONPAIR))
         return {(off, on): counts for off in (False, True) for on in (False, True)}
     command = [sys.executable, "-c", "from collide.adapters.hosts.mujoco_limits import main; main()"]
     try:
@@ -69,15 +69,15 @@ def _counts(limit) -> np.ndarray:
     counts = np.zeros((N, N), dtype=np.int64)
     for i in OURS:
         for j in OURS:
-            if i <= j and j != PLANE and host().table[N * i + j]:
-                counts[i, j] = min(limit(i, j), _MAX_CONTACTS)
+            if i <= j and j not in (PLANE, FIELD) and host().table[N * i + j]:
+                counts[i, j] = min(limit(i, j), _MAX_ON_FIELD if i == FIELD else _MAX_CONTACTS)
     return counts
 
 
 def _limit(i: int, j: int, disabled: int, enabled: int) -> int:
     """What MuJoCo says it expects at most, when it is reported of one contact more than it ever takes."""
     mujoco, table = host().mujoco, host().table
-    bodies = [_geom_text(i) if i == PLANE else f"<body><freejoint/>{_geom_text(i)}</body>"]
+    bodies = [_geom_text(i) if i in (PLANE, FIELD) else f"<body><freejoint/>{_geom_text(i)}</body>"]
     bodies.append(f"<body><freejoint/>{_geom_text(j)}</body>")
     text = TRIAL[: TRIAL.index("<worldbody>")] + f"<worldbody>{''.join(bodies)}</worldbody></mujoco>"
     model = mujoco.MjModel.from_xml_string(text)
@@ -93,4 +93,6 @@ def _limit(i: int, j: int, disabled: int, enabled: int) -> int:
 
 
 def _geom_text(kind: int) -> str:
-    return '<geom type="mesh" mesh="t"/>' if KINDS[kind] == "mesh" else f'<geom type="{KINDS[kind]}" size=".1 .1 .1"/>'
+    name = KINDS[kind]
+    of_asset = f'{name}="t"' if name in ("mesh", "hfield") else 'size=".1 .1 .1"'
+    return f'<geom type="{name}" {of_asset}/>'

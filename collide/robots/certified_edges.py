@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collide.kernels import address_of
-from collide.robots.certify_motions import COLLIDES_AT, IS_PROVEN, OPEN_INTERVAL, STAYS_OPEN, certify_motions
+from collide.robots.certify_meshes import settle_meshes
+from collide.robots.certify_motions import certify_motions
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
+from collide.robots.motion_bounds import OPEN_INTERVAL
 from collide.robots.robot_bodies import paths_to_root
 
 if TYPE_CHECKING:
@@ -103,40 +105,60 @@ def certify(
     """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
     times = sampled_collision(q0, q1, resolution, lambda q: checker.collides(q, threads=threads), _SAMPLED_HALVINGS)
     remaining = np.flatnonzero(np.isnan(times))
-    verdicts, later = np.full(len(remaining), IS_PROVEN, dtype=np.uint8), np.full(len(remaining), np.nan)
     ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])
-    rows_of_pieces: list[np.ndarray] = [np.zeros((0, OPEN_INTERVAL))]
+    later = np.full(len(remaining), np.nan)
+    open_rows: list[np.ndarray] = [np.zeros((0, OPEN_INTERVAL))]
     counts: list[int] = []
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
         work = _motion_workspace(checker, resolution)
-        done, last = piece.start, piece.stop
-        while done < last:
-            part = slice(done, last)
-            n = certify_motions(
-                space.address, work.address, address_of(ends[0][part]), address_of(ends[1][part]), checker.robot.dof, 0,
-                last - done, address_of(verdicts[part]), address_of(later[part]),
-            )  # fmt: skip
-            intervals = work.open_intervals.copy()
-            intervals[:, 0] = remaining[done + intervals[:, 0].astype(np.int64)]
-            rows_of_pieces.append(intervals)
-            if n == 0:
-                work.grow()
-            done += n
+        begin, end, hit_at = ends[0][piece], ends[1][piece], later[piece]
+        intervals, meshes = _certify_piece(space, work, begin, end, hit_at)
+        of_meshes = settle_meshes(checker, space, work, begin, end, meshes, hit_at, resolution)
+        rows = np.concatenate([intervals, *of_meshes])
+        rows[:, 0] += piece.start
+        open_rows.append(rows)
         counts.append(work.n_checked)
 
     checker._in_pieces(len(remaining), threads, progress, on_piece)
-    times[remaining] = np.where(verdicts == COLLIDES_AT, later, np.nan)
-    free, is_open = np.zeros(len(q0), dtype=bool), np.zeros(len(q0), dtype=bool)
-    free[remaining[verdicts == IS_PROVEN]] = True
-    is_open[remaining[verdicts == STAYS_OPEN]] = True
-    intervals = np.concatenate(rows_of_pieces)
-    intervals = intervals[is_open[intervals[:, 0].astype(np.int64)]]
-    intervals = intervals[np.lexsort((intervals[:, 1], intervals[:, 0]))]
-    rows = np.zeros(len(intervals), dtype=OPEN_DTYPE)
-    rows["edge"], rows["begin"], rows["end"] = intervals[:, :3].T
-    names = [checker.names_of(int(a), int(b)) for a, b in intervals[:, 3:].tolist()]
-    return CertifiedEdges(free, times, rows, names, sum(counts))
+    times[remaining] = later
+    rows = np.concatenate(open_rows)
+    rows = rows[np.isnan(later[rows[:, 0].astype(np.int64)])]
+    rows[:, 0] = remaining[rows[:, 0].astype(np.int64)]
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    free = np.isnan(times)
+    out = np.zeros(len(rows), dtype=OPEN_DTYPE)
+    out["edge"], out["begin"], out["end"] = rows[:, :3].T
+    free[out["edge"]] = False
+    names = [_names_of(checker, int(body), int(partner)) for body, partner in rows[:, 3:].tolist()]
+    return CertifiedEdges(free, times, out, names, sum(counts))
+
+
+def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) -> tuple[np.ndarray, np.ndarray]:
+    """(open intervals, pairs of meshes), (k, OPEN_INTERVAL) each, of some motions; ``times`` of collisions written."""
+    verdicts = np.zeros(len(q0), dtype=np.uint8)
+    open_rows, meshes = [np.zeros((0, OPEN_INTERVAL))], [np.zeros((0, OPEN_INTERVAL))]
+    done = 0
+    while done < len(q0):
+        n = certify_motions(
+            space.address, work.address, address_of(q0[done:]), address_of(q1[done:]), q0.shape[1], 0, len(q0) - done,
+            address_of(verdicts[done:]), address_of(times[done:]),
+        )  # fmt: skip
+        for rows, out in ((work.open_intervals, open_rows), (work.mesh_pairs, meshes)):
+            rows = rows.copy()
+            rows[:, 0] += done
+            out.append(rows)
+        if n == 0:
+            work.grow()
+        done += n
+    return np.concatenate(open_rows), np.concatenate(meshes)
+
+
+def _names_of(checker: RobotChecker, body: int, partner: int) -> tuple[str, str]:
+    """Of a body and its partner as `motion_bounds.py` has them."""
+    if body >= 0:
+        return checker.names_of(body, partner)
+    return checker.names_of(*checker.setting.self_pairs[partner].tolist())
 
 
 def _motion_workspace(checker: RobotChecker, resolution: float) -> MotionWorkspace:

@@ -8,8 +8,8 @@ from collide.kernels import address_of, code_of
 from collide.lowering.shape_table import NO_TERMS, POSE
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
-from collide.robots import certify_motions as motions
 from collide.robots import check_scene as layout
+from collide.robots import motion_bounds as motions
 from collide.robots.check_tables import Setting
 from collide.robots.forward_kinematics import JointTable
 
@@ -23,7 +23,7 @@ _OPEN_INTERVALS = 4096
 class CheckWorkspace:
     """One thread's buffers.
 
-    header, motion_header : of `check_scene.py` and `certify_motions.py`.
+    header, motion_header : of `check_scene.py` and `motion_bounds.py`.
     open_pairs : (k, OPEN_INTS) what the last call left to others.   open_intervals : (k, OPEN_INTERVAL).
     """
 
@@ -78,7 +78,7 @@ class CheckWorkspace:
 class MotionWorkspace:
     """What `certify_motions` works on besides: paths of joints, intervals, pairs.
 
-    open_intervals : (k, OPEN_INTERVAL) what the last call left open.
+    open_intervals, mesh_pairs : (k, OPEN_INTERVAL) what the last call left open, and to others.
     """
 
     def __init__(self, paths: list[np.ndarray], between: np.ndarray, dof: int, n_pairs: int, resolution: float,
@@ -89,31 +89,39 @@ class MotionWorkspace:
         for k, path in enumerate(paths):
             table[k, : len(path)] = path
         n_items = min(_MAX_ITEMS, max(1024, motions.MAX_INTERVALS * n_pairs))
-        self._open = np.empty((_OPEN_INTERVALS, motions.OPEN_INTERVAL))
         self._buffers = {
             motions.PATHS_AT: table, motions.PATH_LENGTHS_AT: lengths, motions.BETWEEN_AT: between,
             motions.CONFIGURATION_AT: np.zeros(max(dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
-            motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS, motions.INTERVAL)),
-            motions.ITEMS_AT: np.empty((n_items, motions.ITEM), dtype=np.int64), motions.OPEN_INTERVALS_AT: self._open,
+            motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
+            motions.ITEMS_AT: np.empty((n_items, motions.ITEM), dtype=np.int64),
         }  # fmt: skip
         self.header = np.zeros(motions.MOTION_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():
             self.header[word] = address_of(buffer)
         self.header[motions.PATH_STRIDE], self.header[motions.ITEM_CAPACITY] = stride, n_items
-        self.header[motions.OPEN_INTERVAL_CAPACITY] = _OPEN_INTERVALS
+        self._make_space(_OPEN_INTERVALS)
         self.header[motions.RESOLUTION :].view(np.float64)[:] = resolution, rounding
         self.address = address_of(self.header)
+
+    def _make_space(self, n: int) -> None:
+        """For so many open intervals and pairs of meshes."""
+        self._open, self._meshes = np.empty((n, motions.OPEN_INTERVAL)), np.empty((n, motions.OPEN_INTERVAL))
+        self.header[motions.OPEN_INTERVALS_AT], self.header[motions.MESH_PAIRS_AT] = map(
+            address_of, (self._open, self._meshes)
+        )
+        self.header[motions.OPEN_INTERVAL_CAPACITY] = self.header[motions.MESH_PAIR_CAPACITY] = n
+
+    def grow(self) -> None:
+        """Make space for twice as many."""
+        self._make_space(2 * len(self._open))
 
     @property
     def open_intervals(self) -> np.ndarray:
         return self._open[: self.header[motions.N_OPEN_INTERVALS]]
 
-    def grow(self) -> None:
-        """Make space for twice as many open intervals."""
-        self._open = np.empty((2 * len(self._open), motions.OPEN_INTERVAL))
-        self._buffers[motions.OPEN_INTERVALS_AT] = self._open
-        self.header[motions.OPEN_INTERVALS_AT] = address_of(self._open)
-        self.header[motions.OPEN_INTERVAL_CAPACITY] = len(self._open)
+    @property
+    def mesh_pairs(self) -> np.ndarray:
+        return self._meshes[: self.header[motions.N_MESH_PAIRS]]
 
     @property
     def n_checked(self) -> int:

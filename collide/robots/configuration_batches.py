@@ -12,8 +12,9 @@ from collide.robots import open_pairs
 from collide.robots.check_configurations import COLLIDES, IS_OPEN, check_configurations
 from collide.robots.check_scene import OPEN_LOWER
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.distance_gradients import distance_gradients
 from collide.robots.nearest_pairs import nearest_pairs
-from collide.robots.robot_distances import NEAREST_DTYPE, gradients
+from collide.robots.robot_distances import NEAREST_DTYPE
 
 if TYPE_CHECKING:
     from collide.robots.robot_checker import RobotChecker
@@ -45,14 +46,16 @@ def measure_piece(
         done = nearest_pairs(space.address, address_of(q), checker.robot.dof, done, len(q), limit, address_of(rows))
         if len(space.open_pairs):
             _take_nearer(checker, rows, space.open_pairs.copy(), q, limit)
+    distance_gradients(
+        space.address, address_of(q), checker.robot.dof, len(q), address_of(checker.robot.moves), address_of(rows),
+        address_of(gradient),
+    )  # fmt: skip
     for field in NEAREST_DTYPE.names or ():
         out[field] = rows[field]
     far = rows["a"] < 0
     out["beyond"], out["certified"] = far, rows["certified"] | far
     out["distance"][far] = out["upper"][far] = np.inf
     out["lower"][far] = limit
-    robot, link_of = checker.robot, np.array([body.link for body in checker.setting.bodies])
-    gradient[:] = gradients(robot.joint_table, robot.moves, q, checker.link_poses(q), out, link_of)
 
 
 def _take_nearer(checker: RobotChecker, rows: np.ndarray, pairs: np.ndarray, q: np.ndarray, limit: float) -> None:
@@ -70,7 +73,8 @@ def _take_nearer(checker: RobotChecker, rows: np.ndarray, pairs: np.ndarray, q: 
         order = np.lexsort((lowers, pairs[:, 0]))
         is_first = np.zeros(len(pairs), dtype=bool)
         is_first[order[np.flatnonzero(np.diff(pairs[order, 0], prepend=-1))]] = True
-        measured = open_pairs.distances(*_asked_poses(checker, pairs[is_first], q), *_both(checker), limit)
+        numbered, X_WLs = _asked_poses(checker, pairs[is_first], q)
+        measured = open_pairs.distances(numbered, X_WLs, *_both(checker), limit=limit)
         at = pairs[is_first, 0]
         better = ~measured["beyond"] & ((rows["a"][at] < 0) | (measured["distance"] < rows["distance"][at]))
         rows[at[better]] = measured[better]

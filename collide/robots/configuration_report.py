@@ -64,7 +64,8 @@ class ConfigurationReport:
         """The report about one configuration (dof,)."""
         X_WLs = checker.link_poses(q)
         pairs = _tested_pairs(checker)
-        rows = open_pairs.distances(pairs, X_WLs, checker.setting.bodies, checker.setting.surroundings.bodies, _NEAR)
+        setting = checker.setting
+        rows = open_pairs.distances(pairs, X_WLs, setting.bodies, setting.surroundings.bodies, limit=_NEAR)
         rows = rows[~rows["beyond"]]
         rows = rows[np.argsort(rows["distance"], kind="stable")]
         explained = [_explained(checker, row) for row in rows]

@@ -186,7 +186,7 @@ def _put_product(A, a, B, b, out, to):
 
 
 @kernel(inline=True)
-def _sine_cosine(angle):
+def sine_cosine_of(angle):
     """`sine_cosine` of any angle; beyond LARGEST_ANGLE of one reduced in doubles, which lie as far apart there."""
     size = abs(angle)
     if not size < math.inf:
@@ -200,7 +200,7 @@ def _sine_cosine(angle):
 @kernel(inline=True)
 def _rotate_columns(links, at, coordinate, sign, angle):
     """Turn the pose at ``at`` about one of its own coordinate axes, or against it: two columns are mixed."""
-    sine, cosine = _sine_cosine(angle)
+    sine, cosine = sine_cosine_of(angle)
     sine *= sign
     u = (coordinate + 1) % 3
     v = (coordinate + 2) % 3
@@ -217,7 +217,7 @@ def _rotate(links, at, axes, axis, angle):
 
     The diagonal is a² + cos·(1 − a²), so that what does not turn keeps exact zeros and ones.
     """
-    sine, cosine = _sine_cosine(angle)
+    sine, cosine = sine_cosine_of(angle)
     t = 1.0 - cosine
     x = axes[axis]
     y = axes[axis + 1]

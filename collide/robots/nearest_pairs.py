@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.narrowphase.rows import BEYOND, BODY_B, DISTANCE, LOWER, ROW, UPPER, is_undecided_or_refused, view_row
 from collide.numerics.vec3 import Vec3, sub
 from collide.robots.check_configurations import begin_configuration, leave_open
@@ -15,11 +15,9 @@ from collide.robots.check_scene import (
     BODY_INTS,
     COUNT,
     FIRST,
-    IS_BOUND_AT,
     N_BODIES,
     N_LINK_PARTS,
     N_OPEN,
-    N_PARTS,
     N_SELF_PAIRS,
     OPEN_CAPACITY,
     PADDED,
@@ -32,7 +30,7 @@ from collide.robots.check_scene import (
     place,
     view_scene,
 )
-from collide.robots.part_pairs import ask, boxes_are_apart, is_bounded, middle
+from collide.robots.part_pairs import ask, boxes_are_apart, is_bounded, middle, only_holds
 
 #: The first distance looked within [m], and by how much more each time.
 _FIRST_LIMIT, _GROWTH = 0.05, 8.0
@@ -40,7 +38,7 @@ _FIRST_LIMIT, _GROWTH = 0.05, 8.0
 _LAST_LIMIT = 10.0
 #: `a` of a row where there is no pair.
 NONE = -1
-_BODY_A = BODY_B - 1
+BODY_A = BODY_B - 1
 
 
 @entry("int64(int64, int64, int64, int64, int64, float64, int64)")
@@ -61,9 +59,9 @@ def nearest_pairs(header_at, q_at, dof, first, n, max_distance, rows_at):
         limit = min(_FIRST_LIMIT, max_distance)
         while True:
             words[N_OPEN] = n_open
-            row.words[_BODY_A] = NONE
+            row.words[BODY_A] = NONE
             _find_nearest(scene, row, rows_at + ROW * k, k, limit)
-            if row.words[_BODY_A] != NONE or words[N_OPEN] > n_open or limit >= max_distance:
+            if row.words[BODY_A] != NONE or words[N_OPEN] > n_open or limit >= max_distance:
                 break
             limit = min(limit * _GROWTH, max_distance) if limit < _LAST_LIMIT else max_distance
         if words[N_OPEN] > words[OPEN_CAPACITY]:
@@ -121,15 +119,14 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         return limit
     if row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
         return limit
-    is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
-    if is_bound[p] != 0 or is_bound[q] != 0:
+    if only_holds(scene, p) or only_holds(scene, q):
         leave_open(scene, number, a, b, row.doubles[LOWER])
         return limit
     out = view_row(row_at)
-    if out.words[_BODY_A] != NONE and not row.doubles[DISTANCE] < out.doubles[DISTANCE]:
+    if out.words[BODY_A] != NONE and not row.doubles[DISTANCE] < out.doubles[DISTANCE]:
         return limit
     _copy_row(scene, row_at)
-    out.words[_BODY_A] = a
+    out.words[BODY_A] = a
     out.words[BODY_B] = b
     return min(limit, out.doubles[UPPER]) if out.doubles[UPPER] > -math.inf else limit
 

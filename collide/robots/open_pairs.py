@@ -30,15 +30,17 @@ def are_hits(
 
 
 def distances(
-    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], limit: float
+    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit
 ) -> np.ndarray:
-    """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` beyond the limit [m].
+    """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` a limit [m].
 
+    limit : one of all, or (k,) of each, which may be exceeded.
     Where a body is swollen, distances and its points are those of what it is swollen to.
     """
     out = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     for rows, A, B, X_WA, X_WB, padding in _batches(pairs, X_WLs, bodies, around):
-        within = query.distance(A, B, X_WA, X_WB, max_distance=limit + padding, check_poses=False).rows.copy()
+        farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows]))
+        within = query.distance(A, B, X_WA, X_WB, max_distance=farthest + padding, check_poses=False).rows.copy()
         for field in ("distance", "lower", "upper"):
             within[field] -= padding
         within["point_a"] += padding * within["normal"]

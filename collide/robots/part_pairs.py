@@ -45,10 +45,15 @@ def state_of_parts(scene, p, q, margin):
         return OPEN
     if row.doubles[LOWER] > margin:
         return BEYOND_MARGIN
-    is_bound = view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])
-    if is_bound[p] != 0 or is_bound[q] != 0:
-        return OPEN
-    return HITTING if row.flags[HIT] != 0 else NEAR
+    if row.flags[HIT] == 0:
+        return NEAR
+    return OPEN if only_holds(scene, p) or only_holds(scene, q) else HITTING
+
+
+@kernel(inline=True)
+def only_holds(scene, part):
+    """Whether a part is more than what is meant: a mesh is within."""
+    return view_u8(scene.words[IS_BOUND_AT], scene.words[N_PARTS])[part] != 0
 
 
 @kernel

@@ -92,6 +92,8 @@ class Robot:
         [(link, link, reason)], both with collision geometry, in the order of the links.
     place
         The robot and the file it comes from, for messages.
+    joint_table, moves
+        Joints as kernels read them, in the order of `sorted_joints`; (joints, links) uint8, 1 where one moves a link.
 
     Raises
     ------
@@ -126,6 +128,7 @@ class Robot:
         self.joint_table = joint_table(
             self._order, self._index, self._columns, self._drivers, self.root, self.dof
         )
+        self.moves = self._joint_moves()
         self.geometry = {link: tuple(elements) for link, elements in (geometry or {}).items() if elements}
         for link in self.geometry:
             if link not in self._index:
@@ -340,15 +343,14 @@ class Robot:
         """Joints with parents before children, in the order of `joint_table`."""
         return tuple(self._order)
 
-    @property
-    def moves(self) -> np.ndarray:
-        """(joints, links) bool, joints as `sorted_joints`: whether a joint moves a link."""
-        out = np.zeros((len(self._order), len(self.links)), dtype=bool)
+    def _joint_moves(self) -> np.ndarray:
+        """(joints, links) uint8, joints as `sorted_joints`: 1 where a joint moves a link."""
+        out = np.zeros((len(self._order), len(self.links)), dtype=np.uint8)
         above: dict[str, list[int]] = {self.root: []}
         for k, joint in enumerate(self._order):
             above[joint.child] = [*above[joint.parent], k]
         for link, joints in above.items():
-            out[joints, self._index[link]] = True
+            out[joints, self._index[link]] = 1
         return out
 
     # --- kinematics ------------------------------------------------------------------------------

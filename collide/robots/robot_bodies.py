@@ -124,7 +124,8 @@ def filters_of(
     Never tested: pairs that the robot disables, that ``allowed`` or the World name, links of a fixed base against
     static bodies, and what groups and masks exclude.
     """
-    reasons = _named_pairs(robot, objects, world, allowed, {body.name for body in (*bodies, *around)})
+    known = {body.name for body in bodies} | {body.name for body in around}
+    reasons = _named_pairs(robot, objects, world, allowed, known)
     skipped: dict[str, int] = {}
 
     def is_skipped(a: str, b: str, why: str | None = None) -> bool:

@@ -78,7 +78,7 @@ class RobotChecker:
         self.robot, self.world = robot, World() if world is None else world
         self._X_WR = np.eye(4) if X_WR is None else as_poses(X_WR, "RobotChecker: X_WR")[0].copy()
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
-        self._asked, self._mobile = [tuple(pair) for pair in allowed], bool(mobile)
+        self._asked, self._mobile = list(allowed), bool(mobile)
         self._seen: tuple | None = None
         self._spare: list[CheckWorkspace] = []
         self._prepare()
@@ -241,7 +241,7 @@ class RobotChecker:
         Notes
         -----
         Distances in the middle of an interval against how far anything can move within half of it
-        (`certify_motions.py` says how it is bounded). Mimicking, prismatic, planar and floating joints move straight in
+        (`motion_bounds.py` says how it is bounded). Mimicking, prismatic, planar and floating joints move straight in
         their columns as well.
         """
         q0, q1 = self._edges(Q0, Q1)

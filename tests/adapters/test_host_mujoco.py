@@ -376,18 +376,6 @@ def test_a_diverged_state_is_mujocos():
     assert np.isfinite(data.qpos).all()
 
 
-def test_height_fields_are_left_to_mujoco():
-    text = (
-        '<mujoco><asset><hfield name="h" nrow="4" ncol="4" size="1 1 .1 .1"/></asset><worldbody>'
-        '<geom type="hfield" hfield="h"/><body pos="0 0 .09"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
-    )
-    model = mujoco.MjModel.from_xml_string(text)
-    alone = stepped(model, 50).qpos
-    with install(model) as installed:
-        assert list(installed.remaining) == [(0, 0)] and "hfield" in installed.remaining[0, 0]
-        np.testing.assert_array_equal(stepped(model, 50).qpos, alone)
-
-
 def test_bad_arguments():
     model = pit(2)
     for bad in (None, 3, [], [model, 3], "model"):

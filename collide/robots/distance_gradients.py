@@ -1,0 +1,119 @@
+"""How the distance of the nearest pair changes with each column of q.
+
+Moving with joint j, a point p of its child's subtree has velocity ω × (p − o) or along the axis; the distance of bodies
+that part changes by the normal times the difference of both witness points' velocities.
+"""
+
+from __future__ import annotations
+
+import math
+
+from collide.kernels import entry, kernel, view_f64, view_u8
+from collide.lowering.shape_table import POSE
+from collide.narrowphase.rows import BODY_B, DISTANCE, NORMAL, POINT_A, POINT_B, ROW, view_row
+from collide.numerics.vec3 import Vec3, cross, dot, neg, rotate, sub, vec3_at
+from collide.robots.check_configurations import begin_configuration
+from collide.robots.check_scene import BODY_INTS, LINK, N_LINKS, view_scene
+from collide.robots.forward_kinematics import (
+    ACROSS,
+    AXIS,
+    CHILD,
+    COLUMN,
+    FIXED,
+    FLOATING,
+    JOINT_DOUBLES,
+    JOINT_INTS,
+    KIND,
+    MULTIPLIER,
+    PARENT,
+    PLANAR,
+    TRANSLATION,
+    X_PJ,
+    sine_cosine_of,
+)
+from collide.robots.nearest_pairs import BODY_A, NONE
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64)")
+def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
+    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where there is none.
+
+    moves : (joints, links) bytes, 1 where a joint moves a link.
+    """
+    scene = view_scene(header_at)
+    joints = scene.joints
+    n_links = scene.words[N_LINKS]
+    q = view_f64(q_at, dof * n)
+    out = view_f64(out_at, dof * n)
+    moves = view_u8(moves_at, joints.n * n_links)
+    for k in range(n):
+        row = view_row(rows_at + ROW * k)
+        is_differentiable = row.words[BODY_A] != NONE and row.doubles[DISTANCE] != 0.0
+        for j in range(dof):
+            out[dof * k + j] = 0.0 if is_differentiable else math.nan
+        if not is_differentiable:
+            continue
+        begin_configuration(scene, q, dof * k)
+        link_a = scene.bodies[BODY_INTS * row.words[BODY_A] + LINK]
+        link_b = scene.bodies[BODY_INTS * row.words[BODY_B] + LINK] if row.words[BODY_B] >= 0 else -1
+        nhat = vec3_at(row.doubles, NORMAL)
+        for j in range(joints.n):
+            moves_a = moves[n_links * j + link_a] != 0
+            moves_b = link_b >= 0 and moves[n_links * j + link_b] != 0
+            if moves_a and not moves_b:
+                _add_joint(scene, j, q, dof * k, neg(nhat), vec3_at(row.doubles, POINT_A), out)
+            elif moves_b and not moves_a:
+                _add_joint(scene, j, q, dof * k, nhat, vec3_at(row.doubles, POINT_B), out)
+
+
+@kernel
+def _add_joint(scene, j, q, first, direction, p_W, out):
+    """Add what the columns of joint j do to a point p along a direction."""
+    joints, links = scene.joints, scene.links
+    at = JOINT_DOUBLES * j
+    kind = joints.ints[JOINT_INTS * j + KIND]
+    column = first + joints.ints[JOINT_INTS * j + COLUMN]
+    child = POSE * joints.ints[JOINT_INTS * j + CHILD]
+    if kind == FIXED:
+        return
+    if kind == FLOATING:
+        _add_floating(scene, j, q, column, direction, p_W, out)
+        return
+    axis = rotate(links, child, vec3_at(joints.doubles, at + AXIS))
+    multiplier = joints.doubles[at + MULTIPLIER]
+    if kind == TRANSLATION:
+        out[column] += multiplier * dot(axis, direction)
+        return
+    if kind == PLANAR:
+        # It shifts before it turns: along axes of the frame not yet turned.
+        for k in range(2):
+            across = _in_joint_frame(scene, j, vec3_at(joints.doubles, at + ACROSS + 3 * k))
+            out[column + k] += dot(across, direction)
+        column += 2
+    arm = sub(p_W, vec3_at(links, child + 9))
+    out[column] += multiplier * dot(cross(axis, arm), direction)
+
+
+@kernel(cold=True)
+def _add_floating(scene, j, q, column, direction, p_W, out):
+    """x, y, z along the joint frame's axes; yaw about its z, pitch about its y as yaw leaves it, roll about the child's
+    x."""
+    links = scene.links
+    child = POSE * scene.joints.ints[JOINT_INTS * j + CHILD]
+    arm = sub(p_W, vec3_at(links, child + 9))
+    rotation = sine_cosine_of(q[column + 5])
+    z = _in_joint_frame(scene, j, Vec3(0.0, 0.0, 1.0))
+    out[column] += dot(_in_joint_frame(scene, j, Vec3(1.0, 0.0, 0.0)), direction)
+    out[column + 1] += dot(_in_joint_frame(scene, j, Vec3(0.0, 1.0, 0.0)), direction)
+    out[column + 2] += dot(z, direction)
+    pitch_axis = _in_joint_frame(scene, j, Vec3(-rotation.sine, rotation.cosine, 0.0))
+    out[column + 3] += dot(cross(rotate(links, child, Vec3(1.0, 0.0, 0.0)), arm), direction)
+    out[column + 4] += dot(cross(pitch_axis, arm), direction)
+    out[column + 5] += dot(cross(z, arm), direction)
+
+
+@kernel(inline=True)
+def _in_joint_frame(scene, j, v):
+    """A vector of joint j's frame, in W's axes."""
+    parent = POSE * scene.joints.ints[JOINT_INTS * j + PARENT]
+    return rotate(scene.links, parent, rotate(scene.joints.doubles, JOINT_DOUBLES * j + X_PJ, v))

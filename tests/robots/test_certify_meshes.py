@@ -1,0 +1,64 @@
+"""Motions of meshes that are not convex: proven by their own distances, not by those of hulls."""
+
+from __future__ import annotations
+
+import numpy as np
+from naive import pose, rng_of
+from random_robots import random_configurations, random_robot
+
+import collide
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape, Robot
+
+
+def ring() -> collide.Mesh:
+    """A square frame in the plane across z, 2 m wide with a hole of 1 m: its hull fills the hole."""
+    outer, inner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), 0.5 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    corners = np.array([(*xy, z) for z in (-0.05, 0.05) for xy in (*outer, *inner)], dtype=float)
+    faces = []
+    for k in range(4):
+        j = (k + 1) % 4
+        across = (k, 4 + k, 4 + j, j), (8 + k, 8 + j, 12 + j, 12 + k)
+        around = (k, j, 8 + j, 8 + k), (4 + k, 12 + k, 12 + j, 4 + j)
+        for a, b, c, d in across + around:
+            faces += [(a, b, c), (a, c, d)]
+    return collide.Mesh(corners, faces)
+
+
+def test_a_rod_is_proven_to_pass_through_a_ring():
+    world = collide.World()
+    world.add(ring(), name="ring", static=True)
+    rod = [LinkShape(collide.Capsule(0.1, 0.4), np.eye(4), None, "test")]
+    joints = [Joint("slide", "prismatic", "base", "rod", np.eye(4), (0, 0, 1.0), -2.0, 2.0),
+              Joint("shift", "prismatic", "rod", "tip", np.eye(4), (1.0, 0, 0), -2.0, 2.0)]  # fmt: skip
+    robot = Robot("rod", ["base", "rod", "tip"], joints, {"rod": rod})
+    checker = collide.RobotChecker(robot, world)
+    assert ring().solid and not collide.contains(ring(), np.eye(4), np.zeros((1, 3)))[0]
+    edges = checker.certify_edges([[-1.0, 0.0], [-1.0, 0.0]], [[1.0, 0.0], [-0.05, 0.0]])
+    assert edges.free.all() and len(edges.open) == 0
+    robot = Robot("rod", ["base", "rod", "tip"], joints, {"tip": rod})
+    edges = collide.RobotChecker(robot, world).certify_edges([[-0.9, 0.0], [-1.0, 0.39]], [[0.9, 0.8], [1.0, 0.39]])
+    assert edges.collides[0] and edges.free[1]
+
+
+def test_motions_of_meshes_have_no_sample_that_collides():
+    decided = total = 0
+    for seed in range(4):
+        rng = rng_of("meshes in motion", seed)
+        dented = collide.Mesh(ring().vertices * 0.2, ring().faces)
+        robot = random_robot(rng, n_links=4, shape=lambda rng, size, dented=dented: dented)
+        world = collide.World()
+        for k in range(6):
+            world.add(dented, pose(t=rng.uniform(-0.6, 0.6, 3)), name=f"ring{k}")
+        checker = collide.RobotChecker(robot, world)
+        Q0 = random_configurations(rng, robot, 40)
+        Q0 = Q0[~checker.collides(Q0)][:8]
+        Q1 = Q0 + 0.3 * rng.normal(size=Q0.shape)
+        edges = checker.certify_edges(Q0, Q1, resolution=0.01)
+        for k in np.flatnonzero(edges.free):
+            hits = checker.collides(Q0[k] + rng.random(100)[:, None] * (Q1[k] - Q0[k]))
+            assert not hits.any(), f"seed {seed}, edge {k}: proven free, and {hits.sum()} samples hit"
+        for k in np.flatnonzero(edges.collides):
+            assert checker.collides(Q0[k] + edges.time[k] * (Q1[k] - Q0[k])), f"seed {seed}, edge {k}"
+        decided, total = decided + (~edges.is_open).sum(), total + len(edges)
+    assert total >= 20 and decided >= 0.8 * total
