@@ -210,7 +210,8 @@ class MuJoCo:
         for p, half in zip(steps.middles, steps.half_lengths):
             body = spec.worldbody.add_body(pos=p)
             body.add_freejoint()
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half)
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, mass=0.0)
+            body.mass, body.inertia, body.explicitinertial = 1.0, (1.0, 1.0, 1.0), True
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         mujoco.set_mjcb_time(time.process_time)
