@@ -28,7 +28,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from accuracy_engines import ENGINES, PATHS, Answer, ask, missing
-from convex import aligned, say, tell, write
+from convex import aligned, log, say, write
 from startup import machine
 
 from collide.adapters.peers import exact
@@ -99,7 +99,7 @@ class Tally:
         slack = abs(value) * (OPEN_HALFSPACE if case.kind == HALFSPACE else OPEN)
         if not Decimal(answer.lower) - slack <= value <= Decimal(answer.upper) + slack:
             self.missed += 1
-            tell(f"a bracket misses: {answer.lower!r} ≤ {value:.20e} ≤ {answer.upper!r} of\n{case.snippet()}")
+            log(f"a bracket misses: {answer.lower!r} ≤ {value:.20e} ≤ {answer.upper!r} of\n{case.snippet()}")
         if not answer.certified:
             self.uncertified[kind] += 1
             width = (answer.upper - answer.lower) / size_of(case)
@@ -163,9 +163,9 @@ def show_families(rows: list[dict]) -> None:
         aligned("collide: largest errors of certified answers", lines)
         for r in ours:
             if r["example"]:
-                tell(f"uncertified: {r['family']}, {r['example']}")
+                log(f"uncertified: {r['family']}, {r['example']}")
         total = {key: sum(r[key] for r in ours) for key in ("gaps", "depths", "touchs", "missed", "wrong_signs")}
-        tell(", ".join(f"{name} {count}" for name, count in total.items()))
+        log(", ".join(f"{name} {count}" for name, count in total.items()))
     others = [name for name in dict.fromkeys(r["engine"] for r in rows) if name != "collide"]
     if others:
         by_key = {(r["family"], r["engine"]): r for r in rows}
@@ -257,7 +257,7 @@ def main() -> None:
         if reason := missing(name):
             say(f"left out: {name} ({reason})")
             args.engines.remove(name)
-    tell(", ".join(f"{name} {value}" for name, value in about.items()))
+    log(", ".join(f"{name} {value}" for name, value in about.items()))
     seeds = range(args.first_seed, args.first_seed + args.seeds)
     for part in PARTS if args.part == "all" else [args.part]:
         if part == "families":
@@ -275,9 +275,9 @@ def main() -> None:
             from accuracy_plots import plot
 
             for place in plot(part, rows, args.plot):
-                tell(f"drawn to {place.name}")
+                log(f"drawn to {place.name}")
         if not args.no_csv:
-            tell(f"written to benchmarks/results/{write(f'accuracy-{part}', rows, about).name}")
+            log(f"written to benchmarks/results/{write(f'accuracy-{part}', rows, about).name}")
         sys.stdout.flush()
 
 

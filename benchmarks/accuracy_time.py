@@ -11,7 +11,7 @@ import statistics
 from decimal import Decimal
 
 import numpy as np
-from convex import aligned, say, seconds_of, tell
+from convex import aligned, log, say, seconds_of
 from convex_peers import Coal, Fcl
 from convex_shapes import LENGTH, Solid, rotations
 
@@ -127,4 +127,4 @@ def show_time(rows: list[dict]) -> None:
         if (e, s) == ("coal", "1e-09") and by_key[n, side, level, e, s]["min_us"]
         < by_key[n, side, level, "collide", "signed"]["min_us"]
     ]  # fmt: skip
-    tell(f"cells in which coal at tolerance 1e-9 is faster: {len(slower)} {slower or ''}".rstrip())
+    log(f"cells in which coal at tolerance 1e-9 is faster: {len(slower)} {slower or ''}".rstrip())

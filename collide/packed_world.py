@@ -1,29 +1,28 @@
-"""A World as the kernels see it: flat tables of shapes, posed parts, boxes, and a box-tree."""
+"""A World as the kernels see it: flat tables of shapes, posed parts, boxes, and a box-tree, brought up to date as it
+changes.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
-from collide.broadphase.filters import CULLED, count_skipped
 from collide.casts.posed_parts import PosedParts
 from collide.errors import UnsupportedQuery
 from collide.lazy_modules import lazy_module
-from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import bounding_parts_of, is_single_convex
-from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, has_own_pose, pose_table
+from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
-from collide.results import EXACT, HOW, PAIR_DTYPE, UNDECIDED
+from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
+from collide.threads import share
 from collide.world_bodies import BodiesAsTheyStood, Roster
+from collide.world_part_pairs import PartTrees, updating
+from collide.world_parts import WorldParts
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
@@ -31,6 +30,11 @@ mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 #: Booleans about meshes that stop at the first hit ask so many pairs of the same two shapes at first, then twice as
 #: many.
 _FIRST_CHUNK = 8
+#: Pairs of bodies that a thread takes at once; booleans that stop at a hit look whether there was one after so many.
+_PAIRS_AT_ONCE = 2048
+#: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most, of at most
+#: so many, evenly taken: to look at all would take half as long as to ask them.
+_MIN_SORTED, _LIKELIEST, _MAX_COMPARED = 512, 32, 2048
 
 
 class Answer(NamedTuple):
@@ -45,102 +49,183 @@ class Answer(NamedTuple):
     mesh_pairs: int
 
 
+class PairFilters(NamedTuple):
+    """What is said of pairs of bodies, by position; another object once it changes.
+
+    allowed : (k, 2) pairs that are never tested, i < j.   reasons : why, of each.
+    margin_keys, margins : (m,) i·2^32 + j of pairs with a margin of their own, i < j, ascending, and that [m].
+    """
+
+    allowed: np.ndarray
+    reasons: list[str]
+    margin_keys: np.ndarray
+    margins: np.ndarray
+
+
 class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
-    roster : the bodies.   X_WBs : (n, 4, 4) their poses, copied.   allowed : {(i, j): reason}, i < j, positions.
-    single_convex : (n,) bool: bodies that are one convex set in their own frame.
+    roster : the bodies.   filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; None before there
+    is any.   has_margins : whether any body or pair has.
     """
 
-    def __init__(self, roster: Roster, X_WBs: np.ndarray, allowed: dict[tuple[int, int], str]):
-        self.roster, self.X_WBs, self.allowed = roster, X_WBs.copy(), allowed
-        n = len(roster.ids)
-        self._allowed_keys = np.sort(np.array([i * n + j for i, j in allowed], dtype=np.int64))
-        self._shape_of, self._shapes = _distinct_shapes(roster.shapes)
-        is_meshed = np.array([shape.meshed for shape in self._shapes], dtype=bool)
-        self._meshed = is_meshed[self._shape_of]
-        self._any_meshed = bool(is_meshed.any())
-        self.single_convex = np.array([is_single_convex(shape) for shape in self._shapes], dtype=bool)[self._shape_of]
+    def __init__(self, roster: Roster, X_WBs: np.ndarray, filters: PairFilters):
+        self.roster, self.filters = roster, filters
+        self.parts = WorldParts()
+        self.tree: BoxTree | None = None
         self._shape_set: ShapeSet | None = None
-        self._lay_out_parts()
-        self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
-        self._part_boxes = boxes_of(self._table, self._poses.rows, self._row_of)
-        self._tree = BoxTree(self._body_boxes()) if n else None
+        self._part_trees = PartTrees(self.parts)
+        self._inflation = np.zeros(0)
+        self._work = {"added": 0, "removed": 0, "moved": 0}
+        self._any_dead = self.has_margins = self._any_meshed = False
+        self._append(roster, X_WBs)
+        self._take_sleep(roster._replace(sleeping=np.zeros(len(roster.ids), dtype=bool)), roster)
+        self.set_filters(filters)
 
-    def _lay_out_parts(self) -> None:
-        """Parts of all bodies, one body after another: those of its shape."""
-        parts = [bounding_parts_of(shape) for shape in self._shapes]
-        row_of, self._table = _table_of([packed for of_shape in parts for packed, _ in of_shape])
-        X_SP = np.array([X for of_shape in parts for _, X in of_shape]).reshape(-1, 4, 4)
-        reach = np.array([packed.reach for of_shape in parts for packed, _ in of_shape])
-        n_parts = np.array([len(of_shape) for of_shape in parts], dtype=np.int64)
-        first = np.cumsum(n_parts) - n_parts
-        self._counts = counts = n_parts[self._shape_of]
-        self._all_of_one_part = bool((counts == 1).all())
-        self._first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        self._body_of = np.repeat(np.arange(len(counts)), counts)
-        which = _runs(first[self._shape_of], counts)
-        self._row_of, self._X_BP, self._reach = row_of[which], X_SP[which], reach[which]
-        self._has_pose = has_own_pose(X_SP)[which]
+    # --- changes --------------------------------------------------------------------------------
 
-    def _body_boxes(self) -> np.ndarray:
-        """(n, 6) boxes around the parts of each body."""
-        if self._all_of_one_part:
-            return self._part_boxes
-        starts = self._first[:-1]
-        low = np.minimum.reduceat(self._part_boxes[:, :3], starts)
-        return np.hstack([low, np.maximum.reduceat(self._part_boxes[:, 3:], starts)])
-
-    def move(self, bodies: np.ndarray, X_WBs: np.ndarray) -> None:
-        """Take new poses (k, 4, 4) of bodies (k,), by position, and refit the tree. Others' boxes are not made
-        again.
+    def update(self, roster: Roster, X_WBs: np.ndarray, moved: np.ndarray) -> None:
+        """Take what has changed since: bodies behind the others, removed ones, margins, sleep; poses of ``moved`` (k,)
+        positions.   X_WBs : (n, 4, 4), of all bodies.
         """
-        self.X_WBs[bodies] = X_WBs
-        parts: np.ndarray | slice = bodies if self._all_of_one_part else self._parts_of(bodies)
-        if len(bodies) == len(self.roster.ids):
-            parts = slice(None)  # all of them: nothing is gathered
-        X_WB = X_WBs if self._all_of_one_part else self.X_WBs[self._body_of[parts]]
-        moved = pose_table(X_WB, self._X_BP[parts], self._reach[parts], self._has_pose[parts])
-        before = self._poses.rows[parts, POSE_TERMS].copy()
-        has_terms = before >= 0.0
-        if np.array_equal(has_terms, moved.rows[:, POSE_TERMS] >= 0.0):  # exact terms of products keep their places
-            if has_terms.any():
-                self._poses.terms[before[has_terms].astype(np.int64)] = moved.terms
-                moved.rows[has_terms, POSE_TERMS] = before[has_terms]
-            self._poses.rows[parts] = moved.rows
-        else:
-            self._poses = pose_table(self.X_WBs[self._body_of], self._X_BP, self._reach, self._has_pose)
-        self._part_boxes[parts] = boxes_of(self._table, moved.rows, self._row_of[parts])
-        assert self._tree is not None
-        self._tree.refit(self._body_boxes())
+        before, n = self.roster, len(self.roster.ids)
+        if roster is not before:
+            self._append(roster, X_WBs[n:])
+            dead = np.flatnonzero(before.alive & ~roster.alive[:n])
+            dead = np.append(dead, n + np.flatnonzero(~roster.alive[n:]))
+            if len(dead):
+                assert self.tree is not None
+                self.tree.remove(dead)
+                self._any_dead = True
+            self._work["removed"] += len(dead)
+            self._take_sleep(before, roster)
+            if (before.margin != roster.margin[:n]).any() or roster.margin[n:].any():
+                self._inflate()
+            moved = moved[moved < n]
+        if self._any_dead:
+            moved = moved[roster.alive[moved]]
+        if len(moved):
+            self.parts.move(moved, X_WBs[moved])
+            assert self.tree is not None
+            self.tree.move(moved, self._tree_boxes(moved))
+            self._work["moved"] += len(moved)
 
-    def _parts_of(self, bodies: np.ndarray) -> np.ndarray:
-        """Parts of bodies, one body after another."""
-        return _runs(self._first[bodies], self._counts[bodies])
+    def _append(self, roster: Roster, X_WBs: np.ndarray) -> None:
+        n = len(self.parts.shape_of)
+        self.roster = roster
+        new = np.arange(n, len(roster.ids))
+        if not len(new):
+            return
+        self.parts.append(roster.shapes[n : len(roster.ids)], X_WBs)
+        self._inflation = np.append(self._inflation, np.zeros(len(new)))
+        self._shape_set, self._any_meshed = None, bool(self.parts.meshed.any())
+        boxes = self.parts.body_boxes(new)
+        if self.tree is None:
+            self.tree = BoxTree(boxes, roster.static != 0)
+            self.tree.set_groups(new, roster.group, roster.mask)
+        else:
+            self.tree.append(boxes, roster.static[n:] != 0, roster.group[n:], roster.mask[n:])
+        self._work["added"] += len(new)
+
+    def _take_sleep(self, before: Roster, roster: Roster) -> None:
+        if self.tree is None:
+            return
+        changed = np.append(before.sleeping, np.zeros(len(roster.ids) - len(before.ids), dtype=bool)) != roster.sleeping
+        for asleep in (False, True):
+            self.tree.set_asleep(np.flatnonzero(changed & (roster.sleeping == asleep)), asleep)
+
+    def set_filters(self, filters: PairFilters) -> None:
+        """Take other allowed pairs and margins of pairs."""
+        self.filters = filters
+        if self.tree is not None:
+            self.tree.set_allowed(filters.allowed)
+            self._inflate()
+
+    def _inflate(self) -> None:
+        """Boxes in the tree have room for margins: two of them meet where the bodies' are within their margin."""
+        inflation = self.roster.margin.copy()
+        pairs = np.stack([self.filters.margin_keys >> 32, self.filters.margin_keys & 0xFFFFFFFF], axis=1)
+        np.maximum.at(inflation, pairs, 0.5 * self.filters.margins[:, None])
+        changed = np.flatnonzero((inflation != self._inflation) & self.roster.alive)
+        self._inflation, self.has_margins = inflation, bool(inflation.any())
+        if len(changed):
+            assert self.tree is not None
+            self.tree.move(changed, self._tree_boxes(changed))
+
+    def _tree_boxes(self, bodies: np.ndarray) -> np.ndarray:
+        """(k, 6) boxes of bodies with room for their margins, rounded outwards."""
+        boxes = self.parts.body_boxes(bodies)
+        if not self.has_margins:
+            return boxes
+        inflation = self._inflation[bodies, None]
+        inflation = inflation + (np.abs(boxes).max(axis=1, keepdims=True) + inflation) * 2.0**-50 * (inflation > 0.0)
+        return np.hstack([boxes[:, :3] - inflation, boxes[:, 3:] + inflation])
+
+    # --- what there is --------------------------------------------------------------------------
+
+    @property
+    def X_WBs(self) -> np.ndarray:
+        """(n, 4, 4) poses.   shapes : the distinct ones.   shape_of : (n,) which of them each body has."""
+        return self.parts.X_WBs
+
+    @property
+    def shapes(self) -> list[Shape]:
+        return self.parts.shapes
+
+    @property
+    def shape_of(self) -> np.ndarray:
+        return self.parts.shape_of
+
+    @property
+    def meshed(self) -> np.ndarray:
+        """(n,) bool: bodies that are meshes or hold one."""
+        return self.parts.meshed
+
+    def take_work(self) -> dict:
+        """{what: number} of what was brought up to date since this was last called."""
+        work, self._work = self._work, {"added": 0, "removed": 0, "moved": 0}
+        return work if self.tree is None else work | self.tree.take_work()
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of tables, boxes and tree [bytes], without that of shapes."""
+        return self.parts.nbytes + (0 if self.tree is None else self.tree.nbytes)
+
+    def posed_parts(self) -> tuple[PosedParts, np.ndarray, np.ndarray]:
+        """(all parts, (parts,) the body of each, (n + 1,) the first part of each body and the number of all)."""
+        parts = self.parts
+        parts.table.build_trees(parts.row_of)
+        all_parts = PosedParts(parts.table, parts.poses, parts.row_of, parts.X_WBs[parts.body_of], parts.X_BP)
+        return all_parts, parts.body_of, parts.first
 
     def candidates(self, margin: float) -> np.ndarray:
-        """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m]."""
-        if self._tree is None:
-            return np.empty((0, 2), dtype=np.int64)
-        pairs = self._tree.pairs(margin, self.roster.static, self.roster.group, self.roster.mask)
-        allowed = self._allowed_keys
-        if not len(allowed):
-            return pairs
-        keys = pairs[:, 0] * len(self.roster.ids) + pairs[:, 1]
-        at = np.minimum(np.searchsorted(allowed, keys), len(allowed) - 1)
-        return pairs[allowed[at] != keys]
+        """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m], and the
+        margins of bodies and pairs.
+        """
+        with updating():  # what the tree keeps of pairs
+            return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
+
+    def margins_of(self, pairs: np.ndarray) -> np.ndarray:
+        """(k,) the margins [m] of pairs (k, 2), i < j: their own, or the sum of both bodies'."""
+        margins = self.roster.margin[pairs].sum(axis=1)
+        keys = self.filters.margin_keys
+        if len(keys) and len(pairs):
+            wanted = (pairs[:, 0] << 32) + pairs[:, 1]
+            at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+            margins = np.where(keys[at] == wanted, self.filters.margins[at], margins)
+        return margins
 
     def posed_shapes(self, pairs: np.ndarray) -> tuple[Picked, Picked, np.ndarray, np.ndarray]:
         """(A, B, X_WA, X_WB) of pairs (k, 2) of positions, as batches of pair queries take them."""
         if self._shape_set is None:
-            self._shape_set = ShapeSet(self._shapes)
+            self._shape_set = ShapeSet(list(self.shapes))
         a, b = pairs.T
         X_WA, X_WB = self.X_WBs[a], self.X_WBs[b]
-        return self._shape_set[self._shape_of[a]], self._shape_set[self._shape_of[b]], X_WA, X_WB
+        return self._shape_set[self.shape_of[a]], self._shape_set[self.shape_of[b]], X_WA, X_WB
 
     def convex_sets_of(self, pairs: np.ndarray) -> tuple[ShapeTable, np.ndarray]:
         """(table, (k, 2) rows of it) of pairs (k, 2) of positions of bodies that are single convex sets."""
-        return self._table, self._row_of[self._first[pairs]]
+        return self.parts.table, self.parts.row_of[self.parts.first[pairs]]
 
     def bodies_named(self, *positions: np.ndarray) -> BodiesAsTheyStood:
         """The bodies at positions that results name, with their poses now."""
@@ -150,30 +235,72 @@ class PackedWorld:
         named = np.flatnonzero(is_named)
         return BodiesAsTheyStood(self.roster, named, self.X_WBs[named])
 
-    def answer(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
+    def answer(
+        self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool, threads: int = 1
+    ) -> Answer:
         """Rows of candidates (k, 2).
 
         limit : [m], as of `collide.distance`.   stop_at_hit : rows after the first hit may be missing.
         boolean : rows tell no more than ``hit``, ``how`` and ``iterations``, in no order.
+        threads : at most so many answer; the answers are the same bits, whatever is missing with ``stop_at_hit``, too.
         """
+        if stop_at_hit and len(candidates) > _MIN_SORTED:
+            first = self._likeliest(candidates)
+            answer = self._answer_in_pieces(candidates[first], limit, boolean, True, 1)
+            if answer.rows["hit"].any():
+                return answer
+            rest = self._answer_in_pieces(np.delete(candidates, first, axis=0), limit, boolean, True, threads)
+            return _joined([answer, rest], boolean)
+        return self._answer_in_pieces(candidates, limit, boolean, stop_at_hit, threads)
+
+    def _likeliest(self, candidates: np.ndarray) -> np.ndarray:
+        """Numbers of the candidates whose boxes overlap most, in sides of the smaller one."""
+        some = np.arange(0, len(candidates), -(-len(candidates) // _MAX_COMPARED))
+        a, b = (self.parts.body_boxes(bodies) for bodies in candidates[some].T)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            overlap = (np.minimum(a[:, 3:], b[:, 3:]) - np.maximum(a[:, :3], b[:, :3])).min(axis=1)
+            sides = np.minimum((a[:, 3:] - a[:, :3]).max(axis=1), (b[:, 3:] - b[:, :3]).max(axis=1))
+            overlap = np.nan_to_num(overlap / sides, nan=0.0)
+        return np.sort(some[np.argpartition(-overlap, _LIKELIEST)[:_LIKELIEST]])
+
+    def _answer_in_pieces(
+        self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool, threads: int
+    ) -> Answer:
+        """Pieces of the same sizes whatever the number of threads; after one with a hit, others are left out."""
+        starts = range(0, len(candidates), _PAIRS_AT_ONCE)
+        if len(starts) < 2 or (threads < 2 and not stop_at_hit):
+            return self._answer_piece(candidates, limit, boolean, stop_at_hit)
+        answers: dict[int, Answer] = {}
+        first_hit = [len(candidates)]
+
+        def work(start: int) -> None:
+            if stop_at_hit and start > first_hit[0]:
+                return
+            piece = candidates[start : start + _PAIRS_AT_ONCE]
+            answers[start] = self._answer_piece(piece, limit, boolean, stop_at_hit)
+            if stop_at_hit and answers[start].rows["hit"].any():
+                first_hit[0] = min(first_hit[0], start)
+
+        share(starts, work, threads)
+        return _joined([answers[start] for start in starts if start in answers and start <= first_hit[0]], boolean)
+
+    def _answer_piece(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
         if not self._any_meshed:
-            return self._answer_convex(candidates, limit, boolean=boolean, stop_at_hit=stop_at_hit)
-        meshed = self._meshed[candidates].any(axis=1)
-        convex = self._answer_convex(candidates[~meshed], limit, boolean=boolean, stop_at_hit=stop_at_hit)
+            return self._answer_convex(candidates, limit, boolean, stop_at_hit)
+        meshed = self.parts.meshed[candidates].any(axis=1)
+        convex = self._answer_convex(candidates[~meshed], limit, boolean, stop_at_hit)
         if stop_at_hit and convex.rows["hit"].any():
             return convex
         of_meshes = self._answer_meshes(candidates[meshed], limit, boolean, stop_at_hit)
-        rows = np.concatenate([convex.rows, of_meshes])
-        if not boolean:
-            rows = rows[np.lexsort((rows["b"], rows["a"]))]
-        return Answer(rows, convex.convex_pairs, convex.body_pairs + len(of_meshes), len(of_meshes))
+        return _joined([convex, Answer(of_meshes, 0, len(of_meshes), len(of_meshes))], boolean)
 
     # --- pairs with a mesh ----------------------------------------------------------------------
 
     def _answer_meshes(self, pairs: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> np.ndarray:
         """Rows of pairs of bodies with a mesh: those of the same two shapes are one batch."""
         answered = [np.zeros(0, dtype=PAIR_DTYPE)]
-        for batch in _batches(pairs, self._shape_of, len(self._shapes), _FIRST_CHUNK if stop_at_hit else len(pairs)):
+        chunk = _FIRST_CHUNK if stop_at_hit else len(pairs)
+        for batch in batches_of_shapes(pairs, self.shape_of, len(self.shapes), chunk):
             answered.append(self._mesh_rows(batch, limit, boolean))
             if stop_at_hit and answered[-1]["hit"].any():
                 break
@@ -182,7 +309,7 @@ class PackedWorld:
     def _mesh_rows(self, pairs: np.ndarray, limit: float, boolean: bool) -> np.ndarray:
         """Rows of pairs (k, 2) of bodies of the same two shapes. Raises UnsupportedQuery."""
         a, b = pairs.T
-        A, B = self._shapes[self._shape_of[a[0]]], self._shapes[self._shape_of[b[0]]]
+        A, B = self.shapes[self.shape_of[a[0]]], self.shapes[self.shape_of[b[0]]]
         if boolean:
             rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
             states = mesh_batches.pair_states(A, B, self.X_WBs[a], self.X_WBs[b])
@@ -196,7 +323,8 @@ class PackedWorld:
     def refused(self, candidates: np.ndarray, limit: float) -> list[tuple[int, int, str]]:
         """(position, position, reason) of candidates for which `answer` raises UnsupportedQuery: pairs with a mesh."""
         refused = []
-        for pairs in _batches(candidates[self._meshed[candidates].any(axis=1)], self._shape_of, len(self._shapes)):
+        with_mesh = candidates[self.parts.meshed[candidates].any(axis=1)]
+        for pairs in batches_of_shapes(with_mesh, self.shape_of, len(self.shapes)):
             try:
                 self._mesh_rows(pairs, limit, False)
             except UnsupportedQuery:
@@ -214,182 +342,38 @@ class PackedWorld:
 
     # --- convex bodies and unions of convex parts -----------------------------------------------
 
-    def _answer_convex(self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool) -> Answer:
-        pairs, owner = self._part_pairs(candidates, limit)
+    def _answer_convex(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
+        parts = self.parts
+        pairs, owner = self._part_trees.near(candidates, limit)
         rows = run_pairs(
-            self._table, self._poses, self._row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
+            parts.table, parts.poses, parts.row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
         )
+        if boolean and parts.all_of_one_part:
+            return Answer(rows, len(rows), len(rows), 0)
         pairs, owner = pairs[: len(rows)], owner[: len(rows)]
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
         if boolean:
             return Answer(rows, len(rows), len(starts), 0)
         rows["a"], rows["b"] = candidates[owner, 0], candidates[owner, 1]
-        rows["part_a"] = pairs[:, 0] - self._first[rows["a"]]
-        rows["part_b"] = pairs[:, 1] - self._first[rows["b"]]
-        spans = np.hstack([self._spans(rows["a"][starts]), self._spans(rows["b"][starts])])
-        of_bodies = combine(rows, starts, spans, self._table, self._poses, self._row_of)
+        rows["part_a"] = pairs[:, 0] - parts.first[rows["a"]]
+        rows["part_b"] = pairs[:, 1] - parts.first[rows["b"]]
+        spans = np.hstack([parts.spans(rows["a"][starts]), parts.spans(rows["b"][starts])])
+        of_bodies = combine(rows, starts, spans, parts.table, parts.poses, parts.row_of)
         return Answer(of_bodies, len(rows), len(starts), 0)
 
-    def _spans(self, bodies: np.ndarray) -> np.ndarray:
-        """(k, 2): first part and number of parts of bodies."""
-        return np.stack([self._first[bodies], self._counts[bodies]], axis=1)
 
-    def _part_pairs(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of parts whose boxes come within margin, and the candidate each belongs to.
-
-        A candidate keeps at least its first pair of parts, so that every pair asked has a row.
-        """
-        if self._all_of_one_part:
-            return candidates, np.arange(len(candidates))
-        a, b = candidates.T
-        n_pairs = self._counts[a] * self._counts[b]
-        owner = np.repeat(np.arange(len(candidates)), n_pairs)
-        within = _runs(np.zeros_like(n_pairs), n_pairs)
-        width = self._counts[b[owner]]
-        i = self._first[a[owner]] + within // np.maximum(width, 1)
-        j = self._first[b[owner]] + within % np.maximum(width, 1)
-        low, high = self._part_boxes[:, :3], self._part_boxes[:, 3:]
-        near = ((low[i] - margin <= high[j]) & (low[j] - margin <= high[i])).all(axis=1)
-        first_of_each = np.flatnonzero(np.diff(owner, prepend=-1))
-        is_empty = np.ones(len(candidates), dtype=bool)
-        is_empty[owner[near]] = False
-        near[first_of_each[is_empty]] = True
-        return np.stack([i[near], j[near]], axis=1), owner[near]
-
-    # --- casts ----------------------------------------------------------------------------------
-
-    @property
-    def tree(self) -> BoxTree | None:
-        """The box-tree over bodies; None of a World without any."""
-        return self._tree
-
-    @property
-    def shapes(self) -> list[Shape]:
-        """The distinct shapes.   shape_of : (n,) which of them each body has.   meshed : (n,) bool."""
-        return self._shapes
-
-    @property
-    def shape_of(self) -> np.ndarray:
-        return self._shape_of
-
-    @property
-    def meshed(self) -> np.ndarray:
-        return self._meshed
-
-    def posed_parts(self) -> tuple[PosedParts, np.ndarray, np.ndarray]:
-        """(all parts, (parts,) the body of each, (n + 1,) the first part of each body and the number of all)."""
-        self._table.build_trees(self._row_of)
-        parts = PosedParts(self._table, self._poses, self._row_of, self.X_WBs[self._body_of], self._X_BP)
-        return parts, self._body_of, self._first
-
-    # --- an outside shape -----------------------------------------------------------------------
-
-    def against(self, shape: Shape, X_WS: np.ndarray, limit: float) -> np.ndarray:
-        """Rows of one outside shape at a pose (4, 4) against all bodies near it; b is a position, a is 0."""
-        parts = bounding_parts_of(shape)
-        packed = [part for part, _ in parts]
-        reach = np.array([part.reach for part in packed])
-        poses = pose_table(np.repeat(X_WS[None], len(parts), axis=0), np.array([X for _, X in parts]), reach)
-        boxes = boxes_of(ShapeTable(packed), poses.rows, np.arange(len(parts)))
-        box = np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
-        bodies = self._tree.touching(box, limit) if self._tree is not None else np.empty(0, dtype=np.int64)
-        meshed = np.full(len(bodies), True) if shape.meshed else self._meshed[bodies]
-        if not meshed.any():
-            return self._convex_against(packed, poses, bodies, limit)
-        rows = [self._convex_against(packed, poses, bodies[~meshed], limit)]
-        pairs = np.repeat(bodies[meshed][:, None], 2, axis=1)
-        for batch in _batches(pairs, self._shape_of, len(self._shapes)):
-            b = batch[:, 0]
-            B = self._shapes[self._shape_of[b[0]]]
-            rows.append(mesh_batches.rows_within(shape, B, X_WS[None], self.X_WBs[b], limit))
-            rows[-1]["a"], rows[-1]["b"] = 0, b
-        answered = np.concatenate(rows)
-        return answered[np.argsort(answered["b"], kind="stable")]
-
-    def _convex_against(
-        self, packed: list[PackedConvex], poses: PoseTable, bodies: np.ndarray, limit: float
-    ) -> np.ndarray:
-        """What `against` gives, of parts and bodies that are convex or made of convex parts."""
-        if not len(bodies):
-            return np.zeros(0, dtype=PAIR_DTYPE)
-        n_own = len(packed)
-        body_parts = self._parts_of(bodies)
-        table = ShapeTable([*packed, *self._table.packed])
-        row_of = np.concatenate([np.arange(n_own), self._row_of + n_own])
-        pairs = np.stack(
-            [np.tile(np.arange(n_own), len(body_parts)), np.repeat(body_parts + n_own, n_own)], axis=1
-        )
-        poses = poses.followed_by(self._poses)
-        rows = run_pairs(table, poses, row_of, pairs, boolean=False, limit=limit)
-        rows["b"] = self._body_of[pairs[:, 1] - n_own]
-        rows["part_a"] = pairs[:, 0]
-        rows["part_b"] = pairs[:, 1] - n_own - self._first[rows["b"]]
-        starts = np.flatnonzero(np.diff(rows["b"], prepend=-1))
-        spans = self._spans(bodies)
-        spans[:, 0] += n_own
-        spans = np.hstack([np.tile([0, n_own], (len(starts), 1)), spans])
-        return combine(rows, starts, spans, table, poses, row_of)
+def _joined(answers: list[Answer], boolean: bool) -> Answer:
+    """One answer of several: rows by a and b, but of booleans."""
+    rows = np.concatenate([np.zeros(0, dtype=PAIR_DTYPE), *(answer.rows for answer in answers)])
+    if not boolean:
+        rows = rows[np.lexsort((rows["b"], rows["a"]))]
+    n_parts, n_bodies = sum(answer.convex_pairs for answer in answers), sum(answer.body_pairs for answer in answers)
+    return Answer(rows, n_parts, n_bodies, sum(answer.mesh_pairs for answer in answers))
 
 
-@dataclass(frozen=True)
-class QueryRecord:
-    """What `World.stats` of a query are made of, when they are asked for."""
-
-    packed: PackedWorld
-    n_candidates: int
-    hit: np.ndarray
-    how: np.ndarray
-    iterations: np.ndarray
-    convex_pairs: int
-    body_pairs: int
-    mesh_pairs: int
-    seconds: dict
-
-    def stats(self) -> dict:
-        """As `World.stats` says."""
-        roster = self.packed.roster
-        n = len(roster.ids)
-        skipped = count_skipped(roster.static, roster.group, roster.mask, self.packed.allowed)
-        pairs = n * (n - 1) // 2
-        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
-        return {
-            "bodies": n, "static": int(roster.static.sum()), "pairs": pairs, "skipped": skipped,
-            "narrowphase": self.body_pairs, "convex_pairs": self.convex_pairs, "mesh_pairs": self.mesh_pairs,
-            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
-            "how": dict(Counter(HOW[how] for how in self.how)),
-            "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
-            "epa_iterations": int((self.iterations >> 16).sum()), "seconds": self.seconds,
-        }  # fmt: skip
-
-
-def _distinct_shapes(shapes: Sequence[Shape]) -> tuple[np.ndarray, list[Shape]]:
-    """((n,) number of each body's shape among the distinct ones, these by first appearance)."""
-    distinct = {id(shape): shape for shape in shapes}
-    number_of = {key: number for number, key in enumerate(distinct)}
-    numbers = np.fromiter((number_of[id(shape)] for shape in shapes), dtype=np.int64, count=len(shapes))
-    return numbers, list(distinct.values())
-
-
-def _table_of(packed: list[PackedConvex]) -> tuple[np.ndarray, ShapeTable]:
-    """The table row of every convex set, and the table: a row for each distinct one."""
-    rows: dict[tuple[bytes, float], int] = {}
-    distinct: list[PackedConvex] = []
-    row_of = np.empty(len(packed), dtype=np.int64)
-    for k, part in enumerate(packed):
-        key = part.content, part.slop
-        if key not in rows:
-            rows[key] = len(distinct)
-            distinct.append(part)
-        row_of[k] = rows[key]
-    return row_of, ShapeTable(distinct)
-
-
-def _runs(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Numbers starts[k], …, starts[k] + counts[k] − 1, one run after another."""
-    return np.repeat(starts - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
-
-
-def _batches(pairs: np.ndarray, shape_of: np.ndarray, n_shapes: int, chunk: int = 1 << 60) -> Iterator[np.ndarray]:
+def batches_of_shapes(
+    pairs: np.ndarray, shape_of: np.ndarray, n_shapes: int, chunk: int = 1 << 60
+) -> Iterator[np.ndarray]:
     """Pairs (k, 2) of bodies in batches of the same two shapes; of each at most ``chunk`` first, then twice as many."""
     keys = shape_of[pairs[:, 0]] * n_shapes + shape_of[pairs[:, 1]]
     order = np.argsort(keys, kind="stable")

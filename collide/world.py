@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import time
+from collections.abc import Sequence
 
 import numpy as np
 
 from collide import argument_checks as checks
 from collide.certificates.make_certificate import certify
-from collide.contact.contact_rows import WorldContacts, no_rows
 from collide.errors import InvalidArgument
 from collide.lazy_modules import lazy_module
-from collide.packed_world import QueryRecord
-from collide.results import WorldResult
-from collide.security_margin import checked_margin, within
+from collide.results import PAIR_DTYPE, WorldResult
 from collide.shapes.shape import Shape
-from collide.transforms import as_pose, as_poses
+from collide.threads import check_threads
+from collide.transforms import as_poses
 from collide.world_bodies import Body
 from collide.world_hits import WorldHits
-from collide.world_scene import WorldScene
+from collide.world_outside import answer_outside, questions_of
+from collide.world_pairs import WorldPairs
 
 __all__ = ["Body", "World"]
 
-#: Contacts need what meshes need, which other questions about convex scenes do not.
-contact_query = lazy_module("collide.contact.contact_query")
-#: And so do casts.
+#: Casts need what other questions about convex scenes do not.
 casts = lazy_module("collide.world_casts")
-world_contacts = lazy_module("collide.world_contacts")
 cast_arguments = lazy_module("collide.casts.cast_arguments")
 
 
-class World(WorldScene):
+class World(WorldPairs):
     """Bodies that may touch, and the questions one asks of them.
 
-    A pair of bodies is tested unless both are static, their groups and masks exclude each other
+    A pair of bodies is tested unless both are static or asleep, their groups and masks exclude each other
     (tested when ``(group_A & mask_B) and (group_B & mask_A)``), or `allow` names the pair.
 
         world = collide.World()
@@ -43,158 +38,104 @@ class World(WorldScene):
         world.add(collide.Sphere(0.1), pose_of_ball, name="ball")
         for row, (a, b) in zip(rows := world.distances(max_distance=0.05), rows.names): ...
 
-    Packed arrays and the box-tree are made when a query first needs them, and again when bodies are added or removed,
-    or pairs allowed: O(n log n) for n bodies. Moving k bodies refits the tree at the next query: O(n), of which what
-    depends on the shapes O(k). A World is not safe to change from one thread while another asks.
+    Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query:
+    what was added, moved or removed costs as much as there is of it, but for copies of a few bytes a body. Which pairs
+    are near is kept from query to query while few bodies change. A World is not safe to change from one thread while
+    another asks.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._stats: dict = {}
-        self._last_query: QueryRecord | None = None
-
-    def __getstate__(self) -> dict:
-        """What a copy or a pickle takes along: the scene and `stats`."""
-        return super().__getstate__() | {"_stats": copy.deepcopy(self.stats), "_last_query": None}
-
-    def collides(self, *, security_margin: float = 0.0) -> bool:
-        """Whether any tested pair hits; stops at the first that does.
+    def query(
+        self, shape: Shape | Sequence[Shape], X_WS, max_distance: float = 0.0, *, threads: int = 1
+    ) -> WorldResult:
+        """Outside shapes against every body: pairs at most ``max_distance`` apart.
 
         Parameters
         ----------
-        security_margin : [m], ≥ 0, finite: pairs at most so far apart are hits, too, decided as by `collide.collide`;
-            which those are, `distances` says. Then every pair is asked.
-
-        Returns
-        -------
-        bool. Pairs whose sign is open count as hits, as in `collide.collide`.
-
-        Raises
-        ------
-        InvalidArgument; with a margin UnsupportedQuery for pairs that `collide.distance` does not answer.
-        """
-        margin = checked_margin("World.collides: security_margin", security_margin)
-        if not margin:
-            return bool(self._answer(0.0, boolean=True)["hit"].any())
-        rows = self._answer(margin)
-        packed = self._pack()
-        shapes, X_WBs = packed.roster.shapes, packed.X_WBs
-
-        def question(k: int):
-            a, b = int(rows["a"][k]), int(rows["b"][k])
-            return shapes[a], shapes[b], X_WBs[a], X_WBs[b]
-
-        return bool(within(rows, margin, question).any())
-
-    def collisions(self) -> WorldResult:
-        """Every hitting pair with its depth.
-
-        Returns
-        -------
-        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies.
-
-        Raises
-        ------
-        UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names them.
-        """
-        rows = self._answer(0.0)
-        return self._result(rows[rows["hit"]])
-
-    def distances(self, max_distance: float = math.inf) -> WorldResult:
-        """Every tested pair at most ``max_distance`` apart, hits included.
-
-        Parameters
-        ----------
-        max_distance : [m], ≥ 0; infinity for all pairs.
-
-        Returns
-        -------
-        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. None is left out
-            that is not proven farther apart: ``lower ≤ max_distance`` of all of them. Two half-spaces that meet have
-            distance −inf.
-
-        Raises
-        ------
-        InvalidArgument; UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names
-        them.
-        """
-        limit = checks.limit("World.distances: max_distance", max_distance)
-        rows = self._answer(limit)
-        return self._result(rows[_within(rows, limit)])
-
-    def contacts(self, margin: float = 0.0, *, max_contacts: int = 8) -> WorldContacts:
-        """Contacts of every tested pair within a margin; `stats` stays as it is.
-
-        Parameters
-        ----------
-        margin : [m], ≥ 0, finite: bodies up to so far apart are in contact, too.
-        max_contacts : of each patch, ≥ 1.
-
-        Returns
-        -------
-        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, one a contact, sorted by (a, b). What
-            they say and promise: `collide.contacts`.
-
-        Raises
-        ------
-        InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
-        """
-        margin = contact_query.check_margin("World.contacts", margin)
-        max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
-        packed = self._pack()
-        pairs = packed.candidates(margin)
-        if not len(pairs):
-            return WorldContacts(no_rows(), packed.bodies_named(pairs))
-        rows, counts = world_contacts.contacts_of_bodies(packed, pairs, margin, max_contacts)
-        return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
-
-    def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
-        """Pairs for which `distances` raises UnsupportedQuery.
-
-        Allow these pairs, and the rest of the World is answered.
-
-        Parameters
-        ----------
-        max_distance : [m], ≥ 0, as in `distances`.
-
-        Returns
-        -------
-        [(id, id, reason), …], sorted. Such are some shapes against a mesh.
-        """
-        limit = checks.limit("World.unanswerable: max_distance", max_distance)
-        packed = self._pack()
-        ids = packed.roster.ids.tolist()
-        return [(ids[a], ids[b], reason) for a, b, reason in packed.refused(packed.candidates(limit), limit)]
-
-    def query(self, shape: Shape, X_WS, max_distance: float = 0.0) -> WorldResult:
-        """One outside shape S against every body: pairs at most ``max_distance`` apart.
-
-        Parameters
-        ----------
-        shape : any shape.
-        X_WS : (4, 4) its pose in the world W [m].
+        shape : any shape, or N of them.
+        X_WS : (4, 4) or (N, 4, 4) poses in the world W [m]. A single shape or pose goes with every one of the others.
         max_distance : [m], ≥ 0.
+        threads : at most so many answer; the answers are the same bits.
 
         Returns
         -------
-        WorldResult : rows sorted by b, the body's id; a is −1 for the outside shape, and normals point from it to the
-            body. Filters do not apply, and `stats` stays that of the last query of the whole World. O(log n) for bodies
-            that are spread out.
+        WorldResult : rows sorted by question and b, the body's id; a is −1 for the first question, −2 for the second
+            and so on, and normals point from the outside shape to the body. Filters, margins and sleep do not apply,
+            and `stats` stays that of the last query of the whole World. O(log n) a question for bodies that are spread
+            out.
 
         Raises
         ------
         InvalidArgument, InvalidPose; UnsupportedQuery : for pairs that `collide.distance` does not answer.
         """
-        limit = checks.limit("World.query: max_distance", max_distance)
+        limit, threads = checks.limit("World.query: max_distance", max_distance), check_threads(threads)
+        shapes = [shape] if isinstance(shape, Shape) else list(shape) if isinstance(shape, (list, tuple)) else None
+        if shapes is None or not all(isinstance(item, Shape) for item in shapes):
+            raise InvalidArgument(
+                f"World.query: shape must be a shape or a list of shapes, got {checks.describe(shape)}"
+            )
+        X_WS = as_poses(X_WS, "World.query: X_WS")
+        n = len(X_WS)
         if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.query: shape must be a shape, got {checks.describe(shape)}")
-        X_WS = as_pose(X_WS, "World.query: X_WS").copy()
-        rows = self._pack().against(shape, X_WS, limit)
-        rows = rows[_within(rows, limit)]
+            n = checks.matched_count("World.query", shape=len(shapes), X_WS=len(X_WS))
+        X_WS = np.array(np.broadcast_to(X_WS, (n, 4, 4)))
+        packed = self._pack()
+        rows = np.zeros(0, dtype=PAIR_DTYPE)
+        if n:
+            rows = answer_outside(packed, questions_of(shapes, X_WS), limit, threads)
+        rows = rows[~(rows["lower"] > limit)]
+        asked = rows["a"].copy()
         rows["a"] = rows["b"]
         bodies = self._to_ids(rows)
-        rows["a"], bodies[-1] = -1, Body(-1, "query", shape, X_WS, False, 0, 0)
+        rows["a"] = -1 - asked
+        for k in np.unique(asked).tolist() if n != 1 else [0]:
+            name = "query" if n == 1 else f"query {k}"
+            bodies[-1 - k] = Body(-1 - k, name, shapes[k % len(shapes)], X_WS[k], False, 0, 0)
         return WorldResult(rows, bodies, certify)
+
+    def boxes_near(self, low_W, high_W, margin: float = 0.0) -> list[int]:
+        """Bodies whose axis-aligned bounding boxes come near a box: the broadphase alone.
+
+        Parameters
+        ----------
+        low_W, high_W : (3,) corners of the box in W [m], low ≤ high; infinite where it has no end.
+        margin : [m], ≥ 0: along every axis.
+
+        Returns
+        -------
+        Ids, ascending. Boxes are rounded outwards by a few units in the last place; those of half-spaces have no end,
+        and are near everything. O(log n) for bodies that are spread out.
+
+        Raises
+        ------
+        InvalidArgument
+        """
+        margin = checks.limit("World.boxes_near: margin", margin)
+        corners = [np.asarray(corner, dtype=np.float64) for corner in (low_W, high_W)]
+        if any(corner.shape != (3,) or np.isnan(corner).any() for corner in corners) or (corners[0] > corners[1]).any():
+            raise InvalidArgument(
+                f"World.boxes_near: low_W and high_W must be corners (3,) of a box, low ≤ high, got "
+                f"{checks.describe(low_W)} and {checks.describe(high_W)}"
+            )
+        packed = self._pack()
+        if packed.tree is None:
+            return []
+        low, high = corners
+        near = packed.tree.touching(np.concatenate([low, high]), margin)
+        boxes = packed.parts.body_boxes(near)  # those of the tree have room for margins
+        meets = ((boxes[:, :3] - margin <= high) & (low - margin <= boxes[:, 3:])).all(axis=1)
+        return packed.roster.ids[near[meets]].tolist()
+
+    def bounding_boxes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The axis-aligned bounding box of every body.
+
+        Returns
+        -------
+        (ids, boxes) : (n,) int32 ascending, and (n, 6) float64, low x, y, z, high x, y, z in W [m], rounded outwards by
+            a few units in the last place; infinite of half-spaces.
+        """
+        packed = self._pack()
+        alive = np.flatnonzero(packed.roster.alive)
+        return packed.roster.ids[alive], packed.parts.body_boxes(alive)
 
     def raycast(
         self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
@@ -292,44 +233,6 @@ class World(WorldScene):
         which = casts.checked_filter("World.nearest", group, mask)
         return self._hits(casts.nearest_bodies(self._pack(), points, limit, which))
 
-    @property
-    def stats(self) -> dict:
-        """What the last `collides`, `collisions` or `distances` tested, culled, skipped, decided and took.
-
-        bodies, static : numbers of bodies.   pairs : of all bodies, n(n − 1)/2.   skipped : {reason: pairs}.
-        narrowphase : pairs of bodies answered.   convex_pairs : pairs of their convex parts answered.
-        mesh_pairs : of the pairs of bodies, those of which one is a mesh or holds one.
-        hits, undecided : pairs.   how : {argument: pairs}.   gjk_iterations, epa_iterations : sums.
-        seconds : {pack, broadphase, narrowphase} [s].
-
-        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit.
-        """
-        if self._last_query is not None:
-            self._stats, self._last_query = self._last_query.stats(), None
-        return self._stats
-
-    # --- how they are answered ------------------------------------------------------------------
-
-    def _answer(self, limit: float, *, boolean: bool = False) -> np.ndarray:
-        """Rows of all tested pairs within the limit [m], a and b positions; of a boolean rows up to the first hit."""
-        started = time.perf_counter()
-        packed = self._pack()
-        ready = time.perf_counter()
-        candidates = packed.candidates(limit)
-        culled = time.perf_counter()
-        answer = packed.answer(candidates, limit, boolean=boolean, stop_at_hit=boolean)
-        ended = time.perf_counter()
-        rows = answer.rows
-        self._last_query = QueryRecord(
-            packed, len(candidates), rows["hit"].copy(), rows["how"].copy(), rows["iterations"].copy(),
-            answer.convex_pairs, answer.body_pairs, answer.mesh_pairs,
-            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
-        )  # fmt: skip
-        return rows
-
-    def _result(self, rows: np.ndarray) -> WorldResult:
-        return WorldResult(rows, self._to_ids(rows), certify)
-
     def _hits(self, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
         """Rows whose bodies are positions, with their ids."""
         roster = self._pack().roster
@@ -337,8 +240,3 @@ class World(WorldScene):
         met = rows["body"] >= 0
         rows["body"][met] = roster.ids[rows["body"][met]]
         return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)
-
-
-def _within(rows: np.ndarray, limit: float) -> np.ndarray:
-    """(n,) bool: pairs that are not proven farther apart than the limit [m], also those whose bracket holds it."""
-    return ~(rows["lower"] > limit)

@@ -1,7 +1,8 @@
 """The bodies of a World in columns: adding, moving and naming them makes no object a body.
 
 A `Body` is made when somebody asks for one. What a query answers about is a `Roster`, which no change of the World
-reaches: results stay true of the bodies as they stood.
+reaches: results stay true of the bodies as they stood. Rows of removed bodies stay, empty, until they are as many as
+the others: then all are closed up at once, so that a removal costs the same however many bodies there are.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide import argument_checks as checks
+from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose, as_poses
@@ -21,6 +23,8 @@ from collide.transforms import as_pose, as_poses
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
 _IDENTITY = np.eye(4)
+#: So many rows of removed bodies stay whatever the number of others.
+_MIN_ROWS = 64
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,7 @@ class Body:
     id : never used again in this World.   name : unique in it.
     shape : any shape.   X_WB : (4, 4) its pose in the world [m], read-only.
     static : never tested against other static bodies.   group, mask : bit sets of 32 bits.
+    margin : [m], as of `World.set_margin`.   sleeping : as of `World.sleep`.
     """
 
     id: int
@@ -41,18 +46,24 @@ class Body:
     static: bool
     group: int
     mask: int
+    margin: float = 0.0
+    sleeping: bool = False
 
     def __post_init__(self) -> None:
         self.X_WB.flags.writeable = False  # of a copy as well
 
     def __reduce__(self):
-        return Body, (self.id, self.name, self.shape, self.X_WB, self.static, self.group, self.mask)
+        return Body, (
+            self.id, self.name, self.shape, self.X_WB, self.static, self.group, self.mask, self.margin, self.sleeping,
+        )  # fmt: skip
 
 
 class Roster(NamedTuple):
     """Bodies by position, in the order of their ids: what stays while bodies only move. Never changed once made.
 
-    ids : (n,) int32, ascending.   names, shapes : of each.   static, group, mask : (n,) int64.
+    ids : (n,) int32, ascending.   names, shapes : of each; these lists may go on with bodies that came later.
+    static, group, mask : (n,) int64.   alive : (n,) bool, False of bodies that were removed.
+    margin : (n,) float64 [m].   sleeping : (n,) bool.   generation : another one once positions are others.
     """
 
     ids: np.ndarray
@@ -61,11 +72,16 @@ class Roster(NamedTuple):
     static: np.ndarray
     group: np.ndarray
     mask: np.ndarray
+    alive: np.ndarray
+    margin: np.ndarray
+    sleeping: np.ndarray
+    generation: int
 
     def body(self, position: int, X_WB: np.ndarray) -> Body:
         return Body(
             int(self.ids[position]), self.names[position], self.shapes[position], X_WB.copy(),
             bool(self.static[position]), int(self.group[position]), int(self.mask[position]),
+            float(self.margin[position]), bool(self.sleeping[position]),
         )  # fmt: skip
 
 
@@ -87,31 +103,34 @@ class BodiesAsTheyStood(dict):
 
 
 class WorldBodies:
-    """Bodies in columns that grow; row k of each is one body, in the order of ids.
-
-    Rows of removed bodies stay empty until the next `roster`.
-    """
+    """Bodies in columns that grow; row k of each is one body, in the order of ids."""
 
     def __init__(self) -> None:
         self._row_of: dict[int, int] = {}
         self._id_of: dict[str, int] = {}
-        self._next = 0
+        self._next = self._generation = 0
         self._ids: list[int] = []
-        self._names: list[str | None] = []
+        self._names: list[str] = []
         self._shapes: list[Shape] = []
         self._flags: list[tuple[bool, int, int]] = []
         self._X_WBs = np.empty((16, 4, 4))
-        self._moved = np.zeros(16, dtype=bool)
+        self._moved, self._alive, self._asleep = (np.zeros(16, dtype=bool) for _ in range(3))
+        self._margins = np.zeros(16)
         self._made: dict[int, Body] = {}
+        self._columns = _columns_of([], [])
         self._roster: Roster | None = None
 
     def __getstate__(self) -> dict:
-        """For copies and pickles: the lists are changed in place."""
-        roster = self.roster()
+        """For copies and pickles: lists and arrays are changed in place."""
+        self._close_gaps()
+        n = len(self)
         return {
-            "_row_of": dict(self._row_of), "_id_of": dict(self._id_of), "_next": self._next, "_ids": list(self._ids),
-            "_names": list(self._names), "_shapes": list(self._shapes), "_flags": list(self._flags),
-            "_X_WBs": self.poses().copy(), "_moved": np.zeros(len(self), dtype=bool), "_made": {}, "_roster": roster,
+            "_row_of": dict(self._row_of), "_id_of": dict(self._id_of), "_next": self._next,
+            "_generation": self._generation, "_ids": list(self._ids), "_names": list(self._names),
+            "_shapes": list(self._shapes), "_flags": list(self._flags), "_X_WBs": self.poses().copy(),
+            "_moved": np.zeros(n, dtype=bool), "_alive": np.ones(n, dtype=bool), "_asleep": self._asleep[:n].copy(),
+            "_margins": self._margins[:n].copy(), "_made": {}, "_columns": _columns_of(self._ids, self._flags),
+            "_roster": None,
         }  # fmt: skip
 
     def __len__(self) -> int:
@@ -127,7 +146,9 @@ class WorldBodies:
 
     # --- one body -------------------------------------------------------------------------------
 
-    def add(self, shape: Shape, X_WB, name: str | None, static: bool, group: int, mask: int) -> int:
+    def add(
+        self, shape: Shape, X_WB, name: str | None, static: bool, group: int, mask: int, margin: float = 0.0
+    ) -> int:
         """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
         if not isinstance(shape, Shape):
             raise InvalidArgument(
@@ -143,9 +164,10 @@ class WorldBodies:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
         flags = _flag("static", static), _bits("group", group), _bits("mask", mask)
         if row == len(self._X_WBs):
-            self._X_WBs = np.concatenate([self._X_WBs, np.empty((max(16, row), 4, 4))])
-            self._moved = np.zeros(len(self._X_WBs), dtype=bool)
-        self._X_WBs[row] = X_WB
+            for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
+                rows = getattr(self, column)
+                setattr(self, column, np.concatenate([rows, np.zeros((max(16, row), *rows.shape[1:]), rows.dtype)]))
+        self._X_WBs[row], self._margins[row], self._alive[row] = X_WB, margin, True
         self._ids.append(identity)
         self._names.append(name)
         self._shapes.append(shape)
@@ -156,8 +178,8 @@ class WorldBodies:
 
     def remove(self, identity: int) -> None:
         row = self._row_of.pop(identity)
-        del self._id_of[self._names[row]]  # type: ignore[arg-type]
-        self._names[row] = None
+        del self._id_of[self._names[row]]
+        self._alive[row] = False
         self._made.pop(identity, None)
         self._roster = None
 
@@ -169,15 +191,25 @@ class WorldBodies:
         self._moved[row] = True
         self._made.pop(identity, None)
 
+    def set_margin(self, identity: int, margin: float) -> None:
+        self._margins[self._row_of[identity]] = margin
+        self._made.pop(identity, None)
+        self._roster = None
+
+    def set_sleeping(self, bodies: Iterable[int | str], asleep: bool) -> None:
+        """Raises UnknownBody: then nothing has changed."""
+        self._asleep[self._rows_of(bodies)] = asleep
+        self._made.clear()
+        self._roster = None
+
     def body(self, identity: int) -> Body:
-        """The same object until it is moved."""
+        """The same object until it is moved, or its margin or sleep changes."""
         body = self._made.get(identity)
         if body is None:
             row = self._row_of[identity]
             X_WB = self._X_WBs[row].copy()
-            name = self._names[row]
-            assert name is not None
-            body = Body(identity, name, self._shapes[row], X_WB, *self._flags[row])
+            margin, asleep = float(self._margins[row]), bool(self._asleep[row])
+            body = Body(identity, self._names[row], self._shapes[row], X_WB, *self._flags[row], margin, asleep)
             self._made[identity] = body
         return body
 
@@ -199,7 +231,7 @@ class WorldBodies:
         return int(body)
 
     def name_of(self, identity: int) -> str:
-        return self._names[self._row_of[identity]]  # type: ignore[return-value]
+        return self._names[self._row_of[identity]]
 
     # --- all of them ----------------------------------------------------------------------------
 
@@ -225,7 +257,7 @@ class WorldBodies:
             if set(map(type, bodies)) - {int}:
                 bodies = [self.id_of(body) for body in bodies]
         n = self._next
-        if len(self._row_of) == n and len(bodies):  # none was ever removed: ids are rows
+        if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
             with contextlib.suppress(OverflowError):
                 rows = np.asarray(bodies, dtype=np.int64)
                 if 0 <= rows.min() and rows.max() < n:
@@ -233,13 +265,18 @@ class WorldBodies:
         return np.array([self._row_of[self.id_of(body)] for body in bodies], dtype=np.int64)
 
     def roster(self) -> Roster:
-        """The bodies as they are now, poses apart. Rows are positions of it from then on."""
+        """The bodies as they are now, poses apart. Rows are positions of it, until its generation is another."""
         if self._roster is None:
-            if len(self._row_of) < len(self._ids):
+            if len(self._ids) > _MIN_ROWS + 2 * len(self._row_of):
                 self._close_gaps()
-            flags = np.array(self._flags, dtype=np.int64).reshape(-1, 3).T.copy()
-            ids = np.array(self._ids, dtype=np.int32)
-            self._roster = Roster(ids, list(self._names), list(self._shapes), *flags)  # type: ignore[arg-type]
+            n, known = len(self._ids), len(self._columns[0].rows)
+            for column, rows in zip(self._columns, _columns_of(self._ids[known:], self._flags[known:])):
+                column.extend(rows.rows)
+            ids, static, group, mask = (column.rows for column in self._columns)
+            alive, margins, asleep = (column[:n].copy() for column in (self._alive, self._margins, self._asleep))
+            self._roster = Roster(
+                ids, self._names, self._shapes, static, group, mask, alive, margins, asleep, self._generation
+            )
         return self._roster
 
     def poses(self) -> np.ndarray:
@@ -249,10 +286,21 @@ class WorldBodies:
     def _close_gaps(self) -> None:
         """Drop the rows of removed bodies."""
         rows = list(self._row_of.values())
-        self._X_WBs, self._moved = self._X_WBs[rows], self._moved[rows]
+        if len(rows) == len(self._ids):
+            return
+        for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
+            setattr(self, column, getattr(self, column)[rows])
         self._ids, self._names = [self._ids[row] for row in rows], [self._names[row] for row in rows]
         self._shapes, self._flags = [self._shapes[row] for row in rows], [self._flags[row] for row in rows]
         self._row_of = {identity: row for row, identity in enumerate(self._ids)}
+        self._columns, self._roster = _columns_of([], []), None
+        self._generation += 1
+
+
+def _columns_of(ids: list[int], flags: list[tuple[bool, int, int]]) -> list[GrowingRows]:
+    """Columns: ids, static, group, mask."""
+    columns = np.array(flags, dtype=np.int64).reshape(-1, 3).T
+    return [GrowingRows(np.array(ids, dtype=np.int32)), *(GrowingRows(column) for column in columns)]
 
 
 def _flag(field: str, value) -> bool:

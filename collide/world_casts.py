@@ -230,7 +230,7 @@ def nearest_bodies(packed: PackedWorld, points: np.ndarray, limit: float, which:
     skipped = which.skipped(packed)
     questions = np.zeros((n, SWEEP))
     questions[:, :3], questions[:, 9] = points, limit
-    pairs = _near_boxes(packed.tree, questions, skipped)
+    pairs = _near_boxes(packed, questions, skipped)
     X_WP = np.tile(np.eye(4), (n, 1, 1))
     X_WP[:, :3, 3] = points
     point, body = pairs.T
@@ -256,12 +256,14 @@ def nearest_bodies(packed: PackedWorld, points: np.ndarray, limit: float, which:
     return rows
 
 
-def _near_boxes(tree: BoxTree, questions: np.ndarray, skipped: np.ndarray) -> np.ndarray:
+def _near_boxes(packed: PackedWorld, questions: np.ndarray, skipped: np.ndarray) -> np.ndarray:
     """(k, 2) points and bodies that may be nearest, by question."""
-    if not skipped.any():
-        return bodies_ahead(tree, questions, of_points=True)[0]
-    remaining = np.flatnonzero(skipped == 0)  # what is left out bounds nothing
+    assert packed.tree is not None
+    if not (skipped.any() or packed.has_margins):
+        return bodies_ahead(packed.tree, questions, of_points=True)[0]
+    remaining = np.flatnonzero((skipped == 0) & packed.roster.alive)  # what is left out bounds nothing
     if not len(remaining):
         return np.empty((0, 2), dtype=np.int64)
-    pairs, _ = bodies_ahead(BoxTree(np.ascontiguousarray(tree.boxes[remaining])), questions, of_points=True)
+    tree = BoxTree(packed.parts.body_boxes(remaining))
+    pairs, _ = bodies_ahead(tree, questions, of_points=True)
     return np.stack([pairs[:, 0], remaining[pairs[:, 1]]], axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterable
 
 import numpy as np
@@ -10,9 +11,11 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.log import log_duration
-from collide.packed_world import PackedWorld
+from collide.packed_world import PackedWorld, PairFilters
+from collide.security_margin import checked_margin
 from collide.shapes.shape import Shape
-from collide.world_bodies import BodiesAsTheyStood, Body, WorldBodies
+from collide.world_bodies import BodiesAsTheyStood, Body, Roster, WorldBodies
+from collide.world_part_pairs import updating
 
 
 class WorldScene:
@@ -21,15 +24,22 @@ class WorldScene:
     def __init__(self) -> None:
         self._bodies = WorldBodies()
         self._allowed: dict[tuple[int, int], str] = {}
+        self._pair_margins: dict[tuple[int, int], float] = {}
+        self._partners: dict[int, set[int]] = {}
         self._packed: PackedWorld | None = None
+        self._pairs_changed = False
 
     def __getstate__(self) -> dict:
-        """What a copy or a pickle takes along: bodies, names and what is allowed. The rest is made again."""
-        return {"_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed), "_packed": None}
+        """What a copy or a pickle takes along: bodies, names and what is said of pairs. The rest is made again."""
+        return {
+            "_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed),
+            "_pair_margins": dict(self._pair_margins), "_partners": copy.deepcopy(self._partners), "_packed": None,
+            "_pairs_changed": False,
+        }  # fmt: skip
 
     def add(
         self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
-        mask: int = 0xFFFF,
+        mask: int = 0xFFFF, margin: float = 0.0,
     ) -> int:  # fmt: skip
         """Add a body.
 
@@ -41,6 +51,7 @@ class WorldScene:
         name : not empty, unique in this World; "body 7" and so on if left out.
         static : never tested against other static bodies.
         group, mask : bit sets of up to 32 bits: the groups it is in, and those it is tested against.
+        margin : [m], ≥ 0: as of `set_margin`.
 
         Returns
         -------
@@ -50,9 +61,8 @@ class WorldScene:
         ------
         InvalidArgument, InvalidPose : naming the argument and the value; nothing is added.
         """
-        identity = self._bodies.add(shape, X_WB, name, static, group, mask)
-        self._packed = None
-        return identity
+        margin = checked_margin("World.add: margin", margin) if margin != 0.0 else 0.0
+        return self._bodies.add(shape, X_WB, name, static, group, mask, margin)
 
     def remove(self, body: int | str) -> None:
         """Take a body out, and what was allowed for it.
@@ -67,9 +77,11 @@ class WorldScene:
         """
         identity = self._bodies.id_of(body)
         self._bodies.remove(identity)
-        if self._allowed:
-            self._allowed = {pair: reason for pair, reason in self._allowed.items() if identity not in pair}
-        self._packed = None
+        for partner in self._partners.pop(identity, ()):
+            pair = min(identity, partner), max(identity, partner)
+            self._allowed.pop(pair, None)
+            self._pair_margins.pop(pair, None)
+            self._partners[partner].discard(identity)
 
     def set_pose(self, body: int | str, X_WB) -> None:
         """Move a body. About 2 µs.
@@ -99,6 +111,66 @@ class WorldScene:
         """
         self._bodies.move_many(bodies, X_WBs)
 
+    def sleep(self, bodies: Iterable[int | str]) -> None:
+        """Put bodies to sleep: pairs of which both are asleep or static are not tested until one is woken.
+
+        They stay where they are for all other questions, and may be moved; that does not wake them.
+
+        Parameters
+        ----------
+        bodies : ids or names.
+
+        Raises
+        ------
+        UnknownBody : then none has been put to sleep.
+        """
+        self._bodies.set_sleeping(bodies, True)
+
+    def wake(self, bodies: Iterable[int | str]) -> None:
+        """Wake bodies that were put to sleep; others stay as they are.
+
+        Parameters
+        ----------
+        bodies : ids or names.
+
+        Raises
+        ------
+        UnknownBody : then none has been woken.
+        """
+        self._bodies.set_sleeping(bodies, False)
+
+    def set_margin(self, body: int | str, margin: float | None, *, partner: int | str | None = None) -> None:
+        """Count a body as hit already at a distance.
+
+        A pair hits in `collides` and `collisions`, and has contacts in `contacts`, where it is at most its margin
+        apart: the sum of both bodies' margins, unless the pair has one of its own. What distances are told is the same.
+
+        Parameters
+        ----------
+        body : id or name.
+        margin : [m], 0 or within 1e-50 … 1e50; None, with ``partner``: the pair has none of its own any more.
+        partner : id or name of another body: the margin is that of the pair.
+
+        Raises
+        ------
+        UnknownBody, InvalidArgument
+        """
+        identity = self._bodies.id_of(body)
+        if margin is not None:
+            margin = checked_margin("World.set_margin: margin", margin)
+        if partner is None:
+            if margin is None:
+                raise InvalidArgument("World.set_margin: margin of a body must be a number [m], ≥ 0, got None")
+            self._bodies.set_margin(identity, margin)
+            return
+        pair = self._pair("World.set_margin", identity, self._bodies.id_of(partner))
+        if margin is None:
+            self._pair_margins.pop(pair, None)
+        else:
+            self._pair_margins[pair] = margin
+            self._note_partners(pair)
+        self._pairs_changed = True
+
     def allow(self, a, b=None, *, reason: str = "allowed") -> None:
         """Never test a pair: ``allow("link3", "link4")``; or many, ``allow(matrix)``.
 
@@ -116,12 +188,21 @@ class WorldScene:
             matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
             self._allow_matrix(matrix, reason)
         else:
-            i, j = self._bodies.id_of(a), self._bodies.id_of(b)
-            if i == j:
-                name = self._bodies.name_of(i)
-                raise InvalidArgument(f'World.allow: "{name}" twice; a body is never tested against itself')
-            self._allowed.setdefault((min(i, j), max(i, j)), str(reason))
-        self._packed = None
+            pair = self._pair("World.allow", self._bodies.id_of(a), self._bodies.id_of(b))
+            self._allowed.setdefault(pair, str(reason))
+            self._note_partners(pair)
+        self._pairs_changed = True
+
+    def _pair(self, caller: str, i: int, j: int) -> tuple[int, int]:
+        if i == j:
+            name = self._bodies.name_of(i)
+            raise InvalidArgument(f'{caller}: "{name}" twice; a body is never tested against itself')
+        return min(i, j), max(i, j)
+
+    def _note_partners(self, pair: tuple[int, int]) -> None:
+        """Who is named together, so that removing a body looks at its own pairs alone."""
+        for i, j in (pair, pair[::-1]):
+            self._partners.setdefault(i, set()).add(j)
 
     def _allow_matrix(self, matrix: np.ndarray, reason: str) -> None:
         n = len(self)
@@ -133,6 +214,7 @@ class WorldScene:
         ids = self.ids
         for i, j in np.argwhere(np.triu(matrix, 1)).tolist():
             self._allowed.setdefault((ids[i], ids[j]), str(reason))
+            self._note_partners((ids[i], ids[j]))
 
     def __len__(self) -> int:
         return len(self._bodies)
@@ -172,16 +254,36 @@ class WorldScene:
     # --- as queries see them --------------------------------------------------------------------
 
     def _pack(self) -> PackedWorld:
+        with updating():
+            return self._brought_up_to_date()
+
+    def _brought_up_to_date(self) -> PackedWorld:
         moved = self._bodies.take_moved()
-        if self._packed is None:
+        roster, X_WBs = self._bodies.roster(), self._bodies.poses()
+        packed = self._packed
+        if packed is None or packed.roster.generation != roster.generation:
             with log_duration("tables and box-tree of a World of %d bodies made", len(self)):
-                roster = self._bodies.roster()
-                position = {identity: k for k, identity in enumerate(roster.ids.tolist())} if self._allowed else {}
-                allowed = {(position[i], position[j]): reason for (i, j), reason in self._allowed.items()}
-                self._packed = PackedWorld(roster, self._bodies.poses(), allowed)
-        elif len(moved):
-            self._packed.move(moved, self._bodies.poses()[moved])
-        return self._packed
+                packed = self._packed = PackedWorld(roster, X_WBs, self._filters(roster))
+        else:
+            if roster is not packed.roster or len(moved):
+                packed.update(roster, X_WBs, moved)
+            if self._pairs_changed:
+                packed.set_filters(self._filters(roster))
+        self._pairs_changed = False
+        return packed
+
+    def _filters(self, roster: Roster) -> PairFilters:
+        """What is said of pairs, by position."""
+
+        def positions(pairs: Iterable[tuple[int, int]]) -> np.ndarray:
+            flat = np.fromiter(itertools.chain.from_iterable(pairs), dtype=np.int64)
+            return np.searchsorted(roster.ids, flat).reshape(-1, 2)
+
+        with_margin = positions(self._pair_margins)
+        keys = (with_margin[:, 0] << 32) + with_margin[:, 1]
+        order = np.argsort(keys)
+        margins = np.fromiter(self._pair_margins.values(), dtype=np.float64)[order]
+        return PairFilters(positions(self._allowed), list(self._allowed.values()), keys[order], margins)
 
     def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
         """The bodies at the positions that rows name; in the rows, in place, their ids."""

@@ -10,8 +10,7 @@ from naive_triangles import world_points
 from surfaces import torus
 
 import collide
-from collide.packed_world import PackedWorld
-from collide.world_bodies import WorldBodies
+from collide.world_parts import WorldParts
 
 EYE = np.eye(4)
 
@@ -114,10 +113,11 @@ def test_an_open_sign_is_counted_as_such():
     assert not world.collides() and world.stats["undecided"] == 0
 
 
-def boxes_of(shape, X):
-    bodies = WorldBodies()
-    bodies.add(shape, X, None, False, 1, 1)
-    return PackedWorld(bodies.roster(), bodies.poses(), {})._part_boxes
+def boxes_of(shape, *poses) -> np.ndarray:
+    """(k, 6) boxes of its parts, pose after pose."""
+    parts = WorldParts()
+    parts.append([shape] * len(poses), np.array(poses))
+    return parts.boxes
 
 
 def test_boxes_of_posed_meshes_hold_them_and_are_tight():

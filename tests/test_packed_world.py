@@ -12,7 +12,7 @@ import pytest
 from naive import pose, random_pose, rng_of
 
 import collide
-from collide import packed_world
+from collide import world_parts, world_record
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.errors import InvalidArgument, UnknownBody
 from collide.results import PAIR_DTYPE
@@ -48,7 +48,8 @@ def answers(world: collide.World) -> list:
     """Everything asked: bytes of rows, booleans, statistics but for seconds."""
     found = []
     for ask in (world.collides, lambda: world.distances(0.4).rows.tobytes(), lambda: world.collisions().rows.tobytes()):
-        found += [ask(), {key: value for key, value in world.stats.items() if key != "seconds"}]
+        of_history = "seconds", "updates", "bytes_per_body"
+        found += [ask(), {key: value for key, value in world.stats.items() if key not in of_history}]
     return [*found, world.query(collide.Sphere(0.5), EYE, 0.3).rows.tobytes()]
 
 
@@ -72,9 +73,9 @@ def test_moving_one_body_looks_at_one(monkeypatch):
         world.add(collide.Sphere(0.4), pose(t=(k, 0, 0)), static=k > 0)
     assert not world.collides()
     for name in ("boxes_of", "pose_table"):
-        own = getattr(packed_world, name)
+        own = getattr(world_parts, name)
         monkeypatch.setattr(
-            packed_world, name, lambda *given, own=own, name=name: seen.append((name, len(given[-1]))) or own(*given)
+            world_parts, name, lambda *given, own=own, name=name: seen.append((name, len(given[-1]))) or own(*given)
         )
     world.set_pose(0, pose(t=(7.5, 0, 0)))
     assert world.collides() and sorted(seen) == [("boxes_of", 1), ("pose_table", 1)]
@@ -83,8 +84,8 @@ def test_moving_one_body_looks_at_one(monkeypatch):
 
 
 def test_statistics_are_worked_out_when_asked_for_and_are_those_of_the_question(monkeypatch):
-    counted, own = [], packed_world.count_skipped
-    monkeypatch.setattr(packed_world, "count_skipped", lambda *given: counted.append(1) or own(*given))
+    counted, own = [], world_record.count_skipped
+    monkeypatch.setattr(world_record, "count_skipped", lambda *given: counted.append(1) or own(*given))
     world = crowd(rng_of("statistics"))
     assert world.stats == {}
     rows = world.distances(0.3)

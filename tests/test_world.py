@@ -8,10 +8,8 @@ import naive
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
-from validate_box_tree import validate_box_tree
 
 import collide
-from collide.broadphase.box_tree import BoxTree
 
 #: All but the effort: a World leaves out parts of compounds that are too far apart to matter.
 FIELDS = [field for field in naive.ANSWER_FIELDS if field != "iterations"]
@@ -243,51 +241,6 @@ def test_empty_and_lonely_worlds():
     world.add(collide.Halfspace((0, 0, 1), 0.0))
     assert not world.collides() and len(world.distances()) == 0
     assert len(world.query(collide.Sphere(1), np.eye(4))) == 1
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 7, 64, 65, 300])
-def test_box_tree_finds_the_pairs_of_brute_force(n):
-    rng = rng_of("tree", n)
-    low = rng.uniform(-1, 1, (n, 3))
-    boxes = np.hstack([low, low + rng.uniform(0, 1, (n, 3)) * 10.0 ** rng.uniform(-4, 0, (n, 1))])
-    boxes[rng.random(n) < 0.05] = [-np.inf] * 3 + [np.inf] * 3
-    static, group, mask = (rng.integers(*span, n).astype(np.int64) for span in ((0, 2), (1, 4), (1, 4)))
-    tree = BoxTree(boxes)
-    validate_box_tree(tree)
-    for margin in (0.0, 0.1):
-        assert tree.pairs(margin, static, group, mask).tolist() == meeting_pairs(boxes, margin, static, group, mask)
-    moved = boxes + np.where(np.isfinite(boxes), np.tile(rng.uniform(-0.5, 0.5, (n, 3)), 2), 0)
-    tree.refit(moved)
-    validate_box_tree(tree)
-    assert tree.pairs(0.05, static, group, mask).tolist() == meeting_pairs(moved, 0.05, static, group, mask)
-    for k in range(0, n, 9):
-        meets = (boxes_meet(moved[k], moved, 0.02)).nonzero()[0]
-        assert tree.touching(moved[k], 0.02).tolist() == meets.tolist()
-
-
-def boxes_meet(box, boxes, margin):
-    return ((box[:3] - margin <= boxes[:, 3:]) & (boxes[:, :3] <= box[3:] + margin)).all(axis=1)
-
-
-def meeting_pairs(boxes, margin, static, group, mask):
-    return [
-        [i, int(j)]
-        for i in range(len(boxes))
-        for j in boxes_meet(boxes[i], boxes, margin).nonzero()[0]
-        if j > i and not (static[i] and static[j]) and group[i] & mask[j] and group[j] & mask[i]
-    ]
-
-
-def test_a_damaged_tree_is_noticed():
-    boxes = np.hstack([np.arange(12.0).reshape(4, 3), np.arange(12.0).reshape(4, 3) + 1])
-    tree = BoxTree(boxes)
-    tree.nodes[1, 0] += 0.5
-    with pytest.raises(AssertionError, match="node 1"):
-        validate_box_tree(tree)
-    tree = BoxTree(boxes)
-    tree.order[0] = tree.order[1]
-    with pytest.raises(AssertionError, match="missing or doubled"):
-        validate_box_tree(tree)
 
 
 def test_many_flush_boxes_in_a_grid():

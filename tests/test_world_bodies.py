@@ -82,27 +82,35 @@ def test_rosters_and_results_stay_as_they_were():
     bodies = bodies_of(6)
     bodies.remove(2)
     roster, X_WBs = bodies.roster(), bodies.poses().copy()
-    assert roster is bodies.roster() and roster.ids.tolist() == [0, 1, 3, 4, 5] == bodies.ids
-    stood = BodiesAsTheyStood(roster, np.array([1, 4]), X_WBs[[1, 4]])
+    assert roster is bodies.roster() and roster.ids[roster.alive].tolist() == [0, 1, 3, 4, 5] == bodies.ids
+    stood = BodiesAsTheyStood(roster, np.array([1, 5]), X_WBs[[1, 5]])
     bodies.move_many([1, 5], poses_of("rosters", 2))
     bodies.remove(0)
     bodies.add(collide.Box((1, 1, 1)), None, "new", False, 1, 1)
-    assert roster.ids.tolist() == [0, 1, 3, 4, 5] and len(roster.names) == 5
+    bodies.set_sleeping([1], True)
+    bodies.set_margin(5, 0.1)
+    bodies.roster()
+    assert roster.ids[roster.alive].tolist() == [0, 1, 3, 4, 5] and len(roster.ids) == 6
     for one in (stood, pickle.loads(pickle.dumps(stood)), copy.deepcopy(stood)):
         assert [one[k].name for k in (1, 5)] == ["body 1", "body 5"] and np.array_equal(one[5].X_WB, EYE)
+        assert not one[1].sleeping and one[5].margin == 0.0
         assert one[1] is one[1] and not one[1].X_WB.flags.writeable
 
 
 def test_columns_grow_and_shrink():
-    bodies, X = WorldBodies(), poses_of("growing", 100)
-    for k in range(100):
+    bodies, X, most = WorldBodies(), poses_of("growing", 700), 0
+    for k in range(700):
         assert bodies.add(collide.Sphere(1.0), X[k], None, False, 1, 1) == k
-        if k % 3 == 0:
-            bodies.remove(k)
+        if k >= 20 and k % 50:
+            bodies.remove(k - 20)
         if k % 10 == 0:
             bodies.roster()
-    remaining = [k for k in range(100) if k % 3]
-    assert bodies.ids == remaining == bodies.roster().ids.tolist() and np.array_equal(bodies.poses(), X[remaining])
+            most = max(most, len(bodies.poses()))
+    roster = bodies.roster()
+    remaining = bodies.ids
+    assert 20 < len(remaining) < 50 and most < 300, "rows of removed bodies are closed up now and then"
+    assert roster.ids[roster.alive].tolist() == remaining and roster.generation > 2
+    assert np.array_equal(bodies.poses()[roster.alive], X[remaining])
     assert bodies.names == {k: f"body {k}" for k in remaining}
 
 

@@ -64,8 +64,7 @@ def boxes_of(shapes: Sequence[Shape], poses: np.ndarray) -> np.ndarray:
     world = World()
     for shape, X in zip(shapes, poses):
         world.add(shape, X)
-    tree = world._pack().tree
-    return np.empty((0, 6)) if tree is None else tree.boxes
+    return world.bounding_boxes()[1]
 
 
 def closest(A: Tables, rows_a: Sequence[int], B: Tables, rows_b: Sequence[int], limit: float) -> tuple:
@@ -160,10 +159,8 @@ def exchanged(row: tuple) -> tuple:
 
 def overlapping(world: World, tables: Tables, low: np.ndarray, high: np.ndarray) -> tuple | None:
     """((body, link), …) whose boxes meet a box, sorted; None where there are none, as in pybullet."""
-    tree = world._pack().tree
-    if tree is None:
-        return None
-    places = sorted(tables.place(row) for row in tree.touching(np.concatenate([low, high]), 0.0).tolist())
+    rows = np.searchsorted(world.ids, world.boxes_near(low, high))
+    places = sorted(tables.place(row) for row in rows.tolist())
     return tuple(places) or None
 
 

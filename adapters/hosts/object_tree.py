@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.hosts.posed_objects import HostObject, box_of, boxes_of_objects, latest_change
-from collide.broadphase.box_tree import BoxTree, meeting_boxes
+from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.boxes_ahead import SWEEP, bodies_ahead
+from collide.broadphase.graded_boxes import BODY
+from collide.broadphase.walk_boxes import boxes_met, pairs_among
 from collide.kernels import address_of
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -195,8 +197,6 @@ class _Tree(BoxTree):
 
     def __init__(self, boxes: np.ndarray):
         super().__init__(boxes)
-        self._zeros = np.zeros(len(boxes), dtype=np.int64)
-        self._ones = self._zeros + 1
         self._is_bounded = np.isfinite(boxes).all(axis=1)
         self._hits = np.empty((64, 2), dtype=np.int64)
         self._keep_addresses()
@@ -208,35 +208,35 @@ class _Tree(BoxTree):
 
     def _keep_addresses(self) -> None:
         """Of single boxes: arguments of the kernel that stay, and room for what it finds."""
-        self._fixed = (
-            address_of(self.nodes), self.leaves, address_of(self.order), len(self.order), 0.0, False,
-            address_of(self._zeros), address_of(self._ones), address_of(self._ones), address_of(self._hits), 64,
-        )  # fmt: skip
+        self._held = self.header()
+        self._fixed_arguments = address_of(self._hits), 64
 
     def touching_one(self, box: np.ndarray) -> list[int]:
         """As `touching` without a margin, sooner for a box that meets few."""
-        count = meeting_boxes(address_of(box), 1, *self._fixed)
+        count = boxes_met(address_of(self._held), address_of(box), 1, 0.0, *self._fixed_arguments)
         if count > len(self._hits) or len(self.unbounded):
             return self.touching(box, 0.0).tolist()
         hits = self._hits[:count, 1].tolist()
         hits.sort()
         return hits
 
-    def _meeting(self, queries: np.ndarray, margin: float, among_themselves: bool) -> np.ndarray:
-        return self._search(queries, margin, among_themselves, self._zeros, self._ones, self._ones)
+    def _among_first(self, n_leaves: int, margin: float) -> np.ndarray:
+        """(k, 2) pairs of rows, one of which is at the first leaves."""
+        leaves = np.flatnonzero(self.links[: self.n_nodes, BODY] >= 0)[:n_leaves]
+        return self.walk_pairs(pairs_among, 0, int(leaves.max(initial=-1)) + 1, margin, False)
 
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""
         n = len(self.boxes)
         is_first = np.zeros(n, dtype=bool)
         is_first[self.order[:_FIRST_LEAVES]] = True
-        first = _sorted_pairs(self._meeting(self.boxes[self.order[:_FIRST_LEAVES]], margin, True), n)
+        first = _sorted_pairs(self._among_first(_FIRST_LEAVES, margin), n)
         if len(first):
             yield first
         if len(self.unbounded):
             yield _all_with(self.unbounded, n)
         if len(self.order) > _FIRST_LEAVES:
-            hits = self._meeting(self.boxes[self.order], margin, True)
+            hits = self._among_first(n, margin)
             hits = hits[~is_first[hits].any(axis=1)]
             if len(hits):
                 yield _sorted_pairs(hits, n)
@@ -247,7 +247,7 @@ class _Tree(BoxTree):
         n = len(guests.boxes)
         for some in (which[:_FIRST_LEAVES], which[_FIRST_LEAVES:]):
             if len(some):
-                hits = self._meeting(guests.boxes[some], margin, False)
+                hits = self.bounded_met(guests.boxes[some], margin)
                 if len(hits):
                     yield _sorted_keys(hits[:, 1] * n + some[hits[:, 0]], n)
         if len(self.unbounded) or len(which) < n:
@@ -255,7 +255,7 @@ class _Tree(BoxTree):
 
     def as_guests(self) -> _Guests:
         """These boxes, to be compared with another tree's."""
-        return _Guests(self.boxes, self._is_bounded, *self.nodes[1].reshape(2, 3))
+        return _Guests(self.boxes, self._is_bounded, *self.around.reshape(2, 3))
 
     def near_gap(self, guests: _Guests | None) -> float:
         """A margin within which there is a pair, if there is one at all: of boxes at leaves side by side, or of a guest

@@ -1,236 +1,397 @@
-"""A box-tree over bodies: sorted by size class and Morton code, then an implicit binary tree.
+"""A box-tree over bodies that is brought up to date as they are moved, added and removed.
 
-Boxes of one size class stand together, as the graded box-tree of Erickson's local polyhedra keeps
-facets near cubes of their own size ("Local polyhedra and geometric graphs", section 3.2): a floor
-slab does not widen the boxes of the cups on it. Within a class, order along the Z-curve.
-
-Leaf k of the tree is the k-th body in that order; node i has children 2i and 2i + 1, node 1 is the
-root, and the leaves start at a power of two. Empty places hold boxes that meet nothing.
+It is a graded tree (`graded_boxes.py`), or rather several in a row: first that of the bodies that stay where they are,
+then one of the others, then smaller and smaller ones of bodies that were added since; a walk goes through all of them.
+A leaf's box may be larger than its body's: a body that moves within it changes nothing. What changed is known, so that
+pairs found before are kept where nothing did.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+from collide.broadphase.allowed_rows import allowed_rows
+from collide.broadphase.graded_boxes import BODY, LINK, STACK, fit_inner_nodes, fit_paths, grow_graded, place_leaves
+from collide.broadphase.growing_rows import GrowingRows
+from collide.broadphase.walk_boxes import (
+    ALLOWED_AT,
+    CHANGED_BIT,
+    FLAGS,
+    GROUP,
+    MASK,
+    STATIC_BIT,
+    STILL_BIT,
+    boxes_met,
+    pairs_among,
+    pairs_of_leaves,
+    tested_pairs,
+)
+from collide.kernels import address_of
 
-#: Bits of a Morton code along each axis.
-_BITS = 16
-#: Bodies that have moved are sorted anew once all sides of the tree's boxes, added up, have grown by this factor: in
-#: metres, or in sides of the box around all.
+#: A tree is made anew once all sides of its nodes, added up, have grown by this factor: in metres, or in sides of the
+#: box around all.
 _GROWN = 1.5
+#: Of fewer bodies all nodes are fitted at once; of more, the paths above those that left their leaves' boxes, where
+#: these are at most one in so many.
+_MIN_PATHS, _SHARE_OF_PATHS = 64, 8
+#: Pairs are kept from query to query of so many bodies or more, where at most one in so many has changed, and there are
+#: at most so many of them a body.
+_MIN_CACHED, _SHARE_OF_CACHED, _MAX_CACHED = 128, 8, 16
+_NO_BODIES = np.empty(0, dtype=np.int64)
+_NO_WORK = {"trees made": 0, "nodes fitted": 0, "leaves changed": 0}
+#: A box that meets nothing.
+_NOTHING = np.array([np.inf] * 3 + [-np.inf] * 3)
+
+
+class _CachedPairs(NamedTuple):
+    """Pairs (k, 2) whose leaves' boxes are within the margin, but for those of bodies that have changed since."""
+
+    margin: float
+    pairs: np.ndarray
 
 
 class BoxTree:
     """The tree, over boxes (n, 6): low x, y, z, high x, y, z.
 
-    Boxes without end (half-spaces) are kept apart and meet everything; ``nodes`` (2·leaves, 6)
-    holds the rest, ``order`` (m,) the body at each leaf.
+    Parameters
+    ----------
+    boxes : (n, 6), copied. Those without end (half-spaces) are kept apart and meet everything.
+    fixed : (n,) bool: bodies that stay, in a tree of their own; pairs of two of them are not looked for.
+
+    Notes
+    -----
+    ``nodes`` (m, 6) are boxes in preorder, ``links`` (m, LINK) as of `graded_boxes.py`, the first ``n_fixed`` those of
+    the tree of what stays. ``sections``: where each tree begins, and where the last one ends. ``leaf_of`` (n,) the node
+    of each body, −1 of those without one.
     """
 
-    def __init__(self, boxes: np.ndarray):
-        finite = np.isfinite(boxes).all(axis=1)
-        self.boxes = np.ascontiguousarray(boxes)
-        self.unbounded, self._bounded = np.flatnonzero(~finite), np.flatnonzero(finite)
-        self.leaves = 1 << max(0, (len(self._bounded) - 1).bit_length())
-        self.nodes = np.empty((2 * self.leaves, 6))
-        self._least_sides = np.zeros(2)
-        self._sort()
+    def __init__(self, boxes: np.ndarray, fixed: np.ndarray | None = None):
+        n = len(boxes)
+        fixed = np.zeros(n, dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
+        columns = np.array(boxes, dtype=np.float64), fixed, np.ones(n, dtype=bool), _traits_of(fixed), np.full(n, -1)
+        self._columns = [GrowingRows(column) for column in columns]
+        self._take_columns()
+        self._allowed = np.zeros(1, dtype=np.int64)
+        self._cached: _CachedPairs | None = None
+        self._changed: list[np.ndarray] = []
+        self._n_holes = 0
+        self._work = dict(_NO_WORK)
+        self.sections = [0]
+        self.nodes, self.links = np.empty((0, 6)), np.empty((0, LINK), dtype=np.int64)
+        self._make()
+
+    # --- making ---------------------------------------------------------------------------------
+
+    def take_work(self) -> dict[str, int]:
+        """What has been done since this was last called: trees made, nodes fitted, leaves given other boxes."""
+        work, self._work = self._work, dict(_NO_WORK)
+        return work
+
+    def _take_columns(self) -> None:
+        self.boxes, self._fixed, self._alive, self.traits, self.leaf_of = (column.rows for column in self._columns)
+
+    def _make(self) -> None:
+        """All trees anew, of the bodies that there are."""
+        is_bounded = np.isfinite(self.boxes).all(axis=1) & self._alive
+        self.unbounded = np.flatnonzero(self._alive & ~is_bounded)
+        self.sections = [0]
+        self._resize(2 * int(is_bounded.sum()))
+        self.leaf_of[:] = -1
+        self._sides: list[float] = []
+        self._n_holes = 0
+        for bodies in (np.flatnonzero(is_bounded & self._fixed), np.flatnonzero(is_bounded & ~self._fixed)):
+            if len(bodies):
+                self._add_section(bodies)
+        self.n_fixed = self.sections[1] if (is_bounded & self._fixed).any() else 0
+        self._least = self._quality()
+        self._work["trees made"] += 1
+
+    def _resize(self, capacity: int) -> None:
+        """Memory for so many nodes."""
+        nodes, links = np.empty((max(capacity, 2), 6)), np.empty((max(capacity, 2), LINK), dtype=np.int64)
+        used = min(self.sections[-1], capacity)
+        nodes[:used], links[:used] = self.nodes[:used], self.links[:used]
+        self.nodes, self.links = nodes, links
+
+    def _add_section(self, bodies: np.ndarray) -> None:
+        """A tree over bodies behind the others."""
+        begin, m = self.sections[-1], len(bodies)
+        if begin + 2 * m > len(self.nodes):
+            self._resize(begin + begin // 2 + 2 * m)
+        bodies = np.array(bodies, dtype=np.int64)
+        scratch = np.empty(2 * m + 34 + STACK, dtype=np.int64)
+        end = grow_graded(
+            address_of(bodies), m, address_of(self.boxes), len(self.boxes), begin, address_of(self.links),
+            len(self.links), address_of(scratch),
+        )  # fmt: skip
+        leaves = begin + np.flatnonzero(self.links[begin:end, BODY] >= 0)
+        self.leaf_of[bodies], self.nodes[leaves] = leaves, self.boxes[bodies]
+        self.sections.append(end)
+        self._sides.append(self._fit(begin, end))
+
+    def _fit(self, begin: int, end: int) -> float:
+        self._work["nodes fitted"] += end - begin
+        return fit_inner_nodes(address_of(self.links), address_of(self.nodes), begin, end)
+
+    def _quality(self) -> tuple[float, float]:
+        """All sides of inner nodes added up: in metres, and in sides of the box around all."""
+        sides = sum(self._sides)
+        if not self._sides:
+            return 0.0, 0.0
+        x0, y0, z0, x1, y1, z1 = self.around.tolist()
+        extent = (x1 - x0) + (y1 - y0) + (z1 - z0)
+        return sides, sides / extent if 0.0 < extent < math.inf else 0.0
+
+    @property
+    def n_nodes(self) -> int:
+        return self.sections[-1]
+
+    @property
+    def order(self) -> np.ndarray:
+        """Bodies that have leaves, in their order."""
+        bodies = self.links[: self.n_nodes, BODY]
+        return bodies[bodies >= 0]
+
+    @property
+    def around(self) -> np.ndarray:
+        """(6,) the box around all bodies that have an end; one that meets nothing, of none."""
+        if len(self.sections) == 2:
+            return self.nodes[0]
+        roots = self.nodes[self.sections[:-1]]
+        return np.concatenate([roots[:, :3].min(axis=0, initial=np.inf), roots[:, 3:].max(axis=0, initial=-np.inf)])
+
+    # --- changes --------------------------------------------------------------------------------
 
     def refit(self, boxes: np.ndarray) -> None:
-        """Take moved boxes. Bodies are sorted anew where the tree has become much worse than it was when they were
-        last: what is near in the order is to be near in space.
-        """
+        """Take boxes (n, 6) of all bodies."""
         if len(boxes) != len(self.boxes):
             raise ValueError("refit needs the same bodies; build a new tree")
-        self.boxes = np.ascontiguousarray(boxes)
-        sides = self._fit()
-        if (sides > _GROWN * self._least_sides).any():
-            self._sort()
-        self._least_sides = np.minimum(self._least_sides, sides)
+        self.move(np.arange(len(boxes)), boxes)
 
-    def _sort(self) -> None:
-        bounded = self._bounded
-        self.order = bounded[_sorted_order(self.boxes[bounded])] if len(bounded) else bounded
-        self._least_sides = self._fit()
-
-    def _fit(self) -> np.ndarray:
-        """Make all nodes; (2,) the sum of their boxes' sides, in metres and in sides of the box around all."""
-        sides = fit_nodes(
-            address_of(self.boxes), len(self.boxes), address_of(self.order), len(self.order), address_of(self.nodes),
-            self.leaves,
-        )  # fmt: skip
-        if sides < 0.0 or np.isfinite(self.boxes[self.unbounded]).all(axis=1).any():
-            raise ValueError("refit needs the same bodies, bounded and unbounded ones; build a new tree")
-        around_all = float((self.nodes[1, 3:] - self.nodes[1, :3]).sum()) if len(self.order) else 0.0
-        return np.array([sides, sides / around_all if around_all > 0.0 else 0.0])
-
-    def pairs(self, margin: float, static: np.ndarray, group: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis.
-
-        Pairs of static bodies, and pairs whose groups and masks exclude each other, are left out.
+    def move(self, bodies: np.ndarray, boxes: np.ndarray) -> None:
+        """Take boxes (k, 6) of bodies (k,) that moved. The tree is made anew where it has become much worse than it was
+        when it was last: what is near in it is to be near in space.
         """
-        pairs = self._search(self.boxes[self.order], margin, True, static, group, mask)
+        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(boxes)
+        escaped = np.empty(len(bodies), dtype=np.int64)
+        n = place_leaves(
+            address_of(bodies), len(bodies), address_of(boxes), address_of(self.boxes), len(self.boxes),
+            address_of(self.leaf_of), address_of(self.nodes), len(self.nodes), address_of(escaped),
+        )  # fmt: skip
+        if n < 0:
+            raise ValueError("bodies keep their ends, or have none; build a new tree")
+        self._refit_above(escaped[:n])
+
+    def _refit_above(self, bodies: np.ndarray) -> None:
+        """Fit the nodes above bodies whose leaves have other boxes."""
+        self._work["leaves changed"] += len(bodies)
+        if not len(bodies):
+            return
+        self._note_changed(bodies)
+        n_leaves = len(self.boxes)
+        if n_leaves < _MIN_PATHS or _SHARE_OF_PATHS * len(bodies) > n_leaves:
+            ends = zip(self.sections[:-1], self.sections[1:])
+            self._sides = [self._fit(begin, end) for begin, end in ends]
+        else:
+            leaves, out = self.leaf_of[bodies], np.empty(7)
+            self._sides[0] += fit_paths(
+                address_of(leaves), len(leaves), address_of(self.links), address_of(self.nodes), self.n_nodes,
+                address_of(out),
+            )  # fmt: skip
+            self._work["nodes fitted"] += int(out[6])
+        sides, relative = self._quality()
+        if sides > _GROWN * self._least[0] or relative > _GROWN * self._least[1]:
+            self._make()
+        self._least = min(self._least[0], sides), min(self._least[1], relative)
+
+    def append(self, boxes: np.ndarray, fixed: np.ndarray, group=1, mask=1) -> None:
+        """Add bodies (k,), numbered on from the last, with groups and masks. The last trees are made one with theirs
+        where they are not much larger: each body is sorted O(log n) times in all.
+        """
+        first, k = len(self.boxes), len(boxes)
+        fixed = np.asarray(fixed, dtype=bool)
+        traits = _traits_of(fixed)
+        traits[:, GROUP], traits[:, MASK] = group, mask
+        added = boxes, fixed, np.ones(k, dtype=bool), traits, np.full(k, -1)
+        for column, rows in zip(self._columns, added):
+            column.extend(rows)
+        self._take_columns()
+        new = np.arange(first, first + k)
+        is_bounded = np.isfinite(boxes).all(axis=1)
+        self.unbounded = np.append(self.unbounded, new[~is_bounded])
+        bodies = new[is_bounded]
+        if not len(bodies):
+            return
+        before = sum(self._sides)
+        n_first = 1 if self.n_fixed else 0
+        while len(self._sides) > n_first and self.sections[-1] - self.sections[-2] <= 4 * len(bodies):
+            in_last = self.links[self.sections[-2] : self.sections[-1], BODY]
+            bodies = np.append(bodies, in_last[in_last >= 0])
+            del self.sections[-1], self._sides[-1]
+        self._add_section(bodies)
+        growth = 1.0 - before / max(sum(self._sides), 1e-300)
+        sides, relative = self._quality()
+        self._least = self._least[0] + growth * sides, self._least[1] + growth * relative
+        self._note_changed(new[is_bounded])
+
+    def remove(self, bodies: np.ndarray) -> None:
+        """Take bodies out; their numbers stay unused."""
+        self._alive[bodies] = False
+        self.boxes[bodies] = _NOTHING
+        self.unbounded = self.unbounded[self._alive[self.unbounded]]
+        bodies = bodies[self.leaf_of[bodies] >= 0]
+        leaves = self.leaf_of[bodies]
+        self.nodes[leaves], self.links[leaves, BODY] = _NOTHING, -1
+        self._n_holes += len(bodies)
+        if 2 * self._n_holes > self.n_nodes // 2 + 64:
+            self._make()
+        else:
+            self._refit_above(bodies)
+        self.leaf_of[bodies] = -1
+
+    def _note_changed(self, bodies: np.ndarray) -> None:
+        self.traits[bodies, FLAGS] |= CHANGED_BIT
+        self._changed.append(bodies)
+
+    # --- filters --------------------------------------------------------------------------------
+
+    def set_groups(self, bodies: np.ndarray, group: np.ndarray, mask: np.ndarray) -> None:
+        """Groups and masks (k,) of bodies: pairs with ``(group_i & mask_j) == 0`` either way are not found."""
+        self.traits[bodies, GROUP], self.traits[bodies, MASK] = group, mask
+        self._cached = None
+
+    def set_allowed(self, allowed: np.ndarray) -> None:
+        """Pairs (k, 2) of bodies, each once, that are not found."""
+        row_at, self._allowed = allowed_rows(allowed, len(self.boxes))
+        self.traits[:, ALLOWED_AT] = row_at
+        self._cached = None
+
+    def set_asleep(self, bodies: np.ndarray, asleep: bool) -> None:
+        """Pairs of which both are fixed or asleep are not found."""
+        flags = self.traits[bodies, FLAGS]
+        still = asleep | ((flags & STATIC_BIT) != 0)
+        self.traits[bodies, FLAGS] = (flags & ~STILL_BIT) | STILL_BIT * still.astype(np.int64)
+
+    # --- questions ------------------------------------------------------------------------------
+
+    def pairs(self, margin: float) -> np.ndarray:
+        """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis and that filters let
+        through. Of two fixed bodies none are.
+        """
+        pairs = self._bounded_pairs(margin)
         if len(self.unbounded):
-            pairs = np.concatenate([pairs, _with_unbounded(self.unbounded, len(self.boxes), static, group, mask)])
+            pairs = np.concatenate([pairs, self._tested(self._with_unbounded(), margin)])
         n = len(self.boxes)
         keys = np.minimum(pairs[:, 0], pairs[:, 1]) * n + np.maximum(pairs[:, 0], pairs[:, 1])
         keys.sort()
         return np.stack(np.divmod(keys, n), axis=1)
 
-    def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
-        """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
-        everything = np.zeros(len(self.boxes), dtype=np.int64)
-        pairs = self._search(box.reshape(1, 6), margin, False, everything, everything + 1, everything + 1)
-        return np.sort(np.concatenate([pairs[:, 1], self.unbounded]))
+    def _bounded_pairs(self, margin: float) -> np.ndarray:
+        n = len(self.boxes)
+        changed = self._changed[0] if len(self._changed) == 1 else np.concatenate([_NO_BODIES, *self._changed])
+        is_little_changed = n >= _MIN_CACHED and _SHARE_OF_CACHED * len(changed) <= n
+        if not is_little_changed or (self._cached is not None and self._cached.margin < margin):
+            self._cached = None
+        if self._cached is not None and len(changed):
+            self._cached = self._brought_up_to_date(self._cached, changed)
+        elif is_little_changed and self._cached is None:
+            among = (self.n_fixed, self.n_nodes, margin, True)
+            pairs = self._walk_if_few(pairs_among, *among, limit=_MAX_CACHED * n + 64)
+            self._cached = None if pairs is None else _CachedPairs(margin, pairs)
+        if len(changed):
+            self.traits[changed, FLAGS] &= ~CHANGED_BIT
+            self._changed.clear()
+        if self._cached is not None:
+            return self._tested(self._cached.pairs, margin)
+        return self.walk_pairs(pairs_among, self.n_fixed, self.n_nodes, margin, False)
 
-    def _search(self, queries, margin, among_themselves, static, group, mask) -> np.ndarray:
-        queries = np.ascontiguousarray(queries)
-        capacity = 64 + 8 * len(queries)
+    def _brought_up_to_date(self, cached: _CachedPairs, changed: np.ndarray) -> _CachedPairs | None:
+        """What is kept, with other pairs of the bodies that have changed."""
+        flags = self.traits[:, FLAGS] & CHANGED_BIT
+        remaining = cached.pairs[(flags[cached.pairs[:, 0]] | flags[cached.pairs[:, 1]]) == 0]
+        leaves = np.unique(self.leaf_of[changed])
+        leaves = leaves[leaves >= 0]
+        limit = _MAX_CACHED * len(self.boxes) + 64
+        new = self._walk_if_few(pairs_of_leaves, address_of(leaves), len(leaves), cached.margin, limit=limit)
+        if new is None or len(new) + len(remaining) > limit:
+            return None
+        return _CachedPairs(cached.margin, np.concatenate([remaining, new]))
+
+    def header(self) -> np.ndarray:
+        """The tree as kernels take it, until it changes."""
+        return np.array(
+            [
+                address_of(self.nodes), address_of(self.links), self.n_nodes, self.n_fixed, address_of(self.boxes),
+                len(self.boxes), address_of(self.traits), address_of(self._allowed), len(self._allowed),
+            ],
+            dtype=np.int64,
+        )  # fmt: skip
+
+    def walk_pairs(self, walk: Callable[..., int], *arguments) -> np.ndarray:
+        """(k, 2) pairs of a walk (`walk_boxes.py`), in no order.   arguments : of it, between tree and ``pairs``."""
+        pairs = self._walk_if_few(walk, *arguments, limit=1 << 60)
+        assert pairs is not None
+        return pairs
+
+    def _walk_if_few(self, walk: Callable[..., int], *arguments, limit: int) -> np.ndarray | None:
+        """The same; None where they are more than a limit."""
+        header, capacity = self.header(), 64 + 4 * len(self.boxes)
         while True:
             pairs = np.empty((capacity, 2), dtype=np.int64)
-            count = meeting_boxes(
-                address_of(queries), len(queries), address_of(self.nodes), self.leaves, address_of(self.order),
-                len(self.order), margin, among_themselves, address_of(static), address_of(group), address_of(mask),
-                address_of(pairs), capacity,
-            )  # fmt: skip
+            count = walk(address_of(header), *arguments, address_of(pairs), capacity)
+            if count > limit:
+                return None
             if count <= capacity:
                 return pairs[:count]
             capacity = count
 
+    def _tested(self, pairs: np.ndarray, margin: float) -> np.ndarray:
+        """Those of pairs (k, 2) that filters let through and whose boxes are within the margin."""
+        header, pairs = self.header(), np.ascontiguousarray(pairs)
+        out = np.empty_like(pairs)
+        return out[: tested_pairs(address_of(header), address_of(pairs), len(pairs), margin, address_of(out))]
 
-def _sorted_order(boxes: np.ndarray) -> np.ndarray:
-    """Size class first, then the Z-curve through the centres; ties by body, so that it is reproducible."""
-    centres = 0.5 * boxes[:, :3] + 0.5 * boxes[:, 3:]
-    low = centres.min(axis=0)
-    extent = float((centres.max(axis=0) - low).max())
-    scale = (2**_BITS - 1) / extent if extent > 0.0 and math.isfinite(2**_BITS / extent) else 0.0
-    cells = np.clip((centres - low) * scale, 0, 2**_BITS - 1).astype(np.uint64)
-    x, y, z = (_spread_bits(cells[:, axis]) for axis in range(3))
-    size = (boxes[:, 3:] - boxes[:, :3]).max(axis=1)
-    size_class = np.frexp(np.maximum(size, np.finfo(float).tiny))[1]
-    smaller = (int(size_class.max()) - size_class).astype(np.uint64)  # at most 2,100: twelve bits
-    code = x | (y << np.uint64(1)) | (z << np.uint64(2))
-    return np.argsort((smaller << np.uint64(3 * _BITS)) | code, kind="stable")
+    def _with_unbounded(self) -> np.ndarray:
+        """(k, 2) each body without end with every other."""
+        others = np.flatnonzero(self._alive)
+        i, j = np.repeat(self.unbounded, len(others)), np.tile(others, len(self.unbounded))
+        is_unbounded = np.zeros(len(self.boxes), dtype=bool)
+        is_unbounded[self.unbounded] = True
+        keep = (i != j) & ~(is_unbounded[j] & (j < i))
+        return np.stack([i[keep], j[keep]], axis=1)
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that is held [bytes]."""
+        cached = 0 if self._cached is None else self._cached.pairs.nbytes
+        columns = sum(column.nbytes for column in self._columns)
+        return self.nodes.nbytes + self.links.nbytes + self._allowed.nbytes + columns + cached
 
-def _spread_bits(values: np.ndarray) -> np.ndarray:
-    """Numbers of _BITS bits with two zeros between any two bits (H. S. Warren, "Hacker's Delight", 7-2)."""
-    for shift, mask in ((32, 0xFFFF00000000FFFF), (16, 0x00FF0000FF0000FF), (8, 0xF00F00F00F00F00F),
-                        (4, 0x30C30C30C30C30C3), (2, 0x9249249249249249)):  # fmt: skip
-        values = (values | (values << np.uint64(shift))) & np.uint64(mask)
-    return values
+    def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
+        """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
+        return np.sort(self.boxes_met(box.reshape(1, 6), margin)[:, 1])
 
+    def bounded_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
+        """(k, 2) outside boxes (n, 6), by number, and bodies that have an end whose boxes come within ``margin``."""
+        boxes = np.ascontiguousarray(boxes, dtype=np.float64)
+        return self.walk_pairs(boxes_met, address_of(boxes), len(boxes), margin)
 
-def _with_unbounded(unbounded, n, static, group, mask) -> np.ndarray:
-    i = np.repeat(unbounded, n)
-    j = np.tile(np.arange(n), len(unbounded))
-    is_unbounded = np.zeros(n, dtype=bool)
-    is_unbounded[unbounded] = True
-    keep = (i != j) & ~(is_unbounded[j] & (j < i))
-    keep &= ~((static[i] != 0) & (static[j] != 0))
-    keep &= ((group[i] & mask[j]) != 0) & ((group[j] & mask[i]) != 0)
-    return np.stack([i[keep], j[keep]], axis=1)
-
-
-@kernel(inline=True)
-def _next_subtree(node):
-    """The next subtree to the right: sibling of the node's nearest ancestor that is a left child; 0 at the end."""
-    while node & 1:
-        node >>= 1
-    return node + 1 if node > 0 else 0
+    def boxes_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
+        """The same, with bodies without end, in no order."""
+        met = self.bounded_met(boxes, margin)
+        if not len(self.unbounded):
+            return met
+        n, m = len(boxes), len(self.unbounded)
+        always = np.stack([np.repeat(np.arange(n), m), np.tile(self.unbounded, n)], axis=1)
+        return np.concatenate([met, always])
 
 
-@entry("float64(int64, int64, int64, int64, int64, int64)")
-def fit_nodes(boxes_at, n_boxes, order_at, n_order, nodes_at, leaves):
-    """Write all nodes of a tree; the sum of their boxes' sides, or −1 where the box of a leaf is not finite.
-
-    boxes : 6·n_boxes doubles, low x, y, z, high x, y, z.   order : the body of each leaf.   nodes : 12·leaves doubles
-        out.
-    """
-    boxes = view_f64(boxes_at, 6 * n_boxes)
-    order = view_i64(order_at, n_order)
-    nodes = view_f64(nodes_at, 12 * leaves)
-    is_bounded = True
-    sides = 0.0
-    for leaf in range(leaves):
-        at = 6 * (leaves + leaf)
-        for axis in range(3):
-            nodes[at + axis] = math.inf
-            nodes[at + 3 + axis] = -math.inf
-        if leaf < n_order:
-            for k in range(6):
-                value = boxes[6 * order[leaf] + k]
-                nodes[at + k] = value
-                is_bounded = is_bounded and -math.inf < value < math.inf
-    for node in range(leaves - 1, 0, -1):
-        at = 6 * node
-        child = 12 * node
-        for axis in range(3):
-            nodes[at + axis] = min(nodes[child + axis], nodes[child + 6 + axis])
-            nodes[at + 3 + axis] = max(nodes[child + 3 + axis], nodes[child + 9 + axis])
-            side = nodes[at + 3 + axis] - nodes[at + axis]
-            sides += max(side, 0.0)  # of empty places it is −inf
-    return sides if is_bounded else -1.0
-
-
-@entry("int64(int64, int64, int64, int64, int64, int64, float64, boolean, int64, int64, int64, int64, int64)")
-def meeting_boxes(
-    queries_at, n_queries, nodes_at, leaves, order_at, n_order, margin, among_themselves, static_at, group_at, mask_at,
-    pairs_at, capacity,
-):  # fmt: skip
-    """Pairs (query, body) of boxes within ``margin`` along every axis; returns how many there are.
-
-    Only the first ``capacity`` are stored. Among themselves, query k is leaf k: it looks at later
-    leaves only, and names its body.
-    Arguments are flat: entries take integers, doubles and booleans alone.
-    """
-    queries = view_f64(queries_at, 6 * n_queries)
-    nodes = view_f64(nodes_at, 12 * leaves)
-    order = view_i64(order_at, n_order)
-    pairs = view_i64(pairs_at, 2 * capacity)
-    n_bodies = 0
-    for k in range(n_order):
-        n_bodies = max(n_bodies, order[k] + 1)
-    static = view_i64(static_at, n_bodies)
-    group = view_i64(group_at, n_bodies)
-    mask = view_i64(mask_at, n_bodies)
-    count = 0
-    for k in range(n_queries):
-        low0 = queries[6 * k] - margin
-        low1 = queries[6 * k + 1] - margin
-        low2 = queries[6 * k + 2] - margin
-        high0 = queries[6 * k + 3] + margin
-        high1 = queries[6 * k + 4] + margin
-        high2 = queries[6 * k + 5] + margin
-        # Depth first without a stack: down to the left while boxes meet, else on to the next subtree to the right.
-        # Among themselves, it begins to the right of the query's own leaf.
-        node = _next_subtree(leaves + k) if among_themselves else 1
-        while node > 0:
-            at = 6 * node
-            meets = (
-                nodes[at] <= high0 and nodes[at + 3] >= low0
-                and nodes[at + 1] <= high1 and nodes[at + 4] >= low1
-                and nodes[at + 2] <= high2 and nodes[at + 5] >= low2
-            )  # fmt: skip
-            if meets and node < leaves:
-                node = 2 * node
-                continue
-            if meets and node - leaves < n_order:
-                i = order[k] if among_themselves else k
-                j = order[node - leaves]
-                tested = True
-                if among_themselves:
-                    tested = (
-                        not (static[i] != 0 and static[j] != 0)
-                        and (group[i] & mask[j]) != 0 and (group[j] & mask[i]) != 0
-                    )  # fmt: skip
-                if tested:
-                    if count < capacity:
-                        pairs[2 * count] = i
-                        pairs[2 * count + 1] = j
-                    count += 1
-            node = _next_subtree(node)
-    return count
+def _traits_of(fixed: np.ndarray) -> np.ndarray:
+    """(n, TRAITS) of bodies in group 1 that are tested with all others."""
+    traits = np.tile(np.array([0, 1, 1, -1], dtype=np.int64), (len(fixed), 1))
+    traits[:, FLAGS] = (STATIC_BIT | STILL_BIT) * fixed.astype(np.int64)
+    return traits

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.graded_boxes import BODY, LINK, SKIP
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 
 #: Doubles of a question: low and high corner of the box that moves, the direction, and the largest t that counts.
@@ -83,69 +84,74 @@ def _farthest_corner(nodes, node, point, at):
     return math.sqrt(square) * (1.0 + _ROUNDING)
 
 
+@kernel(inline=True)
+def _nearest_sibling(nodes, links, node, end, point, at):
+    """Of a node and those that follow it under the same one, up to ``end``, the nearest to a point."""
+    nearest = node
+    least = math.inf
+    while node < end:
+        gap = box_gap(nodes, node, point, at)
+        if gap < least:
+            nearest, least = node, gap
+        node = links[LINK * node + SKIP]
+    return nearest
+
+
 @kernel
-def _nearest_of_all(nodes, leaves, point, at):
+def _nearest_of_all(nodes, links, n_nodes, point, at):
     """A distance within which there is a body, from above: down to a near leaf, then through what may be nearer."""
-    node = 1
-    while node < leaves:
-        node = 2 * node
-        if box_gap(nodes, node + 1, point, at) < box_gap(nodes, node, point, at):
-            node += 1
+    node = _nearest_sibling(nodes, links, 0, n_nodes, point, at)
+    while links[LINK * node + SKIP] > node + 1:
+        node = _nearest_sibling(nodes, links, node + 1, links[LINK * node + SKIP], point, at)
     best = _farthest_corner(nodes, node, point, at)
-    node = 1
-    while node > 0:
+    node = 0
+    while node < n_nodes:
+        following = links[LINK * node + SKIP]
         if box_gap(nodes, node, point, at) < best:
-            if node < leaves:
-                node = 2 * node
-                continue
-            best = min(best, _farthest_corner(nodes, node, point, at))
-        while node & 1:
-            node >>= 1
-        node = node + 1 if node > 0 else 0
+            if following == node + 1:
+                best = min(best, _farthest_corner(nodes, node, point, at))
+            following = node + 1
+        node = following
     return best
 
 
-@entry("int64(int64, int64, boolean, int64, int64, int64, int64, int64, int64, int64)")
-def boxes_ahead(
-    questions_at, n, of_points, nodes_at, leaves, order_at, n_order, pairs_at, bounds_at, capacity
-):
+@entry("int64(int64, int64, boolean, int64, int64, int64, int64, int64, int64)")
+def boxes_ahead(questions_at, n, of_points, nodes_at, links_at, n_nodes, pairs_at, bounds_at, capacity):
     """Pairs (question, body) of boxes that are come to, with t from below; returns how many there are.
 
     questions : SWEEP doubles each; ``of_points``, a point is the low corner, every box is named whose distance from it
         is at most the limit, and bounds are distances.
+    nodes, links : of a tree, or several in a row (`graded_boxes.py`).
     pairs : out, two integers each, of the first ``capacity``.   bounds : out, a double each.
     """
     questions = view_f64(questions_at, SWEEP * n)
-    nodes = view_f64(nodes_at, 12 * leaves)
-    order = view_i64(order_at, n_order)
+    nodes = view_f64(nodes_at, 6 * n_nodes)
+    links = view_i64(links_at, LINK * n_nodes)
     pairs = view_i64(pairs_at, 2 * capacity)
     bounds = view_f64(bounds_at, capacity)
     count = 0
     for k in range(n):
         at = SWEEP * k
         limit = questions[at + 9]
-        if of_points:
-            limit = min(limit, _nearest_of_all(nodes, leaves, questions, at))
-        node = 1
-        while node > 0:
+        if of_points and n_nodes > 0:
+            limit = min(limit, _nearest_of_all(nodes, links, n_nodes, questions, at))
+        node = 0
+        while node < n_nodes:
             if of_points:
                 bound = box_gap(nodes, node, questions, at)
                 bound = bound if bound <= limit else math.inf
             else:
                 bound = box_entry(nodes, node, questions, at, limit)
-            is_met = bound < math.inf
-            if is_met and node < leaves:
-                node = 2 * node
+            if bound == math.inf:
+                node = links[LINK * node + SKIP]
                 continue
-            if is_met and node - leaves < n_order:
+            if links[LINK * node + BODY] >= 0:
                 if count < capacity:
                     pairs[2 * count] = k
-                    pairs[2 * count + 1] = order[node - leaves]
+                    pairs[2 * count + 1] = links[LINK * node + BODY]
                     bounds[count] = bound
                 count += 1
-            while node & 1:  # to the next subtree to the right
-                node >>= 1
-            node = node + 1 if node > 0 else 0
+            node += 1
     return count
 
 
@@ -158,8 +164,8 @@ def bodies_ahead(tree: BoxTree, questions: np.ndarray, of_points: bool = False) 
     while True:
         pairs, bounds = np.empty((capacity, 2), dtype=np.int64), np.empty(capacity)
         count = boxes_ahead(
-            address_of(questions), len(questions), of_points, address_of(tree.nodes), tree.leaves,
-            address_of(tree.order), len(tree.order), address_of(pairs), address_of(bounds), capacity,
+            address_of(questions), len(questions), of_points, address_of(tree.nodes), address_of(tree.links),
+            tree.n_nodes, address_of(pairs), address_of(bounds), capacity,
         )  # fmt: skip
         if count <= capacity:
             break

@@ -2,42 +2,48 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 import numpy as np
 
-STATIC, MASKED, CULLED = "static–static", "filtered by group and mask", "broadphase"
+STATIC, MASKED, ASLEEP, CULLED = "static–static", "filtered by group and mask", "sleeping", "broadphase"
+#: Combinations of static, group, mask and sleeping that are compared with each other at once.
+_BLOCK = 256
 
 
-def count_skipped(static: np.ndarray, group: np.ndarray, mask: np.ndarray, allowed: dict) -> dict[str, int]:
+def count_skipped(
+    static: np.ndarray, group: np.ndarray, mask: np.ndarray, asleep: np.ndarray, allowed: np.ndarray,
+    reasons: Sequence[str],
+) -> dict[str, int]:  # fmt: skip
     """Pairs of n bodies that no query tests, by reason; each pair is counted once.
 
-    static, group, mask : (n,).   allowed : {(i, j): reason} with i < j, positions of bodies.
+    static, group, mask, asleep : (n,).   allowed : (k, 2) bodies, each pair once.   reasons : (k,) why, of each.
 
-    Precedence: static–static, then group and mask, then the reason a pair was allowed for. Counted
-    over the distinct combinations of static, group and mask, not over all pairs.
+    Precedence: static–static, then group and mask, then the reason a pair was allowed for, then that none of the two is
+    awake and free to move. Counted over the distinct combinations of the four, not over all pairs.
     """
-    skipped: dict[str, int] = {}
-    classes, inverse, sizes = np.unique(
-        np.stack([static.astype(np.int64), group, mask], axis=1), axis=0, return_inverse=True, return_counts=True
-    )
+    traits = np.stack([static.astype(np.int64), group, mask, (asleep | (static != 0)).astype(np.int64)], axis=1)
+    classes, inverse, sizes = np.unique(traits, axis=0, return_inverse=True, return_counts=True)
     inverse = inverse.reshape(-1)
-    verdict = {}
-    for a in range(len(classes)):
-        for b in range(a, len(classes)):
-            verdict[a, b] = why = _excluded(classes[a], classes[b])
-            if why:
-                n_pairs = sizes[a] * (sizes[a] - 1) // 2 if a == b else sizes[a] * sizes[b]
-                if n_pairs:
-                    skipped[why] = skipped.get(why, 0) + int(n_pairs)
-    for (i, j), reason in allowed.items():
-        a, b = sorted((int(inverse[i]), int(inverse[j])))
-        if not verdict[a, b]:
-            skipped[reason] = skipped.get(reason, 0) + 1
-    return skipped
+    skipped: Counter[str] = Counter()
+    for start in range(0, len(classes), _BLOCK):
+        block = np.arange(start, min(start + _BLOCK, len(classes)))
+        pairs = sizes[block, None] * sizes[None]
+        pairs[block - start, block] = sizes[block] * (sizes[block] - 1) // 2
+        pairs[np.arange(len(classes))[None] < block[:, None]] = 0  # each two classes once
+        for reason, applies in _exclusions(classes[block][:, None], classes[None]).items():
+            skipped[reason] += int(pairs[applies].sum())
+    by_class = _exclusions(classes[inverse[allowed[:, 0]]], classes[inverse[allowed[:, 1]]])
+    remains = ~(by_class[STATIC] | by_class[MASKED])
+    skipped.update(reasons[k] for k in np.flatnonzero(remains).tolist())
+    skipped[ASLEEP] -= int(by_class[ASLEEP].sum())  # counted as allowed
+    return {reason: count for reason, count in skipped.items() if count}
 
 
-def _excluded(a: np.ndarray, b: np.ndarray) -> str | None:
-    if a[0] and b[0]:
-        return STATIC
-    if not (a[1] & b[2]) or not (b[1] & a[2]):
-        return MASKED
-    return None
+def _exclusions(a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
+    """{reason: bool} of traits (…, 4) of one and the other, of each pair the first that applies."""
+    both_static = (a[..., 0] != 0) & (b[..., 0] != 0)
+    masked = ((a[..., 1] & b[..., 2]) == 0) | ((b[..., 1] & a[..., 2]) == 0)
+    still = (a[..., 3] != 0) & (b[..., 3] != 0)
+    return {STATIC: both_static, MASKED: masked & ~both_static, ASLEEP: still & ~masked & ~both_static}

@@ -90,8 +90,8 @@ def candidate_parts(
     limits = directions.limits(limit)
     header = np.array(
         [
-            address_of(tree.nodes), tree.leaves, address_of(tree.order), len(tree.order), address_of(first),
-            len(first) - 1, address_of(skipped), address_of(meshed),
+            address_of(tree.nodes), address_of(tree.links), tree.n_nodes, address_of(first), len(first) - 1,
+            address_of(skipped), address_of(meshed),
         ],
         dtype=np.int64,
     )  # fmt: skip

@@ -10,6 +10,7 @@ import math
 from typing import Any, NamedTuple
 
 from collide.broadphase.boxes_ahead import downwards, slab_entry, upwards
+from collide.broadphase.graded_boxes import BODY, LINK, MAX_CHILDREN, MAX_DEPTH, SKIP
 from collide.casts.cut_parts import (
     FIRST_LOWER,
     FIRST_UPPER,
@@ -26,25 +27,26 @@ from collide.casts.silhouette import CAST_INTEGERS
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.narrowphase.posed_pair import Tables
 
-#: Nodes that may wait: one a level, and some.
-_STACK = 128
+#: Nodes that may wait: all children of a node but one, at every level.
+_STACK = MAX_CHILDREN * MAX_DEPTH
 #: Doubles and integers of workspace: of a chord, its row, and of the nodes that wait.
 TREE_RAY_DOUBLES = RAY_DOUBLES + RAY_ROW + _STACK + 3
 TREE_RAY_INTEGERS = CAST_INTEGERS + _STACK
 
 # Integers of a tree of parts in memory.
-NODES_AT, LEAVES, ORDER_AT, N_ORDER, FIRST_AT, N_BODIES, SKIPPED_AT, MESHED_AT = range(8)
-TREE_OF_PARTS = 8
+NODES_AT, LINKS_AT, N_NODES, FIRST_AT, N_BODIES, SKIPPED_AT, MESHED_AT = range(7)
+TREE_OF_PARTS = 7
 
 
 class _Tree(NamedTuple):
-    """A box-tree over bodies.   first : the first part of each body, and the number of all.
+    """Box-trees over bodies in a row, as of `graded_boxes.py`.   first : the first part of each body, and the number of
+    all.
     skipped, meshed : 1 of bodies that are not asked, and of those whose parts are only bounds.
     """
 
     nodes: Any
-    leaves: int
-    order: Any
+    links: Any
+    n_nodes: int
     first: Any
     skipped: Any
     meshed: Any
@@ -71,8 +73,9 @@ def _tree_at(header_at):
     header = view_i64(header_at, TREE_OF_PARTS)
     n = header[N_BODIES]
     return _Tree(
-        view_f64(header[NODES_AT], 12 * header[LEAVES]), header[LEAVES], view_i64(header[ORDER_AT], header[N_ORDER]),
-        view_i64(header[FIRST_AT], n + 1), view_i64(header[SKIPPED_AT], n), view_i64(header[MESHED_AT], n),
+        view_f64(header[NODES_AT], 6 * header[N_NODES]), view_i64(header[LINKS_AT], LINK * header[N_NODES]),
+        header[N_NODES], view_i64(header[FIRST_AT], n + 1), view_i64(header[SKIPPED_AT], n),
+        view_i64(header[MESHED_AT], n),
     )  # fmt: skip
 
 
@@ -99,22 +102,24 @@ def _nearest_wall(row, best):
 
 
 @kernel(inline=True)
-def _push_children(tree, walk, node, top, best):
-    """Put the children that the ray comes to onto the stack, the nearer one on top."""
-    near, far = 2 * node, 2 * node + 1
-    near_key = _entry_of(tree, near, walk.ray, walk.inverse, best)
-    far_key = _entry_of(tree, far, walk.ray, walk.inverse, best)
-    if far_key < near_key:
-        near, far, near_key, far_key = far, near, far_key, near_key
-    if far_key < math.inf:
-        walk.stack[top] = far
-        walk.keys[top] = far_key
-        top += 1
-    if near_key < math.inf:
-        walk.stack[top] = near
-        walk.keys[top] = near_key
-        top += 1
-    return top
+def _push_met(tree, walk, node, end, top, best):
+    """Put a node, and those that follow it under the same one up to ``end``, onto the stack where the
+    ray comes to them, the nearest on top. Returns its new height.
+    """
+    count = 0
+    while node < end:
+        key = _entry_of(tree, node, walk.ray, walk.inverse, best)
+        if key < math.inf:
+            k = count
+            while k > 0 and walk.keys[top + k - 1] < key:
+                walk.stack[top + k] = walk.stack[top + k - 1]
+                walk.keys[top + k] = walk.keys[top + k - 1]
+                k -= 1
+            walk.stack[top + k] = node
+            walk.keys[top + k] = key
+            count += 1
+        node = tree.links[LINK * node + SKIP]
+    return top + count
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, boolean, int64, int64, int64, int64)")
@@ -142,22 +147,18 @@ def parts_on_rays(
             doubles_at, integers_at,
         )  # fmt: skip
         best = limits[k]
-        top = 0
         for axis in range(3):
             walk.inverse[axis] = 1.0 / walk.ray[3 + axis] if walk.ray[3 + axis] != 0.0 else math.inf
-        if _entry_of(tree, 1, walk.ray, walk.inverse, best) < math.inf:
-            walk.stack[0] = 1
-            walk.keys[0] = 0.0
-            top = 1
+        top = _push_met(tree, walk, 0, tree.n_nodes, 0, best)
         while top > 0:
             top -= 1
             node = walk.stack[top]
             if walk.keys[top] > best:
                 continue
-            if node < tree.leaves:
-                top = _push_children(tree, walk, node, top, best)
+            body = tree.links[LINK * node + BODY]
+            if body < 0:
+                top = _push_met(tree, walk, node + 1, tree.links[LINK * node + SKIP], top, best)
                 continue
-            body = tree.order[node - tree.leaves]
             if tree.skipped[body] != 0:
                 continue
             for part in range(tree.first[body], tree.first[body + 1]):

@@ -5,6 +5,7 @@ Rows are flat because nine arrays cost 500 ns a call in Python and four addresse
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -35,6 +36,9 @@ TERM_ROW = LOW_PARTS + 12
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
 PRODUCT_SLOP = 16 * 2.0**-53
 
+#: Once rows are added, ranks are so far apart that others go between them.
+_RANK_STEP = 1 << 32
+
 
 class ShapeTable:
     """Distinct convex sets, row by row, with everything they point to kept alive.
@@ -46,27 +50,62 @@ class ShapeTable:
     """
 
     def __init__(self, packed: list[PackedConvex]):
-        self.packed = packed
-        self.ints = np.zeros((len(packed), INTS), dtype=np.int64)
-        self.numbers = np.zeros((len(packed), NUMBERS))
-        for k, p in enumerate(packed):
+        self.packed: list[PackedConvex] = []
+        self.ints, self.numbers = np.zeros((len(packed), INTS), dtype=np.int64), np.zeros((len(packed), NUMBERS))
+        self._without_tree: set[int] = set()
+        self._contents: list[bytes] = sorted({p.content for p in packed})
+        self._ranks = list(range(len(self._contents)))
+        self._write(packed)
+
+    def append(self, packed: list[PackedConvex]) -> None:
+        """Add rows: O(log n) each, and that of moving what there is where memory has run out."""
+        n = len(self.packed) + len(packed)
+        if n > len(self.ints):
+            capacity = n + max(len(self.packed), 16)
+            for name in ("ints", "numbers"):
+                rows = getattr(self, name)
+                grown = np.zeros((capacity, rows.shape[1]), dtype=rows.dtype)
+                grown[: len(self.packed)] = rows[: len(self.packed)]
+                setattr(self, name, grown)
+        is_ranked_anew = False
+        for content in sorted({p.content for p in packed}):
+            at = bisect_left(self._contents, content)
+            if self._contents[at : at + 1] != [content]:
+                below = self._ranks[at - 1] if at else -_RANK_STEP
+                above = self._ranks[at] if at < len(self._ranks) else below + 2 * _RANK_STEP
+                self._contents.insert(at, content)
+                self._ranks.insert(at, (below + above) // 2)
+                is_ranked_anew = is_ranked_anew or not below < self._ranks[at] < above
+        if is_ranked_anew:
+            self._ranks = [rank * _RANK_STEP for rank in range(len(self._contents))]
+        self._write(packed)
+        if is_ranked_anew:
+            self.ints[: len(self.packed), RANK] = [self._rank_of(p) for p in self.packed]
+
+    def _write(self, packed: list[PackedConvex]) -> None:
+        """Rows behind those that there are."""
+        first = len(self.packed)
+        self.packed.extend(packed)
+        for k, p in enumerate(packed, first):
             self.ints[k] = (
                 p.kind,
                 len(p.points),
                 p.coordinates.shape[1],
                 address_of(p.coordinates),
                 p.lowest,
-                0,
+                self._rank_of(p),
                 0,
                 coarse_address(p),
             )
             self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
             self.numbers[k, PARAMS:] = p.params
-        order = {c: rank for rank, c in enumerate(sorted({p.content for p in packed}))}
-        self.ints[:, RANK] = [order[p.content] for p in packed]
+            if may_have_tree(p):
+                self._without_tree.add(k)
         self.addresses = address_of(self.ints), address_of(self.numbers)
-        self._without_tree = {k for k, p in enumerate(packed) if may_have_tree(p)}
         self.faces: Any = None  # `hull_faces.HullFaceTable`, once contacts are asked for
+
+    def _rank_of(self, packed: PackedConvex) -> int:
+        return self._ranks[bisect_left(self._contents, packed.content)]
 
     @property
     def is_built(self) -> bool:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from collide.broadphase.graded_boxes import BODY, SKIP
+from collide.broadphase.graded_boxes import LINK as NODE_LINK
 from collide.kernels import kernel, view_f64, view_i64, view_u8
 from collide.lowering.compound_table import MEASURE, PART, TURNED
 from collide.lowering.shape_table import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS, PRODUCT_SLOP
@@ -22,9 +24,9 @@ from collide.robots.forward_kinematics import Joints, view_joints
     # parts of bodies in their links, how many there are of these, and how many numbers on their padded twins stand;
     # boxes of all parts in their own frames; whether a part only holds what is meant; all parts
     PARTS_AT, N_LINK_PARTS, PADDED, PART_BOXES_AT, IS_BOUND_AT, N_PARTS,
-    # surroundings: nodes, leaves, order of the tree over their parts, how many in it; those without end; bodies of
-    # parts; a byte for every body and body of the surroundings: never tested; how many of the latter
-    NODES_AT, LEAVES, ORDER_AT, N_ORDER, UNBOUNDED_AT, N_UNBOUNDED, BODY_OF_AT, ALLOWED_AT, N_AROUND,
+    # surroundings: nodes of the tree over their parts, their links, how many; those without end; bodies of parts; a
+    # byte for every body and body of the surroundings: never tested; how many of the latter
+    NODES_AT, NODE_LINKS_AT, N_NODES, UNBOUNDED_AT, N_UNBOUNDED, BODY_OF_AT, ALLOWED_AT, N_AROUND,
     # shapes
     INTS_AT, NUMBERS_AT, TERMS_AT, SHAPE_OF_AT,
     # workspace of one thread: poses of all parts; of links; boxes of bodies in the world; for which configuration a
@@ -34,8 +36,8 @@ from collide.robots.forward_kinematics import Joints, view_joints
     OPEN_AT, OPEN_CAPACITY, N_OPEN, STAMP,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(45)  # fmt: skip
-HEADER = 45
+) = range(44)  # fmt: skip
+HEADER = 44
 
 # Integers of a body: its link, its first part and how many there are.
 LINK, FIRST, COUNT = range(3)
@@ -119,9 +121,9 @@ def boxes_meet(scene, a, b, margin):
 def find_parts_around(scene, body, margin):
     """Candidates become the parts around whose boxes come within a margin of a body's; returns how many."""
     words, boxes, near = scene.words, scene.world_boxes, scene.candidates
-    leaves, n_order = words[LEAVES], words[N_ORDER]
-    nodes = view_f64(words[NODES_AT], 12 * leaves)
-    order = view_i64(words[ORDER_AT], n_order)
+    n_nodes = words[N_NODES]
+    nodes = view_f64(words[NODES_AT], 6 * n_nodes)
+    links = view_i64(words[NODE_LINKS_AT], NODE_LINK * n_nodes)
     unbounded = view_i64(words[UNBOUNDED_AT], words[N_UNBOUNDED])
     at = BOX * body
     low0 = boxes[at] - margin
@@ -133,24 +135,19 @@ def find_parts_around(scene, body, margin):
     count = words[N_UNBOUNDED]
     for k in range(count):
         near[k] = unbounded[k]
-    # As `box_tree.meeting_boxes` goes: down to the left while boxes meet, else on to the next subtree to the right.
-    node = 1 if n_order > 0 else 0
-    while node > 0:
+    # As `walk_boxes.boxes_met` goes: to the first child where boxes meet, else to what comes after the subtree.
+    node = 0
+    while node < n_nodes:
         n = 6 * node
         meets = (
             nodes[n] <= high0 and nodes[n + 3] >= low0
             and nodes[n + 1] <= high1 and nodes[n + 4] >= low1
             and nodes[n + 2] <= high2 and nodes[n + 5] >= low2
         )  # fmt: skip
-        if meets and node < leaves:
-            node = 2 * node
-            continue
-        if meets and node - leaves < n_order:
-            near[count] = order[node - leaves]
+        if meets and links[NODE_LINK * node + BODY] >= 0:
+            near[count] = links[NODE_LINK * node + BODY]
             count += 1
-        while node & 1:
-            node >>= 1
-        node = node + 1 if node > 0 else 0
+        node = node + 1 if meets else links[NODE_LINK * node + SKIP]
     return count
 
 

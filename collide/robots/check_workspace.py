@@ -58,9 +58,8 @@ class CheckWorkspace:
             layout.OPEN_CAPACITY: capacity,
         }  # fmt: skip
         if tree is not None:
-            order = np.ascontiguousarray(tree.order, dtype=np.int64)
-            buffers |= {layout.NODES_AT: tree.nodes, layout.ORDER_AT: order}
-            numbers |= {layout.LEAVES: tree.leaves, layout.N_ORDER: len(order)}
+            buffers |= {layout.NODES_AT: tree.nodes, layout.NODE_LINKS_AT: tree.links}
+            numbers |= {layout.N_NODES: tree.n_nodes}
         self.header = np.zeros(layout.HEADER, dtype=np.int64)
         for word, number in numbers.items():
             self.header[word] = number

@@ -373,7 +373,10 @@ class RobotChecker:
 
         def on_piece(piece: slice) -> None:
             nonlocal done
-            space = spare.pop() if spare else CheckWorkspace(self.robot.joint_table, setting)
+            try:
+                space = spare.pop()
+            except IndexError:  # all are in use: another thread may have taken the last
+                space = CheckWorkspace(self.robot.joint_table, setting)
             work(space, piece)
             spare.append(space)
             done += piece.stop - piece.start

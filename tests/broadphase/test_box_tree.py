@@ -1,95 +1,242 @@
-"""The box-tree beside every box against every other, as bodies move near and far; it stays as good as a new one."""
+"""The box-tree beside every box against every other, as bodies are added, moved near and far, and removed; every
+property of the tree; it stays as good as a new one, and costs what has changed.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from validate_box_tree import depths_of, growth_of, validate_box_tree
 
 from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.graded_boxes import BODY, SKIP
 
-STATIC, GROUP, MASK = 0, 1, 2
+KINDS = ["uniform", "clusters", "all sizes", "a few huge", "rods", "flat", "a line to nothing", "in one place"]
 
 
 def boxes_of(rng, kind: str, n: int) -> np.ndarray:
     """(n, 6): low and high corners."""
-    if kind == "uniform":
-        middle, half = rng.uniform(0, n ** (1 / 3), (n, 3)), rng.uniform(0.1, 0.4, (n, 3))
-    elif kind == "clusters":
+    middle, half = rng.uniform(0, n ** (1 / 3), (n, 3)), rng.uniform(0.1, 0.4, (n, 3))
+    if kind == "clusters":
         middle = rng.normal(size=(n, 3)) * 0.5 + 100.0 * rng.integers(0, 3, (n, 1))
         half = rng.uniform(0.01, 0.1, (n, 3))
     elif kind == "all sizes":
         middle, half = rng.uniform(0, 10, (n, 3)), 10.0 ** rng.uniform(-6, 1, (n, 1)) * rng.uniform(0.1, 1, (n, 3))
-    else:  # in one place
+    elif kind == "a few huge":
+        half[: n // 20] *= n ** (1 / 3)
+    elif kind == "rods":  # all outliers of the root
+        middle[:, 0], half[:, 0] = 0.0, n ** (1 / 3)
+    elif kind == "flat":
+        middle[:, 2], half[:, 2] = 0.0, 0.0
+    elif kind == "a line to nothing":
+        middle, half = 2.0 ** -np.arange(n)[:, None] * np.ones(3), 2.0 ** -np.arange(n)[:, None] * np.full(3, 0.3)
+    elif kind == "in one place":
         middle, half = np.full((n, 3), 3.0), np.zeros((n, 3))
-    boxes = np.hstack([middle - half, middle + half])
+    return np.hstack([middle - half, middle + half])
+
+
+def filters_of(rng, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """(group, mask)."""
+    return 1 << rng.integers(0, 3, n), rng.integers(1, 8, n)
+
+
+def all_pairs(tree: BoxTree, alive, margin: float, group, mask, still, allowed) -> np.ndarray:
+    """Every box against every other."""
+    boxes = tree.boxes
+    i, j = (alive[k] for k in np.triu_indices(len(alive), 1))
+    keep = ((boxes[i, :3] - margin <= boxes[j, 3:]) & (boxes[i, 3:] + margin >= boxes[j, :3])).all(axis=1)
+    keep &= ~(still[i] & still[j]) & ((group[i] & mask[j]) != 0) & ((group[j] & mask[i]) != 0)
+    pairs = np.stack([i[keep], j[keep]], axis=1).tolist()
+    return np.array([pair for pair in pairs if tuple(pair) not in allowed]).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("n", [1, 2, 5, 40, 170])
+def test_pairs_are_those_of_all_boxes_whatever_happens(kind, n):
+    """Few and many moved, near and far; bodies come and go; asleep, allowed, without end."""
+    rng, n_pairs, removed = np.random.default_rng([n, KINDS.index(kind)]), 0, set()
+    boxes, fixed = boxes_of(rng, kind, n), rng.random(n) < 0.3
     if n > 3:
         boxes[0] = [-np.inf] * 3 + [np.inf] * 3
-    return boxes
+    tree, asleep = BoxTree(boxes, fixed), np.zeros(n, dtype=bool)
+    group, mask = filters_of(rng, n)
+    tree.set_groups(np.arange(n), group, mask)
+    allowed: set = set()
+    for step in range(24):
+        done = step % 6
+        alive = np.array(sorted(set(range(len(tree.boxes))) - removed))
+        bounded = alive[np.isfinite(tree.boxes[alive]).all(axis=1)]
+        few = rng.permutation(bounded)[: max(1, len(bounded) // 20)]
+        if done == 1 and len(bounded):
+            tree.move(bounded, tree.boxes[bounded] + np.tile(rng.normal(size=(len(bounded), 3)) * 0.3, 2))
+        elif done in (0, 2) and len(few):
+            scale = 0.02 if step % 4 else 5.0
+            tree.move(few, tree.boxes[few] + np.tile(rng.normal(size=(len(few), 3)) * scale, 2))
+        elif done == 3:
+            k = int(rng.integers(1, 6))
+            more, stay = boxes_of(rng, kind, k), rng.random(k) < 0.3
+            traits = filters_of(rng, k)
+            tree.append(more, stay, *traits)
+            group, mask = np.append(group, traits[0]), np.append(mask, traits[1])
+            fixed, asleep = np.append(fixed, stay), np.append(asleep, np.zeros(k, dtype=bool))
+        elif done == 4 and len(few) and len(alive) > 2:
+            tree.remove(few)
+            removed |= set(few.tolist())
+        elif done == 5 and len(few):
+            asleep[few] = ~asleep[few]
+            tree.set_asleep(few[asleep[few]], True)
+            tree.set_asleep(few[~asleep[few]], False)
+            pairs = rng.permutation(len(tree.boxes))[: 2 * (len(tree.boxes) // 2)].reshape(-1, 2)
+            allowed = {tuple(sorted(p)) for p in pairs.tolist()}
+            tree.set_allowed(np.array(sorted(allowed)).reshape(-1, 2))
+        validate_box_tree(tree, len(removed))
+        alive = np.array(sorted(set(range(len(tree.boxes))) - removed))
+        for margin in (0.0, float(rng.choice([0.05, 1.0]))):
+            pairs, wanted = tree.pairs(margin), all_pairs(tree, alive, margin, group, mask, fixed | asleep, allowed)
+            assert np.array_equal(pairs, wanted), f"kind={kind!r}; n={n}; step={step}; margin={margin}"
+            n_pairs += len(wanted)
+        box = tree.boxes[rng.choice(alive[np.isfinite(tree.boxes[alive]).all(axis=1)])] if len(bounded) else np.ones(6)
+        near = ((box[:3] - 0.1 <= tree.boxes[:, 3:]) & (box[3:] + 0.1 >= tree.boxes[:, :3])).all(axis=1)
+        assert np.array_equal(tree.touching(box, 0.1), np.flatnonzero(near)), f"kind={kind!r}; n={n}; step={step}"
+    assert n_pairs > 2 * n or n < 40
 
 
-def filters_of(rng, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(static, group, mask)."""
-    return rng.integers(0, 2, n) * rng.integers(0, 2, n), 1 << rng.integers(0, 3, n), rng.integers(1, 8, n)
-
-
-def all_pairs(boxes, margin: float, static, group, mask) -> np.ndarray:
-    """Every box against every other."""
-    i, j = np.triu_indices(len(boxes), 1)
-    near = ((boxes[i, :3] - margin <= boxes[j, 3:]) & (boxes[j, :3] - margin <= boxes[i, 3:])).all(axis=1)
-    keep = near & ~((static[i] != 0) & (static[j] != 0)) & ((group[i] & mask[j]) != 0) & ((group[j] & mask[i]) != 0)
-    return np.stack([i[keep], j[keep]], axis=1)
-
-
-@pytest.mark.parametrize("kind", ["uniform", "clusters", "all sizes", "in one place"])
-@pytest.mark.parametrize("n", [1, 2, 5, 90])
-def test_pairs_are_those_of_all_boxes(kind, n):
-    rng = np.random.default_rng(n)
-    tree = BoxTree(boxes_of(rng, kind, n))
-    n_pairs = 0
-    for step in range(12):
-        if step:
-            boxes = boxes_of(rng, kind, n) if step % 3 == 0 else tree.boxes + np.tile(rng.normal(size=3) * 0.1, 2)
-            tree.refit(boxes)
-        filters, margin = filters_of(rng, n), float(rng.choice([0.0, 0.05, 1.0]))
-        pairs, wanted = tree.pairs(margin, *filters), all_pairs(tree.boxes, margin, *filters)
-        assert np.array_equal(pairs, wanted), (kind, n, step)
-        n_pairs += len(wanted)
-        box = tree.boxes[rng.integers(n)]
-        near = ((tree.boxes[:, :3] - margin <= box[3:]) & (box[:3] - margin <= tree.boxes[:, 3:])).all(axis=1)
-        assert np.array_equal(tree.touching(box, margin), np.flatnonzero(near)), (kind, n, step)
-    assert n_pairs > 2 * n or n < 5
-
-
-def test_what_has_moved_far_is_sorted_anew():
-    """All bodies change places, spread, and come back: the sides of a tree made anew are a little less at most."""
-    rng = np.random.default_rng(1)
-    boxes = boxes_of(rng, "uniform", 2000)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tree_has_the_depth_of_the_sizes_in_it(kind):
+    """Levels: log2 of the width by the least size, as the paper has it, and those of the outliers' trees."""
+    n = 600 if kind != "a line to nothing" else 50
+    boxes = boxes_of(np.random.default_rng(3), kind, n)
     tree = BoxTree(boxes)
-    first = tree.order
+    validate_box_tree(tree)
+    sides = (boxes[:, 3:] - boxes[:, :3]).max(axis=1)
+    width = float((boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)).max())
+    levels = np.ceil(np.log2(max(width / sides.min(), 1.0))) if sides.min() > 0 else 0
+    assert depths_of(tree).max() <= levels + 3 + np.log2(n) + 1, (depths_of(tree).max(), levels)
+    assert tree.n_nodes <= 2 * n - 1
+
+
+def test_rods_as_long_as_the_world_are_no_list():
+    """All are outliers of the root, and a walk is to open few: the paper bounds their number by locality alone."""
+    n = 4000
+    tree = BoxTree(boxes_of(np.random.default_rng(4), "rods", n))
+    validate_box_tree(tree)
+    box = tree.boxes[17]
+    opened, node = 0, 0
+    while node < tree.n_nodes:
+        opened += 1
+        low, high = tree.nodes[node, :3], tree.nodes[node, 3:]
+        node = node + 1 if (low <= box[3:]).all() and (high >= box[:3]).all() else int(tree.links[node, SKIP])
+    met = len(tree.touching(box, 0.0))
+    assert opened < 20 * met + 150 < n, (opened, met)
+
+
+def test_what_has_moved_far_is_made_anew():
+    """All bodies change places, spread, and come back: the sides of a tree made anew are a little less at most."""
+    boxes = boxes_of(np.random.default_rng(1), "uniform", 2000)
+    tree = BoxTree(boxes)
     for step, spread in enumerate([1.0, 1.0, 8.0, 8.0, 1.0, 0.1, 1.0]):
         moved = boxes_of(np.random.default_rng(step), "uniform", 2000)
-        middle = np.tile(0.5 * (moved[1:, :3] + moved[1:, 3:]), 2)
-        moved[1:] += (spread - 1.0) * middle
+        moved += (spread - 1.0) * np.tile(0.5 * (moved[:, :3] + moved[:, 3:]), 2)
         tree.refit(moved)
-        sides, fresh = tree._fit(), BoxTree(moved)._fit()
-        assert sides[0] <= 1.6 * fresh[0], (step, sides, fresh)
-    assert not np.array_equal(tree.order, first)
+        assert growth_of(tree) <= 1.7, (step, growth_of(tree))
+    assert tree.take_work()["trees made"] > 3
 
 
-def test_what_moves_a_little_keeps_its_order():
-    """Sorting takes as long as a query: steps of a simulation are not to pay for it."""
+def test_what_moves_a_few_at_a_time_stays_good_as_well():
+    """Paths alone are fitted: the sum of sides that decides is kept by differences, for ten thousand moves."""
+    rng = np.random.default_rng(5)
+    tree = BoxTree(boxes_of(rng, "uniform", 800))
+    for _ in range(1000):
+        few = rng.choice(800, 10, replace=False)
+        fresh = boxes_of(rng, "uniform", 800)[few]
+        tree.move(few, fresh)
+    validate_box_tree(tree)
+    assert growth_of(tree) <= 1.8, growth_of(tree)
+
+
+def test_what_moves_a_little_keeps_its_tree():
+    """Making it takes as long as a query: steps of a simulation are not to pay for it."""
     rng = np.random.default_rng(2)
-    boxes = boxes_of(rng, "uniform", 500)
-    tree = BoxTree(boxes)
-    first = tree.order
+    tree = BoxTree(boxes_of(rng, "uniform", 500))
     for _ in range(20):
         tree.refit(tree.boxes + np.tile(rng.uniform(-0.01, 0.01, (500, 3)), 2))
-    assert tree.order is first
+    assert tree.take_work()["trees made"] == 1
+
+
+def test_most_small_steps_change_no_node():
+    """A body that goes on as it went gets room for some steps: one in five or so of its steps costs anything."""
+    rng = np.random.default_rng(6)
+    tree = BoxTree(boxes_of(rng, "uniform", 400))
+    step = np.tile(rng.uniform(-0.002, 0.002, (400, 3)), 2)
+    tree.refit(tree.boxes + step)
+    tree.take_work()
+    for _ in range(40):
+        tree.refit(tree.boxes + step)
+        validate_box_tree(tree)
+    assert 0 < tree.take_work()["leaves changed"] < 0.3 * 40 * 400
+
+
+@pytest.mark.parametrize("n", [1000, 20000])
+def test_moving_a_few_looks_at_few_nodes(n):
+    rng = np.random.default_rng(7)
+    boxes = boxes_of(rng, "uniform", n)
+    tree = BoxTree(boxes, np.arange(n) % 2 == 0)
+    tree.pairs(0.0)
+    tree.take_work()
+    for _ in range(10):
+        few = rng.choice(n, 5, replace=False)
+        tree.move(few, tree.boxes[few] + np.tile(rng.normal(size=(5, 3)) * 0.3, 2))
+        tree.pairs(0.0)
+    work = tree.take_work()
+    assert work["leaves changed"] == 50 and work["nodes fitted"] < 50 * 25 and not work["trees made"], work
+
+
+def test_adding_one_at_a_time_sorts_each_a_few_times():
+    """Trees of what was added are joined with others of their size: n log n nodes in all, not n squared."""
+    rng, n = np.random.default_rng(8), 2000
+    boxes = boxes_of(rng, "uniform", n)
+    tree = BoxTree(boxes[:1])
+    for k in range(1, n):
+        tree.append(boxes[k : k + 1], np.zeros(1, dtype=bool))
+    validate_box_tree(tree)
+    assert tree.take_work()["nodes fitted"] < 6 * n * np.log2(n)
+    assert len(tree.sections) <= np.log2(n) + 2
+
+
+def test_memory_does_not_grow_with_what_comes_and_goes():
+    rng = np.random.default_rng(9)
+    tree = BoxTree(boxes_of(rng, "uniform", 300))
+    alive = list(range(300))
+    for _ in range(200):
+        tree.remove(np.array(alive[:10]))
+        first = len(tree.boxes)
+        tree.append(boxes_of(rng, "uniform", 10), np.zeros(10, dtype=bool))
+        alive = alive[10:] + list(range(first, first + 10))
+    validate_box_tree(tree, 2000)
+    assert tree.n_nodes < 1500 and len(tree.nodes) < 4000
 
 
 def test_other_bodies_are_refused():
     boxes = boxes_of(np.random.default_rng(3), "uniform", 10)
     with pytest.raises(ValueError, match="same bodies"):
         BoxTree(boxes).refit(boxes[:9])
-    with pytest.raises(ValueError, match="same bodies"):
+    boxes[0] = [-np.inf] * 3 + [np.inf] * 3
+    with pytest.raises(ValueError, match="keep their ends"):
         BoxTree(boxes).refit(np.roll(boxes, 1, axis=0))
+
+
+@pytest.mark.parametrize("what", ["box", "skip", "body", "leaf"])
+def test_a_damaged_tree_is_noticed(what):
+    tree = BoxTree(boxes_of(np.random.default_rng(3), "uniform", 30))
+    validate_box_tree(tree)
+    leaves = np.flatnonzero(tree.links[: tree.n_nodes, BODY] >= 0)
+    if what == "box":
+        tree.nodes[0, 0] += 0.5
+    elif what == "skip":
+        tree.links[1, SKIP] += 1
+    elif what == "body":
+        tree.links[leaves[0], BODY] = tree.links[leaves[1], BODY]
+    else:
+        tree.boxes[tree.links[leaves[3], BODY], 0] -= 1.0
+    with pytest.raises(AssertionError, match=r"node|leaf|missing or doubled|body"):
+        validate_box_tree(tree)
