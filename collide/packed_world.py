@@ -79,6 +79,7 @@ class PackedWorld:
         self._work = {"added": 0, "removed": 0, "moved": 0}
         self._any_dead = self.has_margins = self._any_meshed = False
         self._append(roster, X_WBs)
+        self._remove(np.flatnonzero(~roster.alive))
         self._take_sleep(roster._replace(sleeping=np.zeros(len(roster.ids), dtype=bool)), roster)
         self.set_filters(filters)
 
@@ -93,11 +94,7 @@ class PackedWorld:
             self._append(roster, X_WBs[n:])
             dead = np.flatnonzero(before.alive & ~roster.alive[:n])
             dead = np.append(dead, n + np.flatnonzero(~roster.alive[n:]))
-            if len(dead):
-                assert self.tree is not None
-                self.tree.remove(dead)
-                self._any_dead = True
-            self._work["removed"] += len(dead)
+            self._remove(dead)
             self._take_sleep(before, roster)
             if (before.margin != roster.margin[:n]).any() or roster.margin[n:].any():
                 self._inflate()
@@ -126,6 +123,14 @@ class PackedWorld:
         else:
             self.tree.append(boxes, roster.static[n:] != 0, roster.group[n:], roster.mask[n:])
         self._work["added"] += len(new)
+
+    def _remove(self, dead: np.ndarray) -> None:
+        """Take bodies (k,) out of the tree; their rows stay."""
+        if len(dead):
+            assert self.tree is not None
+            self.tree.remove(dead)
+            self._any_dead = True
+            self._work["removed"] += len(dead)
 
     def _take_sleep(self, before: Roster, roster: Roster) -> None:
         if self.tree is None:

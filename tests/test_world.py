@@ -259,3 +259,15 @@ def test_many_flush_boxes_in_a_grid():
     assert {(int(row["a"]), int(row["b"])) for row in rows} == neighbours
     assert (rows["distance"] == 0.0).all() and rows["certified"].all()
     assert world.stats["undecided"] == 0
+
+
+def test_bodies_removed_before_the_first_query_are_gone():
+    """A World's first tables are made of the bodies there are, not of rows of some that were removed."""
+    world = collide.World()
+    ids = [world.add(collide.Sphere(1.0), collide.pose((0.1 * k, 0, 0))) for k in range(4)]
+    world.remove(ids[1])
+    rows = world.distances()
+    assert sorted(zip(rows["a"].tolist(), rows["b"].tolist())) == [(0, 2), (0, 3), (2, 3)]
+    assert world.raycast((0.1, 0, 9), (0, 0, -1))["body"][0] != ids[1]
+    assert sum(world.stats["skipped"].values()) + world.stats["narrowphase"] == world.stats["pairs"] == 3
+    assert ids[1] not in world.query(collide.Sphere(0.1), np.eye(4))["b"].tolist()

@@ -32,12 +32,12 @@ def misaligned() -> np.ndarray:
 )  # fmt: skip
 def test_what_is_left_to_the_long_way(pair, X):
     assert pair.collide(X, EYE) is None and pair.collide(EYE, X) is None
-    assert pair.distance(X, FAR, True) is None and pair.distance(EYE, X, True) is None
+    assert pair.distance(X, FAR, True, np.inf) is None and pair.distance(EYE, X, True, np.inf) is None
 
 
 def test_matrices_are_answered(pair):
     assert pair.collide(EYE, EYE) is True and pair.collide(EYE, FAR) is False
-    row = pair.distance(EYE, FAR, True)
+    row = pair.distance(EYE, FAR, True, np.inf)
     assert row.dtype == PAIR_DTYPE and row.shape == (1,) and not row["hit"][0] and row["distance"][0] > 3
     read_only = FAR.copy()
     read_only.flags.writeable = False
@@ -46,4 +46,4 @@ def test_matrices_are_answered(pair):
 
 def test_poses_that_are_none_are_left_to_whoever_says_so(pair):
     for X in (2 * EYE, np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])):
-        assert pair.collide(EYE, X) is None and pair.distance(EYE, X, False) is None
+        assert pair.collide(EYE, X) is None and pair.distance(EYE, X, False, np.inf) is None
