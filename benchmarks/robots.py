@@ -1,7 +1,7 @@
 """Configurations and motions of robots checked: collide beside MuJoCo and Pinocchio, and what certificates cost.
 
     python benchmarks/robots.py                       # three minutes; prints tables and writes results/robots_*.csv
-    python benchmarks/robots.py --table clutter       # one of clutter, verdicts, motions, batches; no file
+    python benchmarks/robots.py --table clutter       # one of clutter, verdicts, motions, batches
     python benchmarks/robots.py --quick               # half a minute; no file
 
 clutter    thousand configurations a second: a Panda (9 hulls, 8 boxes of fingers; meshes of example-robot-data) over a
@@ -251,7 +251,7 @@ def main() -> None:
     log(str(about))
     for table in TABLES if arguments.table is None else (arguments.table,):
         rows = globals()[f"{table}_table"](arguments.quick)
-        if rows and not arguments.quick and arguments.table is None:
+        if rows and not arguments.quick:
             write(f"robots_{table}", rows, about)
 
 
