@@ -25,21 +25,18 @@ pairs of collide, the tree before, coal and python-fcl are the same.
 from __future__ import annotations
 
 import argparse
-import csv
-import os
-import platform
 import statistics
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from broadphase_before import ImplicitBoxTree
+from convex import write
+from startup import machine
 
 import collide
 from collide.broadphase.box_tree import BoxTree
 
-RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (100, 1000, 10_000, 100_000)
 LAYOUTS = ("uniform", "clustered", "a few huge", "all sizes", "few move")
 #: Seconds that the turns of one size and layout may take, and how many there are.
@@ -313,11 +310,7 @@ def main() -> int:
                     f"{row['median_ms']:>10.3f} ms   × {row['ratio']}", flush=True,
                 )  # fmt: skip
     if not options.no_csv:
-        machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()}
-        with open(RESULTS / "broadphase.csv", "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, [*rows[0], *machine])
-            writer.writeheader()
-            writer.writerows(row | machine for row in rows)
+        write("broadphase", rows, machine())
     return 0
 
 

@@ -22,20 +22,17 @@ Milliseconds of CPU time of this process; medians.
 from __future__ import annotations
 
 import argparse
-import csv
-import os
-import platform
 import statistics
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
+from convex import write
+from startup import machine
 
 import collide
 
-RESULTS = Path(__file__).resolve().parent / "results"
 SIZES = (100, 1000, 5000, 20_000)
 LAYOUTS = ("random", "sparse", "pit")
 REPEATS = 11
@@ -140,11 +137,7 @@ def main() -> int:
             first = measured[0]
             print(f"{layout:<7}{n:>7}  {first['hits']:>6} hits  {first['bytes_per_body']} B a body  {figures}")
     if not options.no_csv:
-        machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()}
-        with open(RESULTS / "world_steps.csv", "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, [*rows[0], *machine])
-            writer.writeheader()
-            writer.writerows(row | machine for row in rows)
+        write("world_steps", rows, machine())
     return 0
 
 
