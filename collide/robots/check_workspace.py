@@ -35,7 +35,9 @@ class CheckWorkspace:
         nothing = np.zeros(1, dtype=np.int64)
         tree = around.tree
         unbounded = np.ascontiguousarray(tree.unbounded, dtype=np.int64) if tree is not None else nothing[:0]
-        capacity = max(_LEAST_OPEN, n_bodies * n_around + len(self_pairs) + 1)
+        n_link_parts = n_parts - n_around
+        # One configuration leaves each pair of parts to others at most once.
+        capacity = max(_LEAST_OPEN, n_link_parts * (n_around + n_link_parts) + 1)
         self._open = np.empty((capacity, layout.OPEN_INTS), dtype=np.int64)
         self._buffers = buffers = {
             layout.POSES_AT: tables.poses.copy(), layout.LINKS_AT: np.zeros((joints.n_links, POSE)),

@@ -240,3 +240,16 @@ def test_bad_arguments_are_named():
         with pytest.raises(InvalidArgument, match=words):
             ask()
     assert checker.within_limits([[0.5], [1.5], [1.0 + 1e-12]]).tolist() == [True, False, True]
+
+
+def test_there_is_space_for_all_that_one_configuration_leaves_to_others():
+    """A link of a hundred parts within sixty meshes that are not convex: six thousand pairs of parts."""
+    rng = rng_of("many parts")
+    beads = collide.Compound([(collide.Sphere(0.001), pose(t=rng.uniform(-0.05, 0.05, 3))) for _ in range(100)])
+    world, mesh = collide.World(), dented()
+    for k in range(60):
+        world.add(mesh, pose(t=(0.01 * (k % 6), 0.01 * (k // 6), 0)), name=f"mesh{k}")
+    checker = collide.RobotChecker(slider(beads), world)
+    assert checker.collides([[0.0], [1.0]]).tolist() == [True, False]
+    measured = checker.distances([[0.0], [0.9]])
+    assert measured.hit.tolist() == [True, False] and 0.5 < measured.distance[1] < 0.9
