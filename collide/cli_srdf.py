@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 
 from collide.cli_files import check_place, write_json, write_text
+from collide.cli_numbers import count, count_or_none
 from collide.errors import InvalidArgument
 
 EPILOG = """examples:
@@ -38,9 +39,9 @@ exit status: 0 done, 1 the SRDF compared with is wrong about a pair, 2 error"""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="a URDF, or a scene with a robot in it")
     parser.add_argument("--name", metavar="NAME", help="which robot, of a scene with several")
-    parser.add_argument("--samples", type=_count, default=10_000, metavar="N", help="configurations drawn (10000)")
+    parser.add_argument("--samples", type=count, default=10_000, metavar="N", help="configurations drawn (10000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds draw others (0)")
-    parser.add_argument("--rounds", type=_count_or_none, default=24, metavar="N",
+    parser.add_argument("--rounds", type=count_or_none, default=24, metavar="N",
                         help="of the search for rare collisions; 0: no search (24)")
     parser.add_argument("--always", type=_share, default=1.0, metavar="SHARE",
                         help="share of the sample that makes a pair Always (1; MoveIt: 0.95)")
@@ -145,23 +146,6 @@ def _disabled_pairs(robot, place: str) -> list[tuple[str, str, str]]:
     if not pairs:
         raise InvalidArgument(f"--compare: {place} disables no pair of links of robot {robot.name}")
     return pairs
-
-
-def _count(text: str) -> int:
-    number = _count_or_none(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be 1 or more, got {text!r}")
-    return number
-
-
-def _count_or_none(text: str) -> int:
-    try:
-        number = int(text.replace("_", ""))
-    except ValueError:
-        number = -1
-    if number < 0:
-        raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more, got {text!r}")
-    return number
 
 
 def _share(text: str) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from collide.cli_files import write_json
+from collide.cli_numbers import count, count_or_none
 from collide.errors import InvalidArgument
 
 EPILOG = """examples:
@@ -45,16 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser, add_scene_arguments: Callable
     group = parser.add_argument_group("sweep")
     group.add_argument("--out", metavar="DIR", required=True, help="the folder of the answers, made if need be")
     group.add_argument("--configurations", metavar="FILE", help="a .npy, .csv or .parquet file")
-    group.add_argument("--random", type=_count, metavar="N", help="so many configurations, drawn within the limits")
+    group.add_argument("--random", type=count, metavar="N", help="so many configurations, drawn within the limits")
     group.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds draw others (0)")
     group.add_argument("--each", action="store_true", help="every SCENE is one of its own")
     group.add_argument("--name", metavar="NAME", help="which robot, of a scene with several")
     group.add_argument("--distances", action="store_true", help="least distances and their bodies, too")
     group.add_argument("--values", action="store_true", help="write the configurations, too")
-    group.add_argument("--workers", type=_count_or_none, metavar="N",
+    group.add_argument("--workers", type=count_or_none, metavar="N",
                        help="processes of this machine; 0: this one (default: one for each core)")
     group.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster: tcp://host:8786")
-    group.add_argument("--chunk", type=_count, metavar="N", help="rows of a chunk")
+    group.add_argument("--chunk", type=count, metavar="N", help="rows of a chunk")
     group.add_argument("--restart", action="store_true", help="throw away what is in DIR, and begin anew")
     parser.add_argument("--json", metavar="FILE|-", help="write the summary as JSON, or - to standard output")
     parser.add_argument("--quiet", action="store_true", help="no summary, no progress; errors are still told")
@@ -137,20 +138,3 @@ def _summary_dict(results: Any) -> dict[str, Any]:
     from collide.sweeps.sweep_tables import to_dict
 
     return to_dict(results)
-
-
-def _count(text: str) -> int:
-    number = _count_or_none(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be 1 or more, got {text!r}")
-    return number
-
-
-def _count_or_none(text: str) -> int:
-    try:
-        number = int(text.replace("_", ""))
-    except ValueError:
-        number = -1
-    if number < 0:
-        raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more, got {text!r}")
-    return number
