@@ -102,7 +102,7 @@ class PackedWorld:
         if self._any_dead:
             moved = moved[roster.alive[moved]]
         if len(moved):
-            self.parts.move(moved, X_WBs[moved])
+            self.parts.move(moved, X_WBs)
             assert self.tree is not None
             self.tree.move(moved, self._tree_boxes(moved))
             self._work["moved"] += len(moved)
@@ -158,8 +158,10 @@ class PackedWorld:
             self.tree.move(changed, self._tree_boxes(changed))
 
     def _tree_boxes(self, bodies: np.ndarray) -> np.ndarray:
-        """(k, 6) boxes of bodies with room for their margins, rounded outwards."""
-        boxes = self.parts.body_boxes(bodies)
+        """(k, 6) boxes of bodies (k,), ascending, with room for their margins, rounded outwards."""
+        parts = self.parts
+        is_whole = parts.all_of_one_part and len(bodies) == len(parts.boxes)
+        boxes = parts.boxes if is_whole else parts.body_boxes(bodies)
         if not self.has_margins:
             return boxes
         inflation = self._inflation[bodies, None]

@@ -17,8 +17,9 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.numerics.rigid_poses import are_rigid_matrices
 from collide.shapes.shape import Shape
-from collide.transforms import as_pose, as_poses
+from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
@@ -238,7 +239,8 @@ class WorldBodies:
     def move_many(self, bodies: Iterable[int | str], X_WBs) -> None:
         """Give k bodies other poses (k, 4, 4). Raises UnknownBody, InvalidPose: then none has moved."""
         rows = self._rows_of(bodies)
-        X_WBs = as_poses(X_WBs, "World.set_poses: X_WBs")
+        if not _are_rigid_matrices(X_WBs):
+            X_WBs = as_poses(X_WBs, "World.set_poses: X_WBs")
         if len(X_WBs) != len(rows):
             raise InvalidPose(f"World.set_poses: {len(rows)} bodies but {len(X_WBs)} poses")
         self._X_WBs[rows] = X_WBs
@@ -301,6 +303,11 @@ def _columns_of(ids: list[int], flags: list[tuple[bool, int, int]]) -> list[Grow
     """Columns: ids, static, group, mask."""
     columns = np.array(flags, dtype=np.int64).reshape(-1, 3).T
     return [GrowingRows(np.array(ids, dtype=np.int32)), *(GrowingRows(column) for column in columns)]
+
+
+def _are_rigid_matrices(X) -> bool:
+    """Whether X is an array of rigid poses for certain; all else is looked at by `as_poses`."""
+    return type(X) is np.ndarray and are_rigid_matrices(X, SAFE_TOLERANCE, LARGEST)
 
 
 def _flag(field: str, value) -> bool:

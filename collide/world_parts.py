@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.bounding_boxes import boxes_of, move_parts
 from collide.broadphase.growing_rows import GrowingRows
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import bounding_parts_of, is_single_convex
@@ -54,7 +54,7 @@ class WorldParts:
         self._of_parts = _columns((np.int64,), (np.int64,), (float, 4, 4), (float,), (bool,), (float, POSE), (float, 6))
         self._first = GrowingRows(np.zeros(1, dtype=np.int64))
         self._terms = GrowingRows(np.empty((0, TERM_ROW)))
-        self.all_of_one_part = True
+        self.all_of_one_part, self._any_own_pose = True, False
         self._take_columns()
 
     def _take_columns(self) -> None:
@@ -88,6 +88,7 @@ class WorldParts:
         for column, rows in zip(self._of_parts, (body_of, row_of, X_BP, reach, has_pose, poses.rows, boxes)):
             column.extend(rows)
         self.all_of_one_part = self.all_of_one_part and bool((counts == 1).all())
+        self._any_own_pose = self._any_own_pose or bool(has_pose.any())
         self._take_columns()
 
     def _numbers_of(self, shapes: Sequence[Shape]) -> np.ndarray:
@@ -124,7 +125,11 @@ class WorldParts:
         return row_of
 
     def move(self, bodies: np.ndarray, X_WBs: np.ndarray) -> None:
-        """Take new poses (k, 4, 4) of bodies (k,). Others' boxes are not made again."""
+        """Take new poses of bodies (k,), ascending, from those of all (n, 4, 4). Others' boxes are not made again."""
+        if self.all_of_one_part and not self._any_own_pose:
+            move_parts(self.table, self.row_of, bodies, X_WBs, self.X_WBs, self.poses.rows, self.boxes)
+            return
+        X_WBs = X_WBs[bodies]
         self.X_WBs[bodies] = X_WBs
         parts: np.ndarray | slice = bodies if self.all_of_one_part else self.parts_of(bodies)
         if len(bodies) == len(self.shape_of):

@@ -72,12 +72,19 @@ def test_moving_one_body_looks_at_one(monkeypatch):
     for k in range(1000):
         world.add(collide.Sphere(0.4), pose(t=(k, 0, 0)), static=k > 0)
     assert not world.collides()
-    for name in ("boxes_of", "pose_table"):
+
+    def watch(name: str, how_many) -> None:
         own = getattr(world_parts, name)
-        monkeypatch.setattr(
-            world_parts, name, lambda *given, own=own, name=name: seen.append((name, len(given[-1]))) or own(*given)
-        )
+        monkeypatch.setattr(world_parts, name, lambda *given: seen.append((name, how_many(given))) or own(*given))
+
+    watch("boxes_of", lambda given: len(given[-1]))
+    watch("pose_table", lambda given: len(given[-1]))
+    watch("move_parts", lambda given: len(given[2]))
     world.set_pose(0, pose(t=(7.5, 0, 0)))
+    assert world.collides() and seen == [("move_parts", 1)]
+    posed = world.add(collide.Compound([(collide.Sphere(0.4), pose(t=(0, 0, 0.1)))]), pose(t=(0, 9, 0)))
+    world.collides(), seen.clear()
+    world.set_pose(posed, pose(t=(3.5, 0, 0)))
     assert world.collides() and sorted(seen) == [("boxes_of", 1), ("pose_table", 1)]
     seen.clear()
     assert world.collides() and not seen, "nothing moved"

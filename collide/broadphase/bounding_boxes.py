@@ -17,6 +17,8 @@ from collide.lowering.shape_table import (
     PARAMS,
     POSE,
     POSE_SLOP,
+    POSE_STRETCH,
+    POSE_TERMS,
     RADIUS,
     REACH,
     SLOP,
@@ -24,11 +26,14 @@ from collide.lowering.shape_table import (
     ShapeTable,
 )
 from collide.numerics.vec3 import column_at, dot, neg, vec3_at
+from collide.support.shape_kinds import POINTS
 from collide.support.support_mapping import settled_vertex, support
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
 #: derivation in `narrowphase/bounds.py` needs fewer.
 _OUTWARD = 32 * 2.0**-53
+#: So few points are gone through one by one: who is farthest need not be known, only how far.
+_MAX_LISTED = 16
 
 
 @kernel
@@ -36,6 +41,18 @@ def _farthest_point(kind, coordinates, m, params, at, tree, g):
     """The core point farthest in direction g (`support`); with a support tree, that of the proven vertex."""
     vertex, point, _ = support(kind, coordinates, m, params, at, tree, 0, -1, g)
     return point if tree == 0 else column_at(coordinates, m, settled_vertex(coordinates, m, tree, vertex, g))
+
+
+@kernel(inline=True)
+def _extent(coordinates, m, g):
+    """(least, largest) product of m points with g."""
+    low = math.inf
+    high = -math.inf
+    for k in range(m):
+        along = dot(column_at(coordinates, m, k), g)
+        low = min(low, along)
+        high = max(high, along)
+    return low, high
 
 
 @kernel
@@ -47,12 +64,34 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
     kind = ints[INTS * s + KIND]
     m = ints[INTS * s + PADDED]
     tree = ints[INTS * s + TREE]
-    high = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, row), row) + t
-    low = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, neg(row)), row) + t
+    if kind == POINTS and m <= _MAX_LISTED and tree == 0:
+        low, high = _extent(coordinates, m, row)
+    else:
+        high = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, row), row)
+        low = dot(_farthest_point(kind, coordinates, m, numbers, at + PARAMS, tree, neg(row)), row)
+    low += t
+    high += t
     radius = numbers[at + RADIUS]
     out = radius + numbers[at + SLOP] + poses[POSE * p + POSE_SLOP]
     out += _OUTWARD * (math.sqrt(dot(row, row)) * numbers[at + REACH] + abs(t) + radius)
     return low - out, high + out
+
+
+@kernel
+def _put_box(ints_at, numbers_at, s, poses, k, boxes):
+    """Box k becomes that of shape s at pose row k; a half-space gets an infinite one."""
+    ints = view_i64(ints_at, INTS * (s + 1))
+    numbers = view_f64(numbers_at, NUMBERS * (s + 1))
+    if ints[INTS * s + KIND] == HALFSPACE:
+        for axis in range(3):
+            boxes[6 * k + axis] = -math.inf
+            boxes[6 * k + 3 + axis] = math.inf
+        return
+    coordinates = view_f64(ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED])
+    for axis in range(3):
+        low, high = _bound(ints, numbers, poses, coordinates, s, k, axis)
+        boxes[6 * k + axis] = low
+        boxes[6 * k + 3 + axis] = high
 
 
 @entry("void(int64, int64, int64, int64, int64, int64)")
@@ -65,19 +104,36 @@ def bounding_boxes(ints_at, numbers_at, poses_at, shape_of_at, n, boxes_at):
     poses = view_f64(poses_at, POSE * n)
     boxes = view_f64(boxes_at, 6 * n)
     for k in range(n):
-        s = shape_of[k]
-        ints = view_i64(ints_at, INTS * (s + 1))
-        numbers = view_f64(numbers_at, NUMBERS * (s + 1))
-        if ints[INTS * s + KIND] == HALFSPACE:
-            for axis in range(3):
-                boxes[6 * k + axis] = -math.inf
-                boxes[6 * k + 3 + axis] = math.inf
-        else:
-            coordinates = view_f64(ints[INTS * s + ADDRESS], 3 * ints[INTS * s + PADDED])
-            for axis in range(3):
-                low, high = _bound(ints, numbers, poses, coordinates, s, k, axis)
-                boxes[6 * k + axis] = low
-                boxes[6 * k + 3 + axis] = high
+        _put_box(ints_at, numbers_at, shape_of[k], poses, k, boxes)
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def move_single_parts(
+    ints_at, numbers_at, shape_of_at, n_bodies, moved_at, n_moved, X_new_at, X_WBs_at, poses_at, boxes_at
+):
+    """Take the poses of bodies that are one part each, which has none of its own: body ``k`` is shape ``shape_of[k]``.
+
+    moved : the bodies.   X_new, X_WBs : 16 doubles a body; from the first to the second, and to pose rows as of
+    `pose_table`.   boxes : as of `bounding_boxes`.
+    """
+    shape_of = view_i64(shape_of_at, n_bodies)
+    moved = view_i64(moved_at, n_moved)
+    X_new = view_f64(X_new_at, 16 * n_bodies)
+    X_WBs = view_f64(X_WBs_at, 16 * n_bodies)
+    poses = view_f64(poses_at, POSE * n_bodies)
+    boxes = view_f64(boxes_at, 6 * n_bodies)
+    for k in range(n_moved):
+        body = moved[k]
+        for j in range(16):
+            X_WBs[16 * body + j] = X_new[16 * body + j]
+        for axis in range(3):
+            for j in range(3):
+                poses[POSE * body + 3 * axis + j] = X_new[16 * body + 4 * axis + j]
+            poses[POSE * body + 9 + axis] = X_new[16 * body + 4 * axis + 3]
+        poses[POSE * body + POSE_SLOP] = 0.0
+        poses[POSE * body + POSE_TERMS] = -1.0
+        poses[POSE * body + POSE_STRETCH] = -1.0
+        _put_box(ints_at, numbers_at, shape_of[body], poses, body, boxes)
 
 
 def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
@@ -88,3 +144,18 @@ def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.n
         address_of(boxes),
     )  # fmt: skip
     return boxes
+
+
+def move_parts(
+    table: ShapeTable, row_of: np.ndarray, moved: np.ndarray, X_new: np.ndarray, X_WBs: np.ndarray, poses: np.ndarray,
+    boxes: np.ndarray,
+) -> None:  # fmt: skip
+    """`move_single_parts` of arrays.
+
+    row_of : (n,) int64, the row of the table of each body.   moved : (k,) int64.   X_new, X_WBs : (n, 4, 4).
+    poses : (n, POSE).   boxes : (n, 6).
+    """
+    move_single_parts(
+        address_of(table.ints), address_of(table.numbers), address_of(row_of), len(row_of), address_of(moved),
+        len(moved), address_of(X_new), address_of(X_WBs), address_of(poses), address_of(boxes),
+    )  # fmt: skip

@@ -1,384 +1,154 @@
-"""A box-tree over bodies that is brought up to date as they are moved, added and removed.
+"""A box-tree over bodies and the pairs that are near in it: kept from one query to the next where few have changed.
 
-It is a graded tree (`graded_boxes.py`), or rather several in a row: first that of the bodies that stay where they are,
-then one of the others, then smaller and smaller ones of bodies that were added since; a walk goes through all of them.
-A leaf's box may be larger than its body's: a body that moves within it changes nothing. What changed is known, so that
-pairs found before are kept where nothing did.
+Leaves' boxes may be larger than their bodies', so most steps of bodies change none of them. The pairs whose leaves'
+boxes meet are then the same as before, and a query compares the bodies' own boxes in these pairs alone.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
-from collide.broadphase.allowed_rows import allowed_rows
-from collide.broadphase.graded_boxes import BODY, LINK, STACK, fit_inner_nodes, fit_paths, grow_graded, place_leaves
-from collide.broadphase.growing_rows import GrowingRows
+from collide.broadphase.moved_leaves import forget_changes
+from collide.broadphase.tree_in_memory import N_CHANGED
+from collide.broadphase.tree_over_bodies import CachedPairs, TreeOverBodies
 from collide.broadphase.walk_boxes import (
-    ALLOWED_AT,
-    CHANGED_BIT,
-    FLAGS,
-    GROUP,
-    MASK,
-    STATIC_BIT,
-    STILL_BIT,
+    STACK_OF_PAIRS,
     boxes_met,
+    mended_pairs,
     pairs_among,
-    pairs_of_leaves,
+    pairs_of_all,
+    pairs_of_keys,
     tested_pairs,
 )
 from collide.kernels import address_of
 
-#: A tree is made anew once all sides of its nodes, added up, have grown by this factor: in metres, or in sides of the
-#: box around all.
-_GROWN = 1.5
-#: Of fewer bodies all nodes are fitted at once; of more, the paths above those that left their leaves' boxes, where
-#: these are at most one in so many.
-_MIN_PATHS, _SHARE_OF_PATHS = 64, 8
-#: Pairs are kept from query to query of so many bodies or more, where at most one in so many has changed, and there are
-#: at most so many of them a body.
-_MIN_CACHED, _SHARE_OF_CACHED, _MAX_CACHED = 128, 8, 16
-_NO_BODIES = np.empty(0, dtype=np.int64)
-_NO_WORK = {"trees made": 0, "nodes fitted": 0, "leaves changed": 0}
-#: A box that meets nothing.
-_NOTHING = np.array([np.inf] * 3 + [-np.inf] * 3)
+#: Pairs are kept from query to query where at most one body in so many has changed, and there are at most so many of
+#: them a body. Of so many bodies or more they are mended, where at most one in so many has changed; else made anew.
+_SHARE_OF_CACHED, _MAX_CACHED, _MIN_MENDED, _SHARE_OF_MENDED = 3, 16, 256, 4
 
 
-class _CachedPairs(NamedTuple):
-    """Pairs (k, 2) whose leaves' boxes are within the margin, but for those of bodies that have changed since."""
-
-    margin: float
-    pairs: np.ndarray
-
-
-class BoxTree:
-    """The tree, over boxes (n, 6): low x, y, z, high x, y, z.
-
-    Parameters
-    ----------
-    boxes : (n, 6), copied. Those without end (half-spaces) are kept apart and meet everything.
-    fixed : (n,) bool: bodies that stay, in a tree of their own; pairs of two of them are not looked for.
-
-    Notes
-    -----
-    ``nodes`` (m, 6) are boxes in preorder, ``links`` (m, LINK) as of `graded_boxes.py`, the first ``n_fixed`` those of
-    the tree of what stays. ``sections``: where each tree begins, and where the last one ends. ``leaf_of`` (n,) the node
-    of each body, −1 of those without one.
-    """
-
-    def __init__(self, boxes: np.ndarray, fixed: np.ndarray | None = None):
-        n = len(boxes)
-        fixed = np.zeros(n, dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
-        columns = np.array(boxes, dtype=np.float64), fixed, np.ones(n, dtype=bool), _traits_of(fixed), np.full(n, -1)
-        self._columns = [GrowingRows(column) for column in columns]
-        self._take_columns()
-        self._allowed = np.zeros(1, dtype=np.int64)
-        self._cached: _CachedPairs | None = None
-        self._changed: list[np.ndarray] = []
-        self._n_holes = 0
-        self._work = dict(_NO_WORK)
-        self.sections = [0]
-        self.nodes, self.links = np.empty((0, 6)), np.empty((0, LINK), dtype=np.int64)
-        self._make()
-
-    # --- making ---------------------------------------------------------------------------------
-
-    def take_work(self) -> dict[str, int]:
-        """What has been done since this was last called: trees made, nodes fitted, leaves given other boxes."""
-        work, self._work = self._work, dict(_NO_WORK)
-        return work
-
-    def _take_columns(self) -> None:
-        self.boxes, self._fixed, self._alive, self.traits, self.leaf_of = (column.rows for column in self._columns)
-
-    def _make(self) -> None:
-        """All trees anew, of the bodies that there are."""
-        is_bounded = np.isfinite(self.boxes).all(axis=1) & self._alive
-        self.unbounded = np.flatnonzero(self._alive & ~is_bounded)
-        self.sections = [0]
-        self._resize(2 * int(is_bounded.sum()))
-        self.leaf_of[:] = -1
-        self._sides: list[float] = []
-        self._n_holes = 0
-        for bodies in (np.flatnonzero(is_bounded & self._fixed), np.flatnonzero(is_bounded & ~self._fixed)):
-            if len(bodies):
-                self._add_section(bodies)
-        self.n_fixed = self.sections[1] if (is_bounded & self._fixed).any() else 0
-        self._least = self._quality()
-        self._work["trees made"] += 1
-
-    def _resize(self, capacity: int) -> None:
-        """Memory for so many nodes."""
-        nodes, links = np.empty((max(capacity, 2), 6)), np.empty((max(capacity, 2), LINK), dtype=np.int64)
-        used = min(self.sections[-1], capacity)
-        nodes[:used], links[:used] = self.nodes[:used], self.links[:used]
-        self.nodes, self.links = nodes, links
-
-    def _add_section(self, bodies: np.ndarray) -> None:
-        """A tree over bodies behind the others."""
-        begin, m = self.sections[-1], len(bodies)
-        if begin + 2 * m > len(self.nodes):
-            self._resize(begin + begin // 2 + 2 * m)
-        bodies = np.array(bodies, dtype=np.int64)
-        scratch = np.empty(2 * m + 34 + STACK, dtype=np.int64)
-        end = grow_graded(
-            address_of(bodies), m, address_of(self.boxes), len(self.boxes), begin, address_of(self.links),
-            len(self.links), address_of(scratch),
-        )  # fmt: skip
-        leaves = begin + np.flatnonzero(self.links[begin:end, BODY] >= 0)
-        self.leaf_of[bodies], self.nodes[leaves] = leaves, self.boxes[bodies]
-        self.sections.append(end)
-        self._sides.append(self._fit(begin, end))
-
-    def _fit(self, begin: int, end: int) -> float:
-        self._work["nodes fitted"] += end - begin
-        return fit_inner_nodes(address_of(self.links), address_of(self.nodes), begin, end)
-
-    def _quality(self) -> tuple[float, float]:
-        """All sides of inner nodes added up: in metres, and in sides of the box around all."""
-        sides = sum(self._sides)
-        if not self._sides:
-            return 0.0, 0.0
-        x0, y0, z0, x1, y1, z1 = self.around.tolist()
-        extent = (x1 - x0) + (y1 - y0) + (z1 - z0)
-        return sides, sides / extent if 0.0 < extent < math.inf else 0.0
-
-    @property
-    def n_nodes(self) -> int:
-        return self.sections[-1]
-
-    @property
-    def order(self) -> np.ndarray:
-        """Bodies that have leaves, in their order."""
-        bodies = self.links[: self.n_nodes, BODY]
-        return bodies[bodies >= 0]
-
-    @property
-    def around(self) -> np.ndarray:
-        """(6,) the box around all bodies that have an end; one that meets nothing, of none."""
-        if len(self.sections) == 2:
-            return self.nodes[0]
-        roots = self.nodes[self.sections[:-1]]
-        return np.concatenate([roots[:, :3].min(axis=0, initial=np.inf), roots[:, 3:].max(axis=0, initial=-np.inf)])
-
-    # --- changes --------------------------------------------------------------------------------
-
-    def refit(self, boxes: np.ndarray) -> None:
-        """Take boxes (n, 6) of all bodies."""
-        if len(boxes) != len(self.boxes):
-            raise ValueError("refit needs the same bodies; build a new tree")
-        self.move(np.arange(len(boxes)), boxes)
-
-    def move(self, bodies: np.ndarray, boxes: np.ndarray) -> None:
-        """Take boxes (k, 6) of bodies (k,) that moved. The tree is made anew where it has become much worse than it was
-        when it was last: what is near in it is to be near in space.
-        """
-        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(boxes)
-        escaped = np.empty(len(bodies), dtype=np.int64)
-        n = place_leaves(
-            address_of(bodies), len(bodies), address_of(boxes), address_of(self.boxes), len(self.boxes),
-            address_of(self.leaf_of), address_of(self.nodes), len(self.nodes), address_of(escaped),
-        )  # fmt: skip
-        if n < 0:
-            raise ValueError("bodies keep their ends, or have none; build a new tree")
-        self._refit_above(escaped[:n])
-
-    def _refit_above(self, bodies: np.ndarray) -> None:
-        """Fit the nodes above bodies whose leaves have other boxes."""
-        self._work["leaves changed"] += len(bodies)
-        if not len(bodies):
-            return
-        self._note_changed(bodies)
-        n_leaves = len(self.boxes)
-        if n_leaves < _MIN_PATHS or _SHARE_OF_PATHS * len(bodies) > n_leaves:
-            ends = zip(self.sections[:-1], self.sections[1:])
-            self._sides = [self._fit(begin, end) for begin, end in ends]
-        else:
-            leaves, out = self.leaf_of[bodies], np.empty(7)
-            self._sides[0] += fit_paths(
-                address_of(leaves), len(leaves), address_of(self.links), address_of(self.nodes), self.n_nodes,
-                address_of(out),
-            )  # fmt: skip
-            self._work["nodes fitted"] += int(out[6])
-        sides, relative = self._quality()
-        if sides > _GROWN * self._least[0] or relative > _GROWN * self._least[1]:
-            self._make()
-        self._least = min(self._least[0], sides), min(self._least[1], relative)
-
-    def append(self, boxes: np.ndarray, fixed: np.ndarray, group=1, mask=1) -> None:
-        """Add bodies (k,), numbered on from the last, with groups and masks. The last trees are made one with theirs
-        where they are not much larger: each body is sorted O(log n) times in all.
-        """
-        first, k = len(self.boxes), len(boxes)
-        fixed = np.asarray(fixed, dtype=bool)
-        traits = _traits_of(fixed)
-        traits[:, GROUP], traits[:, MASK] = group, mask
-        added = boxes, fixed, np.ones(k, dtype=bool), traits, np.full(k, -1)
-        for column, rows in zip(self._columns, added):
-            column.extend(rows)
-        self._take_columns()
-        new = np.arange(first, first + k)
-        is_bounded = np.isfinite(boxes).all(axis=1)
-        self.unbounded = np.append(self.unbounded, new[~is_bounded])
-        bodies = new[is_bounded]
-        if not len(bodies):
-            return
-        before = sum(self._sides)
-        n_first = 1 if self.n_fixed else 0
-        while len(self._sides) > n_first and self.sections[-1] - self.sections[-2] <= 4 * len(bodies):
-            in_last = self.links[self.sections[-2] : self.sections[-1], BODY]
-            bodies = np.append(bodies, in_last[in_last >= 0])
-            del self.sections[-1], self._sides[-1]
-        self._add_section(bodies)
-        growth = 1.0 - before / max(sum(self._sides), 1e-300)
-        sides, relative = self._quality()
-        self._least = self._least[0] + growth * sides, self._least[1] + growth * relative
-        self._note_changed(new[is_bounded])
-
-    def remove(self, bodies: np.ndarray) -> None:
-        """Take bodies out; their numbers stay unused."""
-        self._alive[bodies] = False
-        self.boxes[bodies] = _NOTHING
-        self.unbounded = self.unbounded[self._alive[self.unbounded]]
-        bodies = bodies[self.leaf_of[bodies] >= 0]
-        leaves = self.leaf_of[bodies]
-        self.nodes[leaves], self.links[leaves, BODY] = _NOTHING, -1
-        self._n_holes += len(bodies)
-        if 2 * self._n_holes > self.n_nodes // 2 + 64:
-            self._make()
-        else:
-            self._refit_above(bodies)
-        self.leaf_of[bodies] = -1
-
-    def _note_changed(self, bodies: np.ndarray) -> None:
-        self.traits[bodies, FLAGS] |= CHANGED_BIT
-        self._changed.append(bodies)
-
-    # --- filters --------------------------------------------------------------------------------
-
-    def set_groups(self, bodies: np.ndarray, group: np.ndarray, mask: np.ndarray) -> None:
-        """Groups and masks (k,) of bodies: pairs with ``(group_i & mask_j) == 0`` either way are not found."""
-        self.traits[bodies, GROUP], self.traits[bodies, MASK] = group, mask
-        self._cached = None
-
-    def set_allowed(self, allowed: np.ndarray) -> None:
-        """Pairs (k, 2) of bodies, each once, that are not found."""
-        row_at, self._allowed = allowed_rows(allowed, len(self.boxes))
-        self.traits[:, ALLOWED_AT] = row_at
-        self._cached = None
-
-    def set_asleep(self, bodies: np.ndarray, asleep: bool) -> None:
-        """Pairs of which both are fixed or asleep are not found."""
-        flags = self.traits[bodies, FLAGS]
-        still = asleep | ((flags & STATIC_BIT) != 0)
-        self.traits[bodies, FLAGS] = (flags & ~STILL_BIT) | STILL_BIT * still.astype(np.int64)
-
-    # --- questions ------------------------------------------------------------------------------
+class BoxTree(TreeOverBodies):
+    """The tree, and questions about it; arguments as of `TreeOverBodies`."""
 
     def pairs(self, margin: float) -> np.ndarray:
         """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis and that filters let
         through. Of two fixed bodies none are.
         """
-        pairs = self._bounded_pairs(margin)
+        cached = self._cached_pairs(margin)
+        if cached is not None:
+            pairs = self._tested(cached.keys, margin, True)
+        else:
+            keys = self._walk_if_few(margin, False, 1 << 60)
+            assert keys is not None
+            pairs = _pairs_of(keys)
         if len(self.unbounded):
-            pairs = np.concatenate([pairs, self._tested(self._with_unbounded(), margin)])
-        n = len(self.boxes)
-        keys = np.minimum(pairs[:, 0], pairs[:, 1]) * n + np.maximum(pairs[:, 0], pairs[:, 1])
-        keys.sort()
-        return np.stack(np.divmod(keys, n), axis=1)
-
-    def _bounded_pairs(self, margin: float) -> np.ndarray:
-        n = len(self.boxes)
-        changed = self._changed[0] if len(self._changed) == 1 else np.concatenate([_NO_BODIES, *self._changed])
-        is_little_changed = n >= _MIN_CACHED and _SHARE_OF_CACHED * len(changed) <= n
-        if not is_little_changed or (self._cached is not None and self._cached.margin < margin):
-            self._cached = None
-        if self._cached is not None and len(changed):
-            self._cached = self._brought_up_to_date(self._cached, changed)
-        elif is_little_changed and self._cached is None:
-            among = (self.n_fixed, self.n_nodes, margin, True)
-            pairs = self._walk_if_few(pairs_among, *among, limit=_MAX_CACHED * n + 64)
-            self._cached = None if pairs is None else _CachedPairs(margin, pairs)
-        if len(changed):
-            self.traits[changed, FLAGS] &= ~CHANGED_BIT
-            self._changed.clear()
-        if self._cached is not None:
-            return self._tested(self._cached.pairs, margin)
-        return self.walk_pairs(pairs_among, self.n_fixed, self.n_nodes, margin, False)
-
-    def _brought_up_to_date(self, cached: _CachedPairs, changed: np.ndarray) -> _CachedPairs | None:
-        """What is kept, with other pairs of the bodies that have changed."""
-        flags = self.traits[:, FLAGS] & CHANGED_BIT
-        remaining = cached.pairs[(flags[cached.pairs[:, 0]] | flags[cached.pairs[:, 1]]) == 0]
-        leaves = np.unique(self.leaf_of[changed])
-        leaves = leaves[leaves >= 0]
-        limit = _MAX_CACHED * len(self.boxes) + 64
-        new = self._walk_if_few(pairs_of_leaves, address_of(leaves), len(leaves), cached.margin, limit=limit)
-        if new is None or len(new) + len(remaining) > limit:
-            return None
-        return _CachedPairs(cached.margin, np.concatenate([remaining, new]))
-
-    def header(self) -> np.ndarray:
-        """The tree as kernels take it, until it changes."""
-        return np.array(
-            [
-                address_of(self.nodes), address_of(self.links), self.n_nodes, self.n_fixed, address_of(self.boxes),
-                len(self.boxes), address_of(self.traits), address_of(self._allowed), len(self._allowed),
-            ],
-            dtype=np.int64,
-        )  # fmt: skip
-
-    def walk_pairs(self, walk: Callable[..., int], *arguments) -> np.ndarray:
-        """(k, 2) pairs of a walk (`walk_boxes.py`), in no order.   arguments : of it, between tree and ``pairs``."""
-        pairs = self._walk_if_few(walk, *arguments, limit=1 << 60)
-        assert pairs is not None
+            pairs = np.concatenate([pairs, self._tested(self._with_unbounded(), margin, False)])
+            return _pairs_of(np.sort((pairs[:, 0] << 32) + pairs[:, 1]))
         return pairs
 
-    def _walk_if_few(self, walk: Callable[..., int], *arguments, limit: int) -> np.ndarray | None:
-        """The same; None where they are more than a limit."""
-        header, capacity = self.header(), 64 + 4 * len(self.boxes)
+    def _cached_pairs(self, margin: float) -> CachedPairs | None:
+        """What is kept of pairs, brought up to date where it is worth it; None where it is not."""
+        header = self.header()
+        n, n_changed = len(self.boxes), int(header[N_CHANGED])
+        cached = self._cached
+        if cached is not None and (cached.margin < margin or _SHARE_OF_CACHED * n_changed > n):
+            cached = None
+        if cached is not None and not n_changed:
+            return cached
+        if cached is not None and n >= _MIN_MENDED and _SHARE_OF_MENDED * n_changed <= n:
+            cached = self._mended(cached)
+        elif _SHARE_OF_CACHED * n_changed <= n and margin < self._too_wide:
+            keys = self._walk_if_few(margin, True, _MAX_CACHED * n + 64)
+            cached = None if keys is None else CachedPairs(margin, keys)
+            self._too_wide = margin if keys is None else self._too_wide
+        else:
+            cached = None
+        forget_changes(address_of(header))
+        self._cached = cached
+        return cached
+
+    def _walk_if_few(self, margin: float, of_leaves: bool, limit: int) -> np.ndarray | None:
+        """(k,) keys of all pairs (`pairs_of_all`), ascending; None where they are more than a limit."""
+        stack = np.empty(2 * STACK_OF_PAIRS, dtype=np.int64)
+
+        def walk(header_at: int, *target: int) -> int:
+            return pairs_of_all(header_at, margin, of_leaves, address_of(stack), *target)
+
+        return self._collected(walk, 64 + 4 * len(self.boxes), limit)
+
+    def _mended(self, cached: CachedPairs) -> CachedPairs | None:
+        """What is kept, with other pairs of the bodies that have changed."""
+
+        def mend(header_at: int, *target: int) -> int:
+            return mended_pairs(header_at, address_of(cached.keys), len(cached.keys), cached.margin, *target)
+
+        keys = self._collected(mend, 64 + 2 * len(cached.keys), _MAX_CACHED * len(self.boxes) + 64)
+        return None if keys is None else CachedPairs(cached.margin, keys)
+
+    def pairs_among(self, begin: int, end: int, margin: float) -> np.ndarray:
+        """(k, 2) bodies i < j, sorted, one of each at one of the nodes begin … end − 1 and the other behind it, as of
+        `pairs`. None of bodies without end.
+        """
+
+        def walk(header_at: int, *target: int) -> int:
+            return pairs_among(header_at, begin, end, margin, *target)
+
+        keys = self._collected(walk, 64 + 4 * len(self.boxes), 1 << 60)
+        assert keys is not None
+        return _pairs_of(keys)
+
+    def _collected(self, walk: Callable[..., int], capacity: int, limit: int) -> np.ndarray | None:
+        """(k,) keys that a walk finds, ascending; None where they are more than a limit.
+
+        walk : takes the tree, where keys go, and for how many there is room; returns how many there are.
+        """
+        header_at = address_of(self.header())
         while True:
-            pairs = np.empty((capacity, 2), dtype=np.int64)
-            count = walk(address_of(header), *arguments, address_of(pairs), capacity)
+            keys = np.empty(capacity, dtype=np.int64)
+            count = walk(header_at, address_of(keys), capacity)
             if count > limit:
                 return None
             if count <= capacity:
-                return pairs[:count]
+                keys = keys[:count]
+                keys.sort()
+                return keys
             capacity = count
 
-    def _tested(self, pairs: np.ndarray, margin: float) -> np.ndarray:
-        """Those of pairs (k, 2) that filters let through and whose boxes are within the margin."""
-        header, pairs = self.header(), np.ascontiguousarray(pairs)
-        out = np.empty_like(pairs)
-        return out[: tested_pairs(address_of(header), address_of(pairs), len(pairs), margin, address_of(out))]
+    def _tested(self, keys: np.ndarray, margin: float, are_filtered: bool) -> np.ndarray:
+        """Pairs (k, 2) of those keys whose boxes are within the margin and that filters let through."""
+        pairs = np.empty((len(keys) + 1, 2), dtype=np.int64)
+        count = tested_pairs(
+            address_of(self.header()), address_of(keys), len(keys), margin, are_filtered, address_of(pairs)
+        )
+        return pairs[:count]
 
     def _with_unbounded(self) -> np.ndarray:
-        """(k, 2) each body without end with every other."""
+        """Keys of each body without end with every other."""
         others = np.flatnonzero(self._alive)
         i, j = np.repeat(self.unbounded, len(others)), np.tile(others, len(self.unbounded))
         is_unbounded = np.zeros(len(self.boxes), dtype=bool)
         is_unbounded[self.unbounded] = True
         keep = (i != j) & ~(is_unbounded[j] & (j < i))
-        return np.stack([i[keep], j[keep]], axis=1)
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that is held [bytes]."""
-        cached = 0 if self._cached is None else self._cached.pairs.nbytes
-        columns = sum(column.nbytes for column in self._columns)
-        return self.nodes.nbytes + self.links.nbytes + self._allowed.nbytes + columns + cached
+        return ((np.minimum(i, j) << 32) + np.maximum(i, j))[keep]
 
     def touching(self, box: np.ndarray, margin: float) -> np.ndarray:
         """Bodies, sorted, whose boxes come within ``margin`` of one outside box (6,)."""
         return np.sort(self.boxes_met(box.reshape(1, 6), margin)[:, 1])
 
     def bounded_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
-        """(k, 2) outside boxes (n, 6), by number, and bodies that have an end whose boxes come within ``margin``."""
+        """(k, 2) outside boxes (n, 6), by number, and bodies that have an end whose boxes come within ``margin``, in no
+        order.
+        """
         boxes = np.ascontiguousarray(boxes, dtype=np.float64)
-        return self.walk_pairs(boxes_met, address_of(boxes), len(boxes), margin)
+        header_at, capacity = address_of(self.header()), 64 + 4 * len(self.boxes)
+        while True:
+            met = np.empty((capacity, 2), dtype=np.int64)
+            count = boxes_met(header_at, address_of(boxes), len(boxes), margin, address_of(met), capacity)
+            if count <= capacity:
+                return met[:count]
+            capacity = count
 
     def boxes_met(self, boxes: np.ndarray, margin: float) -> np.ndarray:
         """The same, with bodies without end, in no order."""
@@ -390,8 +160,8 @@ class BoxTree:
         return np.concatenate([met, always])
 
 
-def _traits_of(fixed: np.ndarray) -> np.ndarray:
-    """(n, TRAITS) of bodies in group 1 that are tested with all others."""
-    traits = np.tile(np.array([0, 1, 1, -1], dtype=np.int64), (len(fixed), 1))
-    traits[:, FLAGS] = (STATIC_BIT | STILL_BIT) * fixed.astype(np.int64)
-    return traits
+def _pairs_of(keys: np.ndarray) -> np.ndarray:
+    """(k, 2) bodies i < j of keys (k,)."""
+    pairs = np.empty((len(keys), 2), dtype=np.int64)
+    pairs_of_keys(address_of(keys), len(keys), address_of(pairs))
+    return pairs

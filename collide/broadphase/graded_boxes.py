@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.numerics.counting_sort import only_class, sort_by_class
 
 #: Integers of a node: the node after its subtree, the body of a leaf (−1 of others), the node above it (−1 of roots).
 SKIP, BODY, PARENT = range(3)
@@ -32,8 +33,6 @@ _SIDE_BY_SIDE = 8
 MAX_CHILDREN = 9
 #: The most edges from a root to a leaf: of control cubes, of splits, and of halves of up to 2^30 bodies.
 MAX_DEPTH = DEEPEST + _MAX_SPLITS + 30
-#: Room for so many steps of a body that moves, unless that is more than this share of its largest side.
-_STEPS, _MAX_SLACK = 4.0, 0.125
 #: Ranges that wait: at most so many a level.
 STACK = MAX_CHILDREN * MAX_DEPTH * _RANGE
 
@@ -75,33 +74,12 @@ def _octant_of(boxes, body, cube):
 def _sort_range(boxes, bodies, cube, stack, at, of_outliers, scratch, counts):
     """Order the bodies of a range by child, outliers last; counts become how many there are of each."""
     first, last = stack[at + _FIRST], stack[at + _LAST]
-    half = len(bodies)
-    for child in range(9):
-        counts[child] = 0
     for k in range(first, last):
         if of_outliers:
-            child = _octant_of(boxes, bodies[k], cube)
+            scratch[k] = _octant_of(boxes, bodies[k], cube)
         else:
-            child = _child_of(boxes, bodies[k], cube, stack, at) if stack[at + _LEVEL] < DEEPEST else 8
-        scratch[k] = child
-        scratch[half + k] = bodies[k]
-        counts[child] += 1
-    counts[9] = first
-    for child in range(8):
-        counts[10 + child] = counts[9 + child] + counts[child]
-    for k in range(first, last):
-        child = scratch[k]
-        bodies[counts[9 + child]] = scratch[half + k]
-        counts[9 + child] += 1
-
-
-@kernel
-def _only_child(counts, n):
-    """The child that has all n bodies; −1 where they branch."""
-    for child in range(9):
-        if counts[child] == n:
-            return child
-    return -1
+            scratch[k] = _child_of(boxes, bodies[k], cube, stack, at) if stack[at + _LEVEL] < DEEPEST else 8
+    sort_by_class(bodies, first, last, 9, scratch, counts)
 
 
 @kernel
@@ -131,13 +109,13 @@ def _sort_control_cube(boxes, bodies, cube, stack, at, scratch, counts):
     """
     n = stack[at + _LAST] - stack[at + _FIRST]
     _sort_range(boxes, bodies, cube, stack, at, False, scratch, counts)
-    child = _only_child(counts, n)
+    child = only_class(counts, 9, n)
     while 0 <= child < 8:  # nothing branches: the node is that child
         stack[at + _LEVEL] += 1
         for axis in range(3):
             stack[at + _CELL + axis] = 2 * stack[at + _CELL + axis] + ((child >> axis) & 1)
         _sort_range(boxes, bodies, cube, stack, at, False, scratch, counts)
-        child = _only_child(counts, n)
+        child = only_class(counts, 9, n)
     return child < 0
 
 
@@ -148,7 +126,7 @@ def _sort_outliers(boxes, bodies, stack, at, scratch, counts, cube):
     _cube_around(boxes, bodies, first, last, True, cube)
     if cube[3] > 0.0 and stack[at + _LEVEL] < _MAX_SPLITS:
         _sort_range(boxes, bodies, cube, stack, at, True, scratch, counts)
-        if _only_child(counts, last - first) < 0:
+        if only_class(counts, 9, last - first) < 0:
             return
     for child in range(9):
         counts[child] = 0
@@ -229,122 +207,3 @@ def grow_graded(bodies_at, m, boxes_at, n_boxes, begin, links_at, capacity, scra
         if parent >= 0:
             links[LINK * parent + SKIP] = max(links[LINK * parent + SKIP], links[LINK * k + SKIP])
     return node
-
-
-@entry("float64(int64, int64, int64, int64)")
-def fit_inner_nodes(links_at, nodes_at, begin, end):
-    """Boxes of the inner nodes of whole trees, of those of their leaves; the sum of their sides.
-
-    nodes : 6 doubles a node: low x, y, z, high x, y, z.
-    """
-    links = view_i64(links_at, LINK * end)
-    nodes = view_f64(nodes_at, 6 * end)
-    for k in range(begin, end):
-        if links[LINK * k + SKIP] > k + 1:
-            for axis in range(3):
-                nodes[6 * k + axis] = math.inf
-                nodes[6 * k + 3 + axis] = -math.inf
-    sides = 0.0
-    for k in range(end - 1, begin - 1, -1):
-        at = 6 * k
-        if links[LINK * k + SKIP] > k + 1:
-            for axis in range(3):
-                sides += max(nodes[at + 3 + axis] - nodes[at + axis], 0.0)
-        parent = 6 * links[LINK * k + PARENT]
-        if parent >= 0:
-            for axis in range(3):
-                nodes[parent + axis] = min(nodes[parent + axis], nodes[at + axis])
-                nodes[parent + 3 + axis] = max(nodes[parent + 3 + axis], nodes[at + 3 + axis])
-    return sides
-
-
-@kernel
-def _fit_one(links, nodes, node, box):
-    """Make a node's box that around its children; (whether it was another, by how much its sides have grown)."""
-    for axis in range(3):
-        box[axis] = math.inf
-        box[3 + axis] = -math.inf
-    child = node + 1
-    while child < links[LINK * node + SKIP]:
-        for axis in range(3):
-            box[axis] = min(box[axis], nodes[6 * child + axis])
-            box[3 + axis] = max(box[3 + axis], nodes[6 * child + 3 + axis])
-        child = links[LINK * child + SKIP]
-    is_other = False
-    grown = 0.0
-    for axis in range(3):
-        before = max(nodes[6 * node + 3 + axis] - nodes[6 * node + axis], 0.0)
-        is_other = is_other or box[axis] != nodes[6 * node + axis] or box[3 + axis] != nodes[6 * node + 3 + axis]
-        nodes[6 * node + axis] = box[axis]
-        nodes[6 * node + 3 + axis] = box[3 + axis]
-        grown += max(box[3 + axis] - box[axis], 0.0) - before
-    return is_other, grown
-
-
-@entry("float64(int64, int64, int64, int64, int64, int64)")
-def fit_paths(leaves_at, n, links_at, nodes_at, n_nodes, out_at):
-    """Boxes of the nodes above n leaves, as far up as any changes; by how much their sides have grown.
-
-    out : 6 doubles of workspace, then the number of nodes that were looked at.
-    """
-    leaves = view_i64(leaves_at, n)
-    links = view_i64(links_at, LINK * n_nodes)
-    nodes = view_f64(nodes_at, 6 * n_nodes)
-    out = view_f64(out_at, 7)
-    sides = 0.0
-    out[6] = 0.0
-    for k in range(n):
-        node = links[LINK * leaves[k] + PARENT]
-        while node >= 0:
-            is_other, grown = _fit_one(links, nodes, node, out)
-            sides += grown
-            out[6] += 1.0
-            node = links[LINK * node + PARENT] if is_other else -1
-    return sides
-
-
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def place_leaves(bodies_at, n, moved_at, boxes_at, n_boxes, leaf_of_at, nodes_at, n_nodes, escaped_at):
-    """Take the boxes of n bodies that moved; returns how many leaves had to be given other boxes, −1 where a body
-    without a leaf has a box with an end, or one with a leaf has not.
-
-    moved : 6 doubles each, their boxes now.   boxes : of all bodies, brought up to date.   leaf_of : the node of each
-    body, −1 of those without one.   escaped : out, the bodies whose leaves have other boxes.
-
-    A leaf's box holds its body's. A body that moved by little, for its size, gets room for some steps of this length,
-    so that most of its steps change no node.
-    """
-    bodies = view_i64(bodies_at, n)
-    moved = view_f64(moved_at, 6 * n)
-    boxes = view_f64(boxes_at, 6 * n_boxes)
-    leaf_of = view_i64(leaf_of_at, n_boxes)
-    nodes = view_f64(nodes_at, 6 * n_nodes)
-    escaped = view_i64(escaped_at, n)
-    count = 0
-    for k in range(n):
-        at = 6 * bodies[k]
-        leaf = 6 * leaf_of[bodies[k]]
-        step = 0.0
-        side = 0.0
-        is_within = True
-        is_bounded = True
-        for axis in range(3):
-            low, high = moved[6 * k + axis], moved[6 * k + 3 + axis]
-            step = max(step, abs(low - boxes[at + axis]), abs(high - boxes[at + 3 + axis]))
-            side = max(side, high - low)
-            is_bounded = is_bounded and low > -math.inf and high < math.inf
-            boxes[at + axis] = low
-            boxes[at + 3 + axis] = high
-            if leaf >= 0:
-                is_within = is_within and low >= nodes[leaf + axis] and high <= nodes[leaf + 3 + axis]
-        if is_bounded != (leaf >= 0):
-            return -1
-        if leaf < 0 or is_within:
-            continue
-        slack = _STEPS * step if _STEPS * step <= _MAX_SLACK * side else 0.0
-        for axis in range(3):
-            nodes[leaf + axis] = boxes[at + axis] - slack
-            nodes[leaf + 3 + axis] = boxes[at + 3 + axis] + slack
-        escaped[count] = bodies[k]
-        count += 1
-    return count

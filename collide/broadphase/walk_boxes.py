@@ -1,44 +1,38 @@
 """Walks through box-trees in preorder: who meets whom among the bodies, with filters, and who meets boxes from outside.
 
-A node whose box is met is followed by its first child, one whose box is not by what comes after its subtree. Filters
-are asked at leaves, before the bodies' own boxes, which may be smaller than those of their leaves.
+All pairs at once are looked for from pairs of nodes: two children of one node whose boxes meet are opened, the one with
+more nodes first, down to two leaves. A single box goes through the tree by itself: a node that it meets is followed by
+its first child, one that it does not by what comes after its subtree. Filters are asked at leaves, and the bodies' own
+boxes, which may be smaller than those of their leaves.
+
+A pair is a key: i·2^32 + j of bodies i < j. Keys in ascending order are pairs in order.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from collide.broadphase.allowed_rows import is_allowed
-from collide.broadphase.graded_boxes import BODY, LINK, SKIP
+from collide.broadphase.graded_boxes import BODY, LINK, MAX_CHILDREN, MAX_DEPTH, SKIP
+from collide.broadphase.tree_in_memory import (
+    ALLOWED_AT,
+    CHANGED_BIT,
+    FLAGS,
+    GROUP,
+    MASK,
+    N_CHANGED,
+    STATIC_BIT,
+    STILL_BIT,
+    TRAITS,
+    tree_in_memory,
+)
 from collide.kernels import entry, kernel, view_f64, view_i64
-
-#: Integers of a body: bits (below), group, mask, and where its row of allowed pairs begins (−1: it has none).
-FLAGS, GROUP, MASK, ALLOWED_AT = range(4)
-TRAITS = 4
-#: Bits of FLAGS: static; static or asleep: pairs of these are not tested; changed: since the last pairs were looked
-#: for.
-STATIC_BIT, STILL_BIT, CHANGED_BIT = 1, 2, 4
 
 #: More than what two sums of a coordinate and a margin can be off, relatively.
 _ROUNDING = 2.0**-50
-
-# Integers of a tree in memory.
-NODES_AT, LINKS_AT, N_NODES, N_FIXED, BOXES_AT, N_BOXES, TRAITS_AT, ALLOWED_ROWS_AT, N_ALLOWED = range(9)
-TREE = 9
-
-
-class _Tree(NamedTuple):
-    """A forest in preorder.   n_fixed : nodes of the tree of bodies that stay, which comes first.
-    boxes, traits : of bodies.   allowed : as of `allowed_rows.py`.
-    """
-
-    nodes: Any
-    links: Any
-    n_nodes: int
-    n_fixed: int
-    boxes: Any
-    traits: Any
-    allowed: Any
+#: Pairs of nodes that wait at once: two of one node's children, and on the way down from them all but one of what is
+#: opened; twice the depth, since both are opened.
+STACK_OF_PAIRS = MAX_CHILDREN * (MAX_CHILDREN - 1) // 2 + 2 * MAX_DEPTH * (MAX_CHILDREN - 1) + 2
 
 
 class _Box(NamedTuple):
@@ -50,17 +44,6 @@ class _Box(NamedTuple):
     high_x: float
     high_y: float
     high_z: float
-
-
-@kernel(inline=True)
-def _tree_at(header_at):
-    header = view_i64(header_at, TREE)
-    n, n_boxes = header[N_NODES], header[N_BOXES]
-    return _Tree(
-        view_f64(header[NODES_AT], 6 * n), view_i64(header[LINKS_AT], LINK * n), n, header[N_FIXED],
-        view_f64(header[BOXES_AT], 6 * n_boxes), view_i64(header[TRAITS_AT], TRAITS * n_boxes),
-        view_i64(header[ALLOWED_ROWS_AT], header[N_ALLOWED]),
-    )  # fmt: skip
 
 
 @kernel(inline=True)
@@ -90,12 +73,14 @@ def _are_tested(tree, i, j, either):
 
 @kernel(inline=True)
 def _are_near(boxes, i, j, margin):
-    """Whether two bodies' boxes come within a margin, rounded the same whichever is asked first."""
-    a, b = 6 * min(i, j), 6 * max(i, j)
+    """Whether two bodies' boxes come within a margin, i < j. All six are compared: a branch that is foreseen half of
+    the time costs more.
+    """
+    a, b = 6 * i, 6 * j
     return (
-        boxes[a] - margin <= boxes[b + 3] and boxes[a + 3] + margin >= boxes[b]
-        and boxes[a + 1] - margin <= boxes[b + 4] and boxes[a + 4] + margin >= boxes[b + 1]
-        and boxes[a + 2] - margin <= boxes[b + 5] and boxes[a + 5] + margin >= boxes[b + 2]
+        (boxes[a] - margin <= boxes[b + 3]) & (boxes[a + 3] + margin >= boxes[b])
+        & (boxes[a + 1] - margin <= boxes[b + 4]) & (boxes[a + 4] + margin >= boxes[b + 1])
+        & (boxes[a + 2] - margin <= boxes[b + 5]) & (boxes[a + 5] + margin >= boxes[b + 2])
     )  # fmt: skip
 
 
@@ -119,88 +104,182 @@ def _box_at(boxes, at, margin):
     )  # fmt: skip
 
 
-@entry("int64(int64, int64, int64, float64, boolean, int64, int64)")
-def pairs_among(tree_at, begin, end, margin, of_leaves, pairs_at, capacity):
-    """Pairs of bodies within a margin of each other, the first of each a leaf among the nodes begin … end − 1.
+# --- all pairs ----------------------------------------------------------------------------------
 
-    Returns how many there are; only the first ``capacity`` are stored. Over all nodes but those of the fixed tree every
-    pair is met once.
+
+@kernel(inline=True)
+def _are_nodes_near(nodes, a, b, reach):
+    """Whether the boxes of two nodes come within ``reach``, without branches."""
+    a, b = 6 * a, 6 * b
+    return (
+        (nodes[a] - nodes[b + 3] <= reach) & (nodes[b] - nodes[a + 3] <= reach)
+        & (nodes[a + 1] - nodes[b + 4] <= reach) & (nodes[b + 1] - nodes[a + 4] <= reach)
+        & (nodes[a + 2] - nodes[b + 5] <= reach) & (nodes[b + 2] - nodes[a + 5] <= reach)
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _push_if_near(tree, stack, top, a, b, reach):
+    """Put a pair of nodes on the stack, if it is near; the new height."""
+    stack[2 * top] = a
+    stack[2 * top + 1] = b
+    return top + (1 if _are_nodes_near(tree.nodes, a, b, reach) else 0)
+
+
+@kernel
+def _pairs_below(tree, stack, top, reach, margin, of_leaves, keys, count):
+    """Pairs of bodies below the pairs of nodes on the stack, behind the first ``count`` keys; how many keys there are.
+    """
+    links = tree.links
+    either = STATIC_BIT if of_leaves else STILL_BIT
+    while top > 0:
+        top -= 1
+        a, b = stack[2 * top], stack[2 * top + 1]
+        end_a, end_b = links[LINK * a + SKIP], links[LINK * b + SKIP]
+        if end_a - a == 1 and end_b - b == 1:
+            i, j = links[LINK * a + BODY], links[LINK * b + BODY]
+            i, j = min(i, j), max(i, j)
+            is_pair = i >= 0 and (of_leaves or _are_near(tree.boxes, i, j, margin))
+            if is_pair and _are_tested(tree, i, j, either):
+                count = _note_pair(keys, count, i, j)
+            continue
+        if end_a - a < end_b - b:
+            a, b, end_a = b, a, end_b
+        child = a + 1
+        while child < end_a:
+            top = _push_if_near(tree, stack, top, child, b, reach)
+            child = links[LINK * child + SKIP]
+    return count
+
+
+@kernel(inline=True)
+def _note_pair(keys, count, i, j):
+    """Store a pair where there is room; how many there are."""
+    if count < len(keys):
+        keys[count] = (min(i, j) << 32) + max(i, j)
+    return count + 1
+
+
+@kernel
+def _reach(tree, margin):
+    """A margin, and what rounding may do to sums and differences of coordinates within the roots' boxes."""
+    if margin <= 0.0:
+        return 0.0
+    largest = 0.0
+    root = 0
+    while root < tree.n_nodes:
+        if tree.nodes[6 * root] <= tree.nodes[6 * root + 3]:
+            for k in range(6):
+                largest = max(largest, abs(tree.nodes[6 * root + k]))
+        root = tree.links[LINK * root + SKIP]
+    return margin + (largest + margin) * _ROUNDING
+
+
+@entry("int64(int64, float64, boolean, int64, int64, int64)")
+def pairs_of_all(tree_at, margin, of_leaves, stack_at, keys_at, capacity):
+    """Keys of all pairs of bodies within a margin of each other; returns how many there are, of which only the first
+    ``capacity`` are stored.
+
     of_leaves : compare the boxes of leaves, not the bodies' own, and let sleeping bodies through: what may become a
         pair while no leaf is given another box.
+    stack : 2 · STACK_OF_PAIRS integers.
     """
-    tree = _tree_at(tree_at)
-    pairs = view_i64(pairs_at, 2 * capacity)
-    either = STATIC_BIT if of_leaves else STILL_BIT
+    tree = tree_in_memory(tree_at)
+    stack = view_i64(stack_at, 2 * STACK_OF_PAIRS)
+    keys = view_i64(keys_at, capacity)
+    links, n = tree.links, tree.n_nodes
+    reach = _reach(tree, margin)
+    count = 0
+    root = 0
+    while root < n:
+        following = links[LINK * root + SKIP]
+        while following < n:
+            top = _push_if_near(tree, stack, 0, root, following, reach)
+            count = _pairs_below(tree, stack, top, reach, margin, of_leaves, keys, count)
+            following = links[LINK * following + SKIP]
+        root = links[LINK * root + SKIP]
+    for node in range(tree.n_fixed, n):
+        end = links[LINK * node + SKIP]
+        top = 0
+        a = node + 1
+        while a < end:
+            following = links[LINK * a + SKIP]
+            b = following
+            while b < end:
+                top = _push_if_near(tree, stack, top, a, b, reach)
+                b = links[LINK * b + SKIP]
+            a = following
+        if top > 0:
+            count = _pairs_below(tree, stack, top, reach, margin, of_leaves, keys, count)
+    return count
+
+
+# --- single boxes -------------------------------------------------------------------------------
+
+
+@kernel(inline=True)
+def _next_leaf(tree, node, end, box):
+    """The first leaf from a node on whose box meets another; ``end`` where there is none."""
+    while node < end:
+        if not _meet(tree.nodes, 6 * node, box):
+            node = tree.links[LINK * node + SKIP]
+        elif tree.links[LINK * node + BODY] >= 0:
+            return node
+        else:
+            node += 1
+    return end
+
+
+@entry("int64(int64, int64, int64, float64, int64, int64)")
+def pairs_among(tree_at, begin, end, margin, keys_at, capacity):
+    """Keys of pairs of bodies within a margin of each other, the first of each a leaf among the nodes begin … end − 1
+    and the other behind it; the rest as of `pairs_of_all`.
+    """
+    tree = tree_in_memory(tree_at)
+    keys = view_i64(keys_at, capacity)
     count = 0
     for k in range(begin, end):
         i = tree.links[LINK * k + BODY]
         if i < 0:
             continue
-        box = _box_at(tree.nodes, 6 * k, margin) if of_leaves else _box_at(tree.boxes, 6 * i, margin)
-        node = 0 if tree.n_fixed > 0 else k + 1
+        box = _box_at(tree.boxes, 6 * i, margin)
+        node = _next_leaf(tree, k + 1, tree.n_nodes, box)
         while node < tree.n_nodes:
-            if not _meet(tree.nodes, 6 * node, box):
-                node = tree.links[LINK * node + SKIP]
-            else:
-                j = tree.links[LINK * node + BODY]
-                if j >= 0 and (of_leaves or _are_near(tree.boxes, i, j, margin)) and _are_tested(tree, i, j, either):
-                    if count < capacity:
-                        pairs[2 * count] = i
-                        pairs[2 * count + 1] = j
-                    count += 1
-                node += 1
-            if node == tree.n_fixed:
-                node = k + 1
+            j = tree.links[LINK * node + BODY]
+            if _are_near(tree.boxes, min(i, j), max(i, j), margin) and _are_tested(tree, i, j, STILL_BIT):
+                count = _note_pair(keys, count, i, j)
+            node = _next_leaf(tree, node + 1, tree.n_nodes, box)
     return count
 
 
 @entry("int64(int64, int64, int64, float64, int64, int64)")
-def pairs_of_leaves(tree_at, leaves_at, n, margin, pairs_at, capacity):
-    """Pairs of n leaves' bodies, whose CHANGED_BIT is set, with all others whose leaves' boxes come within a margin.
+def mended_pairs(tree_at, cached_at, n_cached, margin, keys_at, capacity):
+    """Keys of pairs whose leaves' boxes come within a margin, from those that there were: without those of bodies that
+    have changed, and with what these meet now. Returns how many there are; only the first ``capacity`` are stored.
 
-    A pair of two of them is met once. Sleeping bodies count as if they were awake. The rest as of `pairs_among`.
+    Sleeping bodies count as if they were awake. A pair of two that have changed is met once.
     """
-    tree = _tree_at(tree_at)
-    leaves = view_i64(leaves_at, n)
-    pairs = view_i64(pairs_at, 2 * capacity)
+    tree = tree_in_memory(tree_at)
+    cached = view_i64(cached_at, n_cached)
+    keys = view_i64(keys_at, capacity)
     count = 0
-    for k in range(n):
-        leaf = leaves[k]
-        i = tree.links[LINK * leaf + BODY]
+    for k in range(n_cached):
+        i, j = cached[k] >> 32, cached[k] & 0xFFFFFFFF
+        if (tree.traits[TRAITS * i + FLAGS] | tree.traits[TRAITS * j + FLAGS]) & CHANGED_BIT == 0:
+            count = _note_pair(keys, count, i, j)
+    for k in range(tree.header[N_CHANGED]):
+        i = tree.changed[k]
+        leaf = tree.leaf_of[i]
+        if leaf < 0:
+            continue
         box = _box_at(tree.nodes, 6 * leaf, margin)
-        node = 0
+        node = _next_leaf(tree, 0, tree.n_nodes, box)
         while node < tree.n_nodes:
-            if not _meet(tree.nodes, 6 * node, box):
-                node = tree.links[LINK * node + SKIP]
-                continue
             j = tree.links[LINK * node + BODY]
-            if j >= 0 and j != i:
-                is_second = (tree.traits[TRAITS * j + FLAGS] & CHANGED_BIT) != 0 and node < leaf
-                if not is_second and _are_tested(tree, i, j, STATIC_BIT):
-                    if count < capacity:
-                        pairs[2 * count] = i
-                        pairs[2 * count + 1] = j
-                    count += 1
-            node += 1
-    return count
-
-
-@entry("int64(int64, int64, int64, float64, int64)")
-def tested_pairs(tree_at, pairs_at, n, margin, tested_at):
-    """Those of n pairs that filters let through and whose own boxes come within a margin; how many these are.
-
-    pairs, tested : two integers each.
-    """
-    tree = _tree_at(tree_at)
-    pairs = view_i64(pairs_at, 2 * n)
-    tested = view_i64(tested_at, 2 * n)
-    count = 0
-    for k in range(n):
-        i, j = pairs[2 * k], pairs[2 * k + 1]
-        if _are_near(tree.boxes, i, j, margin) and _are_tested(tree, i, j, STILL_BIT):
-            tested[2 * count] = i
-            tested[2 * count + 1] = j
-            count += 1
+            has_changed = (tree.traits[TRAITS * j + FLAGS] & CHANGED_BIT) != 0
+            if j != i and not (has_changed and node < leaf) and _are_tested(tree, i, j, STATIC_BIT):
+                count = _note_pair(keys, count, i, j)
+            node = _next_leaf(tree, node + 1, tree.n_nodes, box)
     return count
 
 
@@ -208,9 +287,9 @@ def tested_pairs(tree_at, pairs_at, n, margin, tested_at):
 def boxes_met(tree_at, queries_at, n, margin, pairs_at, capacity):
     """Pairs (query, body) of n outside boxes within a margin of bodies'; returns how many there are, no filter applies.
 
-    queries : 6 doubles each.   The rest as of `pairs_among`.
+    queries : 6 doubles each.   pairs : two integers each, of the first ``capacity``.
     """
-    tree = _tree_at(tree_at)
+    tree = tree_in_memory(tree_at)
     queries = view_f64(queries_at, 6 * n)
     pairs = view_i64(pairs_at, 2 * capacity)
     count = 0
@@ -220,16 +299,48 @@ def boxes_met(tree_at, queries_at, n, margin, pairs_at, capacity):
             queries[at] - margin, queries[at + 1] - margin, queries[at + 2] - margin,
             queries[at + 3] + margin, queries[at + 4] + margin, queries[at + 5] + margin,
         )  # fmt: skip
-        node = 0
+        node = _next_leaf(tree, 0, tree.n_nodes, box)
         while node < tree.n_nodes:
-            if not _meet(tree.nodes, 6 * node, box):
-                node = tree.links[LINK * node + SKIP]
-                continue
             j = tree.links[LINK * node + BODY]
-            if j >= 0 and _meet(tree.boxes, 6 * j, box):
+            if _meet(tree.boxes, 6 * j, box):
                 if count < capacity:
                     pairs[2 * count] = k
                     pairs[2 * count + 1] = j
                 count += 1
-            node += 1
+            node = _next_leaf(tree, node + 1, tree.n_nodes, box)
     return count
+
+
+# --- pairs that are known -----------------------------------------------------------------------
+
+
+@entry("int64(int64, int64, int64, float64, boolean, int64)")
+def tested_pairs(tree_at, keys_at, n, margin, are_filtered, pairs_at):
+    """Those of n pairs whose own boxes come within a margin and that filters let through; how many these are.
+
+    are_filtered : only sleep is left to ask.   pairs : out, two integers each.
+    """
+    tree = tree_in_memory(tree_at)
+    keys = view_i64(keys_at, n)
+    pairs = view_i64(pairs_at, 2 * n)
+    count = 0
+    for k in range(n):
+        i, j = keys[k] >> 32, keys[k] & 0xFFFFFFFF
+        pairs[2 * count] = i
+        pairs[2 * count + 1] = j
+        is_awake = (tree.traits[TRAITS * i + FLAGS] & tree.traits[TRAITS * j + FLAGS] & STILL_BIT) == 0
+        is_pair = is_awake & _are_near(tree.boxes, i, j, margin)
+        if not are_filtered:
+            is_pair = is_pair and _are_tested(tree, i, j, STILL_BIT)
+        count += 1 if is_pair else 0
+    return count
+
+
+@entry("void(int64, int64, int64)")
+def pairs_of_keys(keys_at, n, pairs_at):
+    """n keys as pairs, two integers each."""
+    keys = view_i64(keys_at, n)
+    pairs = view_i64(pairs_at, 2 * n)
+    for k in range(n):
+        pairs[2 * k] = keys[k] >> 32
+        pairs[2 * k + 1] = keys[k] & 0xFFFFFFFF

@@ -14,6 +14,7 @@ import collide
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
+from collide.world_parts import WorldParts
 
 EYE = np.eye(4)
 
@@ -102,3 +103,25 @@ def test_parts_with_poses_of_their_own():
             for axis in range(3):
                 x = sum(w * c for w, c in zip(W[axis], p)) + W[axis][3]
                 assert Fraction(box[axis]) <= x <= Fraction(box[3 + axis]), naive.spell(hull)
+
+
+def test_bodies_that_are_moved_at_once_have_the_boxes_and_poses_of_new_ones():
+    """Bodies of one part and nothing around it are moved by one kernel, which writes poses as `pose_table` does: bit by
+    bit, and of those that moved alone.
+    """
+    rng, parts, n_moved = rng_of("moved at once"), WorldParts(), 0
+    kinds = [shape for shape in shapes(rng).values() if len(parts_of(shape)) == 1] + [collide.Halfspace((0, 0, 1), 0)]
+    X_WBs = np.array([random_pose(rng, 2.0) for _ in kinds])
+    parts.append(kinds, X_WBs)
+    for _ in range(5):
+        moved = np.flatnonzero(rng.random(len(kinds)) < 0.4)
+        X_WBs[moved] = [random_pose(rng, 2.0) for _ in moved]
+        given = X_WBs.copy()
+        given[np.setdiff1d(np.arange(len(kinds)), moved)] = np.nan
+        parts.move(moved, given)
+        new = WorldParts()
+        new.append(kinds, X_WBs)
+        assert parts.boxes.tobytes() == new.boxes.tobytes() and parts.poses.rows.tobytes() == new.poses.rows.tobytes()
+        assert np.array_equal(parts.X_WBs, X_WBs)
+        n_moved += len(moved)
+    assert n_moved > 10

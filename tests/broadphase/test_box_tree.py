@@ -4,6 +4,9 @@ property of the tree; it stays as good as a new one, and costs what has changed.
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from validate_box_tree import depths_of, growth_of, validate_box_tree
@@ -174,6 +177,78 @@ def test_most_small_steps_change_no_node():
         tree.refit(tree.boxes + step)
         validate_box_tree(tree)
     assert 0 < tree.take_work()["leaves changed"] < 0.3 * 40 * 400
+
+
+@pytest.mark.parametrize("kind", ["uniform", "clusters", "all sizes", "a few huge", "flat"])
+@pytest.mark.parametrize("n", [60, 400])
+def test_pairs_are_kept_while_all_bodies_jitter(kind, n):
+    """Leaves get room for steps, and what is near stays known: pairs are those of all boxes in every step, static,
+    sleeping and filtered ones apart, at a margin and without, and while bodies come and go.
+    """
+    rng, n_cached, n_pairs = np.random.default_rng([7, n]), 0, 0
+    boxes, fixed = boxes_of(rng, kind, n), rng.random(n) < 0.2
+    tree, still = BoxTree(boxes, fixed), fixed.copy()
+    group, mask = filters_of(rng, n)
+    tree.set_groups(np.arange(n), group, mask)
+    allowed = {tuple(sorted(pair)) for pair in rng.permutation(n)[: n // 4 * 2].reshape(-1, 2).tolist()}
+    tree.set_allowed(np.array(sorted(allowed)))
+    side = np.median((boxes[:, 3:] - boxes[:, :3]).max(axis=1))
+    step = 0.004 * side
+    removed: set = set()
+    for turn in range(30):
+        moving = np.array(sorted(set(range(len(tree.boxes))) - removed))
+        shift = rng.uniform(-step, step, (len(moving), 3))
+        tree.move(moving, tree.boxes[moving] + np.tile(shift, 2))
+        if turn % 10 == 7:
+            asleep = rng.permutation(moving)[: n // 10]
+            tree.set_asleep(asleep, True)
+            still[asleep] = True
+        elif turn % 10 == 8:
+            tree.remove(moving[:2])
+            removed |= set(moving[:2].tolist())
+        elif turn % 10 == 9:
+            stays = np.array([True, False])
+            tree.append(boxes_of(rng, kind, 2), stays, 1, 7)
+            group, mask = np.append(group, [1, 1]), np.append(mask, [7, 7])
+            still = np.append(still, stays)
+        validate_box_tree(tree, len(removed))
+        alive = np.array(sorted(set(range(len(tree.boxes))) - removed))
+        for margin in (side, 0.0):
+            wanted = all_pairs(tree, alive, margin, group, mask, still, allowed)
+            assert np.array_equal(tree.pairs(margin), wanted), f"kind={kind!r}; n={n}; turn={turn}; margin={margin}"
+            n_pairs += len(wanted)
+        n_cached += tree._cached is not None
+    assert n_cached > 24 and n_pairs > 0, (n_cached, n_pairs)
+
+
+def test_small_bodies_get_room_for_steps_that_are_long_for_them():
+    """A grain that goes ten times its own length in a step, far from others: what is free around it is its room."""
+    rng = np.random.default_rng(10)
+    middle = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
+    tree = BoxTree(np.hstack([middle - 5e-4, middle + 5e-4]))
+    for _ in range(40):
+        at = middle + rng.uniform(-0.005, 0.005, middle.shape)
+        tree.refit(np.hstack([at - 5e-4, at + 5e-4]))
+    assert tree.take_work()["leaves changed"] < 3 * len(middle)
+
+
+def test_pairs_that_would_be_too_many_are_not_kept():
+    boxes = np.tile([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], (300, 1))
+    tree = BoxTree(boxes)
+    for _ in range(3):
+        assert len(tree.pairs(0.0)) == 300 * 299 // 2 and tree._cached is None
+    assert len(tree.pairs(np.inf)) == 300 * 299 // 2
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda tree: pickle.loads(pickle.dumps(tree))])
+def test_copies_are_trees_of_their_own(copied):
+    """What kernels are told of a tree are addresses: a copy has others."""
+    tree = BoxTree(boxes_of(np.random.default_rng(11), "uniform", 50))
+    before = tree.pairs(0.0)
+    other = copied(tree)
+    tree.refit(tree.boxes + 100.0 * np.arange(50)[:, None])
+    assert not len(tree.pairs(0.0))
+    assert len(before) and np.array_equal(other.pairs(0.0), before)
 
 
 @pytest.mark.parametrize("n", [1000, 20000])

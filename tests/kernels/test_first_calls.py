@@ -34,7 +34,8 @@ def run_just_in_time(code: str, tmp_path: Path, *arguments: str, cache: str = "k
 
 # --- kept on disk -----------------------------------------------------------------------------------
 
-#: Asks for a bounding box, whose callee `support_vertex` stands in another file, and tells how it came by its kernel.
+#: Asks for the bounding box of a hull with more points than are listed: the callee `support_vertex` stands in another
+#: file. Tells how it came by its kernel.
 BOX = """
 import json, logging
 import numpy as np
@@ -45,7 +46,7 @@ from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 
 logging.basicConfig(level=logging.INFO, format="%(message)s")
-packed, X = parts_of(collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]))[0]
+packed, X = parts_of(collide.ConvexHull([(k, k * k, k**3) for k in range(20)]))[0]
 poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
 print(boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64)).round(6).tolist())
 """
@@ -66,7 +67,7 @@ def test_kernels_are_kept_until_a_source_of_theirs_is_edited(tmp_path):
     def kept() -> dict[str, int]:
         return {file.name: file.stat().st_mtime_ns for file in (tmp_path / "cache" / "kernels").iterdir()}
 
-    right = "[[-4.0, -5.0, -6.0, 1.0, 2.0, 3.0]]"
+    right = "[[-0.0, -0.0, -0.0, 19.0, 361.0, 6859.0]]"
     assert ask(compiled=True) == right
     files = kept()
     (name,) = files

@@ -36,7 +36,7 @@ def box():
     from collide.lowering.parts import parts_of
     from collide.lowering.shape_table import ShapeTable, pose_table
 
-    packed, X = parts_of(collide.ConvexHull([(0, 0, 0), (1, 2, 3), (-4, -5, -6)]))[0]
+    packed, X = parts_of(collide.ConvexHull([(k, k * k, k**3) for k in range(20)]))[0]
     poses = pose_table(np.eye(4)[None], X[None], np.array([packed.reach]))
     return boxes_of(ShapeTable([packed]), poses.rows, np.zeros(1, dtype=np.int64)).round(6).tolist()
 """
@@ -45,7 +45,7 @@ TOLD = (
     + "print(json.dumps({'box': box(), 'mode': mode.MODE, 'why': mode.WHY, 'at': collide.__file__, 'level': "
     "library.level}))"
 )
-RIGHT = [[-4, -5, -6, 1, 2, 3]]
+RIGHT = [[0, 0, 0, 19, 361, 6859]]
 
 
 @pytest.fixture(scope="session")
