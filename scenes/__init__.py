@@ -4,7 +4,7 @@
     scene = load("panda_workbench")         # a shipped scene, a path, or several paths
     scene.world().distances(max_distance=0.05)
 
-`load` reads URDF with SRDF, MoveIt planning scenes, meshes and the project's own scene files
+`load` reads URDF with SRDF, MJCF, MoveIt planning scenes, meshes and the project's own scene files
 (docs/scene-format.md); `generate` makes seeded scenes. Importing this package imports numpy alone:
 each format's library is loaded when a file needs it.
 """

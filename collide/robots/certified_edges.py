@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,14 +11,12 @@ from collide.kernels import address_of
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
+from collide.robots.checker_scene import CheckerScene
 from collide.robots.motion_bounds import OPEN_INTERVAL
 from collide.robots.robot_bodies import paths_to_root
 
-if TYPE_CHECKING:
-    from collide.robots.robot_checker import RobotChecker
-
 #: Before anything is proven, motions are asked at their ends and, so many times halved, in between.
-_SAMPLED_HALVINGS = 2
+SAMPLED_HALVINGS = 2
 #: Roundings of forward kinematics, as a share of where links are and how far they reach.
 _ROUNDING = 2.0**-40
 
@@ -100,10 +97,12 @@ def sampled_collision(
 
 
 def certify(
-    checker: RobotChecker, q0: np.ndarray, q1: np.ndarray, resolution: float, threads: int, progress
+    checker: CheckerScene, q0: np.ndarray, q1: np.ndarray, times: np.ndarray, resolution: float, threads: int, progress
 ) -> CertifiedEdges:
-    """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
-    times = sampled_collision(q0, q1, resolution, lambda q: checker.collides(q, threads=threads), _SAMPLED_HALVINGS)
+    """`RobotChecker.certify_edges` of checked arguments (N, dof).
+
+    times : (N,) of collisions that are known already, NaN for motions that are to be certified; filled in.
+    """
     remaining = np.flatnonzero(np.isnan(times))
     ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])
     later = np.full(len(remaining), np.nan)
@@ -120,7 +119,7 @@ def certify(
         open_rows.append(rows)
         counts.append(work.n_checked)
 
-    checker._in_pieces(len(remaining), threads, progress, on_piece)
+    checker.in_pieces(len(remaining), threads, progress, on_piece)
     times[remaining] = later
     rows = np.concatenate(open_rows)
     rows = rows[np.isnan(later[rows[:, 0].astype(np.int64)])]
@@ -136,32 +135,27 @@ def certify(
 
 def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) -> tuple[np.ndarray, np.ndarray]:
     """(open intervals, pairs of meshes), (k, OPEN_INTERVAL) each, of some motions; ``times`` of collisions written."""
-    verdicts = np.zeros(len(q0), dtype=np.uint8)
     open_rows, meshes = [np.zeros((0, OPEN_INTERVAL))], [np.zeros((0, OPEN_INTERVAL))]
     done = 0
     while done < len(q0):
-        n = certify_motions(
-            space.address, work.address, address_of(q0[done:]), address_of(q1[done:]), q0.shape[1], 0, len(q0) - done,
-            address_of(verdicts[done:]), address_of(times[done:]),
-        )  # fmt: skip
-        for rows, out in ((work.open_intervals, open_rows), (work.mesh_pairs, meshes)):
-            rows = rows.copy()
-            rows[:, 0] += done
-            out.append(rows)
-        if n == 0:
+        before, done = done, certify_motions(
+            space.address, work.address, address_of(q0), address_of(q1), q0.shape[1], done, len(q0), address_of(times)
+        )
+        open_rows.append(work.open_intervals.copy())
+        meshes.append(work.mesh_pairs.copy())
+        if done == before:
             work.grow()
-        done += n
     return np.concatenate(open_rows), np.concatenate(meshes)
 
 
-def _names_of(checker: RobotChecker, body: int, partner: int) -> tuple[str, str]:
+def _names_of(checker: CheckerScene, body: int, partner: int) -> tuple[str, str]:
     """Of a body and its partner as `motion_bounds.py` has them."""
     if body >= 0:
         return checker.names_of(body, partner)
     return checker.names_of(*checker.setting.self_pairs[partner].tolist())
 
 
-def _motion_workspace(checker: RobotChecker, resolution: float) -> MotionWorkspace:
+def _motion_workspace(checker: CheckerScene, resolution: float) -> MotionWorkspace:
     """Paths of joints from each body to the root, and how many of them stand between the bodies of each pair."""
     robot, setting = checker.robot, checker.setting
     number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}

@@ -5,21 +5,17 @@ All pairs in all their intervals are asked together, in the middle; intervals th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from collide.kernels import address_of
 from collide.robots import open_pairs
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
+from collide.robots.checker_scene import CheckerScene
 from collide.robots.motion_bounds import bound_motions
-
-if TYPE_CHECKING:
-    from collide.robots.robot_checker import RobotChecker
 
 
 def settle_meshes(
-    checker: RobotChecker, space: CheckWorkspace, work: MotionWorkspace, q0: np.ndarray, q1: np.ndarray,
+    checker: CheckerScene, space: CheckWorkspace, work: MotionWorkspace, q0: np.ndarray, q1: np.ndarray,
     rows: np.ndarray, times: np.ndarray, resolution: float,
 ) -> list[np.ndarray]:  # fmt: skip
     """Open intervals (k, OPEN_INTERVAL) that remain of pairs of bodies; ``times`` (N,) of collisions are written.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.robots.check_scene import (
     BODY_INTS,
     COUNT,
@@ -52,45 +52,40 @@ from collide.robots.motion_bounds import (
 )
 from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, OPEN, only_holds, state_of_parts
 
-#: What is known of a motion: proven free; it collides; parts of it stay open.
-IS_PROVEN, COLLIDES_AT, STAYS_OPEN = range(3)
 
-
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, verdicts_at, times_at):
-    """Verdicts, a byte each, of motions from ``first`` on, of n, and the times of collisions; the first one without.
+@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
+def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, times_at):
+    """Write when motions from ``first`` on, of n, collide, NaN where they do not; returns the first one without.
 
     It ends early where there may be no space for the intervals of one more that stay open.
     """
     scene = view_scene(header_at)
     words = view_i64(motions_at, MOTION_HEADER)
     q0, q1 = view_f64(q0_at, dof * n), view_f64(q1_at, dof * n)
-    verdicts, times = view_u8(verdicts_at, n), view_f64(times_at, n)
+    times = view_f64(times_at, n)
     words[N_OPEN_INTERVALS] = 0
     words[N_MESH_PAIRS] = 0
     for k in range(first, n):
         motion = motion_at(scene, motions_at, q0, q1, dof * k, dof)
         n_open = words[N_OPEN_INTERVALS]
         n_mesh = words[N_MESH_PAIRS]
-        verdict, time = _certify(motion, k)
+        time = _certify(motion, k)
         is_full = (
             words[N_OPEN_INTERVALS] > words[OPEN_INTERVAL_CAPACITY] or words[N_MESH_PAIRS] > words[MESH_PAIR_CAPACITY]
         )
-        if is_full or verdict == COLLIDES_AT:
+        if is_full or not math.isnan(time):
             words[N_OPEN_INTERVALS] = n_open
             words[N_MESH_PAIRS] = n_mesh
         if is_full:
             return k
-        verdicts[k] = verdict
         times[k] = time
     return n
 
 
 @kernel
 def _certify(motion, number):
-    """(verdict, time of a collision or NaN) of one motion."""
+    """Time of a collision, or NaN: proven free but for the intervals and pairs that are left open."""
     intervals = motion.intervals
-    verdict = IS_PROVEN
     n_stack = 1
     _push(intervals, 0, 0.0, 1.0, 0.0, -1.0)
     while n_stack > 0:
@@ -106,11 +101,10 @@ def _certify(motion, number):
         _push(intervals, MAX_INTERVALS, begin, end, float(number), 0.0)
         state = _gather(motion, top) if n_items < 0 else _pass_on(motion, first, n_items, top)
         if state == -2:
-            return COLLIDES_AT, time
+            return time
         if state == 0:
             continue
         if motion.max_change * (end - begin) <= motion.resolution or n_stack + 2 > MAX_INTERVALS:
-            verdict = STAYS_OPEN
             _leave_interval(motion, number, begin, end, top, state)
             continue
         # Both halves read the same pairs; what the left one keeps stands beyond them, and is gone when the right one
@@ -118,7 +112,7 @@ def _certify(motion, number):
         _push(intervals, n_stack, time, end, float(top), float(state))
         _push(intervals, n_stack + 1, begin, time, float(top), float(state))
         n_stack += 2
-    return verdict, math.nan
+    return math.nan
 
 
 @kernel(inline=True)

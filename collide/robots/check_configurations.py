@@ -71,9 +71,9 @@ def begin_configuration(scene, q, first):
 
 
 @kernel(inline=True)
-def _verdict(scene, q, first, number):
+def _verdict(scene, q, at, number):
     words = scene.words
-    begin_configuration(scene, q, first)
+    begin_configuration(scene, q, at)
     verdict = IS_FREE
     for body in range(words[N_BODIES]):
         n = find_parts_around(scene, body, 0.0)
@@ -82,7 +82,8 @@ def _verdict(scene, q, first, number):
             around = body_of_part(scene, part)
             if is_allowed(scene, body, around):
                 continue
-            state = _state_of_body(scene, body, words[N_LINK_PARTS] + part, number, -1 - around)
+            first = scene.bodies[BODY_INTS * body + FIRST] + words[PADDED]
+            state = _state_of_bodies(scene, number, body, first, -1 - around, words[N_LINK_PARTS] + part, 1)
             if state == HITTING:
                 return COLLIDES
             if state == OPEN:
@@ -93,7 +94,9 @@ def _verdict(scene, q, first, number):
         b = pairs[2 * k + 1]
         if not boxes_meet(scene, a, b, 0.0):
             continue
-        state = _state_of_two(scene, a, b, number)
+        at_b = BODY_INTS * b
+        first = scene.bodies[BODY_INTS * a + FIRST]
+        state = _state_of_bodies(scene, number, a, first, b, scene.bodies[at_b + FIRST], scene.bodies[at_b + COUNT])
         if state == HITTING:
             return COLLIDES
         if state == OPEN:
@@ -102,35 +105,21 @@ def _verdict(scene, q, first, number):
 
 
 @kernel(inline=True)
-def _state_of_body(scene, body, part, number, partner):
-    """Of a body's padded parts and a part around: HITTING, OPEN (and left to others), or neither."""
-    at = BODY_INTS * body
-    first = scene.bodies[at + FIRST] + scene.words[PADDED]
-    for p in range(first, first + scene.bodies[at + COUNT]):
-        place(scene, p, body)
-        state = state_of_parts(scene, p, part, 0.0)
-        if state == HITTING:
-            return HITTING
-        if state == OPEN:
-            leave_open(scene, number, body, partner, -math.inf)
-            return OPEN
-    return 0
+def _state_of_bodies(scene, number, a, first_a, partner, first_b, n_b):
+    """Of a's parts and those of its partner: HITTING, OPEN (and left to others), or neither.
 
-
-@kernel(inline=True)
-def _state_of_two(scene, a, b, number):
-    """The same of two bodies of the robot."""
-    first_a = scene.bodies[BODY_INTS * a + FIRST]
-    first_b = scene.bodies[BODY_INTS * b + FIRST]
+    first_a : a's first part, padded or not.   partner : a body, or −1 − one around, whose parts stand already.
+    """
     for p in range(first_a, first_a + scene.bodies[BODY_INTS * a + COUNT]):
         place(scene, p, a)
-        for r in range(first_b, first_b + scene.bodies[BODY_INTS * b + COUNT]):
-            place(scene, r, b)
+        for r in range(first_b, first_b + n_b):
+            if partner >= 0:
+                place(scene, r, partner)
             state = state_of_parts(scene, p, r, 0.0)
             if state == HITTING:
                 return HITTING
             if state == OPEN:
-                leave_open(scene, number, a, b, -math.inf)
+                leave_open(scene, number, a, partner, -math.inf)
                 return OPEN
     return 0
 

@@ -13,7 +13,7 @@ import numpy as np
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.lowering.compound_table import lay_out
-from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_points
+from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_halfspace, pack_points
 from collide.lowering.parts import Part, bounding_parts_of, parts_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
@@ -41,11 +41,12 @@ class RobotBody(NamedTuple):
 
 
 class BodyAround(NamedTuple):
-    """One body of the surroundings.   X_WB : (4, 4)."""
+    """One body of the surroundings.   X_WB : (4, 4).   margin : by how much it is swollen against the robot [m]."""
 
     name: str
     shape: Shape
     X_WB: np.ndarray
+    margin: float = 0.0
 
 
 class Surroundings(NamedTuple):
@@ -119,6 +120,9 @@ def surroundings_of(bodies: Sequence[BodyAround]) -> Surroundings:
     poses = pose_table(X_WB, X_BP, np.array([part.reach for part in packed])).rows
     poses[:, POSE_TERMS] = -1.0  # what products of poses lost is in their slop
     poses[:, POSE_STRETCH] = _stretches(poses)
+    margins = np.repeat([body.margin for body in bodies], counts)
+    for k in np.flatnonzero(margins).tolist():
+        packed[k] = packed_within(packed[k], float(margins[k]), poses[k, :9].reshape(3, 3))
     tree = None
     if packed:
         tree = BoxTree(boxes_of(ShapeTable(packed), poses, np.arange(len(packed))))
@@ -182,6 +186,21 @@ def swollen(packed: PackedConvex, by: float) -> PackedConvex:
         return pack_points(packed.points, packed.radius + by, packed.slop, packed.prepared.with_tree)
     radius = packed.radius + by
     return packed._replace(radius=radius, content=packed.content + np.float64(radius).tobytes())
+
+
+def packed_within(packed: PackedConvex, margin: float, R: np.ndarray) -> PackedConvex:
+    """A convex set, turned by R (3, 3), and all that is at most a margin from it in the world [m]; its slop says how
+    well, where the numbers of that are rounded."""
+    if packed.kind == HALFSPACE:
+        normal, offset = packed.params[:3], float(packed.params[3])
+        # Planes n·x = c are taken to n'·y = c + n'·t with n' = n R⁻¹: offsets differ by |n'| for each unit of length.
+        unit = float(np.linalg.norm(np.linalg.solve(R.T, normal)))
+        rounding = 2.0**-48 * (margin + abs(offset) / unit)
+        return pack_halfspace(normal, offset + margin * unit)._replace(slop=packed.slop + rounding)
+    radius = packed.radius + margin
+    back = radius - packed.radius
+    rounding = abs(packed.radius - (radius - back)) + abs(margin - back)  # of the sum, to the last digit
+    return swollen(packed, margin)._replace(slop=packed.slop + rounding)
 
 
 def box_of(packed: PackedConvex) -> np.ndarray:

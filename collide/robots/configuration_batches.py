@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from collide.kernels import address_of
@@ -12,15 +10,13 @@ from collide.robots import open_pairs
 from collide.robots.check_configurations import COLLIDES, IS_OPEN, check_configurations
 from collide.robots.check_scene import OPEN_LOWER
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.checker_scene import CheckerScene
 from collide.robots.distance_gradients import distance_gradients
 from collide.robots.nearest_pairs import nearest_pairs
 from collide.robots.robot_distances import NEAREST_DTYPE
 
-if TYPE_CHECKING:
-    from collide.robots.robot_checker import RobotChecker
 
-
-def check_piece(checker: RobotChecker, space: CheckWorkspace, q: np.ndarray, out: np.ndarray) -> None:
+def check_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out: np.ndarray) -> None:
     """``out`` (n,) becomes whether configurations q (n, dof) collide."""
     verdicts = np.empty(len(q), dtype=np.uint8)
     done = 0
@@ -37,7 +33,7 @@ def check_piece(checker: RobotChecker, space: CheckWorkspace, q: np.ndarray, out
 
 
 def measure_piece(
-    checker: RobotChecker, space: CheckWorkspace, q: np.ndarray, out: np.ndarray, gradient: np.ndarray, limit: float
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out: np.ndarray, gradient: np.ndarray, limit: float
 ) -> None:
     """``out`` (n,) NEAREST_DTYPE and ``gradient`` (n, dof) become those of configurations q (n, dof)."""
     rows = np.zeros(len(q), dtype=PAIR_DTYPE)
@@ -58,7 +54,7 @@ def measure_piece(
     out["lower"][far] = limit
 
 
-def _take_nearer(checker: RobotChecker, rows: np.ndarray, pairs: np.ndarray, q: np.ndarray, limit: float) -> None:
+def _take_nearer(checker: CheckerScene, rows: np.ndarray, pairs: np.ndarray, q: np.ndarray, limit: float) -> None:
     """Where a pair left to others is nearer than what a row tells, the row becomes its.
 
     Those that may be the nearest go first: what lies beyond them need not be measured.
@@ -81,12 +77,12 @@ def _take_nearer(checker: RobotChecker, rows: np.ndarray, pairs: np.ndarray, q: 
         pairs, lowers = pairs[~is_first], lowers[~is_first]
 
 
-def _both(checker: RobotChecker) -> tuple:
+def _both(checker: CheckerScene) -> tuple:
     """Bodies that move, and bodies around."""
     return checker.setting.bodies, checker.setting.surroundings.bodies
 
 
-def _asked_poses(checker: RobotChecker, pairs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _asked_poses(checker: CheckerScene, pairs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(pairs whose configurations are rows of the poses, (k, links, 4, 4) poses) of the configurations they name."""
     asked, inverse = np.unique(pairs[:, 0], return_inverse=True)
     pairs = pairs.copy()

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.robots import open_pairs
-
-if TYPE_CHECKING:
-    from collide.robots.robot_checker import RobotChecker
+from collide.robots.checker_scene import CheckerScene
 
 #: What is nearer than this is listed where nothing collides [m].
 _NEAR = 0.1
@@ -60,7 +58,7 @@ class ConfigurationReport:
     robot: str
 
     @classmethod
-    def of(cls, checker: RobotChecker, q: np.ndarray) -> ConfigurationReport:
+    def of(cls, checker: CheckerScene, q: np.ndarray) -> ConfigurationReport:
         """The report about one configuration (dof,)."""
         X_WLs = checker.link_poses(q)
         pairs = _tested_pairs(checker)
@@ -100,7 +98,7 @@ def _line(pair: ExplainedPair) -> str:
     return f"{pair.a} and {pair.b}, {away}, at ({at}) m"
 
 
-def _tested_pairs(checker: RobotChecker) -> np.ndarray:
+def _tested_pairs(checker: CheckerScene) -> np.ndarray:
     """(k, 3) of configuration 0, as `open_pairs.py` takes them."""
     a, k = np.nonzero(checker.setting.allowed == 0)
     around = np.stack([np.zeros_like(a), a, -1 - k], axis=1)
@@ -108,7 +106,7 @@ def _tested_pairs(checker: RobotChecker) -> np.ndarray:
     return np.concatenate([np.insert(pairs, 0, 0, axis=1), around]).astype(np.int64)
 
 
-def _explained(checker: RobotChecker, row: np.ndarray) -> ExplainedPair:
+def _explained(checker: CheckerScene, row: np.ndarray) -> ExplainedPair:
     a, b = checker.names_of(int(row["a"]), int(row["b"]))
     return ExplainedPair(
         a, b, float(row["distance"]), float(row["lower"]), float(row["upper"]), row["normal"].copy(),

@@ -19,13 +19,13 @@ _IDENTITY = np.eye(4)[None]
 def are_hits(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround]
 ) -> np.ndarray:
-    """(k,) bool: which pairs meet, a body swollen by its padding where the other is around.
+    """(k,) bool: which pairs meet, where one is around both swollen, by padding and margin.
 
     pairs : (k, 3 or more), configurations as rows of X_WLs (N, links, 4, 4).
     """
     out = np.zeros(len(pairs), dtype=bool)
-    for rows, A, B, X_WA, X_WB, padding in _batches(pairs, X_WLs, bodies, around):
-        out[rows] = query.collide(A, B, X_WA, X_WB, security_margin=padding, check_poses=False)
+    for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
+        out[rows] = query.collide(A, B, X_WA, X_WB, security_margin=padding + margin, check_poses=False)
     return out
 
 
@@ -38,13 +38,14 @@ def distances(
     Where a body is swollen, distances and its points are those of what it is swollen to.
     """
     out = np.zeros(len(pairs), dtype=PAIR_DTYPE)
-    for rows, A, B, X_WA, X_WB, padding in _batches(pairs, X_WLs, bodies, around):
-        farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows]))
-        within = query.distance(A, B, X_WA, X_WB, max_distance=farthest + padding, check_poses=False).rows.copy()
+    for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
+        farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows])) + padding + margin
+        within = query.distance(A, B, X_WA, X_WB, max_distance=farthest, check_poses=False).rows.copy()
         for field in ("distance", "lower", "upper"):
-            within[field] -= padding
+            within[field] -= padding + margin
         within["point_a"] += padding * within["normal"]
-        within["hit"] |= (within["lower"] <= 0.0) & (padding > 0.0)
+        within["point_b"] -= margin * within["normal"]
+        within["hit"] |= (within["lower"] <= 0.0) & (padding + margin > 0.0)
         out[rows] = within
     out["a"], out["b"] = pairs[:, 1], pairs[:, 2]
     return out
@@ -53,7 +54,9 @@ def distances(
 def _batches(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround]
 ) -> Iterator[tuple]:
-    """(rows of pairs, A, B, X_WA, X_WB, padding) of those of the same two bodies."""
+    """(rows of pairs, A, B, X_WA, X_WB, padding, margin) of those of the same two bodies."""
+    if not len(pairs):
+        return
     order = np.lexsort((pairs[:, 2], pairs[:, 1]))
     starts = np.flatnonzero((np.diff(pairs[order, 1:3], axis=0, prepend=pairs[order[:1], 1:3] - 1) != 0).any(axis=1))
     for rows in np.split(order, starts[1:]):
@@ -61,7 +64,7 @@ def _batches(
         A, k = bodies[a], pairs[rows, 0]
         X_WA = np.ascontiguousarray(X_WLs[k, A.link])
         if b >= 0:
-            yield rows, A.shape, bodies[b].shape, X_WA, np.ascontiguousarray(X_WLs[k, bodies[b].link]), 0.0
+            yield rows, A.shape, bodies[b].shape, X_WA, np.ascontiguousarray(X_WLs[k, bodies[b].link]), 0.0, 0.0
         else:
             B = around[-1 - b]
-            yield rows, A.shape, B.shape, X_WA, B.X_WB[None], A.padding
+            yield rows, A.shape, B.shape, X_WA, B.X_WB[None], A.padding, B.margin

@@ -38,7 +38,7 @@ from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, as_poses
 
 #: Module and function that read robots from files: found when first needed, since the engine imports no loader.
-_LOADER = ("collide.scenes.loaders.urdf", "load_robot")
+_LOADER = ("collide.scenes.loaders.robot_file", "load_robot")
 
 
 class LinkShape(NamedTuple):
@@ -90,6 +90,8 @@ class Robot:
         Tuples of links welded together by fixed joints, in the order of the links.
     disabled_pairs
         [(link, link, reason)], both with collision geometry, in the order of the links.
+    prefix
+        What `renamed` put before the names of links and joints that the files have.
     place
         The robot and the file it comes from, for messages.
     joint_table, moves
@@ -116,7 +118,7 @@ class Robot:
         self.name = name
         self.links = tuple(links)
         self._index = indices_of("link", self.links)
-        self.sources = list(sources)
+        self.sources, self.prefix = list(sources), ""
         self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
         checked = [checked_joint(joint, self._index) for joint in joints]
         indices_of("joint", [joint.name for joint in checked])
@@ -142,26 +144,27 @@ class Robot:
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
-        """A robot from a URDF file, with the SRDF beside it or the one given.
+        """A robot from a URDF or an MJCF file, with the SRDF beside it or the one given.
 
         Parameters
         ----------
         path : str or Path
-            The URDF file.
+            The URDF file; or an MJCF file, which the package mujoco reads (extra ``[mujoco]``): bodies are links, the
+            root is the world, pairs that MuJoCo's filters leave out are never tested, keyframes are states.
         srdf : str, Path or bool, optional
-            The SRDF file. None looks beside the URDF, False does without.
+            The SRDF file. None looks beside the robot's, False does without. Beside MuJoCo's filters it counts, too.
         **options
             ``meshes``, ``package_path`` and ``missing_meshes`` as of `collide.scenes.load`.
 
         Returns
         -------
         Robot
-            With everything that URDF and SRDF say about collisions.
+            With everything that the files say about collisions.
 
         Raises
         ------
         SceneError
-            Naming file, element and value of what cannot be read.
+            Naming file, element and value of what cannot be read. MissingExtra for MJCF without the package mujoco.
         """
         return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
 
@@ -487,7 +490,7 @@ class Robot:
         """
         if not prefix:
             return self
-        return Robot(
+        robot = Robot(
             self.name,
             [prefix + link for link in self.links],
             [
@@ -506,6 +509,8 @@ class Robot:
             },
             notes=self.notes, sources=self.sources,
         )
+        robot.prefix = prefix + self.prefix
+        return robot
 
 
 def _joint_value(name: str, value) -> float:

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide import argument_checks as checks
+from collide.broadphase.filters import ASLEEP, MASKED, STATIC
 from collide.errors import InvalidArgument, brief, cut, listing
+from collide.packed_world import PackedWorld
 from collide.robots.check_tables import BodyAround, RobotBody
 from collide.robots.kinematic_tree import COLUMNS
 from collide.robots.robot import Robot
@@ -16,6 +18,9 @@ from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
 from collide.world import World
+
+#: The mask of bodies that nothing is said of, as of `World.add`.
+_ALL_GROUPS = 0xFFFF
 
 
 class Attached(NamedTuple):
@@ -111,8 +116,26 @@ def _checked_padding(what: str, value) -> float:
 
 def bodies_around(world: World, robot: Robot) -> list[BodyAround]:
     """Bodies of a World that are not the robot's own; those are named like its links."""
-    names = [name for name in world.names.values() if name not in robot.geometry]
-    return [BodyAround(name, world.body(name).shape, world.body(name).X_WB) for name in names]
+    others = [world.body(name) for name in world.names.values() if name not in robot.geometry]
+    return [BodyAround(body.name, body.shape, body.X_WB, body.margin) for body in others]
+
+
+def refuse_own_margins(packed: PackedWorld, robot: Robot) -> None:
+    """Margins of links among each other are not kept, so that a World must have none of them.
+
+    Raises InvalidArgument naming the link.
+    """
+    names = packed.roster.names
+    asked = [(k,) for k in np.flatnonzero(packed.roster.alive & (packed.roster.margin > 0.0)).tolist()]
+    asked += [divmod(key, 1 << 32) for key in packed.filters.margin_keys.tolist()]
+    for positions in asked:
+        link = next((names[k] for k in positions if names[k] in robot.geometry), None)
+        if link is not None:
+            partner = next((f' and "{cut(names[k])}"' for k in positions if names[k] != link), "")
+            raise InvalidArgument(
+                f'RobotChecker: the World has a margin of "{cut(link)}"{partner}, a link of the robot: margins are of '
+                "bodies around; take it back by World.set_margin, and give padding= for links"
+            )
 
 
 def filters_of(
@@ -122,33 +145,49 @@ def filters_of(
     """Pairs that are tested, and how many are not, by reason.
 
     Never tested: pairs that the robot disables, that ``allowed`` or the World name, links of a fixed base against
-    static bodies, and what groups and masks exclude.
+    bodies that are static or asleep, and what groups and masks exclude: those of a body of the World that is named like
+    the link, else group 1 with all.
     """
     known = {body.name for body in bodies} | {body.name for body in around}
     reasons = _named_pairs(robot, objects, world, allowed, known)
     skipped: dict[str, int] = {}
 
-    def is_skipped(a: str, b: str, why: str | None = None) -> bool:
-        why = why or reasons.get((a, b)) or reasons.get((b, a))
+    def is_skipped(a: str, b: str, why: str | None = None, *, last: str | None = None) -> bool:
+        why = why or reasons.get((a, b)) or reasons.get((b, a)) or last
         if why:
             skipped[why] = skipped.get(why, 0) + 1
         return bool(why)
 
+    traits = _groups_and_masks(bodies, objects, world)
     self_pairs = []
     for i, A in enumerate(bodies):
         for j in range(i + 1, len(bodies)):
             same = "moves with the same link" if A.link == bodies[j].link else None
-            if not is_skipped(A.name, bodies[j].name, same):
+            masked = None if _are_tested(traits[i], traits[j]) else MASKED
+            if not is_skipped(A.name, bodies[j].name, same or masked):
                 self_pairs.append((i, j))
     base = set() if mobile else {robot.links.index(link) for link in robot.base_links}
     matrix = np.zeros((len(bodies), len(around)), dtype=np.uint8)
     for k, B in enumerate(around):
         body = world.body(B.name)
-        masked = "filtered by group and mask" if not (body.mask & 1 and body.group & 0xFFFF) else None
         for i, A in enumerate(bodies):
-            fixed = "static–static" if body.static and A.link in base else None
-            matrix[i, k] = is_skipped(A.name, B.name, masked or fixed)
+            masked = None if _are_tested(traits[i], (body.group, body.mask)) else MASKED
+            fixed = STATIC if body.static and A.link in base else None
+            resting = ASLEEP if body.sleeping and A.link in base else None
+            matrix[i, k] = is_skipped(A.name, B.name, fixed or masked, last=resting)
     return Filters(np.array(self_pairs, dtype=np.int64).reshape(-1, 2), matrix, skipped)
+
+
+def _groups_and_masks(bodies: list[RobotBody], objects: dict[str, Attached], world: World) -> list[tuple[int, int]]:
+    """(group, mask) of each body: of the World's of its name, if it is a link."""
+    names = set(world.names.values()) - objects.keys()
+    in_world = [world.body(body.name) if body.name in names else None for body in bodies]
+    return [(1, _ALL_GROUPS) if body is None else (body.group, body.mask) for body in in_world]
+
+
+def _are_tested(A: tuple[int, int], B: tuple[int, int]) -> bool:
+    """Whether groups and masks of two bodies let their pair be tested."""
+    return bool(A[0] & B[1]) and bool(B[0] & A[1])
 
 
 def _named_pairs(

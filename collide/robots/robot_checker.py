@@ -9,23 +9,16 @@ import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidArgument, brief, listing
-from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
-from collide.robots.check_tables import Setting, check_tables, surroundings_of
-from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.certified_edges import SAMPLED_HALVINGS, CertifiedEdges, certify, sampled_collision
+from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece, measure_piece
 from collide.robots.configuration_report import ConfigurationReport
 from collide.robots.robot import Robot
-from collide.robots.robot_bodies import bodies_around, filters_of, robot_bodies
 from collide.robots.robot_distances import NEAREST_DTYPE, RobotDistances
-from collide.threads import check_threads, pieces_of, share
-from collide.transforms import as_poses
 from collide.world import World
 
-#: A thread is handed at least so many configurations.
-_LEAST_PIECE = 512
 
-
-class RobotChecker:
+class RobotChecker(CheckerScene):
     """Checks whole configurations of a robot: against itself, and against the bodies of a World.
 
         checker = collide.RobotChecker(robot, world)
@@ -39,7 +32,8 @@ class RobotChecker:
         which takes a tenth of the time where they are not convex.
     world : World, optional
         What is around. Bodies named like links of the robot with collision geometry are the robot itself, as in
-        `Scene.world`: they are left out, and pairs allowed for them hold. When the World changes, the next call sees
+        `Scene.world`: they are left out; pairs allowed for them, their groups and masks hold. Margins of the others
+        swell them against the robot; those that sleep are obstacles, too. When the World changes, the next call sees
         it; bodies that move while a call runs stand where they stood when it began.
     X_WR : (4, 4), optional
         Pose of the robot's root in the world W [m], by default the identity.
@@ -64,24 +58,15 @@ class RobotChecker:
     Raises
     ------
     InvalidArgument, InvalidPose
-        Naming the argument: robots without geometry, unknown links and bodies, names used twice.
+        Naming the argument: robots without geometry, unknown links and bodies, names used twice, margins of links in
+        the World.
     """
 
     def __init__(
         self, robot: Robot, world: World | None = None, *, X_WR=None, attached: Iterable = (), padding=0.0,
         allowed: Iterable[tuple[str, str]] = (), mobile: bool = False,
     ):  # fmt: skip
-        if not isinstance(robot, Robot):
-            raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.describe(robot)}")
-        if world is not None and not isinstance(world, World):
-            raise InvalidArgument(f"RobotChecker: world must be a collide.World, got {checks.describe(world)}")
-        self.robot, self.world = robot, World() if world is None else world
-        self._X_WR = np.eye(4) if X_WR is None else as_poses(X_WR, "RobotChecker: X_WR")[0].copy()
-        self._bodies, self._objects = robot_bodies(robot, attached, padding)
-        self._asked, self._mobile = list(allowed), bool(mobile)
-        self._seen: tuple | None = None
-        self._spare: list[CheckWorkspace] = []
-        self._prepare()
+        super().__init__(robot, world, X_WR, attached, padding, allowed, mobile)
 
     @classmethod
     def from_scene(cls, scene, robot: str | None = None, **options) -> RobotChecker:
@@ -127,14 +112,6 @@ class RobotChecker:
             f"{self.n_pairs} pairs tested)"
         )
 
-    def __getstate__(self) -> dict:
-        """What a copy or a pickle takes along. What holds addresses is made again."""
-        return {name: value for name, value in vars(self).items() if name not in ("setting", "_seen", "_spare")}
-
-    def __setstate__(self, state: dict) -> None:
-        vars(self).update(state, _seen=None, _spare=[])
-        self._prepare()
-
     # --- questions ------------------------------------------------------------------------------
 
     def collides(self, Q, *, threads: int = 1, progress: Callable[[int, int], None] | None = None):
@@ -162,7 +139,7 @@ class RobotChecker:
         """
         q, is_single = self._configurations(Q)
         out = np.zeros(len(q), dtype=bool)
-        self._in_pieces(len(q), threads, progress, lambda space, piece: check_piece(self, space, q[piece], out[piece]))
+        self.in_pieces(len(q), threads, progress, lambda space, piece: check_piece(self, space, q[piece], out[piece]))
         return bool(out[0]) if is_single else out
 
     def distances(
@@ -191,7 +168,7 @@ class RobotChecker:
         limit = checks.limit("RobotChecker.distances: max_distance", max_distance)
         q, _ = self._configurations(Q)
         rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
-        self._in_pieces(
+        self.in_pieces(
             len(q), threads, progress,
             lambda space, piece: measure_piece(self, space, q[piece], rows[piece], gradient[piece], limit),
         )  # fmt: skip
@@ -246,7 +223,8 @@ class RobotChecker:
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
-        return certify(self, q0, q1, step, threads, progress)
+        times = sampled_collision(q0, q1, step, lambda q: self.collides(q, threads=threads), SAMPLED_HALVINGS)
+        return certify(self, q0, q1, times, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:
         """Which pairs of a configuration collide, how deep, and what is nearest otherwise, to be printed.
@@ -269,7 +247,7 @@ class RobotChecker:
         q, is_single = self._configurations(q)
         if not is_single:
             raise InvalidArgument(f"RobotChecker.explain: one configuration ({self.robot.dof},), got {q.shape}")
-        self._prepare()
+        self.prepare()
         return ConfigurationReport.of(self, q[0])
 
     def within_limits(self, Q) -> np.ndarray:
@@ -286,75 +264,6 @@ class RobotChecker:
         q, _ = self._configurations(Q)
         return self.robot.within_limits(q)
 
-    # --- what they stand on ---------------------------------------------------------------------
-
-    @property
-    def bodies(self) -> list[str]:
-        """Links with collision geometry and attached objects."""
-        return [body.name for body in self._bodies]
-
-    @property
-    def around(self) -> list[str]:
-        """Bodies of the World that the robot is tested against."""
-        return [body.name for body in self.setting.surroundings.bodies]
-
-    @property
-    def n_pairs(self) -> int:
-        """Pairs of bodies that are tested."""
-        return len(self.setting.self_pairs) + int((self.setting.allowed == 0).sum())
-
-    @property
-    def skipped(self) -> dict[str, int]:
-        """Pairs of bodies that are never tested, by reason."""
-        return dict(self.setting.skipped)
-
-    def names_of(self, a: int, b: int) -> tuple[str, str]:
-        """Names of two bodies by the numbers that results have for them.
-
-        Parameters
-        ----------
-        a : int
-            Number of a body.
-        b : int
-            Number of a body, or −1 − the number of one around.
-
-        Returns
-        -------
-        (str, str)
-        """
-        return self.bodies[a], self.bodies[b] if b >= 0 else self.around[-1 - b]
-
-    def link_poses(self, q) -> np.ndarray:
-        """`Robot.link_poses` of the robot where it stands.
-
-        Parameters
-        ----------
-        q : (N, dof) or (dof,) array_like
-            Configurations [rad or m].
-
-        Returns
-        -------
-        (N, links, 4, 4) float64
-            Poses X_WL [m].
-        """
-        return self.robot.link_poses(q, self._X_WR)
-
-    def _prepare(self) -> None:
-        """The setting of the World as it stands now; nothing is made again while it stays."""
-        packed = self.world._pack()
-        before, now = self._seen, (packed.roster, self.world.allowed, packed.X_WBs)
-        if before is not None and before[0] is now[0] and before[1] == now[1] and np.array_equal(before[2], now[2]):
-            return
-        self._seen = now[0], now[1], now[2].copy()
-        around = bodies_around(self.world, self.robot)
-        filters = filters_of(self.robot, self._bodies, self._objects, self.world, around, self._asked, self._mobile)
-        surroundings = surroundings_of(around)
-        matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
-        base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
-        tables = check_tables(self._bodies, surroundings, np.concatenate(matrices))
-        self.setting = Setting(self._bodies, base, surroundings, tables, *filters)
-        self._spare = []
-
     def _configurations(self, Q) -> tuple[np.ndarray, bool]:
         """((N, dof) C-contiguous, whether a single one was given). Raises InvalidArgument."""
         q = np.ascontiguousarray(self.robot.checked_configurations(Q))
@@ -364,31 +273,6 @@ class RobotChecker:
         q0, q1 = self._configurations(Q0)[0], self._configurations(Q1)[0]
         n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
         return tuple(np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))  # type: ignore
-
-    def _in_pieces(self, n: int, threads: int, progress, work: Callable[[CheckWorkspace, slice], None]) -> None:
-        """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""
-        threads = check_threads(threads)
-        self._prepare()
-        spare, setting, done = self._spare, self.setting, 0
-
-        def on_piece(piece: slice) -> None:
-            nonlocal done
-            try:
-                space = spare.pop()
-            except IndexError:  # all are in use: another thread may have taken the last
-                space = CheckWorkspace(self.robot.joint_table, setting)
-            work(space, piece)
-            spare.append(space)
-            done += piece.stop - piece.start
-            if progress is not None:
-                progress(done, n)
-
-        if threads == 1 and progress is None:
-            if n:
-                on_piece(slice(0, n))
-        else:
-            share(pieces_of(n, max(threads, 8 if progress else 1), _LEAST_PIECE), on_piece, threads)
-
 
 def _positive(what: str, value) -> float:
     number = checks.number(value)

@@ -89,6 +89,9 @@ def _world(world: World) -> list[Any]:
     names = world.names
     return [
         "world",
-        [(body.name, body.shape, body.X_WB, body.static, body.group, body.mask) for body in bodies],
+        [
+            (body.name, body.shape, body.X_WB, body.static, body.group, body.mask, body.margin, body.sleeping)
+            for body in bodies
+        ],
         sorted((names[a], names[b]) for a, b in world.allowed),
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import quoteattr
 
 from collide.sweeps.pair_proposal import ADJACENT, ALWAYS, DEFAULT, NEVER, Proposal
@@ -15,27 +15,30 @@ _ABOUT = {
 }
 
 
-def srdf_text(proposal: Proposal) -> str:
+def srdf_text(proposal: Proposal, elements: Sequence[str] = ()) -> str:
     """The SRDF of a proposal.
 
     Parameters
     ----------
     proposal : Proposal
         Its disabled pairs are written, by reason.
+    elements : sequence of str
+        What stands before them, as XML: groups, states and end effectors of another SRDF of the robot.
 
     Returns
     -------
     str
-        XML. Groups, states and end effectors are not in it: they are no matter of collisions.
+        XML.
     """
-    return "\n".join(_lines(proposal)) + "\n"
+    return "\n".join(_lines(proposal, elements)) + "\n"
 
 
-def _lines(proposal: Proposal) -> Iterator[str]:
+def _lines(proposal: Proposal, elements: Sequence[str]) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     for line in _preface(proposal):
         yield f"<!-- {_in_comment(line)} -->"
     yield f"<robot name={quoteattr(proposal.robot.name)}>"
+    yield from (f"  {element}" for element in elements)
     for reason, about in _ABOUT.items():
         pairs = [pair for pair in proposal.disabled if pair.reason == reason]
         if reason == ALWAYS and proposal.always_share < 1:

@@ -15,14 +15,14 @@ from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
-from collide.scenes.loaders import moveit, scene_yaml, states, urdf
+from collide.scenes.loaders import mjcf, moveit, scene_yaml, states, urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.files import starts_like_xml
 from collide.scenes.loaders.mesh_shapes import part_shape
 from collide.scenes.loaders.xml_text import parse_xml
 
 FORMATS = (
-    "URDF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
+    "URDF and MJCF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
     f"meshes ({', '.join(mesh_loader.SUFFIXES)})"
 )
 
@@ -58,8 +58,8 @@ def load(
     Parameters
     ----------
     path : str or Path
-        A URDF (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene file (docs/scene-format.md), or
-        the name of a shipped scene.
+        A URDF or an MJCF file (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene file
+        (docs/scene-format.md), or the name of a shipped scene.
     *more_paths
         Further files of the same scene.
     state : str, Path or mapping of str to float, optional
@@ -159,7 +159,7 @@ def _load_one(path: Path, options: Options) -> Scene:
 def _load_xml(path: Path, options: Options) -> Scene:
     root = parse_xml(path, [])
     if root.tag == "mujoco":
-        raise SceneError("is an MJCF model (<mujoco>): MJCF is not read yet; export the model as URDF", path=path)
+        return _load_mjcf(path, options)
     if root.tag in ("sdf", "world"):
         raise SceneError(f"is SDF (<{root.tag}>), which is not read; convert it to URDF", path=path)
     if root.tag != "robot":
@@ -170,6 +170,14 @@ def _load_xml(path: Path, options: Options) -> Scene:
     robot = urdf.load_robot(path, options.srdf, seconds=scene.seconds, **options.for_robots())
     scene.name = robot.name
     scene.place_robot(robot, np.eye(4))
+    return scene
+
+
+def _load_mjcf(path: Path, options: Options) -> Scene:
+    scene = Scene("")
+    file = mjcf.load_mjcf(path, options.srdf, meshes=options.meshes, seconds=scene.seconds)
+    scene.name = file.robot.name
+    mjcf.place_mjcf(scene, file, np.eye(4))
     return scene
 
 

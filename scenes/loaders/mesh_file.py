@@ -118,6 +118,19 @@ def _describe(
     return MeshPart(label, distinct(vertices[used]), fill, closed, len(faces)), notes
 
 
+def part_of_arrays(label: str, vertices: np.ndarray, faces: np.ndarray, meshes: str, path: Path) -> MeshPart:
+    """A mesh that another reader has read, (n, 3) vertices and (m, 3) faces, taken as `read_mesh` takes one."""
+    part = _as_it_is(label, vertices, faces, path)
+    if meshes == "mesh":
+        return part
+    whole = MeshPart(label, distinct(vertices[np.unique(faces)]), np.nan, part.closed, part.faces)
+    if part.own_hull:
+        whole.fill = 1.0
+    elif meshes == "pieces":
+        whole.pieces = _decompose(vertices, faces, path)
+    return whole
+
+
 def _as_it_is(label: str, vertices: np.ndarray, faces: np.ndarray, path: Path) -> MeshPart:
     try:
         return described(label, vertices, faces)

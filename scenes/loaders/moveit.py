@@ -18,11 +18,11 @@ import numpy as np
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
-from collide.scenes.loaders import urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed
 from collide.scenes.loaders.files import head
 from collide.scenes.loaders.mesh_shapes import inline_shape
+from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.states import state_of
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Halfspace, Sphere
@@ -45,14 +45,14 @@ def load_planning_scene(
 ) -> Scene:
     """The scene of a planning-scene document.
 
-    robot : a `Robot` or the path of its URDF; None looks for it near the scene file.
+    robot : a `Robot` or the path of its file; None looks for it near the scene file.
     """
     fields = Fields(data, path)
     scene = Scene(fields.text("name") if data.get("name") else path.stem, sources=[str(path)])
     model = fields.text("robot_model_name")
     if not isinstance(robot, Robot):
         file = Path(robot) if robot is not None else find_robot(model, path)
-        robot = urdf.load_robot(
+        robot = load_robot(
             file, srdf, meshes=meshes, package_path=package_path, missing_meshes=missing_meshes, seconds=scene.seconds
         )
     if robot.name != model:

@@ -14,7 +14,7 @@ from typing import Any
 from collide.errors import InvalidArgument, SceneError, brief, listing
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
-from collide.scenes.loaders import resources, shape_yaml, urdf
+from collide.scenes.loaders import mjcf, resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
 from collide.scenes.loaders.files import LARGEST_TEXT, MAX_INCLUDED, read_text
@@ -27,7 +27,7 @@ VERSION = 1
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _SCENE = ("collide", "name", "about", "units", "include", "robots", "bodies", "allow", "states")
-_ROBOT = ("urdf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
+_ROBOT = ("urdf", "mjcf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
 _BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
 
 
@@ -134,13 +134,18 @@ def _include(building: _Building, entry: Any, place: str) -> None:
 
 
 def _add_robot(building: _Building, entry: Fields) -> None:
-    robot = _read_robot(building, entry).renamed(_prefix(entry))
+    file = _read_robot(building, entry)
+    prefix = _prefix(entry)
+    robot = (file.robot if isinstance(file, mjcf.MjcfFile) else file).renamed(prefix)
     name = entry.text("name", robot.name)
     X_WR = read_pose(entry, "pose", building.metres)
     mobile = entry.choice("base", ("fixed", "mobile"), "fixed") == "mobile"
     values = _robot_state(entry, robot)
     try:
-        building.scene.place_robot(robot, X_WR, values, name=name, mobile=mobile)
+        if isinstance(file, mjcf.MjcfFile):
+            mjcf.place_mjcf(building.scene, file, X_WR, values, prefix=prefix, name=name, mobile=mobile)
+        else:
+            building.scene.place_robot(robot, X_WR, values, name=name, mobile=mobile)
     except InvalidArgument as error:
         entry.fail(str(error), "state")
     except SceneError as error:
@@ -151,9 +156,9 @@ def _prefix(entry: Fields) -> str:
     return entry.text("prefix") if entry.get("prefix") else ""
 
 
-def _read_robot(building: _Building, entry: Fields) -> Robot:
-    if ("urdf" in entry) == ("robot" in entry):
-        entry.fail("give either urdf, a file, or robot, a description with links and joints")
+def _read_robot(building: _Building, entry: Fields) -> Robot | mjcf.MjcfFile:
+    if sum(key in entry for key in ("urdf", "mjcf", "robot")) != 1:
+        entry.fail("give either urdf or mjcf, a file, or robot, a description with links and joints")
     meshes = entry.choice("meshes", OPTIONS, building.meshes)
     if "robot" in entry:
         return inline_robot(
@@ -164,7 +169,10 @@ def _read_robot(building: _Building, entry: Fields) -> Robot:
         srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
     elif srdf is not None and srdf is not False:
         entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
-    file = resources.find(entry.text("urdf"), building.path, building.package_path, element=entry.place("urdf"))
+    key = "mjcf" if "mjcf" in entry else "urdf"
+    file = resources.find(entry.text(key), building.path, building.package_path, element=entry.place(key))
+    if key == "mjcf":
+        return mjcf.load_mjcf(file, srdf, meshes=meshes, seconds=building.seconds)
     return urdf.load_robot(
         file, srdf, meshes=meshes, package_path=building.package_path,
         missing_meshes=building.missing_meshes, seconds=building.seconds,

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from collide.errors import SceneError, cut, listing
+from collide.scenes.loaders.files import is_file
 from collide.scenes.loaders.xml_text import parse_xml
+
+#: Elements about collisions: what a proposal of disabled pairs replaces.
+COLLISIONS = ("disable_collisions", "enable_collisions", "disable_default_collisions")
+#: Attributes that name links or joints of the robot, by element.
+_NAMES = {
+    "link": ("name",), "joint": ("name",), "chain": ("base_link", "tip_link"), "end_effector": ("parent_link",),
+    "virtual_joint": ("name", "child_link"), "passive_joint": ("name",), "joint_property": ("joint_name",),
+    "link_sphere_approximation": ("link",),
+}  # fmt: skip
 
 
 @dataclass
@@ -20,6 +31,21 @@ class Semantics:
     pairs: list[tuple[str, str, str]] = field(default_factory=list)
     states: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+
+
+def find_srdf(robot: Path, robot_name: str | None, srdf) -> Path | None:
+    """The SRDF given, or the one beside the file of a robot: same stem, or ../srdf/NAME.srdf; None where none is."""
+    if srdf is False:
+        return None
+    if srdf is not None:
+        if not is_file(Path(srdf)):
+            raise SceneError("no such file", path=srdf)
+        return Path(srdf)
+    for folder in (robot.parent, robot.resolve().parent.parent / "srdf"):
+        for stem in dict.fromkeys(filter(None, (robot.stem, robot_name))):
+            if is_file(folder / f"{stem}.srdf"):
+                return folder / f"{stem}.srdf"
+    return None
 
 
 def read_srdf(path: Path, links: list[str], joints: list[str]) -> Semantics:
@@ -75,3 +101,24 @@ def _read_states(root, path: Path, joints: list[str], semantics: Semantics) -> N
                     element=f'state "{cut(name)}" joint "{cut(label)}"',
                 )
             values[label] = value
+
+
+def other_elements(path: Path, prefix: str = "") -> list[tuple[str, str]]:
+    """(tag, text) of all that an SRDF says but for collisions: groups, states, end effectors, virtual joints.
+
+    prefix : put before names of links and joints, as `Robot.renamed` does. In the order of the file; elements of a
+    namespace, which SRDF has not, are left out.
+    """
+    root = parse_xml(path, [])
+    elements = []
+    for element in root:
+        if not isinstance(element.tag, str) or element.tag in COLLISIONS or "}" in element.tag:
+            continue
+        for inner in element.iter():
+            for attribute in _NAMES.get(str(inner.tag), ()) if prefix else ():
+                if inner.get(attribute):
+                    inner.set(attribute, prefix + inner.get(attribute, ""))
+        ET.indent(element, "  ", level=1)
+        element.tail = None
+        elements.append((element.tag, ET.tostring(element, encoding="unicode")))
+    return elements

@@ -1,8 +1,8 @@
 """URDF: links, joints and collision geometry of a robot, read with every number checked.
 
 Read from the XML itself, so that a complaint can name the link, the element and the text it found
-there. Visual, inertial and transmission elements are not looked at. The SRDF beside a URDF
-(`find_srdf`) says which pairs are never tested.
+there. Inertial and transmission elements are not looked at, visual ones only for pictures
+(`visual_shapes.py`). The SRDF beside a URDF (`srdf.find_srdf`) says which pairs are never tested.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from collide.robots.robot import LinkShape, Robot
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.fields import placed
-from collide.scenes.loaders.files import is_file
 from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
-from collide.scenes.loaders.srdf import read_srdf
+from collide.scenes.loaders.srdf import find_srdf, read_srdf
 from collide.scenes.loaders.xml_text import parse_xml
 from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
 from collide.shapes.shape import Shape
@@ -71,27 +70,13 @@ def load_robot(
     reading = Reading(path, meshes, tuple(_as_paths(package_path)), missing_meshes)
     root = parse_xml(path, reading.notes)
     if root.tag != "robot":
-        reading.fail(f"<{root.tag}>", "the outermost element of a URDF is <robot>")
+        advice = "; a scene file names an MJCF model under mjcf" if root.tag == "mujoco" else ""
+        reading.fail(f"<{root.tag}>", f"the outermost element of a URDF is <robot>{advice}")
     robot = _build(root, reading, find_srdf(path, root.get("name"), srdf))
     if seconds is not None:
         seconds["meshes"] = seconds.get("meshes", 0.0) + reading.seconds
         seconds["read"] = seconds.get("read", 0.0) + time.perf_counter() - started - reading.seconds
     return robot
-
-
-def find_srdf(urdf: Path, robot_name: str | None, srdf) -> Path | None:
-    """The SRDF given, or the one beside the URDF: same stem, or ../srdf/NAME.srdf; None where none is."""
-    if srdf is False:
-        return None
-    if srdf is not None:
-        if not is_file(Path(srdf)):
-            raise SceneError("no such file", path=srdf)
-        return Path(srdf)
-    for folder in (urdf.parent, urdf.resolve().parent.parent / "srdf"):
-        for stem in dict.fromkeys(filter(None, (urdf.stem, robot_name))):
-            if is_file(folder / f"{stem}.srdf"):
-                return folder / f"{stem}.srdf"
-    return None
 
 
 def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
@@ -101,7 +86,7 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     joints = [
         _joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))
     ]
-    geometry = {name: _link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
+    geometry = {name: link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
     _note_unchecked(root, geometry, reading)
     semantics = read_srdf(srdf, links, [joint.name for joint in joints]) if srdf is not None else None
     sources = [str(reading.path)] + ([str(srdf)] if srdf is not None else [])
@@ -233,23 +218,24 @@ def _mimic(element: ET.Element, place: str, reading: Reading) -> Mimic | None:
 # --- collision geometry --------------------------------------------------------------------------
 
 
-def _link_shapes(link: ET.Element, name: str, reading: Reading) -> list[LinkShape]:
+def link_shapes(link: ET.Element, name: str, reading: Reading, tag: str = "collision") -> list[LinkShape]:
+    """The shapes of a <link>, of its elements of one tag: "collision", or "visual" for what it looks like."""
     shapes: list[LinkShape] = []
-    collisions = link.findall("collision")
-    for k, collision in enumerate(collisions):
-        place = _place("link", name) + (f" collision {k}" if len(collisions) > 1 else "")
-        X_LG = _origin(collision, place, reading)
+    elements = link.findall(tag)
+    for k, element in enumerate(elements):
+        place = _place("link", name) + (f" {tag} {k}" if len(elements) > 1 else "")
+        X_LG = _origin(element, place, reading)
         source = f"{reading.path}: {place}"
-        for shape, approximation in _element_shapes(collision, name, place, reading):
+        for shape, approximation in _element_shapes(element, name, place, reading):
             shapes.append(LinkShape(shape, X_LG, approximation, source))
     return shapes
 
 
-def _element_shapes(collision: ET.Element, link: str, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
-    geometry = collision.find("geometry")
+def _element_shapes(described: ET.Element, link: str, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
+    geometry = described.find("geometry")
     children = [] if geometry is None else [child for child in geometry if isinstance(child.tag, str)]
     if len(children) != 1:
-        reading.fail(place, f"<collision> needs <geometry> with one shape in it, found {len(children)}")
+        reading.fail(place, f"<{described.tag}> needs <geometry> with one shape in it, found {len(children)}")
     element = children[0]
     if element.tag == "mesh":
         return _mesh_shapes(element, link, place, reading)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
@@ -135,6 +137,154 @@ def test_padding_swells_against_the_surroundings_alone():
     gap = collide.distance(dented(), collide.Box((0.2, 0.2, 0.2)), pose(t=(0.65, 0, 0)), pose(t=(1.0, 0, 0))).distance
     assert not as_mesh.collides([0.65]) and as_mesh.collides([0.72])
     assert abs(as_mesh.distances([0.65]).distance[0] - (gap - 0.08)) <= 1e-9
+
+
+def test_margins_of_bodies_around_count_as_in_the_world():
+    """By a World that holds the links, too: it decides margins in integers. Every shape, padding besides; the walls
+    stand so that half of the questions are within a digit or two of the margin."""
+    n_hits = n_near = 0
+    for seed in range(40):
+        rng = rng_of("margins of a checker", seed)
+        robot, world = slider(random_link_shape(rng, 0.2) if seed % 3 else dented()), collide.World()
+        shape = (collide.Halfspace(rng.normal(size=3), 0.1), dented(), random_link_shape(rng, 0.3))[min(seed % 5, 2)]
+        margin = float(rng.choice([0.05, 0.1, 1e-3, 1 / 3]))
+        link = robot.geometry["cart"][0].shape
+        X_WB = random_pose(rng, 0.3)
+        X_WB[0, 3] += 0.8
+        q = np.linspace(-1.0, 1.0, 9)[:, None]
+        gaps = [collide.distance(link, shape, pose(t=(x, 0, 0)), X_WB) for x in q[:, 0]]
+        k = int(np.argmin([abs(gap.distance - margin) for gap in gaps]))
+        if gaps[k].distance > 0 and seed % 2:  # moved along the normal until the gap is the margin, but for rounding
+            X_WB[:3, 3] += (margin - gaps[k].distance) * gaps[k].normal
+        world.add(shape, X_WB, name="wall", margin=margin)
+        padding = 0.02 if seed % 4 == 0 else 0.0
+        checker = collide.RobotChecker(robot, world, padding=padding)
+        expected = [
+            collide.collide(link, shape, pose(t=(x, 0, 0)), X_WB, security_margin=margin + padding) for x in q[:, 0]
+        ]
+        told = f"seed {seed}: {link!r}, {shape!r}, {X_WB.tolist()}, margin {margin}, padding {padding}"
+        assert checker.collides(q).tolist() == expected, told
+        measured = checker.distances(q)
+        for row, x, hit in zip(measured.rows, q[:, 0], expected):
+            gap = collide.distance(link, shape, pose(t=(x, 0, 0)), X_WB)
+            if gap.distance > 0:
+                assert abs(row["distance"] - (gap.distance - margin - padding)) <= 1e-9, told
+                apart = (row["point_b"] - row["point_a"]) @ row["normal"]
+                assert abs(apart - row["distance"]) <= 1e-8, told
+            n_near += abs(gap.distance - margin - padding) < 1e-12
+            n_hits += hit
+        edges = checker.certify_edges(q[:-1], q[1:])
+        assert not (edges.free & (np.array(expected[:-1]) | np.array(expected[1:]))).any(), told
+        report = checker.explain(q[k])
+        assert report.collides == expected[k], told
+    assert 60 < n_hits < 300 and n_near >= 8, (n_hits, n_near)
+
+
+def test_margins_are_decided_to_the_last_digit():
+    """By fractions: sums of radius and margin, offset and margin are no doubles here, and a digit decides."""
+    ball, plane = collide.Sphere(0.1), collide.Halfspace((-1.0, 0, 0), -1.0)
+    beside = np.spacing(0.125) * np.arange(-3, 4)
+    cases = [  # half of the link, columns of q, shape, its x, where it begins, margin
+        (0.25, beside - 0.25, ball, 0.30000000000000004, Fraction(0.30000000000000004) - Fraction(0.1), 0.2),
+        (0.75, 0.15 + beside, plane, 0.0, Fraction(1), 0.1),
+    ]  # fmt: skip
+    for half, q, shape, x, begin, margin in cases:
+        world = collide.World()
+        world.add(shape, pose(t=(x, 0, 0)), name="wall", margin=margin)
+        checker = collide.RobotChecker(slider(collide.Box((2 * half, 0.1, 0.1))), world)
+        expected = [begin - Fraction(margin) <= Fraction(value) + Fraction(half) for value in q.tolist()]
+        assert checker.collides(q[:, None]).tolist() == expected and len(set(expected)) == 2
+
+
+def test_brackets_hold_whatever_margins_are():
+    """By fractions: a face of the link before a ball, and before a plane, both with margins."""
+    rng, n_certified = rng_of("brackets of margins"), 0
+    for _ in range(60):
+        radius, margin, half, x, scale = rng.uniform(0.1, 1.0, 5).tolist()
+        q = rng.uniform(-1.0, 0.0, 8)
+        for shape, at, begin in (
+            (collide.Sphere(radius), x, Fraction(x) - Fraction(radius)),
+            (collide.Halfspace((-scale, 0, 0), -x), 0.0, Fraction(x) / Fraction(scale)),
+        ):
+            world = collide.World()
+            world.add(shape, pose(t=(at, 0, 0)), name="wall", margin=margin)
+            checker = collide.RobotChecker(slider(collide.Box((2 * half, 4.0, 4.0))), world)
+            for row, value in zip(checker.distances(q[:, None]).rows, q.tolist()):
+                truth = begin - Fraction(margin) - Fraction(value) - Fraction(half)
+                told = f"{shape!r} at {x!r}, margin {margin!r}, half {half!r}, q {value!r}: {row} and {float(truth)}"
+                if truth > 0:
+                    assert Fraction(float(row["lower"])) <= truth <= Fraction(float(row["upper"])), told
+                    assert row["upper"] - row["lower"] <= 1e-13 * (1 + truth), told
+                n_certified += bool(row["certified"])
+    assert n_certified > 300
+
+
+def test_margins_are_seen_when_they_change():
+    world = collide.World()
+    wall = world.add(collide.Box((0.2, 0.2, 0.2)), pose(t=(1.0, 0, 0)), name="wall", static=True)
+    checker = collide.RobotChecker(slider(), world)
+    q = [[0.75], [0.85]]
+    assert checker.collides(q).tolist() == [False, True]
+    world.set_margin(wall, 0.06)
+    assert checker.collides(q).tolist() == [True, True] and abs(checker.distances(q).distance[0] + 0.01) <= 1e-12
+    assert checker.certify_edges([0.0], [0.73]).free[0] and not checker.certify_edges([0.0], [0.75]).free[0]
+    world.set_margin(wall, 0.0)
+    assert checker.collides(q).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("partner", [None, "wall"])
+def test_margins_of_links_are_refused(partner):
+    """They would be of links among each other, too, which a checker does not keep."""
+    world = collide.World()
+    for name in ("cart", "wall"):
+        world.add(collide.Sphere(0.1), name=name)
+    checker = collide.RobotChecker(slider(), world)
+    world.set_margin("cart", 0.1, partner=partner)
+    for ask in (lambda: collide.RobotChecker(slider(), world), lambda: checker.collides([0.5])):
+        with pytest.raises(InvalidArgument, match=r'margin of "cart".*give padding= for links'):
+            ask()
+    world.set_margin("cart", None if partner else 0.0, partner=partner)
+    assert not checker.collides([0.5])
+
+
+def test_sleeping_bodies_are_obstacles():
+    """To whatever moves. Of a fixed base and a body that sleeps neither does, as in a World; judged by one."""
+    world = collide.World()
+    world.add(collide.Box((0.2, 0.2, 0.2)), pose(t=(0.5, 0, 0)), name="crate")
+    ball = [LinkShape(collide.Sphere(0.5), np.eye(4), None, "test")]  # the base rests on the crate
+    robot = slider(base=ball)
+    checker = collide.RobotChecker(robot, world)
+    assert checker.collides([[-0.9], [0.5]]).tolist() == [True, True]
+    world.sleep(["crate"])
+    assert checker.collides([[-0.9], [0.5]]).tolist() == [False, True] and checker.skipped["sleeping"] == 1
+    assert collide.RobotChecker(robot, world, mobile=True).collides([-0.9])
+    world.wake(["crate"])
+    assert checker.collides([-0.9]) and "sleeping" not in checker.skipped
+
+
+def test_groups_and_masks_are_those_of_the_world():
+    """Also of links that the World holds, among each other; pairs found again from the World's own rows."""
+    rng, n_masked = rng_of("groups of a checker"), 0
+    for _ in range(30):
+        world = collide.World()
+        ball = [LinkShape(collide.Sphere(0.1), np.eye(4), None, "test")]
+        robot = slider(base=ball)
+        robot.semantic_pairs = ()
+        for name in ("base", "cart", "a", "b", "c"):
+            if name != "cart" or rng.random() < 0.7:
+                bits = rng.integers(0, 4, 2).tolist()
+                static = name == "base" or (name != "cart" and bool(rng.random() < 0.3))
+                world.add(collide.Sphere(0.1), name=name, group=bits[0], mask=bits[1], static=static)
+        if "cart" not in world.names.values():
+            world.add(collide.Sphere(0.1), name="cart")
+        expected = {frozenset(pair) for pair in world.collisions().names}
+        of_robot = {pair for pair in expected if pair & {"base", "cart"}}
+        checker = collide.RobotChecker(robot, world)
+        assert checker.n_pairs == len(of_robot) and checker.collides([0.0]) == bool(of_robot)
+        report = checker.explain([0.0])
+        assert {frozenset((pair.a, pair.b)) for pair in report.collisions} == of_robot
+        n_masked += checker.skipped.get("filtered by group and mask", 0) > 0
+    assert n_masked > 15
 
 
 def test_attached_objects_move_with_their_link():

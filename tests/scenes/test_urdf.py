@@ -302,7 +302,6 @@ def test_limits_that_are_missing_or_reversed_are_noted(robot_of):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<mujoco/>", "MJCF is not read yet"),
         ("<sdf/>", "SDF"),
         ("<kml/>", "<kml> is no format known here"),
         ('<robot name="r"><disable_collisions link1="a" link2="b"/></robot>', "is an SRDF: give the URDF"),

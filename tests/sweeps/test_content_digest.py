@@ -17,12 +17,14 @@ from collide.sweeps.content_digest import digest
 MESH = collide.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
-def world(*, x=0.0, name="b", radius=1.0, allow=False, static=False, group=1):
+def world(*, x=0.0, name="b", radius=1.0, allow=False, static=False, group=1, margin=0.0, asleep=False):
     made = World()
     made.add(Box((1, 1, 1)), name="a")
-    made.add(Sphere(radius), pose((x, 0, 0)), name=name, static=static, group=group)
+    made.add(Sphere(radius), pose((x, 0, 0)), name=name, static=static, group=group, margin=margin)
     if allow:
         made.allow("a", name)
+    if asleep:
+        made.sleep([name])
     return made
 
 
@@ -32,6 +34,7 @@ VALUES = [
     Box((1, 1, 1)), Box((1, 1, 2)), Sphere(1), MESH, MESH.scaled(2.0), Compound([(Sphere(1), np.eye(4))]),
     Compound([(Sphere(1), pose((0, 0, 1)))]), collide.ConvexHull(np.eye(3)), collide.ConvexHull(np.eye(3), radius=0.1),
     world(), world(x=1e-300), world(name="c"), world(radius=1.5), world(allow=True), world(static=True), world(group=2),
+    world(margin=0.1), world(asleep=True),
     chain(3, length=1, width=1), chain(4, length=1, width=1), chain(3, length=1, width=2),
     robot_of(["l0", "l1"], [joint("j0", "revolute", "l0", "l1")], {}),
     robot_of(["l0", "l1"], [joint("j0", "continuous", "l0", "l1")], {}),

@@ -59,7 +59,7 @@ def test_srdf_is_written_and_right_about_itself(capsys, tmp_path):
     status, out, _ = run(capsys, "srdf", "workcell", "--samples", 500, "--compare", file)
     assert status == 0 and f"{len(written)} pairs in both, 0 only there (0 wrong), 0 only here" in out
     status, _, err = run(capsys, "srdf", "workcell", "--samples", 5, "--out", file)
-    assert status == 2 and "exists, and may hold" in err and "--force" in err
+    assert status == 2 and "exists: --force overwrites" in err
     assert run(capsys, "srdf", "workcell", "--samples", 5, "--out", file, "--force", "--quiet")[0] == 0
 
 
@@ -81,7 +81,9 @@ def test_srdf_as_json(capsys, arm):
         (["nowhere.urdf"], "nowhere.urdf"), (["workcell", "--name", "leg"], "no robot 'leg': --name takes one of arm"),
         (["workcell", "--samples", "0"], "must be 1 or more"), (["workcell", "--always", "0.1"], "share from 0.5 to 1"),
         (["workcell", "--out", "x.xml"], "must end in .srdf"), (["workcell", "--compare", "none.srdf"], "none.srdf"),
-        (["workcell", "--rounds", "-1"], "0 or more"), (["workcell", "--seed", "-1"], "seed"),
+        (["workcell", "--rounds", "-1"], "0 or more"),
+        (["workcell", "--srdf", "arm.srdf"], "--srdf: workcell is a scene, which names the SRDF"),
+        (["workcell", "--seed", "-1"], "seed"),
     ],
 )  # fmt: skip
 def test_srdf_says_what_is_wrong(capsys, words, complaint):

@@ -15,6 +15,7 @@ from plain_robots import chain, joint, robot_of
 
 import collide
 from collide import Box, SceneError, Sphere, World, pose
+from collide.cli import main
 from collide.scenes import allow_pairs
 from collide.scenes.loaders.allowed_pairs import read_allowed_pairs
 from collide.scenes.loaders.srdf import read_srdf
@@ -75,6 +76,104 @@ def test_pinocchio_reads_what_is_written(tmp_path):
     pinocchio.removeCollisionPairs(model, shapes, str(file), False)
     assert pairs() == before - {frozenset((pair.a, pair.b)) for pair in proposal.disabled}
     assert 15 <= len(pairs()) < len(before) - 15
+
+
+def said(text: str) -> list[str]:
+    """What an SRDF says besides collisions, by the standard library: elements in order, blanks between them off."""
+    return [
+        ET.canonicalize(ET.tostring(e), strip_text=True) for e in ET.fromstring(text) if "collisions" not in e.tag
+    ]  # fmt: skip
+
+
+HAND = """<robot name="hand">
+  <!-- by hand -->
+  <group name="all &amp; more"><chain base_link="palm" tip_link="tip"/><joint name="bend"/><link name="tip"/></group>
+  <group name="both"><group name="all &amp; more"/></group>
+  <disable_default_collisions link="palm"/>
+  <group_state name="open" group="both"><joint name="bend" value="0.5"/></group_state>
+  <enable_collisions link1="palm" link2="tip"/>
+  <end_effector name="tool" parent_link="tip" group="both" parent_group="both"/>
+  <virtual_joint name="fix" type="fixed" parent_frame="world" child_link="palm"/>
+  <passive_joint name="bend"/><disable_collisions link1="palm" link2="tip" reason="Never"/>
+  <link_sphere_approximation link="tip"><sphere center="0 0 0" radius="1"/></link_sphere_approximation>
+  <joint_property joint_name="bend" property_name="weight" value="2"/>
+  <something of="another" tool="1"/>
+</robot>"""
+
+
+def hand(folder: Path) -> Path:
+    """A robot of three links with an SRDF beside it."""
+    folder.mkdir(exist_ok=True)
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    links = "".join(f'<link name="{name}">{ball}</link>' for name in ("palm", "mid", "tip"))
+    joints = "".join(
+        f'<joint name="{name}" type="revolute"><parent link="{a}"/><child link="{b}"/><origin xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1"/></joint>'
+        for name, a, b in (("bend", "palm", "mid"), ("turn", "mid", "tip"))
+    )
+    (folder / "hand.urdf").write_text(f'<robot name="hand">{links}{joints}</robot>')
+    (folder / "hand.srdf").write_text(HAND)
+    return folder / "hand.urdf"
+
+
+def test_groups_and_states_are_kept(tmp_path, capsys):
+    """Every element but those about collisions, in place of which there are the proposal's; also onto itself."""
+    urdf = hand(tmp_path)
+    for out in (tmp_path / "new.srdf", tmp_path / "hand.srdf"):
+        assert main(["srdf", str(urdf), "--samples", "50", "--out", str(out), "--force"]) == 0
+        text = out.read_text()
+        assert said(text) == said(HAND) and len(said(text)) == 9
+        assert {e.tag for e in ET.fromstring(text)} >= {"disable_collisions", "group"} and "enable_" not in text
+        assert {pair[2] for pair in disabled(text)} == {"Adjacent", "Never"}
+        words = " ".join(capsys.readouterr().out.split())
+        assert "kept from hand.srdf: 2 group, 1 group_state, 1 end_effector, 1 virtual_joint, 1 passive_joint" in words
+        assert collide.Robot.load(urdf, srdf=out).states == {"open": {"bend": 0.5}}
+    assert main(["srdf", str(urdf), "--samples", "50", "--out", str(out), "--force", "--pairs-only", "--quiet"]) == 0
+    assert said(out.read_text()) == [] and disabled(out.read_text()) == disabled(text)
+
+
+def test_another_srdf_is_kept_from(tmp_path, capsys):
+    urdf = hand(tmp_path)
+    other, out = tmp_path / "other.srdf", tmp_path / "out.srdf"
+    other.write_text('<robot name="hand"><group name="one"><link name="mid"/></group></robot>')
+    assert main(["srdf", str(urdf), "--srdf", str(other), "--samples", "5", "--out", str(out), "--quiet"]) == 0
+    assert said(out.read_text()) == said(other.read_text())
+
+
+def test_kept_names_have_the_prefix_of_the_robot(tmp_path):
+    """Links and joints, not groups and states: read back by the robot of the scene itself."""
+    hand(tmp_path)
+    scene = tmp_path / "s.json"
+    scene.write_text('{"collide": 1, "robots": [{"urdf": "hand.urdf", "prefix": "L_"}]}')
+    out = tmp_path / "out.srdf"
+    assert main(["srdf", str(scene), "--samples", "50", "--out", str(out), "--quiet"]) == 0
+    expected = HAND
+    for name in ("palm", "tip", "bend", "fix"):
+        expected = expected.replace(f'="{name}"', f'="L_{name}"')
+    assert said(out.read_text()) == said(expected)
+    robot = collide.scenes.load(scene).robots["hand"]
+    read = read_srdf(out, list(robot.links), list(robot.joint_names))
+    assert not read.notes and read.states == {"open": {"L_bend": 0.5}} and len(read.pairs) == 3
+
+
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")
+@pytest.mark.skipif(find_spec("pinocchio") is None, reason="Pinocchio (pin), the other reader, is not installed")
+@pytest.mark.parametrize("name", ["panda", "fetch"])
+def test_pinocchio_reads_what_is_kept(name, tmp_path):
+    import pinocchio
+
+    urdf = ROBOTS / name / f"{name}.urdf"
+    out = tmp_path / "out.srdf"
+    options = ["--meshes", "hull", "--missing-meshes", "skip", "--samples", "20", "--rounds", "0", "--quiet"]
+    assert main(["srdf", str(urdf), *options, "--out", str(out)]) == 0
+    theirs = (ROBOTS / name / f"{name}.srdf").read_text()
+    assert said(out.read_text()) == said(theirs) and len(said(theirs)) >= 6
+    states = []
+    for file in (urdf.with_suffix(".srdf"), out):
+        model = pinocchio.buildModelFromUrdf(str(urdf))
+        pinocchio.loadReferenceConfigurations(model, str(file), False)
+        states.append({entry.key(): entry.data().tolist() for entry in model.referenceConfigurations})
+    assert states[0] == states[1] and (name == "fetch" or len(states[0]) >= 3)
 
 
 @pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")

@@ -1,0 +1,146 @@
+"""What a checker asks about: a robot, what it carries, and the bodies of a World, prepared for the kernels.
+
+`RobotChecker` asks the questions; what answers them reads this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from collide import argument_checks as checks
+from collide.errors import InvalidArgument
+from collide.robots.check_tables import Setting, check_tables, surroundings_of
+from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.robot import Robot
+from collide.robots.robot_bodies import bodies_around, filters_of, refuse_own_margins, robot_bodies
+from collide.threads import check_threads, pieces_of, share
+from collide.transforms import as_poses
+from collide.world import World
+
+#: A thread is handed at least so many configurations.
+_LEAST_PIECE = 512
+
+
+class CheckerScene:
+    """A robot among the bodies of a World; arguments are those of `RobotChecker`.
+
+    setting : everything as it stood when `prepare` was last called.
+    """
+
+    def __init__(
+        self, robot: Robot, world: World | None, X_WR, attached: Iterable, padding, allowed: Iterable[tuple[str, str]],
+        mobile: bool,
+    ):  # fmt: skip
+        if not isinstance(robot, Robot):
+            raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.describe(robot)}")
+        if world is not None and not isinstance(world, World):
+            raise InvalidArgument(f"RobotChecker: world must be a collide.World, got {checks.describe(world)}")
+        self.robot, self.world = robot, World() if world is None else world
+        self._X_WR = np.eye(4) if X_WR is None else as_poses(X_WR, "RobotChecker: X_WR")[0].copy()
+        self._bodies, self._objects = robot_bodies(robot, attached, padding)
+        self._asked, self._mobile = list(allowed), bool(mobile)
+        self._seen: tuple | None = None
+        self._spare: list[CheckWorkspace] = []
+        self.prepare()
+
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle takes along. What holds addresses is made again."""
+        return {name: value for name, value in vars(self).items() if name not in ("setting", "_seen", "_spare")}
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state, _seen=None, _spare=[])
+        self.prepare()
+
+    @property
+    def bodies(self) -> list[str]:
+        """Links with collision geometry and attached objects."""
+        return [body.name for body in self._bodies]
+
+    @property
+    def around(self) -> list[str]:
+        """Bodies of the World that the robot is tested against."""
+        return [body.name for body in self.setting.surroundings.bodies]
+
+    @property
+    def n_pairs(self) -> int:
+        """Pairs of bodies that are tested."""
+        return len(self.setting.self_pairs) + int((self.setting.allowed == 0).sum())
+
+    @property
+    def skipped(self) -> dict[str, int]:
+        """Pairs of bodies that are never tested, by reason."""
+        return dict(self.setting.skipped)
+
+    def names_of(self, a: int, b: int) -> tuple[str, str]:
+        """Names of two bodies by the numbers that results have for them.
+
+        Parameters
+        ----------
+        a : int
+            Number of a body.
+        b : int
+            Number of a body, or −1 − the number of one around.
+
+        Returns
+        -------
+        (str, str)
+        """
+        return self.bodies[a], self.bodies[b] if b >= 0 else self.around[-1 - b]
+
+    def link_poses(self, q) -> np.ndarray:
+        """`Robot.link_poses` of the robot where it stands.
+
+        Parameters
+        ----------
+        q : (N, dof) or (dof,) array_like
+            Configurations [rad or m].
+
+        Returns
+        -------
+        (N, links, 4, 4) float64
+            Poses X_WL [m].
+        """
+        return self.robot.link_poses(q, self._X_WR)
+
+    def prepare(self) -> None:
+        """The setting of the World as it stands now; nothing is made again while it stays."""
+        packed = self.world._pack()
+        before, now = self._seen, (packed.roster, packed.filters, packed.X_WBs)
+        if before is not None and before[0] is now[0] and before[1] is now[1] and np.array_equal(before[2], now[2]):
+            return
+        refuse_own_margins(packed, self.robot)
+        self._seen = now[0], now[1], now[2].copy()
+        around = bodies_around(self.world, self.robot)
+        filters = filters_of(self.robot, self._bodies, self._objects, self.world, around, self._asked, self._mobile)
+        surroundings = surroundings_of(around)
+        matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
+        base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
+        tables = check_tables(self._bodies, surroundings, np.concatenate(matrices))
+        self.setting = Setting(self._bodies, base, surroundings, tables, *filters)
+        self._spare = []
+
+    def in_pieces(self, n: int, threads: int, progress, work: Callable[[CheckWorkspace, slice], None]) -> None:
+        """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""
+        threads = check_threads(threads)
+        self.prepare()
+        spare, setting, done = self._spare, self.setting, 0
+
+        def on_piece(piece: slice) -> None:
+            nonlocal done
+            try:
+                space = spare.pop()
+            except IndexError:  # all are in use: another thread may have taken the last
+                space = CheckWorkspace(self.robot.joint_table, setting)
+            work(space, piece)
+            spare.append(space)
+            done += piece.stop - piece.start
+            if progress is not None:
+                progress(done, n)
+
+        if threads == 1 and progress is None:
+            if n:
+                on_piece(slice(0, n))
+        else:
+            share(pieces_of(n, max(threads, 8 if progress else 1), _LEAST_PIECE), on_piece, threads)
