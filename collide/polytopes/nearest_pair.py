@@ -1,0 +1,260 @@
+"""The nearest points of the hull of points and the intersection of half-spaces: doubles propose, integers decide.
+
+The smallest |y − x| with y = Σ λᵢ pᵢ (λ ≥ 0, Σ λ = 1) and a_j·x ≤ b_j is a convex quadratic program. Its conditions of
+Karush, Kuhn and Tucker: u = y − x = Σ μ_j a_j with μ ≥ 0; μ_j > 0 only where a_j·x = b_j; u·pᵢ ≥ θ, and λᵢ > 0 only
+where u·pᵢ = θ. They are a linear complementarity problem, solved by Lemke's method over a working set of some dozens of
+rows, to which the rows that its answer violates most are added, until there is none. No row leaves the working set, so
+it ends. u = 0 is a common point; a ray of the method is a combination of half-spaces that contradict each other.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.polytopes.complementary_pivoting import decide_basis
+from collide.polytopes.homogeneous_rows import HomogeneousRows, Violations, dot
+from collide.polytopes.pair_proposals import Work, propose_from_samples
+
+APART, MEETING, EMPTY = "apart", "meeting", "empty"
+#: Rows that violate the answer are added by so many a round.
+_N_ADDED = 2
+
+
+class NearestPair(NamedTuple):
+    """An exact answer for some points and half-spaces, in integers over one denominator.
+
+    kind : APART, MEETING or EMPTY.
+    points, weights : rows of points, and λ · denominator, > 0.
+    halfspaces, multipliers : rows of half-spaces, and μ · denominator, > 0.
+    y, x, u : the point of the hull, the one of the half-spaces, and y − x, each times the denominator.
+    theta : the least u·p of all points, times denominator.
+    """
+
+    kind: str
+    points: list[int]
+    weights: list[int]
+    halfspaces: list[int]
+    multipliers: list[int]
+    y: list[int]
+    x: list[int]
+    u: list[int]
+    theta: int
+    denominator: int
+
+    @property
+    def plane(self) -> list[int]:
+        """Negative at points p with u·p < θ."""
+        return [*self.u, -self.theta]
+
+    @property
+    def corner(self) -> list[int]:
+        """Negative at half-spaces that do not hold x."""
+        return [*(-number for number in self.x), self.denominator]
+
+
+def nearest_pair(
+    points: HomogeneousRows,
+    halfspaces: HomogeneousRows,
+    work: Work,
+    point_rows: np.ndarray | None = None,
+    halfspace_rows: np.ndarray | None = None,
+    start: tuple[list[int], list[int]] | None = None,
+) -> NearestPair:
+    """The nearest pair of CH(points) and FH(halfspaces), exactly.
+
+    Parameters
+    ----------
+    points, halfspaces : HomogeneousRows
+        n ≥ 1 points, m ≥ 0 half-spaces in R^d.
+    work : Work
+        Counters and limit.
+    point_rows, halfspace_rows : integer arrays, optional
+        Only these rows; all by default.
+    start : two lists of rows, optional
+        Points and half-spaces to begin with.
+
+    Returns
+    -------
+    NearestPair
+        Checked against every row by proven signs.
+
+    Raises
+    ------
+    UnsupportedQuery
+        Where more rows were read than ``work`` allows.
+    """
+    first = 0 if point_rows is None else int(point_rows[0])
+    working_points, working_halfspaces = ([first], []) if start is None else (list(start[0]) or [first], list(start[1]))
+    proposal = propose_from_samples(
+        points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces
+    )  # fmt: skip
+    pair = None
+    if proposal is not None:
+        working_points, working_halfspaces = proposal.points, proposal.halfspaces
+        pair = settle_basis(points, halfspaces, working_points, working_halfspaces)
+    return finish_exactly(
+        pair, points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces
+    )  # fmt: skip
+
+
+def finish_exactly(
+    pair: NearestPair | None,
+    points: HomogeneousRows,
+    halfspaces: HomogeneousRows,
+    work: Work,
+    point_rows: np.ndarray | None,
+    halfspace_rows: np.ndarray | None,
+    working_points: list[int],
+    working_halfspaces: list[int],
+) -> NearestPair:
+    """The nearest pair of all rows, from one of working sets, or from none: they grow until no row is violated.
+
+    Parameters and errors are those of `nearest_pair`; ``working_points`` and ``working_halfspaces`` hold the rows that
+    ``pair`` is of.
+    """
+    while True:
+        if pair is not None:
+            if pair.kind == EMPTY:
+                return pair
+            if not _add_violated(
+                pair, points, halfspaces, point_rows, halfspace_rows, working_points, working_halfspaces, work
+            ):
+                return pair
+        pair = _solve_in_integers(points, halfspaces, working_points, working_halfspaces, work)
+
+
+def _add_violated(pair, points, halfspaces, point_rows, halfspace_rows, working_points, working_halfspaces, work):
+    """Add the rows that an exact answer violates to the working set; False where there is none."""
+    work.add("exact_rounds")
+    violated = halfspaces.negative(pair.corner, halfspace_rows)
+    _extend(working_halfspaces, violated)
+    n_violated = len(violated.rows)
+    if pair.kind == APART:
+        violated = points.negative(pair.plane, point_rows)
+        _extend(working_points, violated)
+        n_violated += len(violated.rows)
+    work.check(points, halfspaces)
+    return n_violated > 0
+
+
+def _extend(working: list[int], violated: Violations) -> None:
+    """Add the rows that are violated most."""
+    rows = violated.rows
+    if len(rows) > _N_ADDED:
+        rows = rows[np.argpartition(violated.values, _N_ADDED)[:_N_ADDED]]
+    working.extend(row for row in rows.tolist() if row not in working)
+
+
+# --- integers ---------------------------------------------------------------------------------------------------------
+
+
+def settle_basis(
+    points: HomogeneousRows, halfspaces: HomogeneousRows, point_rows: list[int], halfspace_rows: list[int]
+) -> NearestPair | None:
+    """The exact solution with these rows in the basis; None where it is singular or some number of it is negative.
+
+    Of the rows themselves it is the nearest pair; other rows are not looked at. O((s + t)³) operations of integers.
+    """
+    v = [points.integers(row) for row in point_rows]
+    a = [halfspaces.integers(row) for row in halfspace_rows]
+    s, t, d = len(v), len(a), points.dimension
+    cross = [[dot(normal[:d], point[:d]) for normal in a] for point in v]
+    system = [[0] * s + cross[i] + [-v[i][d], 0] for i in range(s)]
+    for j in range(t):
+        gram = [-dot(a[j][:d], a[k][:d]) for k in range(t)]
+        system.append([cross[i][j] for i in range(s)] + gram + [0, a[j][d]])
+    system.append([point[d] for point in v] + [0] * (t + 1) + [1])
+    solved = solve_integers(system)
+    if solved is None:
+        return None
+    numerators, denominator = solved
+    weights, multipliers, theta = numerators[:s], numerators[s : s + t], numerators[s + t]
+    if min(weights) < 0 or min(multipliers, default=0) < 0:
+        return None
+    return _pair(v, a, point_rows, halfspace_rows, weights, multipliers, theta, denominator, d)
+
+
+def _pair(v, a, point_rows, halfspace_rows, weights, multipliers, theta, denominator, d) -> NearestPair:
+    y = [sum(weight * point[k] for weight, point in zip(weights, v)) for k in range(d)]
+    u = [sum(multiplier * normal[k] for multiplier, normal in zip(multipliers, a)) for k in range(d)]
+    x = [p - q for p, q in zip(y, u)]
+    positive_points = [k for k, weight in enumerate(weights) if weight]
+    positive_halfspaces = [k for k, multiplier in enumerate(multipliers) if multiplier]
+    return NearestPair(
+        APART if any(u) else MEETING, [point_rows[k] for k in positive_points],
+        [weights[k] * v[k][d] for k in positive_points], [halfspace_rows[k] for k in positive_halfspaces],
+        [multipliers[k] for k in positive_halfspaces], y, x, u, theta, denominator,
+    )  # fmt: skip
+
+
+def solve_integers(rows: list[list[int]]) -> tuple[list[int], int] | None:
+    """The solution of n equations [coefficients, right-hand side] in n unknowns: (numerators, denominator > 0).
+
+    Fraction-free elimination (Bareiss 1968). None where they are dependent.
+    """
+    n, rows, previous = len(rows), [list(row) for row in rows], 1
+    for k in range(n):
+        row = next((i for i in range(k, n) if rows[i][k]), None)
+        if row is None:
+            return None
+        rows[k], rows[row] = rows[row], rows[k]
+        pivot, line = rows[k][k], rows[k]
+        for i in range(n):
+            if i != k:
+                factor = rows[i][k]
+                rows[i] = [(pivot * x - factor * y) // previous for x, y in zip(rows[i], line)]
+        previous = pivot
+    sign = 1 if previous > 0 else -1
+    return [sign * rows[k][n] for k in range(n)], sign * previous
+
+
+def _solve_in_integers(points, halfspaces, working_points, working_halfspaces, work: Work) -> NearestPair:
+    """The nearest pair of the rows of working sets, by Lemke's method in integers."""
+    work.add("exact_programs")
+    v = [points.integers(row) for row in working_points]
+    a = [halfspaces.integers(row) for row in working_halfspaces]
+    d, n_points, n_halfspaces = points.dimension, len(v), len(a)
+    base, size = v[0], n_points + n_halfspaces
+    edges = [[point[k] * base[d] - base[k] * point[d] for k in range(d)] for point in v[1:]]
+    spans = [point[d] * base[d] for point in v[1:]]
+    M, q = [], []
+    for edge, span in zip(edges, spans):
+        M.append([0] * (n_points - 1) + [span] + [dot(edge, normal[:d]) for normal in a])
+        q.append(0)
+    M.append([-span for span in spans] + [0] * (n_halfspaces + 1))
+    q.append(1)
+    for normal in a:
+        M.append(
+            [-base[d] * dot(edge, normal[:d]) for edge in edges]
+            + [0] + [base[d] * dot(normal[:d], beside[:d]) for beside in a]
+        )  # fmt: skip
+        q.append(normal[d] * base[d] - dot(normal[:d], base[:d]))
+    basis, _ = decide_basis(M, q)
+    work.add("exact_pivots", basis.n_pivots)
+    if basis.ray is not None:
+        return _contradiction(a, working_halfspaces, basis.ray[n_points:], d)
+    is_basic = set(basis.variables)
+    rows = [k for k in range(n_points) if (k + size - 1 if k else n_points - 1) in is_basic]
+    pair = settle_basis(
+        points, halfspaces, [working_points[k] for k in rows],
+        [working_halfspaces[k] for k in range(n_halfspaces) if size + n_points + k in is_basic],
+    )  # fmt: skip
+    if pair is None:
+        raise UnsupportedQuery("meets: a complementary basis without a solution, which no basis is")
+    return pair
+
+
+def _contradiction(a, working_halfspaces, multipliers: list[int], d: int) -> NearestPair:
+    """Half-spaces of which a combination says 0 ≤ a negative number."""
+    positive = [k for k, multiplier in enumerate(multipliers) if multiplier]
+    normal = [sum(multipliers[k] * a[k][axis] for k in positive) for axis in range(d + 1)]
+    if any(normal[:d]) or normal[d] >= 0 or min(multipliers) < 0:
+        raise UnsupportedQuery("meets: a ray that contradicts nothing, which Lemke's method does not end on")
+    zero = [0] * d
+    return NearestPair(
+        EMPTY, [], [], [working_halfspaces[k] for k in positive], [multipliers[k] for k in positive],
+        zero, zero, zero, 0, 1,
+    )  # fmt: skip
