@@ -1,0 +1,152 @@
+"""The shapes of a drawing: triangles as text, each once however many bodies share it, large meshes simplified.
+
+A shape is drawn in the frame B of its body, in single precision. Triangles of shapes come from `collide.tessellate`.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.pages.vertex_clustering import simplified
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.hpolytope import HPolytope
+from collide.shapes.primitives import Box, Halfspace
+from collide.shapes.shape import Shape
+from collide.shapes.tessellation import tessellate
+
+#: Facets that a page holds, of all its shapes: larger meshes are drawn with fewer. 24 bytes a facet in the file.
+MAX_FACETS = 120_000
+#: Meshes of so few are drawn whole, unless there are thousands of them.
+_SMALL = 1_000
+#: Even of small ones a page holds no more.
+_ALL_FACETS = 1_000_000
+#: Coordinates beyond are drawn there [m]: single precision ends at 3.4e38.
+_LARGEST = 1e30
+
+#: A shape, and its pose X_BS in the frame of the body that it is drawn for.
+PosedShape = tuple[Shape, np.ndarray]
+
+
+class Triangles(NamedTuple):
+    """A shape before it is written: vertices (V, 3) in B [m], faces (F, 3), how far they are off [m], how it looks."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    deviation: float
+    smooth: bool
+    unbounded: bool
+
+
+class ShapeTable:
+    """The shapes of one page, gathered first, written together: how much each may take depends on all of them.
+
+    size : edge length of the square that stands for a half-space [m].   max_facets : see `MAX_FACETS`.
+    """
+
+    def __init__(self, size: float, max_facets: int = MAX_FACETS):
+        self._size, self._max_facets = size, max_facets
+        self._rows: dict[tuple, int] = {}
+        self._of_bytes: dict[bytes, int] = {}
+        self._seen: list[Sequence[PosedShape]] = []  # so that no other shape gets the id of one that was seen
+        self._shapes: list[Triangles] = []
+
+    def row(self, shapes: Sequence[PosedShape]) -> int:
+        """The row of what several posed shapes look like together; the same for the same ones, or equal triangles."""
+        key = tuple((id(shape), X_BS.tobytes()) for shape, X_BS in shapes)
+        if key not in self._rows:
+            self._seen.append(shapes)
+            self._rows[key] = self._new_row(self._triangles(shapes))
+        return self._rows[key]
+
+    def _new_row(self, drawn: Triangles) -> int:
+        flags = bytes((drawn.smooth, drawn.unbounded))
+        digest = hashlib.sha256(drawn.vertices.tobytes() + drawn.faces.tobytes() + flags).digest()
+        if digest not in self._of_bytes:
+            self._of_bytes[digest] = len(self._shapes)
+            self._shapes.append(drawn)
+        return self._of_bytes[digest]
+
+    def _triangles(self, shapes: Sequence[PosedShape]) -> Triangles:
+        vertices, faces, deviations, n = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [0.0], 0
+        for shape, X_BS in shapes:
+            try:
+                points, corners = made = tessellate(shape, size=self._size)
+            except (InvalidArgument, UnsupportedQuery):  # no triangles of its kind, or too many
+                continue
+            vertices.append(points @ X_BS[:3, :3].T + X_BS[:3, 3])
+            faces.append(np.asarray(corners, dtype=np.int64) + n)
+            deviations.append(made.deviation)
+            n += len(points)
+        return Triangles(
+            np.concatenate(vertices), np.concatenate(faces), max(deviations),
+            any(is_smooth(shape) for shape, _ in shapes),
+            any(isinstance(shape, Halfspace) for shape, _ in shapes),
+        )  # fmt: skip
+
+    def boxes(self) -> list[np.ndarray | None]:
+        """(2, 3) lowest and highest corner of each shape in its frame [m]; None of unbounded and of empty ones."""
+        return [
+            None if drawn.unbounded or not len(drawn.vertices) else
+            np.array([drawn.vertices.min(axis=0), drawn.vertices.max(axis=0)])
+            for drawn in self._shapes
+        ]  # fmt: skip
+
+    def is_empty(self, row: int) -> bool:
+        """Whether a shape has no triangle: a point, a segment, or what cannot be tessellated."""
+        return not len(self._shapes[row].faces)
+
+    def written(self) -> list[dict]:
+        """The table as plain data, simplified so that it holds about ``max_facets``."""
+        cap = facet_cap([len(drawn.faces) for drawn in self._shapes], self._max_facets)
+        return [_written(drawn, cap) for drawn in self._shapes]
+
+
+def is_smooth(shape: Shape) -> bool:
+    """Whether facets stand for something round, or are so many that they do: all but flat-sided convex shapes."""
+    if hasattr(shape, "items"):
+        return any(is_smooth(part) for part, _ in shape.items)
+    if isinstance(shape, (ConvexHull, HPolytope)):
+        return bool(getattr(shape, "radius", 0.0))
+    return not isinstance(shape, (Box, Halfspace))
+
+
+def facet_cap(counts: Iterable[int], max_facets: int = MAX_FACETS) -> int:
+    """How many facets one shape may have, so that all take ``max_facets``; small ones are whole, below a million."""
+    counts = sorted(counts)
+    return max(_level(counts, max_facets), min(_SMALL, _level(counts, max(max_facets, _ALL_FACETS))))
+
+
+def _level(counts: list[int], total: int) -> int:
+    """The largest cap with sum(min(count, cap)) ≤ total; counts are sorted."""
+    for k, count in enumerate(counts):
+        share = total // (len(counts) - k)
+        if count > share:
+            return max(share, 1)
+        total -= count
+    return counts[-1] if counts else 0
+
+
+def _written(drawn: Triangles, cap: int) -> dict:
+    vertices, faces, moved = simplified(drawn.vertices, drawn.faces, max(cap, 1))
+    positions = np.clip(vertices, -_LARGEST, _LARGEST).astype("<f4")
+    return {
+        "positions": as_base64(positions),
+        "triangles": as_base64(faces.astype("<u4")),
+        "vertex_count": len(vertices),
+        "triangle_count": len(faces),
+        "smooth": drawn.smooth,
+        "simplified_from": len(drawn.faces) if len(faces) < len(drawn.faces) else None,
+        "deviation": float(drawn.deviation + moved),
+        "unbounded": drawn.unbounded,
+    }
+
+
+def as_base64(array: np.ndarray) -> str:
+    """The bytes of an array, row by row, as text."""
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
